@@ -4,8 +4,7 @@
 # make fuzz      a million mutated files of every kind that is read
 # make soak      long runs with extreme actions, kills at random moments, wrong command lines
 # make release-check  the wheel in clean environments, without extras and with each, lowest and newest versions
-# make ecosystem skrl, TorchRL, Tianshou, PufferLib and CleanRL's wrappers on our environments, shipmmg; for every night
-# make mutate    small faults put into MODULES, by default all: do the tests beside them notice?
+# make ecosystem skrl, TorchRL, Tianshou and CleanRL's wrappers on our environments; for every night
 # make evidence  what the pages of docs/ claim, run again
 # make docs      the site, and whether its links, pictures and pages work in a browser
 # make site-test the latter alone
@@ -20,10 +19,10 @@ DATA ?= ../shared/data
 # Bytecode is kept (an empty value means unset): the many processes of the tests compile the same files but once.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo test lint format type bench soak fuzz release-check ecosystem mutate evidence docs site-test clean
+.PHONY: demo test lint format type bench soak fuzz release-check ecosystem evidence docs site-test clean
 
 demo: $(VENV)/demo-installed
-	$(BIN)/shipgym autopilot examples/mariner/ship.toml --agent mariner-calm-ppo --out report
+	$(BIN)/shipgym autopilot examples/mariner/ship.toml --out report
 
 # Many loops and few steps of each: plain Python takes a tenth of the time that compiling them would. Tests that
 # are marked as `compiled` in files so marked take many steps, or state facts about compiled code.
@@ -64,15 +63,12 @@ fuzz: $(VENV)/dev-installed
 ecosystem: $(VENV)/ecosystem-installed
 	OMP_NUM_THREADS=1 $(VENV)/ecosystem/bin/python scripts/ecosystem.py
 
-mutate: $(VENV)/dev-installed
-	SHIPGYM_CACHE=$(CURDIR)/$(VENV)/mutated OMP_NUM_THREADS=1 $(BIN)/python scripts/mutate.py $(MODULES)
-
 evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md --images docs/images || test $$? = 1  # 1: aims missed, as the page says
 	test ! -d $(DATA) || $(BIN)/python scripts/predict_real_ships.py --data $(DATA)
-	$(BIN)/shipgym benchmark --suite shipgym-v1 --controllers wheel-over,tuned-wheel-over,preview-mpc,ppo --out build/suite --no-page
+	$(BIN)/shipgym benchmark --suite shipgym-v1 --controllers wheel-over,tuned-wheel-over,mpc,ppo --out build/suite --no-page
 	$(BIN)/python scripts/best_known.py --suite shipgym-v1 build/suite --search tuned-best,ppo
-	$(BIN)/shipgym benchmark --suite shipgym-v2 --controllers tuned-ilos,wheel-over,tuned-wheel-over,preview-mpc,ppo --out build/suite-v2 --no-page
+	$(BIN)/shipgym benchmark --suite shipgym-v2 --controllers tuned-ilos,wheel-over,tuned-wheel-over,mpc,ppo --out build/suite-v2 --no-page
 	$(BIN)/python scripts/train_pretrained.py --table build/suite-v2
 	$(BIN)/python scripts/transfer.py --data $(DATA)
 	$(BIN)/python scripts/certainty.py
@@ -80,7 +76,6 @@ evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/bridge_logs.py
 	$(BIN)/python scripts/standards.py
 	$(BIN)/python scripts/run_notebooks.py
-	$(BIN)/python scripts/gallery.py
 	$(BIN)/python scripts/tutorial.py
 
 docs: $(VENV)/dev-installed
@@ -111,12 +106,6 @@ $(VENV)/dev-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 $(VENV)/ecosystem-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(PYTHON) -m venv $(VENV)/ecosystem
 	$(VENV)/ecosystem/bin/python -m pip install --quiet -c constraints.txt -e ".[rl]" skrl torchrl tianshou
-	# PufferLib's games need downloads from elsewhere; without them its setup misses a name, which the folder gives
-	$(VENV)/ecosystem/bin/python -m pip install --quiet wheel gym==0.23 pettingzoo==1.24.1 shimmy psutil
-	NO_OCEAN=1 NO_TRAIN=1 PYTHONPATH=$(CURDIR)/scripts/pufferlib_setup $(VENV)/ecosystem/bin/python -m pip install --quiet \
-		--no-deps --no-build-isolation pufferlib==3.0.0
-	$(VENV)/ecosystem/bin/python -m pip install --quiet matplotlib
-	$(VENV)/ecosystem/bin/python -m pip install --quiet --no-deps shipmmg
 	touch $@
 
 clean:

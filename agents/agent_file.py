@@ -1,4 +1,4 @@
-"""Agents by their files, whatever their kind, and pretrained ones by name."""
+"""Load agents by their files, whatever their kind, and pretrained ones by name."""
 
 from __future__ import annotations
 
@@ -6,58 +6,55 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from agents.controllers.controller import Controller
-from agents.controllers.controller_file import POLICIES, REMEDY, read_controller
+from agents.controllers.controller_file import LEARNED, REMEDY, read_controller
 from shipgym import InputError, ShipModel
 from shipgym.checks import did_you_mean
 from shipgym.files import read_json
 
 if TYPE_CHECKING:
-    from agents.policies.one_for_all import OneForAll
     from agents.policies.policy import LearnedPolicy
-    from agents.policies.shield import Shielded
 
-    Agent: TypeAlias = Controller | LearnedPolicy | Shielded
+    Agent: TypeAlias = Controller | LearnedPolicy
 
 RUN_AGENT = "agent.json"  # of a training's folder
 PRETRAINED = Path(__file__).parent / "pretrained"
 
 
 def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
-    """Read the file of a controller, a learned policy or a shielded one; none needs torch.
-
-    Returns a Controller, LearnedPolicy or Shielded, as it was saved. Raises InputError
-    naming the file and the field at fault, or the difference to the model.
+    """Read the file of a controller or of a learned policy; neither needs torch.
 
     Parameters
     ----------
     path : str or Path
-        A file, or the name of a pretrained agent, `mariner-calm-ppo`
+        A file, or the name of a pretrained agent, `sharp-turns-ppo-s0`
         (`list_pretrained`).
     model : ShipModel, optional
-        The ship to steer; one with other observation scales is refused. A policy for
-        all ships is made for her (`OneForAll.for_ship`).
+        The ship to steer; one with other observation scales is refused.
+
+    Returns
+    -------
+    Controller or LearnedPolicy
+        As it was saved.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the field at fault, or the difference to the model.
     """
-    agent = read_agent(path)
-    if hasattr(agent, "for_ship"):
-        if model is None:
-            raise InputError(
-                f"{path}: made for each ship; give her model: load_agent(path,"
-                " model).save(file)"
-            )
-        return agent.for_ship(model)
+    file = find_agent(path)
+    content = read_json(file, "controller file", REMEDY)
+
+    agent: Agent
+    if content.get("kind") == LEARNED:
+        from agents.policies.policy_file import read_policy
+
+        agent = read_policy(content, file)
+    else:
+        agent = read_controller(content, str(path))
+
     if model is not None:
         agent.check_fits_model(model)
     return agent
-
-
-def read_agent(path: str | Path) -> Agent | OneForAll:
-    """What is in a file, or a pretrained agent, as `load_agent`; one for all ships as it is."""
-    content = read_json(file := find_agent(path), "controller file", REMEDY)
-    if content.get("kind") not in POLICIES:
-        return read_controller(content, str(path))
-    from agents.policies.policy_file import read_policy
-
-    return read_policy(content, file)
 
 
 def list_pretrained() -> list[str]:
@@ -66,7 +63,7 @@ def list_pretrained() -> list[str]:
 
 
 def find_agent(name: str | Path) -> Path:
-    """The file of an agent: as given, in the folder of a run, or of the pretrained agent of that name.
+    """File of an agent: as given, in the folder of a run, or of the pretrained agent of that name.
 
     Raises InputError if it is neither, with the nearest pretrained name.
     """
@@ -78,7 +75,7 @@ def find_agent(name: str | Path) -> Path:
     known = list_pretrained()
     if str(name) not in known:
         raise InputError(
-            f"agent: '{name}' found, expected a file, or one of {len(known)} pretrained"
-            f" agents, such as '{known[0]}'.{did_you_mean(str(name), known)}"
+            f"agent: expected a file, or one of {len(known)} pretrained agents, such as"
+            f" '{known[0]}', got '{name}'.{did_you_mean(str(name), known)}"
         )
     return PRETRAINED / f"{name}.json"

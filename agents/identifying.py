@@ -1,16 +1,20 @@
 """Identification of a ship file: its options, those given beside it, and its trials."""
 
-from collections.abc import Mapping
-from typing import Any
+from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import identification
 from identification import IdentificationResult, identify
-from identification.design.reduced import ReducedIdentification, identify_reduced
 from identification.estimators.methods import METHODS
-from identification.validation.comparison import Comparison, compare_methods
 from shipgym import ShipFile, Trial
 from shipgym.checks import placed
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.trials.identify_table import AUTO, check_options
+
+if TYPE_CHECKING:
+    from identification import Comparison, ReducedIdentification
 
 RM_SVM = (  # needs a grey box, so a reference ship beside it implies the structure
     "rm-svm"
@@ -111,7 +115,9 @@ def compare_ship(
         else methods and [n.strip() for n in methods.split(",")]
     )
     with placed(str(ship.path)):
-        return compare_methods(trials, names or None, wanted or None, **arguments)
+        return identification.compare_methods(
+            trials, names or None, wanted or None, **arguments
+        )
 
 
 def reduce_ship(
@@ -120,4 +126,6 @@ def reduce_ship(
     """`identify_reduced` on a ship file."""
     trials, arguments = trials_of(ship, settings)
     with placed(str(ship.path)):
-        return identify_reduced(trials, direction, tolerance, **arguments)
+        return identification.identify_reduced(
+            trials, direction, tolerance, **arguments
+        )

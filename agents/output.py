@@ -13,19 +13,18 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from shipgym.errors import InputError
-from shipgym.files import (
+from shipgym.drafts import (
     DRAFT,
     abandoned_drafts,
     atomic_path,
     draft_folder,
     remove_drafts,
 )
+from shipgym.errors import InputError
 from shipgym.plots import graph_objects
 
-ASIDE = ".old"
-PROCESS = "process"
-LONGEST_COMMAND = 200  # characters that are told of it
+ASIDE = ".old"  # ending of a folder that is about to be replaced
+PROCESS = "process"  # the first word of a lock of ours
 
 
 def check_folder(folder: Path, names: Collection[str]) -> None:
@@ -37,16 +36,13 @@ def check_folder(folder: Path, names: Collection[str]) -> None:
     target = folder.absolute()
     if target.is_symlink() or (target.exists() and not target.is_dir()):
         raise InputError(
-            f"{folder}: is not a folder, expected one to write the results to; choose"
-            " another"
+            f"{folder}: expected a folder to write the results to, got another kind of"
+            " file; choose another name"
         )
     if target.is_dir():
         for name in present(target):
-            if (
-                name not in names
-                or (target / name).is_symlink()
-                or not (target / name).is_file()
-            ):
+            path = target / name
+            if name not in names or path.is_symlink() or not path.is_file():
                 raise InputError(
                     f"{folder}: holds '{name}', which is not a result of this command,"
                     " and would be replaced as a whole; choose another folder or a"
@@ -56,31 +52,28 @@ def check_folder(folder: Path, names: Collection[str]) -> None:
 
 
 def check_writable(folder: Path) -> None:
-    """Refuse a folder that can neither be made nor written; raises InputError naming what is in the way."""
+    """Refuse a folder that can neither be made nor written; InputError names what is in the way."""
     target = folder.absolute()
-    there = [one for one in (target, *target.parents) if one.exists()]
-    both = target.is_dir() and not _stands_alone(
-        target
-    )  # it is renamed within the folder above, and emptied
-    for one in there[: 1 + both]:
-        if not one.is_dir() or not os.access(one, os.W_OK | os.X_OK):
+    existing = [path for path in (target, *target.parents) if path.exists()]
+    needed = existing[:1]
+    if target.is_dir() and not _stands_alone(target):
+        needed = existing[:2]  # it is emptied, and renamed within the folder above
+    for path in needed:
+        if not path.is_dir() or not os.access(path, os.W_OK | os.X_OK):
             raise InputError(
-                f"{folder}: {one} cannot be written to; choose another folder"
+                f"{folder}: {path} cannot be written to; choose another folder"
             )
 
 
 def present(folder: Path) -> list[str]:
     """Names in a folder in order, without locks and drafts."""
     lock = _lock_path(folder).name
-    return sorted(
-        one.name
-        for one in folder.iterdir()
-        if one.name != lock and not DRAFT.fullmatch(one.name)
-    )
+    names = sorted(path.name for path in folder.iterdir())
+    return [name for name in names if name != lock and not DRAFT.fullmatch(name)]
 
 
 def check_page(path: Path, plots: bool = False) -> None:
-    """Refuse a file for a page: one that does not end in .html, a folder, or one that cannot be written.
+    """Refuse a file for a page that does not end in .html, or cannot be written.
 
     Raises InputError naming the file; or if there shall be `plots` and plotly is
     missing.
@@ -88,16 +81,14 @@ def check_page(path: Path, plots: bool = False) -> None:
     if plots:
         graph_objects()
     if path.suffix.lower() not in (".html", ".htm"):
-        raise InputError(
-            f"{path}: ending '{path.suffix}' found, expected a file that ends in .html"
-        )
+        raise InputError(f"{path}: expected a file that ends in .html, got another")
     check_file(path)
 
 
 def check_file(path: Path) -> None:
-    """Refuse a file that cannot be written, before the work for it; raises InputError naming it."""
+    """Refuse a file that cannot be written, before the work for it; InputError names it."""
     if path.is_dir():
-        raise InputError(f"{path}: is a folder, expected a file to write to")
+        raise InputError(f"{path}: expected a file to write to, got a folder")
     folder = path.absolute().parent
     if not folder.is_dir() or not os.access(folder, os.W_OK):
         raise InputError(
@@ -115,13 +106,30 @@ def in_use(folder: Path) -> Iterator[Path]:
     locks is used without. Raises InputError if another process uses the folder, saying
     which, or if it cannot be written.
     """
+    target = folder.absolute()
+    missing = [path for path in (target, *target.parents) if not path.exists()]
     lock_path = _lock_path(folder)
-    missing = [
-        one
-        for one in (folder.absolute(), *folder.absolute().parents)
-        if not one.exists()
-    ]
-    lock, user = FileLock(lock_path), holder(lock_path)
+    lock = _acquired(lock_path, folder)
+    try:
+        if lock.is_locked:
+            lock_path.write_text(process_description(), encoding="utf-8")
+            _put_back(target, lock_path.parent)
+        remove_drafts(lock_path.parent)
+        yield lock_path.parent
+    finally:
+        if lock.is_locked:
+            # before it is free, so that whoever waits for it notices
+            lock_path.unlink(missing_ok=True)
+            lock.release()
+        for path in missing:  # the innermost first
+            with suppress(OSError):
+                path.rmdir()
+
+
+def _acquired(lock_path: Path, folder: Path) -> FileLock:
+    """The lock of a folder, taken, or not where a disk has no locks; InputError if another has it."""
+    lock = FileLock(lock_path)
+    user = holder(lock_path)
     try:
         lock_path.parent.mkdir(parents=True, exist_ok=True)
         with suppress(NotImplementedError):
@@ -137,89 +145,77 @@ def in_use(folder: Path) -> Iterator[Path]:
         ) from None
     except OSError as error:
         if not lock_path.parent.is_dir():
-            raise InputError(
-                f"{folder}: cannot be written ({error.strerror or error})"
-            ) from None
-    try:
-        if lock.is_locked:
-            lock_path.write_text(_this_process(), encoding="utf-8")
-            _put_back(folder.absolute(), lock_path.parent)
-        remove_drafts(lock_path.parent)
-        yield lock_path.parent
-    finally:
-        if lock.is_locked:
-            lock_path.unlink(
-                missing_ok=True
-            )  # before it is free: who waits for it notices
-            lock.release()
-        for made in missing:  # the innermost first
-            with suppress(OSError):
-                made.rmdir()
+            reason = error.strerror or error
+            raise InputError(f"{folder}: cannot be written ({reason})") from None
+    return lock
 
 
 def _stands_alone(target: Path) -> bool:
-    """Whether nothing of a folder can be beside it: a mount point, or below a folder that is read-only."""
-    return target.is_dir() and (
-        os.path.ismount(target) or not os.access(target.parent, os.W_OK | os.X_OK)
-    )
+    """True if nothing can be beside a folder: a mount point, or below a folder that is read-only."""
+    if not target.is_dir():
+        return False
+    return os.path.ismount(target) or not os.access(target.parent, os.W_OK | os.X_OK)
 
 
 def _lock_path(folder: Path) -> Path:
     target = folder.resolve()
-    return (target if _stands_alone(target) else target.parent) / f".{target.name}.lock"
+    home = target if _stands_alone(target) else target.parent
+    return home / f".{target.name}.lock"
 
 
-def _this_process() -> str:
-    command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])[:LONGEST_COMMAND]
-    since = datetime.now().astimezone().isoformat(" ", "seconds")
-    return (
-        f"{PROCESS} {os.getpid()} on {socket.gethostname()} since {since} ({command})"
-    )
+def process_description() -> str:
+    """Describe this process, with its command, for a lock."""
+    longest = 200  # characters of the command
+    program = Path(sys.argv[0]).name
+    command = shlex.join([program, *sys.argv[1:]])
+    now = datetime.now().astimezone()
+    since = now.isoformat(" ", "seconds")
+    host = socket.gethostname()
+    pid = os.getpid()
+    return f"{PROCESS} {pid} on {host} since {since} ({command[:longest]})"
 
 
 def holder(lock: Path) -> str:
-    """Who took a lock, in words."""
+    """Description of the process that has a lock."""
     try:
-        return lock.read_text(encoding="utf-8", errors="replace") or "another process"
+        text = lock.read_text(encoding="utf-8", errors="replace")
     except OSError:
-        return "another process"
+        text = ""
+    return text or "another process"
 
 
 def locks_and_drafts(folder: Path) -> Iterator[tuple[str, bool]]:
-    """What processes have in a folder beside results, in words, and whether its process is dead."""
+    """Descriptions of what processes have in a folder beside results, and True if the process is dead."""
     for draft in abandoned_drafts(folder):
         yield (
-            (
-                f"{draft}: left by a process that was killed; the next run there"
-                " removes it"
-            ),
+            f"{draft}: left by a process that was killed; the next run there removes it",
             True,
         )
     for path in sorted(folder.glob(".*.lock")):
-        if (user := holder(path)).startswith(PROCESS):
-            try:
-                with FileLock(path, timeout=0):
-                    yield (
-                        (
-                            f"{path}: left by {user}, which is dead; the next run there"
-                            " removes it"
-                        ),
-                        True,
-                    )
-            except Timeout:
-                yield f"{path}: {user}", False
-            except OSError:  # another user's
-                continue
+        user = holder(path)
+        if not user.startswith(PROCESS):  # not ours
+            continue
+        try:
+            with FileLock(path, timeout=0):
+                yield (
+                    f"{path}: left by {user}, which is dead; the next run there removes"
+                    " it",
+                    True,
+                )
+        except Timeout:
+            yield f"{path}: {user}", False
+        except OSError:  # another user's
+            continue
 
 
 @contextmanager
 def whole_folder(folder: Path, names: Collection[str]) -> Iterator[Path]:
     """A temporary folder that takes the place of `folder` when the block ends without an error.
 
-    `folder`: where the results shall go, which is locked in the meantime (`in_use`);
-    `names`: as in `check_folder`. Yields the folder to write to. After an error or an
-    interruption nothing of it is left. Raises InputError as `check_folder` and
-    `in_use`, or if the folder cannot be written.
+    Yields the folder to write to. `folder` is locked meanwhile (`in_use`), `names` are
+    those of `check_folder`. After an error or an interruption nothing of it is left.
+    Raises InputError as `check_folder` and `in_use` do, or if the folder cannot be
+    written.
     """
     check_folder(folder, names)
     target = folder.absolute()
@@ -229,9 +225,8 @@ def whole_folder(folder: Path, names: Collection[str]) -> Iterator[Path]:
                 yield draft
                 _take_place(draft, target, names)
         except OSError as error:
-            raise InputError(
-                f"{folder}: cannot be written ({error.strerror or error})"
-            ) from error
+            reason = error.strerror or error
+            raise InputError(f"{folder}: cannot be written ({reason})") from error
 
 
 def _take_place(draft: Path, target: Path, names: Collection[str]) -> None:
@@ -258,7 +253,7 @@ def _replace_files(draft: Path, target: Path, names: Collection[str]) -> None:
         if (draft / name).exists():
             with atomic_path(target / name) as new:
                 shutil.copyfile(draft / name, new)
-        else:  # an earlier one would be of other results
+        else:  # an earlier one would belong to other results
             (target / name).unlink(missing_ok=True)
 
 
@@ -266,4 +261,7 @@ def _put_back(target: Path, home: Path) -> None:
     """Give a folder its name again that a process had set aside when it was killed."""
     for aside in home.glob(f".{escape(target.name)}.*{ASIDE}"):
         with suppress(OSError):
-            shutil.rmtree(aside) if target.exists() else aside.replace(target)
+            if target.exists():
+                shutil.rmtree(aside)
+            else:
+                aside.replace(target)

@@ -15,7 +15,7 @@ from .design.reduction import (
 from .design.reduction import (
     forward_selection as forward_selection,
 )
-from .design.reduction import (
+from .design.sensitivity import (
     sensitivity as sensitivity,
 )
 from .estimators.coefficient_history import (

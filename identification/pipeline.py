@@ -1,9 +1,11 @@
 """From trials to a ship model: `identify`."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,13 +30,6 @@ from identification.regression.grey_box import bare_metrics, explained_samples
 from identification.regression.problem import Problem, held_out, pose
 from identification.regression.samples import Samples
 from identification.result import IdentificationResult
-from identification.simulation_error.maximum_a_posteriori import (
-    MAP,
-    checked_mmg,
-    fit_mmg,
-)
-from identification.simulation_error.prior import with_prior
-from identification.simulation_error.refine import Refined, refine, split_settings
 from identification.uncertainty.bootstrap import (
     bootstrap_covariance,
     influence_covariance,
@@ -56,13 +51,15 @@ from identification.validation.guard import (
     with_coefficients,
 )
 from identification.validation.prediction import predict, trial_metrics
-from identification.validation.selection import select
 from shipgym import ShipModel, SteeringGear, Trial
 from shipgym.arrays import Floats
 from shipgym.ships import GreyBox, Structure
 from shipgym.ships.catalogue import fitted_box
 from shipgym.ships.mmg import MMG
 from shipgym.trials.identify_table import AUTO
+
+if TYPE_CHECKING:
+    from identification.simulation_error.refine import Refined
 
 MEMORY = 1.0  # of residuals, in the time to sail one ship length
 
@@ -127,7 +124,7 @@ def _identified(
     if options.structure == AUTO:
         return _identified_best(trials, options, particulars, steering)
     if options.structure == MMG:
-        return _identified_mmg(trials, checked_mmg(options), particulars, steering)
+        return _identified_mmg(trials, options, particulars, steering)
     method = get_method(options.method)
     problem = pose(trials, options, particulars, steering)
     fit, refined, of_method = _fitted(method, options, problem)
@@ -152,6 +149,8 @@ def _identified_best(
     steering: SteeringGear | None,
 ) -> IdentificationResult:
     """By the structure and method that predict the trials to fit best, each held out, and the ranking."""
+    from identification.validation.selection import select
+
     marked = held_out(trials, options.hold_out)
     fitted = partial(_identified, particulars=particulars, steering=steering)
     chosen, found = select(
@@ -209,14 +208,19 @@ def _identified_mmg(
     steering: SteeringGear | None,
 ) -> IdentificationResult:
     """The MMG form; its regression is that on the model's own accelerations."""
+    from identification.simulation_error.maximum_a_posteriori import (
+        checked_mmg,
+        fit_mmg,
+    )
+
+    options = checked_mmg(options)
     problem = pose(trials, options, particulars, steering)
     model, report = fit_mmg(problem, options)
     samples, estimators = explained_samples(problem.used, model, **problem.sampling)
     fit = _simulated(model, estimators, problem.used)
     problem = replace(problem, samples=samples, blank=model)
-    return _evaluated(
-        model, fit, problem, _provenance(options, MAP, {}, fit, problem) | report
-    )
+    provenance = _provenance(options, name_of(options.method), {}, fit, problem)
+    return _evaluated(model, fit, problem, provenance | report)
 
 
 def _simulated(
@@ -238,6 +242,8 @@ def _fitted(
     """Fit, guard and refine; also the settings of the method alone."""
     task = FitTask(problem.samples, problem.blank, problem.used)
     if options.prior is not None:
+        from identification.simulation_error.pulled import with_prior
+
         method = with_prior(
             method,
             options.prior,
@@ -245,10 +251,14 @@ def _fitted(
             task.blank,
             options.prior_folds,
         )
-    refinement, settings = split_settings(options.settings(), method.refined)
+    settings = options.settings()
+    if not method.refined:
+        return guarded_fit(method, settings, task, options.guarded), None, settings
+
+    from identification.simulation_error.refine import refine, split_settings
+
+    refinement, settings = split_settings(settings)
     fit = guarded_fit(method, settings, task, options.guarded)
-    if refinement is None:
-        return fit, None, settings
     refined = refine(fit, task, refinement, MEMORY * task.blank.travel_time)
     return refined.fit, refined, settings
 

@@ -8,7 +8,8 @@ from identification.report.figures import all_figures
 from identification.report.page import report_page
 from identification.report.summary import summary_table
 from shipgym import InputError
-from shipgym.files import draft_folder, write_json, write_text
+from shipgym.drafts import draft_folder
+from shipgym.files import write_json, write_text
 from shipgym.plots.style import Figure
 
 #: Files of a saved result.

@@ -68,7 +68,7 @@ def head(title: str) -> None:
 def monte_carlo_table() -> None:
     """Manoeuvres, course stability, and PID and LQ in one episode each, over models drawn."""
     from agents import LQ, PID
-    from agents.engines.jobs import JobEngine
+    from agents.jobs import JobEngine
     from agents.verification.monte_carlo import monte_carlo
     from shipgym import load_model
 
@@ -149,7 +149,7 @@ def benchmark_table() -> None:
 
 def tasks_table() -> None:
     """What starting workers costs: jobs that do nothing."""
-    from agents.engines.jobs import run_jobs
+    from agents.jobs import JobEngine, run_jobs
 
     head("100 jobs that do nothing")
     for workers in WORKERS:
@@ -157,7 +157,7 @@ def tasks_table() -> None:
             "100 jobs",
             workers,
             lambda w=workers: run_jobs(
-                nothing, [{"k": k} for k in range(100)], workers=w
+                nothing, [{"k": k} for k in range(100)], JobEngine(workers=w)
             ),
         )
 

@@ -20,8 +20,8 @@ from speed import environments, identification, physics, start
 from speed.measure import Row
 
 from shipgym.checks import check_choice
-from shipgym.envs.registration import TASKS
 from shipgym.errors import InputError
+from shipgym.tasks.definition import TASKS
 
 #: What is measured, by group; each is called when it is its turn.
 GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {

@@ -1,10 +1,9 @@
 """Identify the models in the box again, from trials in the repository or simulated with sensor noise.
 
-    python scripts/build_models.py [name ...]      by default all but those kept, into
-    shipgym/ships/library python scripts/build_models.py --check         compare with
-    what is there; writes nothing python scripts/build_models.py --tables        only
-    print the tables of docs/identified_models.md python scripts/build_models.py
-    --candidates    what was looked at to choose, of models rejected too
+    python scripts/build_models.py [name ...]     write to shipgym/ships/library
+    python scripts/build_models.py --check        compare with what is there
+    python scripts/build_models.py --tables       tables of docs/identified_models.md
+    python scripts/build_models.py --candidates   what was looked at to choose
 
 What the models are compared with in these tables, turning circles at 35 degrees and
 zigzags 15/15 and 25/25, is in no model's trials. Trials, structures and methods of the

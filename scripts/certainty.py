@@ -46,7 +46,7 @@ from shipgym.manoeuvres import (  # noqa: E402
     zigzag,
     zigzag_indices,
 )
-from shipgym.manoeuvres.imo import imo_manoeuvres  # noqa: E402
+from shipgym.manoeuvres.imo_rules import imo_manoeuvres  # noqa: E402
 from shipgym.manoeuvres.intervals import (  # noqa: E402
     IndexInterval,
     attempt,

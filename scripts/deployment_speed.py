@@ -17,20 +17,22 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 
 from agents import LQ, load_agent
-from agents.deployment import steering
-from agents.deployment.c99 import Source, autopilot_source, ship_source
+from agents.deployment.autopilot_c99 import autopilot_source
+from agents.deployment.c99 import Source
 from agents.deployment.fmu import write_fmu
+from agents.deployment.ship_c99 import ship_source
 from agents.deployment.simulated import SimulatedShip, simulate_ship
+from agents.deployment.steering import steer
 from shipgym.ships import load_model
 
 CROSS = ("arm-linux-gnueabihf-gcc", "aarch64-linux-gnu-gcc")
 QEMU = {"arm-linux-gnueabihf-gcc": "qemu-arm", "aarch64-linux-gnu-gcc": "qemu-aarch64"}
 STEPS = 2_000_000
-LOADS = ((0, "no", False), (4, "another", False), (4, "its", False), (4, "its", True))
 MAIN = """
 #include "{name}.h"
 #include <stdio.h>
@@ -109,46 +111,41 @@ def real_time_factor(source: Source, version: str) -> float:
     return options["stop_time"] / elapsed
 
 
-def burn(elsewhere: bool) -> None:
-    """Keep a processor busy, from another session if so: that of another terminal, or of a service."""
-    if elsewhere:
-        os.setsid()
+def burn() -> None:
+    """Keep a processor busy."""
     while True:
         sum(range(10_000))
 
 
 def sail(address: str, seconds: float) -> None:
-    """The simulated ship, in a process of her own."""
-    asyncio.run(
-        simulate_ship(SimulatedShip(load_model("mariner")), address, duration=seconds)
-    )
+    """Simulate the ship, in a process of her own."""
+    ship = SimulatedShip(load_model("mariner"))
+    asyncio.run(simulate_ship(ship, address, duration=seconds))
 
 
-def periods(seconds: float, real_time: bool) -> np.ndarray:
+class TimedLQ(LQ):
+    """LQ that keeps the times at which it steers."""
+
+    beats: ClassVar[list[float]] = []
+
+    def steer(self, *arguments: Any) -> Any:
+        """Steer as LQ does."""
+        self.beats.append(time.perf_counter())
+        return super().steer(*arguments)
+
+
+def periods(seconds: float) -> np.ndarray:
     """Periods of the live loop at 10 Hz, s, with the simulated ship in another process."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp:127.0.0.1:{server.getsockname()[1]}"
-    ship = multiprocessing.Process(
-        target=sail, args=(address, seconds + 60.0), daemon=True
-    )
+    ship = multiprocessing.Process(target=sail, args=(address, seconds + 60.0))
     ship.start()
-    beats: list[float] = []
-    inner, agent = steering.Helm.steer, LQ.from_model(load_model("mariner"), dt=0.1)
-    steering.Helm.steer = lambda self, now: (
-        beats.append(time.perf_counter()),
-        inner(self, now),
-    )[1]  # type: ignore[assignment,method-assign,func-returns-value]
     time.sleep(20.0)  # until she is there
-    os.sched_setscheduler(
-        0,
-        os.SCHED_FIFO if real_time else os.SCHED_OTHER,
-        os.sched_param(10 * real_time),
-    )
-    asyncio.run(steering.steer(agent, address, heading=0.1, duration=seconds))
-    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-    steering.Helm.steer = inner  # type: ignore[method-assign]
+    agent = TimedLQ.from_model(load_model("mariner"), dt=0.1)
+    agent.beats.clear()
+    asyncio.run(steer(agent, address, heading=0.1, duration=seconds))
     ship.terminate()
-    return np.diff(beats)
+    return np.diff(agent.beats)
 
 
 def main() -> None:
@@ -171,7 +168,7 @@ def measure_exports() -> None:
     mariner = load_model("mariner")
     exported = {
         "lq": autopilot_source(LQ.from_model(mariner), "lq"),
-        "ppo": autopilot_source(load_agent("mariner-calm-ppo"), "ppo"),
+        "ppo": autopilot_source(load_agent("sharp-turns-ppo-s0"), "ppo"),
         "ship": ship_source(mariner, "ship"),
     }
     for name, source in exported.items():
@@ -195,31 +192,21 @@ def measure_exports() -> None:
 
 
 def measure_loop(seconds: float) -> None:
-    """Print the period of the live loop under each load."""
-    for load, where, real_time in LOADS:
-        busy = [
-            multiprocessing.Process(
-                target=burn, args=(where == "another",), daemon=True
-            )
-            for _ in range(load)
-        ]
-        for one in busy:
-            one.start()
-        try:
-            off = np.abs(periods(seconds, real_time) - 0.1) * 1e3
-            print(
-                f"live loop, {load} busy processes of {where} session on"
-                f" {os.cpu_count()} cores, {'real-time' if real_time else 'ordinary'}"
-                f" priority: {len(off)} periods, off 100 ms by {np.median(off):.2f} ms"
-                f" at the median, {np.quantile(off, 0.99):.2f} ms at the 99th"
-                f" percentile, {off.max():.2f} ms at most; load average"
-                f" {os.getloadavg()[0]:.0f}",
-                flush=True,
-            )
-        except PermissionError:
-            print("real-time priority is not permitted here")
-        for one in busy:
-            one.terminate()
+    """Print the period of the live loop, alone and beside busy processes."""
+    for load in (0, 4):
+        busy = [multiprocessing.Process(target=burn) for _ in range(load)]
+        for process in busy:
+            process.start()
+        off = np.abs(periods(seconds) - 0.1) * 1e3
+        print(
+            f"live loop, {load} busy processes on {os.cpu_count()} cores, load average"
+            f" {os.getloadavg()[0]:.0f}: {len(off)} periods, off 100 ms by"
+            f" {np.median(off):.1f} ms at the median, {np.quantile(off, 0.99):.1f} ms at"
+            f" the 99th percentile, {off.max():.1f} ms at most",
+            flush=True,
+        )
+        for process in busy:
+            process.terminate()
 
 
 if __name__ == "__main__":

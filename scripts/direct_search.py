@@ -19,11 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from agents.controllers.adaptive_lq import has_sway
 from agents.controllers.controller import Controller
 from agents.controllers.designs import CLASSICAL, INNER, design, no_path
 from agents.controllers.los_autopilot import CRITICAL
-from agents.controllers.wheel_over import own_lead, own_turn
+from agents.controllers.wheel_over import own_lead
 from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_choice, check_whole
@@ -34,7 +33,7 @@ Floats = NDArray[np.float64]
 
 EVALUATIONS, EPISODES, FIRST_SEED = 40, 32, 500_000
 LEAST_GAIN_MARGIN, LEAST_PHASE_MARGIN = 1.5, 20.0  # factor, degrees
-LAWS = ("los", "ilos", "alos", "wheel-over", "preview-mpc")  # guidance
+LAWS = ("los", "ilos", "alos", "wheel-over", "mpc")  # guidance
 FIRST_STEP = 0.4  # of the simplex, in natural logarithms
 REFUSED = 1e12  # cost of settings with which no controller can be designed
 
@@ -61,17 +60,11 @@ class Tuned:
     evaluations: int  # settings that were tried, refused ones among them
 
 
-#: What is searched of controllers like LQ beside its weights. Not MPC's horizon: from
-#: an eighth to twice the design's it changes no cost by more than 2e-5, and a plan's
-#: time grows with its square.
+#: What is searched of controllers like LQ beside its weights.
 FURTHER_SETTINGS: dict[str, tuple[Setting, ...]] = {
     "lqg": (
         Setting("noise", 1.0, 0.01, 100.0),
         Setting("disturbance_deg", 2.0, 0.01, 100.0),
-    ),
-    "lq-adaptive": (
-        Setting("forgetting_lengths", 20.0, 0.1, 100.0),
-        Setting("noise", 1.0, 0.01, 100.0),
     ),
 }
 
@@ -133,13 +126,9 @@ def search(
 def tunable(task: BenchmarkTask) -> tuple[str, ...]:
     """Controllers of `CLASSICAL` that there are for a task.
 
-    Guidance laws need a path to follow, `lq-adaptive` a ship whose sway is described.
+    Guidance laws need a path to follow.
     """
-    without = set[str]()
-    if not task.task.follows_path:
-        without |= {*LAWS}
-    if not has_sway(task.ship):
-        without |= {"lq-adaptive"}
+    without = () if task.task.follows_path else LAWS
     return tuple(kind for kind in CLASSICAL if kind not in without)
 
 
@@ -157,7 +146,7 @@ def tune(
     """
     check_choice(kind, CLASSICAL, "controller")
     seeds = FIRST_SEED + np.arange(episodes)
-    engine = task.handed_out.engine(episodes)
+    engine = task.design_task.engine(episodes)
 
     def cost(asked: Mapping[str, float]) -> float:
         try:
@@ -210,35 +199,21 @@ def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
             raise no_path(kind, task)
         lookahead = task.task.lookahead
         own = [Setting("lookahead_lengths", lookahead)]
-        if kind in ("wheel-over", "preview-mpc"):
-            if hasattr(
-                task.task.settings, "turn_radius"
-            ):  # the path has arcs of its own
-                own.append(
-                    Setting("reach_lengths", own_lead(task.ship, None), 0.3, 3.0)
-                )
-            else:
-                radius, reach = own_turn(task.ship)
-                own += [
-                    Setting("reach_lengths", reach),
-                    Setting("radius_lengths", radius),
-                ]
-                own.append(Setting("turn_lookahead_lengths", lookahead))
+        if kind in ("wheel-over", "mpc"):
+            own.append(Setting("reach_lengths", own_lead(task.ship, None), 0.3, 3.0))
             own.append(Setting("crab_share", 1.0, 0.3, 1.5))
-            own += [Setting("deviation_deg", 3.0)] * (kind == "preview-mpc")
+            own += [Setting("deviation_deg", 3.0)] * (kind == "mpc")
         elif kind != "los":
             own.append(Setting("integral_lengths", CRITICAL * lookahead))
         return [own]
     plain = design(kind, task).design
     integral = Setting("integral_lengths", 20.0, 0.1, 100.0)
-    if kind.startswith("pid"):
+    if kind == "pid":
         own = [
             Setting("frequency", plain["frequency"]),
             Setting("damping", plain["damping"]),
             integral,
         ]
-        if kind == "pid-filtered":
-            own.append(Setting("reference_share", 3.0, 0.2, 100.0))
     else:
         own = [
             integral,
@@ -247,6 +222,6 @@ def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
             *FURTHER_SETTINGS.get(kind, ()),
         ]
     waves = task.task.weather.waves
-    if kind not in ("pid-filtered", "lqg") or waves is None:
+    if kind != "lqg" or waves is None:
         return [own]
     return [own, [*own, Setting("wave_period", waves.peak_period, 0.3, 3.0)]]

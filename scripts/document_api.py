@@ -22,9 +22,7 @@ PACKAGES = {
     "shipgym.sea": "Current, wind and waves.",
     "shipgym.tasks": "Tasks: what an autopilot has to do in an environment.",
     "shipgym.plots": "Figures, made with plotly.",
-    "shipgym.interchange": (
-        "To and from pandas, xarray, Minari, python-control, MSS and shipmmg."
-    ),
+    "shipgym.interchange": "Trials and episodes to and from pandas and Minari.",
     "identification": "From trials to a ship model.",
     "agents": "Autopilots, and how they are run and compared.",
 }
@@ -39,6 +37,8 @@ IMPORT = re.compile(
 
 def names(package: str) -> list[str]:
     """The public names of a package, submodules and constants left out, in the order of its file."""
+    if (ROOT / package.replace(".", "/")).with_suffix(".py").is_file():
+        return list(import_module(package).__all__)
     stub = ROOT / package.replace(".", "/") / "__init__.pyi"
     imports = [
         node

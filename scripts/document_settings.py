@@ -15,10 +15,7 @@ from shipgym.tasks.definition import TASKS, read_definition
 from shipgym.tasks.source import keywords
 
 FOLDER = Path(__file__).parents[1] / "docs" / "environments"
-PAGES = tuple(
-    FOLDER / f"{name}.md"
-    for name in ("course_keeping", "path_following", "path_following_v0")
-)
+PAGES = tuple(FOLDER / f"{name}.md" for name in ("course_keeping", "path_following"))
 MARKS = re.compile(
     r"<!-- settings: ([\w-]+) -->\n.*?<!-- end of settings -->", re.DOTALL
 )

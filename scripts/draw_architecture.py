@@ -25,10 +25,10 @@ ROOMS: dict[str, tuple[float, int, str]] = {
     "agents.training": (0.5, 1, "reinforcement learning, tuning"),
     "agents.verification": (3.5, 1, "the chain of shipgym autopilot"),
     "agents.rollouts": (1.25, 2, "one loop, metrics, replays"),
-    "agents.engines": (3.5, 2, "jobs: processes, Ray"),
+    "agents.jobs": (3.5, 2, "processes, Ray"),
     "agents.deployment": (2.37, 2, "C99, FMU, NMEA 0183"),
-    "agents.policies": (0.5, 3, "learned policies, shield, ONNX"),
-    "agents.controllers": (2, 3, "PID, LQ, LQG, MPC, adaptive"),
+    "agents.policies": (0.5, 3, "learned policies, ONNX"),
+    "agents.controllers": (2, 3, "PID, LQ, LQG, wheel-over, MPC"),
     "agents.suites": (3.5, 3, "tasks and seeds of benchmarks"),
     "identification.design": (0.5, 0, "which terms, which trial next"),
     "identification.pipeline": (2, 0, "identify"),
@@ -40,7 +40,7 @@ ROOMS: dict[str, tuple[float, int, str]] = {
     "identification.estimators": (1.33, 2, "LS-SVM, recursive, others"),
     "identification.search": (2.67, 2, "bee colony, swarm, grid"),
     "identification.regression": (4, 2, "samples, preprocessing"),
-    "shipgym.interchange": (1.75, 0, "pandas, xarray, MSS"),
+    "shipgym.interchange": (1.75, 0, "pandas, Minari"),
     "shipgym.envs": (0.7, 0, "Gymnasium, single and vector"),
     "shipgym.pages": (4, 0, "HTML from templates"),
     "shipgym.plots": (2.8, 0, "figures"),
@@ -61,11 +61,14 @@ APART = {
     "shipgym.engine.episodes": "shipgym.episodes",
     "shipgym.engine.voyages": "shipgym.episodes",
     "shipgym.engine.places": "shipgym.episodes",
+    "agents.job_results": "agents.jobs",
 }
 TITLES = {
     "identification.pipeline": "pipeline.py",
     "identification.result": "result.py, fit.py",
     "shipgym.episodes": "engine/episodes.py",
+    "shipgym.interchange": "interchange.py",
+    "agents.jobs": "jobs.py, job_results.py",
 }
 BACK_GROUND = {"agents": "#f6efe4", "identification": "#e9f1ea", "shipgym": "#e8eef6"}
 

@@ -1,9 +1,9 @@
 """Read mutated files of every kind and look for what is neither read nor refused in one message.
 
-    python scripts/fuzz.py                              a million inputs: 150,000 of the
-    fast kinds python scripts/fuzz.py --inputs 1000000             a million of each of
-    these python scripts/fuzz.py --kind model --kind policy   some kinds python
-    scripts/fuzz.py --time 600 --keep found      ten minutes; files at fault are kept
+    python scripts/fuzz.py                              150,000 of each fast kind
+    python scripts/fuzz.py --inputs 1000000             a million of each fast kind
+    python scripts/fuzz.py --kind model --kind policy   some kinds
+    python scripts/fuzz.py --time 600 --keep found      ten minutes; keep faulty files
 
 Each input is a sound file of `tests/corpus` with one to five changes to its structure
 or its bytes, which follow from `--seed`, the kind and the input's number alone. It is

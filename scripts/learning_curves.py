@@ -1,8 +1,7 @@
 """Learning curves of PPO from scratch by the shipped settings, with seeds, against classical autopilots.
 
-    python scripts/learning_curves.py          about a minute of processor for each of
-    six runs, the picture python scripts/learning_curves.py --draw   the picture alone,
-    from build/learning_curves.json
+    python scripts/learning_curves.py          six runs of about a minute, and the picture
+    python scripts/learning_curves.py --draw   the picture, from build/learning_curves.json
 
 The picture is docs/images/learning_curves.png. Costs are means of a hundred episodes
 held out.
@@ -29,7 +28,7 @@ SEEDS = (0, 1, 2)
 #: Classical autopilots by id.
 CLASSICAL = {
     "shipgym/CourseKeeping-v0": ("lq",),
-    "shipgym/PathFollowing-v1": ("ilos", "wheel-over"),
+    "shipgym/PathFollowing-v0": ("ilos", "wheel-over"),
 }
 SETTINGS = {"base": "none", "total_steps": 1_000_000, "evaluate_every": 32_768}
 

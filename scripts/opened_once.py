@@ -49,8 +49,9 @@ from agents.agent_file import (  # noqa: E402
 )
 from agents.controllers.controller import Controller  # noqa: E402
 from agents.rollouts.course_keeping import sail  # noqa: E402
-from agents.verification.chain import DESIGNS, examined, verify  # noqa: E402
+from agents.verification.chain import examined  # noqa: E402
 from agents.verification.tracks import keep_track  # noqa: E402
+from agents.verification.verify import DESIGNS, verify  # noqa: E402
 from shipgym import ShipModel, load_model  # noqa: E402
 from shipgym.errors import InputError  # noqa: E402
 from shipgym.manoeuvres.imo import imo_assessment  # noqa: E402

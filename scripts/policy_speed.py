@@ -10,7 +10,7 @@ import numpy as np
 from agents import LearnedPolicy
 from agents.policies.network import Network
 from shipgym.ships import load_model
-from shipgym.tasks.task import OBSERVATION_NAMES, observation_scales
+from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 
 SIZES = (len(OBSERVATION_NAMES), 64, 64, 1)
 REPEATS = 300

@@ -12,9 +12,8 @@ from typing import Annotated
 import typer
 from papers.page import ALL, missed, page, papers_of, reproduce, terminal_table
 
-from agents.cli.command import FAILED, answered, fail
-from agents.cli.terminal import answer, err
-from agents.cli.terminal import out as console
+from agents.cli.command import FAILED, fail, shared_options
+from agents.cli.terminal import answer, console, err
 from shipgym.files import write_text
 
 app = typer.Typer(
@@ -22,8 +21,6 @@ app = typer.Typer(
 )
 
 
-@app.command()
-@answered
 def main(
     paper: Annotated[
         str,
@@ -65,6 +62,8 @@ def main(
     if late:
         fail(f"{len(late)} aims missed: {'; '.join(late)}", FAILED)
 
+
+app.command()(shared_options(main))
 
 if __name__ == "__main__":
     app()

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from rich.progress import Progress
 
 import shipgym
-from shipgym.envs.registration import TASKS, VARIANTS, env_id
+from shipgym.tasks.definition import TASKS
 
 ROWS = 256
 CHECK_EVERY = 50  # steps between checks of infos and states
@@ -33,7 +33,6 @@ KINDS = ("random", "extreme", "adversarial")
 WILD = {
     "CourseKeeping": {"max_heading_error_deg": 180.0},
     "PathFollowing": {"ground": 40.0},
-    "PathFollowing-v1": {"ground": 40.0},
 }
 SEAS: dict[str, Any] = {
     "sea": ["calm", "moderate", "rough"],
@@ -52,9 +51,14 @@ class Run:
     kind: str
 
     @property
+    def id(self) -> str:
+        """Of the environment."""
+        return f"shipgym/{self.task}{self.variant}-v0"
+
+    @property
     def name(self) -> str:
         """Its id, model and actions."""
-        return f"{env_id(self.task, self.variant)}, {self.model}, {self.kind}"
+        return f"{self.id}, {self.model}, {self.kind}"
 
     def make(self) -> Any:
         """Its vector environment; wild ones are in seas and sail on where others stop."""
@@ -64,7 +68,7 @@ class Run:
             {"max_envelope_distance": 1e3, **WILD[self.task], **SEAS} if wild else {}
         )
         return gymnasium.make_vec(
-            env_id(self.task, self.variant),
+            self.id,
             ROWS,
             model=self.model,
             autoreset_mode="SameStep" if wild else "NextStep",
@@ -83,8 +87,8 @@ def runs() -> Iterator[Run]:
         "Roll": [ship.name for ship in models if "phi" in ship.state_names],
     }
     for task in TASKS:
-        for variant in VARIANTS:
-            for model in fit[variant]:
+        for variant, names in fit.items():
+            for model in names:
                 for kind in KINDS:
                     yield Run(task, variant, model, kind)
 

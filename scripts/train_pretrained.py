@@ -3,8 +3,7 @@
     python scripts/train_pretrained.py                                   # every task's
     missing runs python scripts/train_pretrained.py --tasks roll-limit --seeds 0,1
     python scripts/train_pretrained.py --table results                   # markdown for
-    docs/pretrained.md python scripts/train_pretrained.py --shield 50
-    # what the shield costs, 50 episodes
+    docs/pretrained.md
 
 Each task is learned with its settings in `agents/training/hyperparameters`, once for
 each training seed, in the design model and over the models drawn from its covariance.
@@ -30,12 +29,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.agent_file import load_agent
-from agents.benchmarking.contestants import pretrained
 from agents.benchmarking.results import BenchmarkResult, load_results
 from agents.benchmarking.statistics import Draws, Interval, interval
 from agents.policies.policy import LearnedPolicy
-from agents.policies.shield import Shielded
-from agents.rollouts.rollout import rollout
 from agents.suites.suite import N_EPISODES, SETS, BenchmarkTask, load_suite
 from agents.training import run_folder
 from agents.training.plan import Given, make_plan
@@ -45,7 +41,7 @@ from shipgym.files import read_json, write_json
 PRETRAINED = Path(__file__).parents[1] / "agents" / "pretrained"
 RESULT = "result.json"
 LARGEST_KB = 300.0
-SLOW = "preview-mpc"  # of the baselines, which no policy adds to
+SLOW = "mpc"  # of the baselines, which no policy adds to
 BROKEN = "delete it and train again"
 GAIN, CLOSE = 0.05, 0.01  # what is asked of five tasks, and of the others
 
@@ -72,11 +68,6 @@ def main() -> None:
         nargs="+",
         help="only print what the agents cost in results",
     )
-    parser.add_argument(
-        "--shield",
-        type=int,
-        help="only print what the shield costs, in so many episodes",
-    )
     asked = parser.parse_args()
     suite = load_suite(asked.suite)
     named = [suite.task(name) for name in asked.tasks.split(",") if name]
@@ -87,9 +78,6 @@ def main() -> None:
                 tasks, [load_results(folder) for folder in asked.table], asked.algorithm
             )
         )
-        return
-    if asked.shield:
-        print(shield_table(tasks, asked.algorithm, asked.shield))
         return
     for seed in map(int, asked.seeds.split(",")):
         for task in tasks:
@@ -274,28 +262,6 @@ def paired(
     first, second = (figures(results, name, task, figure) for name in (one, other))
     n = min(first.shape[1], second.shape[1])
     return first[:, :n], second[:, :n]
-
-
-def shield_table(tasks: Sequence[BenchmarkTask], algorithm: str, episodes: int) -> str:
-    """What the agents of the first training seed cost with a shield and without, and how often it steers."""
-    lines = [
-        "| task | without | with shield | with / without | time the fallback steers |",
-        "| --- | --- | --- | --- | --- |",
-    ]
-    for task in tasks:
-        agent = load_agent(pretrained(task.name, algorithm)[0])
-        engine, seeds = task.engine(episodes), task.seeds[:episodes]
-        free, safe = (
-            rollout(one, engine, seeds, record=("heading_error",))
-            for one in (agent, Shielded.from_model(task.ship, agent))
-        )
-        without, held = float(free.costs.mean()), float(safe.costs.mean())
-        steers = safe.shielded[safe.sailing].mean()
-        lines.append(
-            f"| {task.name} | {without:.1f} | {held:.1f} | {held / without:.3f} |"
-            f" {steers:.2%} |"
-        )
-    return "\n".join(lines)
 
 
 def gain_of(

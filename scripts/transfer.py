@@ -6,13 +6,12 @@ Tasks are those of `shipgym-v2`: contestants know the identified model and are
 evaluated, in the same 100 episodes, on the ship behind her trials. Each is made twice,
 alike but for what is known:
 
-    wheel-over     designed on the model, or on the ship tuned          the classical
-    controller that cost least on the model, its settings by direct search there,
-                   or, with the same budget, on the ship
+    wheel-over     designed on the model, or on the ship
+    tuned          the classical controller that cost least on the model, its settings
+                   by direct search there, or, with the same budget, on the ship
     ppo            the five agents of `agents/pretrained`, learned over models drawn
-    from the covariance and
-                   added to `tuned`; or three learned on the ship, with the same
-                   settings, and added to that tuned on her
+                   from the covariance and added to `tuned`; or three learned on the
+                   ship, with the same settings, and added to that tuned on her
 
 What one costs on the ship over what its twin costs that knew her is the loss by the
 model's error. How large that error is stands beside it: turning circles at 35 deg and
@@ -28,13 +27,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from agents.benchmarking.contestants import pretrained
 from build_models import COMPARED_DEG, errors
 from direct_search import tune
 from numpy.typing import NDArray
 
 import shipgym
 from agents.agent_file import load_agent
-from agents.benchmarking.contestants import pretrained
 from agents.benchmarking.statistics import Draws, Interval, interval
 from agents.controllers.controller import Controller, Policy
 from agents.controllers.designs import NO_BASES, design, tuned
@@ -100,7 +99,7 @@ class Contestant:
 
 def contestants(task: BenchmarkTask, out: Path, runs: int) -> Iterator[Contestant]:
     """All of one task, each made on the model and on the ship."""
-    model, ship = task.handed_out, replace(task.handed_out, model=task.behind)
+    model, ship = task.design_task, replace(task.design_task, model=task.true_ship)
     pairs: dict[str, tuple[Sequence[Policy], Sequence[Policy]]] = {
         "wheel-over": ([design("wheel-over", model)], [design("wheel-over", ship)])
     }

@@ -43,7 +43,7 @@ def main() -> None:
     tasks = [suite.task(name) for name in asked.tasks.split(",") if name] or list(
         suite.tasks
     )
-    tasks = [task.handed_out for task in tasks if task.on == "ship"]
+    tasks = [task.design_task for task in tasks if task.on == "ship"]
     for task in tasks:
         tune_task(task, asked)
 

@@ -24,7 +24,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import typer
-from gallery import DPI, SIZE, STYLE
 
 ROOT = Path(__file__).parents[1]
 if str(ROOT) not in sys.path:
@@ -37,6 +36,16 @@ from tests.ships.mmg import mmg_ship  # noqa: E402
 
 PAGE = ROOT / "docs" / "tutorial.md"
 IMAGES = PAGE.parent / "images" / "tutorial"
+SIZE, DPI = (6.4, 3.4), 110  # inches, dots an inch
+STYLE = {
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.alpha": 0.25,
+    "font.size": 9,
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+}
 SEA = Weather(current=Current(0.39, towards_deg=120.0))
 ANTENNA = 30.0  # m forward of midship
 LATITUDE, LONGITUDE, EARTH = 54.2, 7.6, 6371e3  # degrees north and east, m

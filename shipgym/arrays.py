@@ -1,4 +1,4 @@
-"""Types of arrays, as annotations name them, their integral, and a number as JSON knows it."""
+"""Types of arrays for annotations, their integral, and numbers as JSON has them."""
 
 from typing import Any
 

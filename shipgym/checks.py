@@ -1,13 +1,11 @@
-"""Checks of what a user wrote, each answering with one message that names the place and the remedy."""
+"""Checks of a user's input; a refusal is `place: expected X, got Y; do Z`."""
 
 import difflib
 import math
 import reprlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from numbers import Integral, Real
-from operator import ge, gt, le, lt
 from pathlib import Path
 from types import NoneType
 from typing import Any, TypeAlias
@@ -25,10 +23,10 @@ LONGEST_TEXT = 4096
 Shape: TypeAlias = "tuple[type, ...] | list[Shape] | dict[str, Shape]"
 ANY_KEY = "*"
 _WORDS = {
-    str: "a text",
-    int: "a whole number",
+    str: "a string",
+    int: "an integer",
     float: "a number",
-    bool: "true or false",
+    bool: "a boolean",
     NoneType: "null",
 }
 
@@ -37,51 +35,28 @@ _SHORT.maxstring = _SHORT.maxother = 200
 
 
 def shown(value: Any) -> str:
-    """A value as Python writes it, for a message; of a long text or list only what begins and ends it."""
+    """Write a value as Python does, for a message; a long one is shortened."""
     try:
         return _SHORT.repr(value)
-    except ValueError:  # a whole number of thousands of digits
+    except ValueError:  # an integer of thousands of digits
         return f"a {type(value).__name__}"
 
 
+def unexpected(where: str, expected: str, value: Any, remedy: str = "") -> InputError:
+    """Make the error for a value: `where: expected ..., got value; remedy`."""
+    remedy = f"; {remedy}" if remedy else ""
+    return InputError(f"{where}: expected {expected}, got {shown(value)}{remedy}")
+
+
 @contextmanager
-def placed(where: str) -> Iterator[None]:
-    """Let refusals within the block begin with `where`, the place, unless they do already."""
+def placed(where: str, separator: str = ": ") -> Iterator[None]:
+    """Let refusals within the block begin with the place `where`."""
     try:
         yield
     except InputError as error:
         if str(error).startswith(where):
             raise
-        raise InputError(f"{where}: {error}") from None
-
-
-@dataclass(frozen=True)
-class Findings:
-    """What a battery of checks found."""
-
-    name: str  # of what was checked
-    problems: tuple[
-        str, ...
-    ]  # what makes it unfit to be used, each with a remedy or its place
-    remarks: tuple[str, ...] = ()  # what is unusual, and may be right
-
-    @property
-    def ok(self) -> bool:
-        """Whether there are no problems."""
-        return not self.problems
-
-    @property
-    def verdict(self) -> str:
-        """Whether it is sound, in words."""
-        return "sound" if self.ok else f"{len(self.problems)} problem(s)"
-
-    def __str__(self) -> str:
-        """Verdict, then a line for each problem and remark."""
-        lines = [
-            f"{self.name}: {self.verdict}",
-            *(f"  problem: {problem}" for problem in self.problems),
-        ]
-        return "\n".join(lines + [f"  remark: {remark}" for remark in self.remarks])
+        raise InputError(f"{where}{separator}{error}") from None
 
 
 def quoted(words: Iterable[str]) -> str:
@@ -90,13 +65,12 @@ def quoted(words: Iterable[str]) -> str:
 
 
 def did_you_mean(word: str, options: Iterable[str]) -> str:
-    """``" Did you mean 'beam'?"`` where one of the options looks like `word`, else an empty string."""
+    """Hint such as ``" Did you mean 'beam'?"``; empty if no option looks like `word`."""
     by_lower_case = {option.lower(): option for option in options}
     text = str(word).strip().lower()
     close = difflib.get_close_matches(text, list(by_lower_case), n=1, cutoff=0.6)
-    close = close or [
-        option for option in by_lower_case if len(text) > 2 and (text in option)
-    ]
+    if not close and len(text) > 2:
+        close = [option for option in by_lower_case if text in option]
     return f" Did you mean '{by_lower_case[close[0]]}'?" if close else ""
 
 
@@ -106,7 +80,7 @@ def check_keys(
     where: str,
     required: Iterable[str] = (),
 ) -> None:
-    """Refuse a key that is not among `allowed`, naming the nearest one, and the lack of a required one."""
+    """Refuse a key not among `allowed`, naming the nearest, and a missing required one."""
     for key in mapping:
         if key not in allowed:
             raise InputError(
@@ -123,7 +97,7 @@ def check_keys(
 def check_fields(
     content: Mapping[str, Any], names: Collection[str], where: str, remedy: str
 ) -> None:
-    """Refuse an unknown field of a file, and the lack of any of `names`, ending the latter with `remedy`."""
+    """Refuse an unknown field of a file, and a missing one of `names` with its `remedy`."""
     check_keys(content, names, where)
     for name in names:
         if name not in content:
@@ -132,11 +106,10 @@ def check_fields(
 
 def check_format(content: Mapping[str, Any], known: int, where: str) -> None:
     """Refuse a file whose number `format` is another than the known one."""
-    if (found := content.get("format", known)) != known:
-        raise InputError(
-            f"{where}: format {shown(found)} found, this version of shipgym reads"
-            f" format {known}"
-        )
+    found = content.get("format", known)
+    if found != known:
+        expected = f"format {known}, which this version of shipgym reads"
+        raise unexpected(where, expected, found)
 
 
 def check_table(
@@ -145,25 +118,21 @@ def check_table(
     allowed: Collection[str] | None = None,
     required: Iterable[str] = (),
 ) -> Mapping[str, Any]:
-    """Return `value`, which must be a table (a mapping with text as keys), of these keys where given."""
+    """Return `value`, which must be a table (a mapping by strings), of these keys if given."""
     if not isinstance(value, Mapping):
-        raise InputError(
-            f"{where}: {shown(value)} found, expected a table of keys and values"
-        )
+        raise unexpected(where, "a table of keys and values", value)
     if allowed is not None:
         check_keys(value, allowed, where, required)
     return value
 
 
 def check_text(value: Any, where: str) -> str:
-    """Return `value`, which must be text that is not empty, of at most `LONGEST_TEXT` characters."""
+    """Return `value`, which must be a non-empty string of `LONGEST_TEXT` at most."""
     if not isinstance(value, str) or not value.strip():
-        raise InputError(
-            f"{where}: {shown(value)} found, expected a text that is not empty"
-        )
+        raise unexpected(where, "a non-empty string", value)
     if len(value) > LONGEST_TEXT:
         raise InputError(
-            f"{where}: {len(value)} characters found, expected at most {LONGEST_TEXT}"
+            f"{where}: expected at most {LONGEST_TEXT} characters, got {len(value)}"
         )
     return value
 
@@ -171,18 +140,17 @@ def check_text(value: Any, where: str) -> str:
 def check_choice(
     value: Any, options: Collection[str], where: str, also: str = ""
 ) -> str:
-    """Return `value`, which must be one of the words in `options`; `also` ends the list in the message."""
-    if not isinstance(value, str) or value not in options:
-        hint = did_you_mean(value, options) if isinstance(value, str) else ""
-        raise InputError(
-            f"{where}: {shown(value)} found, expected one of"
-            f" {quoted(options)}{also}.{hint}"
-        )
-    return value
+    """Return `value`, which must be one of `options`; `also` ends the list in messages."""
+    if isinstance(value, str) and value in options:
+        return value
+    hint = did_you_mean(value, options) if isinstance(value, str) else ""
+    raise InputError(
+        f"{where}: expected one of {quoted(options)}{also}, got {shown(value)}.{hint}"
+    )
 
 
 def data_only(value: Any, where: str, own: Any = None, named: bool = False) -> None:
-    """Refuse Python files named in what a file holds: code is run at a user's own word, not at a file's.
+    """Refuse Python files named in a file's content: only a user's own word runs code.
 
     At any depth of `value` these are paths that end in ``.py``, and all that the
     environments' options `task`, `reward` and `sensors` name (`named`: whether `value`
@@ -192,20 +160,16 @@ def data_only(value: Any, where: str, own: Any = None, named: bool = False) -> N
         return
     if isinstance(value, Mapping):
         given = own if isinstance(own, Mapping) else {}
-        for name, one in value.items():
-            data_only(
-                one,
-                f"{where}.{name}",
-                given.get(name),
-                name in ("task", "reward", "sensors"),
-            )
+        for name, entry in value.items():
+            names_code = name in ("task", "reward", "sensors")
+            data_only(entry, f"{where}.{name}", given.get(name), names_code)
     elif isinstance(value, list | tuple):
-        for one in value:
-            data_only(one, where, None, named)
+        for entry in value:
+            data_only(entry, where, None, named)
     elif isinstance(value, str) and (named or Path(value).suffix == ".py"):
         raise InputError(
-            f"{where}: {value!r} found, which is code: no file makes shipgym run"
-            " another; name it on the command line or in your own code"
+            f"{where}: expected data, got {value!r}, which is code: no file makes"
+            " shipgym run another; name it on the command line or in your own code"
         )
 
 
@@ -219,77 +183,88 @@ def check_number(
     at_most: float | None = None,
     hint: str = "",
 ) -> float:
-    """Return `value` as float; it must be a finite number within the open and closed bounds.
+    """Return `value` as float; it must be finite and within open and closed bounds.
 
-    Truth values and numbers in quotes are refused. The InputError begins with `where`,
-    the place, such as ``"ship.toml: [ship] length"``, names the value and what is
-    expected, and ends with `hint`, what to do.
+    Booleans and numbers in quotes are refused. The InputError begins with `where`, the
+    place, such as ``"ship.toml: [ship] length"``, and says what is expected, explained
+    by `hint`, such as ``"in m"``, and what the value is.
     """
-    bounds = (
-        (">", gt, above),
-        (">=", ge, at_least),
-        ("<", lt, below),
-        ("<=", le, at_most),
+    number = _as_float(value)
+    within = (
+        math.isfinite(number)
+        and (above is None or number > above)
+        and (at_least is None or number >= at_least)
+        and (below is None or number < below)
+        and (at_most is None or number <= at_most)
     )
-    given = [(sign, holds, bound) for sign, holds, bound in bounds if bound is not None]
-    stated = " and ".join(f"{sign} {bound:g}" for sign, _, bound in given)
-    expected = f"expected a number {stated}".rstrip() + (f"; {hint}" if hint else "")
-    if isinstance(value, bool) or not isinstance(value, Real):
-        quotes = (
-            " (a text; write the number without quotes)"
-            if isinstance(value, str)
-            else ""
-        )
-        raise InputError(f"{where}: {shown(value)}{quotes} found, {expected}")
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not (
-        math.isfinite(number) and all(holds(number, bound) for _, holds, bound in given)
-    ):
-        raise InputError(f"{where}: {number:g} found, {expected}")
+    if not within:
+        bounds = {">": above, ">=": at_least, "<": below, "<=": at_most}
+        raise _no_such_number(value, where, bounds, hint)
     return number
+
+
+def _no_such_number(
+    value: Any, where: str, bounds: Mapping[str, float | None], hint: str
+) -> InputError:
+    stated = [
+        f"{sign} {bound:g}" for sign, bound in bounds.items() if bound is not None
+    ]
+    expected = f"a number {' and '.join(stated)}".rstrip()
+    if hint:
+        expected += f" ({hint})"
+    if isinstance(value, bool) or not isinstance(value, Real):
+        quotes = "write the number without quotes" if isinstance(value, str) else ""
+        return unexpected(where, expected, value, quotes)
+    return InputError(f"{where}: expected {expected}, got {_as_float(value):g}")
+
+
+def _as_float(value: Any) -> float:
+    """Convert to float: infinite where too large, nan for what is no number."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 def check_whole(
     value: Any, where: str, *, at_least: int, at_most: float = math.inf, hint: str = ""
 ) -> int:
-    """Return `value`, which must be a whole number from `at_least` to `at_most`."""
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, Integral)
-        or not at_least <= int(value) <= at_most
-    ):
-        expected = f"a whole number of at least {at_least}"
-        expected += (f" and at most {at_most}" if at_most < math.inf else "") + (
-            f", {hint}" if hint else ""
-        )
-        raise InputError(f"{where}: {shown(value)} found, expected {expected}")
-    return int(value)
+    """Return `value`, which must be an integer from `at_least` to `at_most`."""
+    whole = isinstance(value, Integral) and not isinstance(value, bool)
+    if whole and at_least <= int(value) <= at_most:
+        return int(value)
+
+    expected = f"an integer of at least {at_least}"
+    if at_most < math.inf:
+        expected += f" and at most {at_most}"
+    if hint:
+        expected += f" ({hint})"
+    raise unexpected(where, expected, value)
 
 
 def check_flag(value: Any, where: str) -> bool:
-    """Return `value`, which must be true or false."""
+    """Return `value`, which must be a boolean."""
     if not isinstance(value, bool):
-        raise InputError(f"{where}: {shown(value)} found, expected true or false")
+        raise unexpected(where, "a boolean", value)
     return value
 
 
 def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]:
-    """Return `values` as a read-only copy; they must be finite numbers, of any shape."""
+    """Return `values` as a read-only copy; they must be finite numbers."""
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{where}: expected an array of numbers") from None
+        raise unexpected(where, "an array of numbers", values) from None
     wrong = np.argwhere(~np.isfinite(array))
     if len(wrong):
         place = tuple(wrong[0].tolist())
         sample = place[0] if len(place) == 1 else place
         remedy = f"; {hint}" if hint else ""
         raise InputError(
-            f"{where}: {array[place]} found at sample {sample}, expected finite"
-            f" numbers{remedy}"
+            f"{where}: expected finite numbers, got {array[place]} at sample"
+            f" {sample}{remedy}"
         )
     array.setflags(write=False)
     return array
@@ -298,43 +273,34 @@ def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]
 def check_array(
     value: Any, shape: tuple[int | None, ...], where: str
 ) -> NDArray[np.float64]:
-    """Return the numbers of a list, or of lists within it, as an array of this shape; None is any length.
+    """Return the numbers of nested lists as an array of a shape; None is any length.
 
-    Texts, truth values, numbers that are not finite and rows that differ in length are
+    Strings, booleans, numbers that are not finite and rows that differ in length are
     refused.
     """
-    size = shape[0]
-    if not isinstance(value, list) or len(value) != (
-        len(value) if size is None else size
-    ):
+    size, *within = shape
+    if not isinstance(value, list) or size not in (None, len(value)):
+        count = "" if size is None else f"{size} "
+        kind = "lists" if within else "numbers"
         found = f"{len(value)} entries" if isinstance(value, list) else shown(value)
-        what = "lists" if len(shape) > 1 else "numbers"
-        raise InputError(
-            f"{where}: {found} found, expected a list of"
-            f" {'' if size is None else f'{size} '}{what}"
-        )
-    if len(shape) == 1:
+        raise InputError(f"{where}: expected a list of {count}{kind}, got {found}")
+
+    if not within:
         for i, number in enumerate(value):
             if isinstance(number, bool) or not isinstance(number, int | float):
-                raise InputError(
-                    f"{where}[{i}]: {shown(number)} found, expected a number"
-                )
+                raise unexpected(f"{where}[{i}]", "a number", number)
         return check_finite(value, where)
-    width = (
-        len(value[0])
-        if shape[1] is None and value and isinstance(value[0], list)
-        else shape[1]
-    )
-    return np.array(
-        [
-            check_array(row, (width, *shape[2:]), f"{where}[{i}]")
-            for i, row in enumerate(value)
-        ]
-    )
+
+    if within[0] is None and value and isinstance(value[0], list):
+        within[0] = len(value[0])  # all rows are as long as the first
+    rows = [
+        check_array(row, tuple(within), f"{where}[{i}]") for i, row in enumerate(value)
+    ]
+    return np.array(rows)
 
 
 def check_shape(value: Any, shape: Shape, where: str) -> None:
-    """Refuse nested JSON values that differ from a shape, naming the place; further keys may be there."""
+    """Refuse nested JSON values that differ from a shape; further keys are allowed."""
     if isinstance(shape, dict):
         table = check_table(value, where)
         for key in table if ANY_KEY in shape else shape:
@@ -342,20 +308,16 @@ def check_shape(value: Any, shape: Shape, where: str) -> None:
                 raise InputError(
                     f"{where}: '{key}' is missing, expected {quoted(shape)}"
                 )
-            check_shape(
-                table[key], shape.get(key, shape.get(ANY_KEY, ())), f"{where}.{key}"
-            )
+            expected = shape.get(key, shape.get(ANY_KEY, ()))
+            check_shape(table[key], expected, f"{where}.{key}")
     elif isinstance(shape, list):
-        several = len(shape) > 1
-        if not isinstance(value, list) or (several and len(value) != len(shape)):
-            raise InputError(
-                f"{where}: {shown(value)} found, expected a"
-                f" list{f' of {len(shape)}' * several}"
-            )
-        for i, entry in enumerate(value):
-            check_shape(entry, shape[i if several else 0], f"{where}[{i}]")
+        if not isinstance(value, list):
+            raise unexpected(where, "a list", value)
+        if len(shape) > 1 and len(value) != len(shape):
+            raise unexpected(where, f"a list of {len(shape)}", value)
+        kinds = shape if len(shape) > 1 else shape * len(value)
+        for i, (entry, kind) in enumerate(zip(value, kinds, strict=True)):
+            check_shape(entry, kind, f"{where}[{i}]")
     elif type(value) not in shape:
-        words = " or ".join(
-            dict.fromkeys(_WORDS.get(kind, kind.__name__) for kind in shape)
-        )
-        raise InputError(f"{where}: {shown(value)} found, expected {words}")
+        words = dict.fromkeys(_WORDS.get(kind, kind.__name__) for kind in shape)
+        raise unexpected(where, " or ".join(words), value)

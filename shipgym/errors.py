@@ -37,7 +37,7 @@ class UnstableModelError(RuntimeError):
 
 
 class ManoeuvreError(RuntimeError):
-    """A manoeuvre, so far in `trial`, never reached its switch heading or the speed at which it ends."""
+    """A manoeuvre, so far in `trial`, never reached its switch heading or final speed."""
 
     def __init__(
         self, message: str, trial: Any

@@ -1,4 +1,4 @@
-"""Libraries that come with an extra of the package, imported when they are first used."""
+"""Libraries of the package's extras, imported when first used."""
 
 from importlib import import_module
 from typing import Any
@@ -7,7 +7,7 @@ from shipgym.errors import InputError
 
 
 def library(name: str, extra: str, use: str = "") -> Any:
-    """A module by name; InputError that says what needs it, and how it is installed, where it is not."""
+    """Import a module by name; InputError says what needs it and how to install it."""
     try:
         return import_module(name)
     except ModuleNotFoundError as error:

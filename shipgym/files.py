@@ -1,4 +1,4 @@
-"""Files that are read within stated limits and with one clear error, and written whole or not at all.
+"""Files read within limits and with one clear error, and written atomically.
 
 Whatever is read is a regular file of at most so many bytes, and what JSON and TOML hold
 is checked in one place (`check_content`), before any reader looks at its fields.
@@ -8,154 +8,46 @@ import json
 import math
 import os
 import re
-import shutil
-import socket
 import stat
-import time
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from errno import EBUSY, ENOENT, EXDEV
-from functools import cache, partial
+from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Any
-from zlib import crc32
+from typing import Any, BinaryIO
 
-from shipgym.checks import check_table, did_you_mean, shown
+from shipgym.checks import check_table, did_you_mean, shown, unexpected
+from shipgym.drafts import atomic_path
 from shipgym.errors import InputError
 
 MIB = 2**20
-#: Most bytes of a file of each kind.
-LARGEST_TOML, LARGEST_JSON, LARGEST_CSV, LARGEST_TENSORS = (
-    MIB // 4,
-    32 * MIB,
-    64 * MIB,
-    256 * MIB,
-)
-#: Most values in a JSON or TOML file, most levels of lists and tables within each
-#: other, longest key.
-MOST_VALUES, DEEPEST, LONGEST_KEY = 1_000_000, 20, 4096
-#: Largest magnitude of a number: products of three such numbers are still finite.
-LARGEST_NUMBER = 1e100
+# most bytes of a file of each kind
+LARGEST_TOML = MIB // 4
+LARGEST_JSON = 32 * MIB
+LARGEST_CSV = 64 * MIB
+LARGEST_TENSORS = 256 * MIB
 
-#: A dotted key that nests deeper than allowed, on which `tomllib` spends time and
-#: memory by the square.
-_LONG_KEY = re.compile(
-    rf"""(?:\.[ \t]*(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*){{{DEEPEST}}}"""
-)
-_AT_ONCE = getattr(
-    os, "O_NONBLOCK", 0
-)  # without waiting, should a file have become a pipe
+MOST_VALUES = 1_000_000  # in a JSON or TOML file
+DEEPEST = 20  # levels of lists and tables within each other
+LONGEST_KEY = 4096  # characters
+LARGEST_NUMBER = 1e100  # magnitude: products of three such numbers are still finite
+
 #: What cannot be written in UTF-8, or ends a text for the operating system.
 _UNWRITABLE = re.compile("[\0\ud800-\udfff]")
-_NOT_LATIN = re.compile(rb"[\x80-\x9f\xfe\xff\0]")
-#: Names of `draft_name`.
-DRAFT = re.compile(r"\..+\.([0-9a-f]{8})-(\d+)\.draft", re.DOTALL)
-ABANDONED_S = 7 * 86400.0
-MOUNTED = (EXDEV, EBUSY)  # what renaming onto a mount point fails with
 
 
-@contextmanager
-def atomic_path(path: Path) -> Iterator[Path]:
-    """A temporary name beside a file, renamed to it when the block ends without an error.
-
-    InputError if the folder does not exist or cannot be written, or what is there is no
-    file, as a device.
-    """
-    draft = draft_name(path)
-    try:
-        if path.exists() and not path.is_file():
-            raise InputError(f"{path}: is not a file; choose another name")
-        remove_drafts(path.parent)
-        yield draft
-        try:
-            draft.replace(path)
-        except OSError as error:
-            if error.errno not in MOUNTED:
-                raise
-            shutil.copyfile(draft, path)
-    except OSError as error:
-        remedy = "; choose a folder that exists" if error.errno == ENOENT else ""
-        raise InputError(
-            f"{path}: cannot be written ({error.strerror or error}){remedy}"
-        ) from error
-    finally:
-        with suppress(OSError):
-            draft.unlink()
-
-
-def draft_name(path: Path) -> Path:
-    """The hidden name beside a file or folder under which this process writes it."""
-    return path.parent / f".{path.name}.{_host()}-{os.getpid()}.draft"
-
-
-@contextmanager
-def draft_folder(path: Path) -> Iterator[Path]:
-    """A folder beside a path that is removed when the block ends, unless it was renamed."""
-    remove_drafts(path.parent)
-    draft = draft_name(path)
-    shutil.rmtree(draft, ignore_errors=True)  # of a killed process of the same number
-    try:
-        draft.mkdir()
-        yield draft
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
-
-
-def abandoned_drafts(folder: Path) -> list[Path]:
-    """Drafts in a folder whose process is dead.
-
-    Those of other computers, and of a process whose number is in use again, count after
-    a week.
-    """
-    found = []
-    with suppress(OSError):
-        for path in folder.iterdir():
-            named = DRAFT.fullmatch(path.name)
-            if named and (
-                _is_dead(*named.groups())
-                or time.time() - path.lstat().st_mtime > ABANDONED_S
-            ):
-                found.append(path)
-    return found
-
-
-@cache
-def remove_drafts(folder: Path) -> None:
-    """Remove what killed processes left half-written in a folder; a process looks once in each folder."""
-    for path in abandoned_drafts(folder):
-        with suppress(OSError):
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
-
-
-def _is_dead(host: str, process: str) -> bool:
-    """Whether a process of this computer is no more."""
-    if host != _host() or os.name != "posix":  # elsewhere the signal 0 would end it
-        return False
-    try:
-        os.kill(int(process), 0)
-    except (ProcessLookupError, OverflowError):
-        return True
-    except PermissionError:
-        pass
-    return False
-
-
-@cache
-def _host() -> str:
-    return f"{crc32(socket.gethostname().encode()):08x}"
+# ---- writing ---------------------------------------------------------------------------
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it where they do not exist; raises InputError if that cannot be."""
+    """Make a folder and those above it if absent; raises InputError if it cannot."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(
-            f"{folder}: no folder can be made there ({error.strerror or error})"
-        ) from None
+        reason = error.strerror or error
+        raise InputError(f"{folder}: no folder can be made there ({reason})") from None
 
 
 def write_bytes(content: bytes, path: Path) -> None:
@@ -170,57 +62,66 @@ def write_text(text: str, path: Path) -> None:
 
 
 def write_json(fields: Mapping[str, Any], path: Path, indent: int | None = 1) -> None:
-    """Write JSON atomically (`atomic_path`); numbers that are not finite are refused with a ValueError."""
+    """Write JSON atomically (`atomic_path`); ValueError for numbers that are not finite."""
     write_text(json.dumps(fields, indent=indent, allow_nan=False) + "\n", path)
 
 
+# ---- reading ---------------------------------------------------------------------------
+
+
 def check_readable(path: Path, what: str) -> None:
-    """InputError for what is missing, no regular file, or cannot be read; `what` it is, as "CSV file"."""
-    read_bytes(path, what, 0)
+    """Refuse a missing, special or unreadable file; `what` it is, such as "CSV file"."""
+    with _opened(path, what):
+        pass
 
 
 def read_bytes(path: Path, what: str, largest: int) -> bytes:
-    """The content of a regular file of at most `largest` bytes, none of it where that is 0.
+    """Content of a regular file of at most `largest` bytes.
 
     Raises InputError for a file that is missing, too large or cannot be read, and for a
     folder, a device or a pipe, which is not opened; `what` is expected there, as "CSV
     file".
     """
+    with _opened(path, what) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > largest:
+            raise InputError(
+                f"{path}: expected a {what} of at most {largest} bytes, got {size}"
+                " bytes; split it, or leave out what is not needed"
+            )
+        return file.read(size)
+
+
+@contextmanager
+def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
+    """A regular file, opened; anything else is refused and not opened."""
+    at_once = getattr(os, "O_NONBLOCK", 0)  # should the file have become a pipe
     try:
         kind = path.stat().st_mode
+        if stat.S_ISDIR(kind):
+            raise InputError(f"{path}: expected a {what}, got a folder")
         if not stat.S_ISREG(kind):
-            found = (
-                "a folder"
-                if stat.S_ISDIR(kind)
-                else "no regular file (a device, a pipe or a socket)"
-            )
-            raise InputError(f"{path}: this is {found}, expected a {what}")
+            found = "no regular file (a device, a pipe or a socket)"
+            raise InputError(f"{path}: expected a {what}, got {found}")
         with open(
-            path, "rb", opener=lambda name, flags: os.open(name, flags | _AT_ONCE)
+            path, "rb", opener=lambda name, flags: os.open(name, flags | at_once)
         ) as file:
-            size = os.fstat(file.fileno()).st_size
-            if not largest:
-                return b""
-            if size > largest:
-                raise InputError(
-                    f"{path}: {size} bytes found, expected a {what} of at most"
-                    f" {largest} bytes; split it, or leave out what is not needed"
-                )
-            return file.read(size)
+            yield file
     except InputError:
         raise
     except FileNotFoundError:
-        near = did_you_mean(path.name, [other.name for other in path.parent.glob("*")])
+        beside = [other.name for other in path.parent.glob("*")]
+        near = did_you_mean(path.name, beside)
         raise InputError(f"{path}: there is no such {what}.{near}") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(
-            f"{path}: cannot be read ({reason}), expected a {what}"
+            f"{path}: expected a {what}, got a file that cannot be read ({reason})"
         ) from None
 
 
 def read_text(path: Path, what: str, largest: int, latin: bool = False) -> str:
-    """A text in UTF-8, as `read_bytes` reads; InputError, naming the line, for what is no such text.
+    """Read UTF-8 text as `read_bytes` does; InputError names the line that is not.
 
     With `latin`, other bytes are read as Latin-1, as instruments write the sign of
     degrees, unless they are control characters there, or those of UTF-16 and of memory
@@ -230,22 +131,28 @@ def read_text(path: Path, what: str, largest: int, latin: bool = False) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        if latin and not _NOT_LATIN.search(data):
+        if latin and not re.search(rb"[\x80-\x9f\xfe\xff\0]", data):
             return data.decode("latin-1")
-        line = data[: error.start].count(b"\n") + 1
-        found = (
-            f"line {line} holds byte 0x{data[error.start]:02x}, which is not UTF-8 text"
-            " (binary content)"
+        raise _not_utf_8(path, what, data, error.start) from None
+
+
+def _not_utf_8(path: Path, what: str, data: bytes, start: int) -> InputError:
+    """The error for a file whose bytes are none of UTF-8 from `start` on."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        place, found = str(path), "UTF-16"
+    else:
+        line = data.count(b"\n", 0, start) + 1
+        place, found = (
+            f"{path}: line {line}",
+            f"byte 0x{data[start]:02x} (binary content)",
         )
-        if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-            found = "the file is in UTF-16"
-        raise InputError(
-            f"{path}: {found}, expected a {what}; save it as text in UTF-8"
-        ) from None
+    return InputError(
+        f"{place}: expected a {what} in UTF-8, got {found}; save it as text in UTF-8"
+    )
 
 
 def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
-    """The object in a JSON file; `what` is expected there, and `remedy` says what to do about a broken one.
+    """Read a JSON object; `what` is expected, `remedy` says how to mend a broken file.
 
     Raises InputError as `read_text` does, and if the file is cut short, holds no
     object, or something that `check_content` refuses.
@@ -255,19 +162,14 @@ def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
 
 
 def parse_json(text: str, where: str, remedy: str) -> Any:
-    """The value of a JSON text within the limits of `check_content`; `where` begins messages: "a.json:"."""
+    """Parse JSON within the limits of `check_content`; messages begin with `where`."""
     loads = partial(json.loads, object_pairs_hook=_unrepeated)
-    return _parsed(
-        loads,
-        text,
-        where,
-        "broken JSON ({}); the file may be cut short: " + remedy,
-        False,
-    )
+    broken = "broken JSON ({}); the file may be cut short: " + remedy
+    return _parsed(loads, text, where, broken)
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """The tables of a TOML file; `what` is expected there, as "ship file".
+    """Tables of a TOML file; `what` is expected there, as "ship file".
 
     Raises InputError as `read_text` does, and if the file is not TOML or holds
     something that `check_content` refuses.
@@ -276,29 +178,24 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:
-    """The tables of a TOML text within the limits of `check_content`; `where` begins messages: "a.toml:"."""
-    if _LONG_KEY.search(text):
+    """Parse TOML within the limits of `check_content`; messages begin with `where`."""
+    # on a dotted key that nests deeper `tomllib` spends time and memory by the square
+    part = r"""\.[ \t]*(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*"""
+    if re.search(rf"(?:{part}){{{DEEPEST}}}", text):
         raise InputError(
-            f"{where} a dotted key of over {DEEPEST} parts found, expected shorter keys"
+            f"{where} expected dotted keys of at most {DEEPEST} parts, got a longer one"
         )
-    return dict(
-        _parsed(
-            tomllib.loads,
-            text,
-            where,
-            "not valid TOML: {}; correct that line",
-            infinite=True,
-        )
-    )
+    broken = "not valid TOML: {}; correct that line"
+    return dict(_parsed(tomllib.loads, text, where, broken, infinite=True))
 
 
 def shipped_toml(package: str, name: str) -> dict[str, Any]:
-    """The tables of a TOML file that comes with a package."""
+    """Tables of a TOML file that comes with a package."""
     return tomllib.loads(resources.files(package).joinpath(name).read_text("utf-8"))
 
 
 def toml_value(text: str) -> Any:
-    """A value as TOML has it, such as 3, true or [1, 2]; any other text is itself."""
+    """Value as TOML has it, such as 3, true or [1, 2]; any other text is itself."""
     try:
         return parse_toml(f"value = {text}", "value:")["value"]
     except InputError:
@@ -306,15 +203,12 @@ def toml_value(text: str) -> Any:
 
 
 def named_values(texts: Iterable[str], where: str, example: str) -> dict[str, Any]:
-    """Values of texts `name=value`, as TOML has them, by name; InputError for one written otherwise."""
+    """Parse texts `name=value`, with values as in TOML; returns them by name."""
     found: dict[str, Any] = {}
     for text in texts:
         name, sign, value = (part.strip() for part in text.partition("="))
         if not sign or not name:
-            raise InputError(
-                f"{where}: {text!r} found, expected name=value, such as {where}"
-                f" {example}"
-            )
+            raise unexpected(where, f"name=value, such as {where} {example}", text)
         found[name] = toml_value(value)
         if found[name] == value:  # not TOML, or more than a file may hold
             with suppress(ValueError):
@@ -323,94 +217,100 @@ def named_values(texts: Iterable[str], where: str, example: str) -> dict[str, An
     return found
 
 
+# ---- limits of what JSON and TOML hold -------------------------------------------------
+
+
 def check_content(
     value: Any, where: str, infinite: bool = False, depth: int = 1
 ) -> None:
     """Refuse what no file of this project holds, before its fields are looked at.
 
     In a list or table from JSON or TOML these are: lists and tables more than `DEEPEST`
-    deep, whole numbers of more than 64 bits (a `seed` may have 128), numbers that are
-    nan or exceed `LARGEST_NUMBER` (unless `infinite` ones may stand there), dates, keys
-    longer than `LONGEST_KEY`, and texts with null bytes or halves of characters. Raises
+    deep, integers of more than 64 bits (a `seed` may have 128), numbers that are nan or
+    exceed `LARGEST_NUMBER` (unless `infinite` ones may stand there), dates, keys longer
+    than `LONGEST_KEY`, and texts with null bytes or halves of characters. Raises
     InputError, which begins with `where`, "model.json:", and names the place.
     """
     if depth > DEEPEST:
-        raise InputError(
-            f"{where}: lists or tables nest deeper than {DEEPEST}; take another copy"
-        )
-    for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+        raise _too_deep(f"{where}:")
+    entries = value.items() if isinstance(value, dict) else enumerate(value)
+    for key, item in entries:
         if isinstance(key, str) and (len(key) > LONGEST_KEY or _UNWRITABLE.search(key)):
-            raise InputError(
-                f"{where}: key {shown(key)} found, expected a text of at most"
-                f" {LONGEST_KEY} characters"
-            )
-        nested = isinstance(item, dict | list)
-        fault = "" if nested else _fault(key, item, infinite)
-        if not nested and not fault:
+            expected = f"keys of at most {LONGEST_KEY} characters"
+            raise unexpected(where, expected, key)
+        if isinstance(item, dict | list):
+            check_content(item, _place(where, key, depth), infinite, depth + 1)
             continue
-        place = (
-            f"{where}[{key}]"
-            if isinstance(key, int)
-            else f"{where}{' ' if depth == 1 else '.'}{key}"
-        )
-        if not nested:
-            raise InputError(f"{place}: {shown(item)} found, expected {fault}")
-        check_content(item, place, infinite, depth + 1)
+        expected = _expected(key, item, infinite)
+        if expected:
+            raise unexpected(_place(where, key, depth), expected, item)
 
 
-def _fault(key: str | int, value: Any, infinite: bool) -> str:
-    """What is expected in the place of a single value; empty where nothing is wrong with it."""
+def _place(where: str, key: str | int, depth: int) -> str:
+    """Place of an entry, as "model.json: steering.rates[2]"."""
+    if isinstance(key, int):
+        return f"{where}[{key}]"
+    return f"{where} {key}" if depth == 1 else f"{where}.{key}"
+
+
+def _expected(key: str | int, value: Any, infinite: bool) -> str:
+    """Expectation that a single value does not meet; empty if none."""
+    if value is None or isinstance(value, bool):
+        return ""
     if isinstance(value, float):
         fine = abs(value) <= LARGEST_NUMBER or (infinite and math.isinf(value))
         return "" if fine else f"a number of magnitude {LARGEST_NUMBER:g} at most"
     if isinstance(value, int):
         bits = 128 if key == "seed" else 64  # NumPy draws seeds of 128 bits
-        return (
-            ""
-            if value.bit_length() <= bits
-            else f"a whole number of at most {bits} bits"
-        )
+        fine = value.bit_length() <= bits
+        return "" if fine else f"an integer of at most {bits} bits"
     if isinstance(value, str):
-        return (
-            "a text without null bytes and halves of characters"
-            if _UNWRITABLE.search(value)
-            else ""
-        )
-    return "" if value is None else "a text, a number, true or false"
+        fine = not _UNWRITABLE.search(value)
+        return "" if fine else "a string without null bytes and halves of characters"
+    return "a string, a number or a boolean"
 
 
 def _parsed(
-    parse: Callable[[str], Any], text: str, where: str, broken: str, infinite: bool
+    parse: Callable[[str], Any],
+    text: str,
+    where: str,
+    broken: str,
+    infinite: bool = False,
 ) -> Any:
-    """What a parser makes of a text, within the limits; `broken` says what is wrong with its syntax."""
-    if sum(map(text.count, "[{,")) > MOST_VALUES:
+    """Parse a text within the limits; `broken` says what is wrong with its syntax."""
+    if sum(text.count(sign) for sign in "[{,") > MOST_VALUES:
         raise InputError(
-            f"{where} more than {MOST_VALUES} values found, expected fewer; split the"
-            " file"
+            f"{where} expected at most {MOST_VALUES} values, got more; split the file"
         )
     try:
         content = parse(text)
     except RecursionError:
-        raise InputError(
-            f"{where} lists or tables nest deeper than {DEEPEST}; take another copy"
-        ) from None
+        raise _too_deep(where) from None
     except KeyError as error:
-        raise InputError(
-            f"{where} key {shown(error.args[0])} appears twice, expected each once"
-        ) from None
+        key = shown(error.args[0])
+        raise InputError(f"{where} expected each key once, got {key} twice") from None
     except (json.JSONDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{where} {broken.format(error)}") from None
-    except ValueError:  # Python's limit to the digits of a whole number
-        raise InputError(f"{where} a whole number of more than 64 bits found") from None
-    check_content(
-        content if isinstance(content, dict | list) else [content], where, infinite
-    )
+    except ValueError:  # Python's limit to the digits of an integer
+        raise InputError(
+            f"{where} expected integers of at most 64 bits, got a longer one"
+        ) from None
+    entries = content if isinstance(content, dict | list) else [content]
+    check_content(entries, where, infinite)
     return content
 
 
+def _too_deep(where: str) -> InputError:
+    return InputError(
+        f"{where} expected at most {DEEPEST} levels of lists and tables, got more; take"
+        " another copy"
+    )
+
+
 def _unrepeated(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A table of pairs; KeyError for a key that appears twice."""
+    """Table of pairs; KeyError for a key that appears twice."""
     table = dict(pairs)
     if len(table) < len(pairs):
-        raise KeyError(Counter(key for key, _ in pairs).most_common(1)[0][0])
+        keys = Counter(key for key, _ in pairs)
+        raise KeyError(keys.most_common(1)[0][0])
     return table

@@ -1,8 +1,9 @@
-"""Python files of a user's own, such as tasks and ships: read as modules, at the user's own word only."""
+"""Users' Python files, such as tasks and ships, executed only when a user names them."""
 
 import hashlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from inspect import (
     CO_ASYNC_GENERATOR,
     CO_COROUTINE,
@@ -29,13 +30,13 @@ LIBRARIES = (
 
 
 def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
-    """A Python file as a module, executed once however often it is asked for while it stays the same.
+    """Import a Python file as a module, executed once while it stays the same.
 
     `expected` says what it is to be, for messages. InputError if there is none, or it
     cannot be executed.
     """
     if not path.is_file():
-        raise InputError(f"{path}: no such file, expected {expected}")
+        raise InputError(f"{path}: expected {expected}, got no such file")
     resolved = path.resolve()
     content = hashlib.sha256(str(resolved).encode() + b"\0" + resolved.read_bytes())
     name = f"shipgym_user_{content.hexdigest()[:16]}"
@@ -55,49 +56,62 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
             raise InputError(f"{path}: {error}") from None
         if not isinstance(error, Exception | SystemExit):  # Ctrl-C
             raise
-        frames = extract_tb(error.__traceback__)
-        passed = (one.lineno for one in frames if one.filename == str(resolved))
-        line = [getattr(error, "lineno", None), *passed][-1]  # the last one in the file
-        place = f"{path}, line {line}" if line else path
-        others = (
-            one
-            for one in frames
-            if not one.filename.startswith(("<", str(resolved), *LIBRARIES))
-        )
-        within = [f" ({one.filename}, line {one.lineno})" for one in others][
-            -1:
-        ]  # of what it imports
-        why = f"{type(error).__name__}: {error}{''.join(within)}"
-        raise InputError(f"{place}: cannot be executed: {why}") from error
+        raise _not_executed(path, str(resolved), error) from error
     return module
 
 
+@contextmanager
+def working_folder() -> Iterator[None]:
+    """Find modules of the working folder, which a user has named, within the block."""
+    before = list(sys.path)
+    sys.path.insert(0, str(Path.cwd()))
+    try:
+        yield
+    finally:
+        sys.path[:] = before
+
+
+def _not_executed(path: Path, resolved: str, error: BaseException) -> InputError:
+    """Error for a file whose execution failed: the last line in it, and in what it imports."""
+    frames = extract_tb(error.__traceback__)
+    passed = [frame.lineno for frame in frames if frame.filename == resolved]
+    line = passed[-1] if passed else getattr(error, "lineno", None)
+    place = f"{path}, line {line}" if line else path
+    ours = ("<", resolved, *LIBRARIES)
+    others = [frame for frame in frames if not frame.filename.startswith(ours)]
+    within = f" ({others[-1].filename}, line {others[-1].lineno})" if others else ""
+    why = f"{type(error).__name__}: {error}{within}"
+    return InputError(f"{place}: cannot be executed: {why}")
+
+
 def check_function(value: Any, count: int, where: str, what: str) -> None:
-    """Refuse what is not a plain function of so many arguments; `what` says what is expected."""
-    code = value.__code__ if isinstance(value, FunctionType) else None
-    if code is None:
-        raise InputError(f"{where}: no plain function found, expected {what}")
-    if code.co_flags & NOT_PLAIN or code.co_argcount != count:
-        more = (
-            " or more, a generator or a coroutine" if code.co_flags & NOT_PLAIN else ""
-        )
+    """Refuse anything but a plain function of `count` arguments; `what` is expected."""
+    if not isinstance(value, FunctionType):
+        raise InputError(f"{where}: expected {what}, got no plain function")
+    code = value.__code__
+    if code.co_flags & NOT_PLAIN:
         raise InputError(
-            f"{where}: {code.co_argcount} arguments{more} found, expected {what}"
+            f"{where}: expected {what}, got one with variable arguments, a generator or"
+            " a coroutine"
+        )
+    if code.co_argcount != count:
+        raise InputError(
+            f"{where}: expected {what}, got one of {code.co_argcount} arguments"
         )
 
 
 def refuse_closure(function: Any) -> None:
-    """Refuse a function made within another, as decorators make them: it cannot be compiled."""
+    """Refuse a closure, as decorators make them: it cannot be compiled."""
     if getattr(function, "__closure__", None):
         raise InputError(
-            f"{place_of(function)}: uses variables of the function around it"
-            f" ({', '.join(function.__code__.co_freevars)}), expected a function at the"
-            " top of a file"
+            f"{place_of(function)}: expected a function at the top of a file, got one"
+            " that uses variables of the function around it"
+            f" ({', '.join(function.__code__.co_freevars)})"
         )
 
 
 def asked(function: Callable[..., Any], *arguments: Any) -> Any:
-    """What a function of a user's own answers; an error in it is an InputError that names file and line."""
+    """Call a user's function; an error in it becomes an InputError naming file and line."""
     try:
         return function(*arguments)
     except InputError:
@@ -109,7 +123,7 @@ def asked(function: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def place_of(function: Any, error: BaseException | None = None) -> str:
-    """File, line and name of a function, or of what failed in a user's own code while it was called."""
+    """File, line and name of a function, or of the user's code in which it failed."""
     code = getattr(function, "__code__", None)
     if code is None:
         return repr(function)

@@ -40,7 +40,6 @@ PAGES = [
     path
     for path in sorted((ROOT / "docs").rglob("*.md"))
     if "```python" in path.read_text(encoding="utf-8")
-    and path.name != "gallery.md"  # made by its script
 ]
 #: Pages that take few steps, for which loops are not worth compiling.
 PLAIN = "docs/environments/"

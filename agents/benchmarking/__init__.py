@@ -1,1 +1,1 @@
-"""The benchmark: contestants in the tasks of a suite, statistics, result files and their page."""
+"""The benchmark: controllers in the tasks of a suite, statistics, result files and their page."""

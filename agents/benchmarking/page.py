@@ -1,48 +1,61 @@
-"""The page of a benchmark: one HTML file with tables that sort, curves, and its worst episodes to replay."""
+"""The page of a benchmark: one HTML file with tables, figures and replays."""
 
 import base64
 import gzip
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from agents.benchmarking import page_figures as figures
-from agents.benchmarking.contestants import BEST_KNOWN
+from agents.benchmarking.episode_figures import histories_figure, tracks_figure
+from agents.benchmarking.page_figures import (
+    costs_figure,
+    looks,
+    profile_figure,
+    scores_figure,
+)
 from agents.benchmarking.page_replays import (
-    bests_of,
-    contestants_of,
-    hardest_of,
+    hardest_seed,
     replay_data,
     replayable,
+    usable_controllers,
+)
+from agents.benchmarking.page_tables import (
+    costs_table,
+    improvement_table,
+    metrics_table,
+    ranking_table,
+    scores_table,
 )
 from agents.benchmarking.replays import EpisodeId, Rerun, rerun
 from agents.benchmarking.results import RESULTS, BenchmarkResult
 from agents.output import check_page
-from agents.suites.suite import N_EPISODES, load_suite
+from agents.suites.suite import N_EPISODES
 from identification.progress import Progress
-from shipgym.files import shipped_toml, write_text
+from shipgym.envs.episode import Episode
+from shipgym.files import write_text
 from shipgym.pages import render
+from shipgym.pages.numbers import counted
+from shipgym.plots.style import Figure
 
 PAGE = "index.html"
-WORST = 3  # episodes of each contestant in each task that may be replayed
+N_WORST = 3  # episodes of each controller in each task that may be replayed
 
-#: Further figures of a task: what the head shows, and how a number is written.
-METRICS: dict[str, tuple[str, str]] = shipped_toml("agents.benchmarking", "words.toml")[
-    "metrics"
-]
-RARE = (
-    "extrapolating",
-    "shielded",
-    "interventions",
-)  # shown only where not 0 throughout
+
+class PageFigure(NamedTuple):
+    """Figure of the page, which its script draws when it comes into sight."""
+
+    name: str  # id, unique in the page
+    caption: str
+    height: int  # pixels
+    data: str  # packed JSON
 
 
 def write_page(
     result: BenchmarkResult,
     path: str | Path,
     controllers: Any = None,
-    worst: int = WORST,
+    worst: int = N_WORST,
     workers: int | None = 1,
     progress: Progress | None = None,
 ) -> None:
@@ -58,123 +71,199 @@ def write_page(
     path : str or Path
         The HTML file; one that exists is replaced. It loads nothing.
     controllers : optional
-        As `benchmark` was given them; needed to replay contestants that were given as
-        objects.
+        As `benchmark` was given them; needed to replay those given as objects.
     worst : int
-        How many episodes of each contestant in each task may be replayed; fewer if they
+        How many episodes of each controller in each task may be replayed; fewer if they
         are too many.
     workers : int or None
-        Processes that run them; None for as many as there are cores.
+        Processes that run them; None for one per core.
     progress : callable, optional
-        Told the stage of the work, what is done and the total.
+        Called with the stage of the work, what is done and the total.
     """
     target = Path(path)
     check_page(target, plots=True)
     count, episodes = replayable(result, worst)
-    write_text(
-        _page(result, rerun(result, episodes, controllers, workers, progress), count),
-        target,
-    )
+    again = rerun(result, episodes, controllers, workers, progress)
+    write_text(_page(result, again, count), target)
 
 
 def _page(result: BenchmarkResult, again: Rerun, count: int) -> str:
-    """The text of the page, with so many of the worst episodes of each contestant to replay."""
-    wins = [name for task in result.tasks for name in bests_of(result, task)]
-    scores, profile = figures.scores_figure(result), result.summary["profile"]
-    replays = {
-        "count": count,
-        "episodes": len(again.episodes),
-        "different": again.different,
-        "refused": dict.fromkeys(
-            (name, why) for (name, _), why in again.refused.items()
-        ),
-        "data": replay_data(result, again, count),
-    }
+    """Return the text of the page with so many episodes of each controller."""
+    summary = result.summary
+    scores_caption = "Relative costs."
+    cost_tables = [costs_table(result)]
+    if summary["reference"]:
+        scores_caption = "Scores with their 95 % intervals."
+        cost_tables.append(scores_table(result))
+    profile = None
+    if summary["profile"]["shares"]:
+        profile_caption = (
+            "Share of all episodes that score more than the threshold; higher is better."
+            " Dotted: wheel-over from the model, and the best known."
+        )
+        profile = _figure("profile-figure", profile_figure(result), profile_caption)
+    failures_title = (
+        f"{len(result.failures)} times a controller failed or could not run a task"
+    )
     return render(
         "agents.benchmarking/page.html",
-        about=result.summary,
-        names=result.ranking,
-        best_known=BEST_KNOWN,
-        styles=figures.styles(result.ranking),
-        wins={name: wins.count(name) for name in result.ranking},
+        suite=summary["suite"]["name"],
+        lead=_lead(result),
         failures=result.failures,
-        tasks=[_task(result, again, task) for task in result.tasks],
-        figures={
-            "scores": scores,
-            "profile": figures.profile_figure(profile, result.ranking),
-        },
-        replays=replays,
-        command=command(result),
-        results_file=RESULTS,
+        failures_title=failures_title,
+        looks=looks(result.ranking),
+        ranking=ranking_table(result),
+        scores_figure=_figure("scores", scores_figure(result), scores_caption),
+        cost_tables=cost_tables,
+        improvement=improvement_table(result),
+        profile=profile,
+        tasks=[
+            _task(result, again, task, number)
+            for number, task in enumerate(result.tasks)
+        ],
+        replays=_about_replays(again, count),
+        not_replayed=_not_replayed(again),
+        replay_data=replay_data(result, again, count),
+        origin=_origin(result),
+        controllers=_files_and_hashes(result),
         packed=packed,
     )
 
 
 def packed(text: str) -> str:
-    """A text that the page's script unpacks: gzip in base64."""
+    """Return a text that the page's script unpacks: gzip in base64."""
     return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
 
 
-def _task(result: BenchmarkResult, again: Rerun, task: str) -> dict[str, Any]:
-    """What the page shows of a task."""
-    found = result.summary["tasks"][task]
+def _figure(name: str, figure: Figure, caption: str) -> PageFigure:
+    return PageFigure(name, caption, figure.layout.height, packed(figure.to_json()))
+
+
+def _lead(result: BenchmarkResult) -> str:
+    summary = result.summary
+    controllers = counted(len(summary["controllers"]), "controller")
+    tasks = counted(len(summary["tasks"]), "task")
+    episodes = counted(summary["seeds"]["count"], "episode")
+    return (
+        f"{controllers} in {tasks}, {episodes} each, the same for all. Tables sort by a"
+        " click on a head; figures may be zoomed."
+    )
+
+
+def _task(
+    result: BenchmarkResult, again: Rerun, task: str, number: int
+) -> dict[str, Any]:
+    """Return what the page shows of a task."""
+    about = result.summary["suite"]["tasks"][task]
+    costs_caption = (
+        "Cost of each episode, with the box of the middle half and the median."
+    )
     return {
         "name": task,
-        **result.summary["suite"]["tasks"][task],
-        "found": found,
-        "best": bests_of(result, task),
-        "metrics": [
-            (name, *METRICS[name]) for name in METRICS if _is_shown(name, found)
-        ],
-        "costs": figures.costs_figure(result, task),
-        "seed": hardest_of(result, task),
-        "hardest": _hardest(result, again, task),
+        "about": f"{about['environment']}, {about['model']}: {about['why']}.",
+        "costs": _figure(f"costs-{number}", costs_figure(result, task), costs_caption),
+        "metrics": metrics_table(result, task, f"metrics-{number}"),
+        "seed": hardest_seed(result, task),
+        "hardest": _hardest(result, again, task, number),
     }
 
 
-def _is_shown(metric: str, found: Mapping[str, Any]) -> bool:
-    """Whether a metric is known of one of the contestants, and not 0 throughout if it is a rare one."""
-    means = [one["metrics"].get(metric, {}).get("mean") for one in found.values()]
-    return any(means) if metric in RARE else any(mean is not None for mean in means)
-
-
-def _hardest(result: BenchmarkResult, again: Rerun, task: str) -> dict[str, Any]:
-    """Figures of all contestants in the hardest episode; none where none of them can be replayed."""
-    names, seed = contestants_of(result, task), hardest_of(result, task)
-    wanted = {
-        name: again.episodes.get(EpisodeId(name, task, 0, seed)) for name in names
-    }
-    episodes = {
-        name: episode for name, episode in wanted.items() if episode is not None
-    }
+def _hardest(
+    result: BenchmarkResult, again: Rerun, task: str, number: int
+) -> list[PageFigure]:
+    """Return the figures of the hardest episode; none if it cannot be replayed."""
+    seed = hardest_seed(result, task)
+    episodes: dict[str, Episode] = {}
+    for name in usable_controllers(result, task):
+        key = EpisodeId(name, task, 0, seed)
+        if key in again.episodes:
+            episodes[name] = again.episodes[key]
     if not episodes:
-        return {}
-    found = {"histories": figures.histories_figure(episodes, result.ranking)}
-    if any(episode.waypoints is not None for episode in episodes.values()):
-        found["tracks"] = figures.tracks_figure(episodes, result.ranking)
-    return found
+        return []
+
+    figures = []
+    has_path = any(episode.waypoints is not None for episode in episodes.values())
+    shown = "Heading, with the ordered course"
+    if has_path:
+        shown = "Cross-track error, with the bounds of the corridor"
+        tracks = tracks_figure(episodes, result.ranking)
+        caption = "Paths over ground; dashed the path to follow, shaded its corridor."
+        figures.append(_figure(f"tracks-{number}", tracks, caption))
+    histories = histories_figure(episodes, result.ranking)
+    figures.append(
+        _figure(f"histories-{number}", histories, f"{shown}, and the rudder.")
+    )
+    return figures
+
+
+def _about_replays(again: Rerun, count: int) -> str:
+    """Return a paragraph about the episodes that may be replayed."""
+    episodes = "the worst episode" if count == 1 else f"the {count} worst episodes"
+    text = (
+        f"For each controller {episodes} of each task, together with the task's best"
+        " controller in the same one; and all controllers in the hardest one. They were"
+        " run again for this page from their seeds"
+    )
+    if not again.different:
+        return f"{text}; each cost the same as in the results."
+    first = " ".join(str(part) for part in again.different[0])
+    return (
+        f"{text}; {len(again.different)} of {len(again.episodes)} cost something else"
+        " than in the results, as on another processor or version: the first is"
+        f" {first}."
+    )
+
+
+def _not_replayed(again: Rerun) -> list[str]:
+    """Return why controllers cannot be replayed, each reason once."""
+    reasons = [f"{name}: {why}" for (name, _), why in again.refused.items()]
+    return list(dict.fromkeys(reasons))
+
+
+def _origin(result: BenchmarkResult) -> dict[str, Any]:
+    """Return how the results were made."""
+    summary = result.summary
+    seeds = summary["seeds"]
+    return {
+        "command": command(result),
+        "suite": summary["suite"],
+        "seeds": f"{seeds['first']} to {seeds['first'] + seeds['count'] - 1}",
+        "versions": summary["versions"],
+        "episodes": summary["episodes"],
+        "results": RESULTS,
+    }
+
+
+def _files_and_hashes(result: BenchmarkResult) -> list[tuple[str, str, str]]:
+    """Return rows of controller, file or design, and SHA-256."""
+    rows = []
+    for name, about in result.summary["controllers"].items():
+        for path, sha256 in about["files"].items():
+            rows.append((name, path, sha256))
+        for task, cells in result.summary["tasks"].items():
+            for sha256 in _policy_hashes(cells, name):
+                rows.append((name, f"controller for {task}", sha256))
+    return rows
+
+
+def _policy_hashes(cells: Mapping[str, Any], name: str) -> list[str]:
+    hashes = cells[name]["policy_sha256"] if name in cells else []
+    return [sha256 for sha256 in hashes if sha256]
 
 
 def command(result: BenchmarkResult) -> str:
-    """The command that makes these results; contestants that were objects stand as `...`."""
-    about = result.summary
-    sources = {
-        name: one["source"] or "..." for name, one in about["contestants"].items()
-    }
-    given = [
-        source if source == name else f"{name}={source}"
-        for name, source in sources.items()
-    ]
-    words = [
-        "shipgym",
-        "benchmark",
-        "--controllers",
-        ",".join(given),
-        "--suite",
-        about["suite"]["name"],
-    ]
-    if len(about["tasks"]) < len(load_suite(about["suite"]["name"]).tasks):
-        words += ["--tasks", ",".join(about["tasks"])]
-    if about["seeds"]["count"] != N_EPISODES:
-        words += ["--episodes", str(about["seeds"]["count"])]
+    """Return the command that makes these results; objects stand as `...`."""
+    summary = result.summary
+    controllers = []
+    for name, about in summary["controllers"].items():
+        source = about["source"] or "..."
+        controllers.append(source if source == name else f"{name}={source}")
+
+    suite = summary["suite"]
+    words = ["shipgym", "benchmark", "--controllers", ",".join(controllers)]
+    words += ["--suite", suite["file"] or suite["name"]]
+    if not suite["complete"]:
+        words += ["--tasks", ",".join(summary["tasks"])]
+    if summary["seeds"]["count"] != N_EPISODES:
+        words += ["--episodes", str(summary["seeds"]["count"])]
     return shlex.join([*words, "--out", "results"])

@@ -1,179 +1,199 @@
-"""The worst episodes of a benchmark, ready for the replay player in its page."""
+"""The worst episodes of a benchmark, ready for the replay player of its page."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.benchmarking.contestants import BEST_KNOWN
-from agents.benchmarking.page_figures import styles
+from agents.benchmarking.page_figures import looks
 from agents.benchmarking.replays import SAME_COST, EpisodeId, Rerun, cost_of
 from agents.benchmarking.results import BenchmarkResult
+from agents.benchmarking.sources import BEST_KNOWN
 from agents.rollouts.replay_page import PLAYER
 from agents.rollouts.replay_series import quantities, run
-from shipgym.files import shipped_toml
 from shipgym.pages import render
 
 MOST_RUNS = 300  # in a page, 5 kB each
-MARK = "@episodes@"  # what the page's script puts its runs in the place of
-DECIMALS: dict[str, int] = shipped_toml("agents.benchmarking", "decimals.toml")
+PLACEHOLDER = "@episodes@"  # in the player, where the page's script puts its runs
+#: Decimals of the histories in the page.
+DECIMALS = {
+    "x": 1,
+    "y": 1,
+    "psi": 1,
+    "delta": 1,
+    "heading_error": 1,
+    "course_order": 1,
+    "rudder_order": 1,
+    "cross_track_error": 1,
+    "speed": 2,
+    "yaw_rate": 3,
+    "heel": 2,
+    "shaft_speed": 1,
+    "reward_so_far": 3,
+    "wind_speed": 1,
+    "wind_from": 0,
+    "current_speed": 2,
+    "current_towards": 0,
+}
 REWARD_DECIMALS = 4
 
 
-def contestants_of(result: BenchmarkResult, task: str) -> list[str]:
-    """Names of those who ran a task and are usable at sea, as they are ranked."""
-    return [
-        name
-        for name in result.ranking
-        if name in result.summary["tasks"][task] and name != BEST_KNOWN
-    ]
+class Choice(NamedTuple):
+    """Episodes of a task that may be replayed together, the first of them chosen.
 
-
-def bests_of(result: BenchmarkResult, task: str) -> list[str]:
-    """Names of the lowest mean cost in a task, several where equal to rounding, of those that sail."""
-    found = result.summary["tasks"][task]
-    costs = {
-        name: found[name]["cost"]["value"] for name in contestants_of(result, task)
-    }
-    known = {name: cost for name, cost in costs.items() if cost is not None}
-    least = min(known.values(), default=np.nan)
-    return [
-        name for name, cost in known.items() if np.isclose(cost, least, rtol=SAME_COST)
-    ]
-
-
-def worst_of(
-    result: BenchmarkResult, contestant: str, task: str, count: int
-) -> list[EpisodeId]:
-    """The episodes that cost a contestant most, the worst first; over all of its training runs."""
-    costs = result.figures(contestant, task)
-    order = np.argsort(-np.nan_to_num(costs, nan=np.inf).ravel(), kind="stable")[:count]
-    first = result.summary["seeds"]["first"]
-    runs, places = (one.tolist() for one in np.unravel_index(order, costs.shape))
-    return [
-        EpisodeId(contestant, task, k, first + place)
-        for k, place in zip(runs, places, strict=True)
-    ]
-
-
-def hardest_of(result: BenchmarkResult, task: str) -> int:
-    """Seed of the episode whose cost has the highest median over the contestants."""
-    costs = [
-        result.figures(name, task).mean(axis=0) for name in contestants_of(result, task)
-    ]
-    place = (
-        int(np.argmax(np.median(np.nan_to_num(costs, nan=np.inf), axis=0)))
-        if costs
-        else 0
-    )
-    return int(result.summary["seeds"]["first"]) + place
-
-
-def entries_of(
-    result: BenchmarkResult, task: str, count: int
-) -> list[tuple[str, list[EpisodeId]]]:
-    """What may be replayed of a task: for whom, and the episodes to lay over each other, the first chosen.
-
-    At first all contestants in the hardest episode, of the task as a whole; then the
-    worst episodes of each, beside the task's best contestant in the same.
+    `controller` is whose worst episode that is; empty for the hardest episode of all.
     """
-    who, seed = contestants_of(result, task), hardest_of(result, task)
-    best = next(iter(bests_of(result, task)), None)
-    found = [("", [EpisodeId(name, task, 0, seed) for name in who])]
-    for name in who:
-        for episode in worst_of(result, name, task, count):
-            beside = (
-                []
-                if best is None or name == best
-                else [EpisodeId(best, task, 0, episode.seed)]
-            )
-            found.append((name, [episode, *beside]))
+
+    controller: str
+    episodes: list[EpisodeId]
+
+
+def usable_controllers(result: BenchmarkResult, task: str) -> list[str]:
+    """Return the controllers that could run a task and are usable at sea, as ranked."""
+    cells = result.summary["tasks"][task]
+    return [name for name in result.ranking if name in cells and name != BEST_KNOWN]
+
+
+def best_controllers(result: BenchmarkResult, task: str) -> list[str]:
+    """Return those of the lowest mean cost in a task, several if equal to rounding."""
+    cells = result.summary["tasks"][task]
+    costs = {}
+    for name in usable_controllers(result, task):
+        cost = cells[name]["cost"]["value"]
+        if cost is not None:
+            costs[name] = cost
+    lowest = min(costs.values(), default=np.nan)
+    return [name for name in costs if np.isclose(costs[name], lowest, rtol=SAME_COST)]
+
+
+def worst_episodes(
+    result: BenchmarkResult, controller: str, task: str, count: int
+) -> list[EpisodeId]:
+    """Return the episodes with the highest costs, over all training runs."""
+    costs = result.figures(controller, task)
+    order = np.argsort(-np.nan_to_num(costs, nan=np.inf).ravel(), kind="stable")
+    runs, numbers = np.unravel_index(order[:count], costs.shape)
+    first = result.summary["seeds"]["first"]
+    return [
+        EpisodeId(controller, task, k, first + number)
+        for k, number in zip(runs.tolist(), numbers.tolist(), strict=True)
+    ]
+
+
+def hardest_seed(result: BenchmarkResult, task: str) -> int:
+    """Return the seed of the episode with the highest median cost over controllers."""
+    first = int(result.summary["seeds"]["first"])
+    costs = [
+        result.figures(name, task).mean(axis=0)
+        for name in usable_controllers(result, task)
+    ]
+    if not costs:
+        return first
+    medians = np.median(np.nan_to_num(costs, nan=np.inf), axis=0)
+    return first + int(np.argmax(medians))
+
+
+def choices(result: BenchmarkResult, task: str, count: int) -> list[Choice]:
+    """Return what may be replayed of a task.
+
+    First all controllers in the hardest episode, then the worst episodes of each with
+    the task's best controller in the same episode.
+    """
+    names, seed = usable_controllers(result, task), hardest_seed(result, task)
+    found = [Choice("", [EpisodeId(name, task, 0, seed) for name in names])]
+    best = best_controllers(result, task)
+    for name in names:
+        for episode in worst_episodes(result, name, task, count):
+            together = [episode]
+            if best and name != best[0]:
+                together.append(EpisodeId(best[0], task, 0, episode.seed))
+            found.append(Choice(name, together))
     return found
 
 
 def replayable(result: BenchmarkResult, wanted: int) -> tuple[int, list[EpisodeId]]:
-    """How many of the worst episodes of each contestant a page has room for, and all that it shows.
+    """Return how many of the worst episodes a page has room for, and all it shows.
 
-    `wanted`: fewer are taken if together they are too many; at least one.
+    At most `wanted` of each controller and task; at least one.
     """
     for count in range(wanted, 0, -1):
-        entries = [
-            entry for task in result.tasks for entry in entries_of(result, task, count)
+        shown = [
+            episode
+            for task in result.tasks
+            for choice in choices(result, task, count)
+            for episode in choice.episodes
         ]
-        episodes = list(dict.fromkeys(one for _, some in entries for one in some))
+        episodes = list(dict.fromkeys(shown))
         if len(episodes) <= MOST_RUNS:
             break
     return count, episodes
 
 
 def replay_data(result: BenchmarkResult, again: Rerun, count: int) -> dict[str, Any]:
-    """All that the page's script needs to replay episodes, ready for JSON.
+    """Return all that the page's script needs to replay episodes, ready for JSON.
 
-    Returns `page`, the player, with a mark where its runs go; `quantities`, what it
-    shows over time; `runs`, in their short form (`short`); `entries`, what may be
-    chosen, by task: for whom, seed, cost, outcome and numbers of the runs.
+    `page` is the player, with a mark where its runs go; `quantities` what it shows over
+    time; `runs` in their short form; `entries` what may be chosen, by task.
     """
     whole: dict[EpisodeId, dict[str, Any]] = {}
-    entries: dict[str, list[dict[str, Any]]] = {task: [] for task in result.tasks}
+    entries: dict[str, list[dict[str, Any]]] = {}
     for task in result.tasks:
-        for who, episodes in entries_of(result, task, count):
-            there = [episode for episode in episodes if episode in again.episodes]
-            if not there or who not in ("", there[0].contestant):
+        entries[task] = []
+        for choice in choices(result, task, count):
+            there = [one for one in choice.episodes if one in again.episodes]
+            if not there or choice.controller not in ("", there[0].controller):
                 continue
-            for one in there:
-                whole[one] = whole.get(one) or run(
-                    _called(result, one), again.episodes[one]
-                )
-            entry = {
-                "who": who,
-                "seed": there[0].seed,
-                "cost": round(cost_of(result, there[0]), 2),
-            }
-            places = [list(whole).index(one) for one in there]
+            for episode in there:
+                if episode not in whole:
+                    title = _title(result, episode)
+                    whole[episode] = run(title, again.episodes[episode])
+            places = [list(whole).index(episode) for episode in there]
             entries[task].append(
-                {**entry, "outcome": whole[there[0]]["outcome"], "runs": places}
+                {
+                    "who": choice.controller,
+                    "seed": there[0].seed,
+                    "cost": round(cost_of(result, there[0]), 2),
+                    "outcome": whole[there[0]]["outcome"],
+                    "runs": places,
+                }
             )
-    look = styles(result.ranking)
+    look = looks(result.ranking)
     runs = [
-        {**short(found), "colour": look[one.contestant][0]}
-        for one, found in whole.items()
+        {**short(one), "colour": look[episode.controller].colour}
+        for episode, one in whole.items()
     ]
     return {
-        "page": render(PLAYER, title="Replay", data=MARK),
-        "mark": f'"{MARK}"',
-        "quantities": quantities([*whole.values()]),
+        "page": render(PLAYER, title="Replay", data=PLACEHOLDER),
+        "mark": f'"{PLACEHOLDER}"',
+        "quantities": quantities(list(whole.values())),
         "runs": runs,
         "entries": entries,
     }
 
 
-def _called(result: BenchmarkResult, episode: EpisodeId) -> str:
-    several = result.summary["tasks"][episode.task][episode.contestant]["runs"] > 1
-    return (
-        f"{episode.contestant}, run {episode.run + 1}"
-        if several
-        else episode.contestant
-    )
+def _title(result: BenchmarkResult, episode: EpisodeId) -> str:
+    n_runs = result.summary["tasks"][episode.task][episode.controller]["runs"]
+    if n_runs == 1:
+        return episode.controller
+    return f"{episode.controller}, run {episode.run + 1}"
 
 
 def short(whole: dict[str, Any]) -> dict[str, Any]:
-    """A run with its histories as whole numbers, each the difference to the one before; see `DECIMALS`."""
-    parts = {key: values for key, values in whole["parts"].items() if np.any(values)}
-    return {
-        **whole,
-        "series": {
-            key: differences(values, DECIMALS[key])
-            for key, values in whole["series"].items()
-        },
-        "parts": {
-            key: differences(values, REWARD_DECIMALS) for key, values in parts.items()
-        },
-        "rewards": differences(whole["rewards"], REWARD_DECIMALS),
-        "other": {},
+    """Return a run with its histories as integers, each the difference to the last."""
+    series = {
+        name: differences(values, DECIMALS[name])
+        for name, values in whole["series"].items()
     }
+    parts = {
+        name: differences(values, REWARD_DECIMALS)
+        for name, values in whole["parts"].items()
+        if np.any(values)
+    }
+    rewards = differences(whole["rewards"], REWARD_DECIMALS)
+    return {**whole, "series": series, "parts": parts, "rewards": rewards, "other": {}}
 
 
 def differences(values: Sequence[float], decimals: int) -> list[int]:
-    """The decimals, and the differences of values in units of the last of them."""
+    """Return the decimals, and the differences of values in units of the last one."""
     units = np.round(np.asarray(values) * 10.0**decimals).astype(np.int64)
     return [decimals, *np.diff(units, prepend=0).tolist()]

@@ -1,28 +1,33 @@
-"""Single episodes of a benchmark run once more, with all that happened in them."""
+"""Single episodes of a benchmark, run again with their histories."""
 
-from collections.abc import Mapping, Sequence
+import glob
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.benchmarking.contestants import Contestant, contestants, remade
+from agents.benchmarking.entries import Entry, read_entries
 from agents.benchmarking.results import BenchmarkResult
-from agents.engines.jobs import run_jobs
+from agents.benchmarking.sources import file_hash, known_names, names_code
+from agents.jobs import JobEngine, run_jobs
 from agents.rollouts.episodes import recorded
-from agents.suites.suite import BenchmarkTask, load_suite
+from agents.suites.suite import BenchmarkTask
 from identification.progress import Progress
+from shipgym.checks import check_table, check_text
 from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
 
-SAME_COST = 1e-9  # relative difference of the cost that is rounding
+SAME_COST = 1e-9  # relative difference of costs that is rounding
 
 
 class EpisodeId(NamedTuple):
-    """An episode of one contestant: in which task, of which training run, with which seed."""
+    """An episode of a controller: its task, its training run and its seed."""
 
-    contestant: str
+    controller: str
     task: str
     run: int
     seed: int
@@ -30,15 +35,21 @@ class EpisodeId(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Rerun:
-    """Episodes that were run once more."""
+    """Episodes that were run again.
 
-    #: those that could be; one whose controller failed at once has no step and is not
-    #: among them
+    Attributes
+    ----------
+    episodes : dict of EpisodeId to Episode
+        Those that have at least one step.
+    refused : dict of (str, str) to str
+        Why a controller could not run a task again.
+    different : tuple of EpisodeId
+        Episodes whose cost is not the one in the results.
+    """
+
     episodes: dict[EpisodeId, Episode] = field(default_factory=dict)
-    refused: dict[tuple[str, str], str] = field(
-        default_factory=dict
-    )  # why others could not
-    different: tuple[EpisodeId, ...] = ()  # whose cost is not the one in the results
+    refused: dict[tuple[str, str], str] = field(default_factory=dict)
+    different: tuple[EpisodeId, ...] = ()
 
 
 def rerun(
@@ -50,112 +61,160 @@ def rerun(
 ) -> Rerun:
     """Run episodes of a benchmark again, from their seeds.
 
-    `result`: whose contestants and tasks they are of. `controllers`: as `benchmark` was
-    given them; objects, and code that a file of results names, are known from here
-    only. `workers`: processes; None for as many as there are cores. Objects steer in
-    this process. `progress`: told what is done, how many of it, and the total.
+    Parameters
+    ----------
+    result : BenchmarkResult
+    episodes : sequence of EpisodeId
+    controllers : optional
+        As `benchmark` was given them; needed for objects, and for code that a file of
+        results names.
+    workers : int or None
+        Number of processes; None for one per core. Objects steer in this process.
+    progress : callable, optional
+        Called with what is done, how many of it, and the total.
     """
-    given = (
-        {}
-        if controllers is None
-        else {one.name: one for one in contestants(controllers)}
-    )
-    wanted: dict[tuple[str, str], dict[int, list[int]]] = {}
-    for name, task, run, seed in episodes:
-        wanted.setdefault((name, task), {}).setdefault(run, []).append(seed)
-    suite = result.summary["suite"]["name"]
-    jobs, found = [], {}
-    for (name, task), seeds in wanted.items():
-        about, asked = result.summary["contestants"][name], load_suite(suite).task(task)
-        runs = [[run, *chosen] for run, chosen in seeds.items()]
+    given: dict[str, Entry] = {}
+    if controllers is not None:
+        given = {entry.name: entry for entry in read_entries(controllers)}
+
+    jobs: list[dict[str, Any]] = []
+    answers: dict[tuple[str, str], dict[str, Any]] = {}
+    for (name, task_name), runs in _by_cell(episodes).items():
         try:
-            one = given.get(name) or remade(name, about, asked, result.allow_code)
+            task = result.task(task_name)
+            about = result.summary["controllers"][name]
+            entry = given.get(name) or rebuild(name, about, task, result.allow_code)
         except InputError as error:
-            found[name, task] = {"refused": str(error)}
+            answers[name, task_name] = {"refused": str(error)}
             continue
-        if not one.is_text:
-            found[name, task] = _recorded(one, asked, suite, runs)
-            continue
-        jobs.append(
-            {
-                "suite": suite,
-                "task": task,
-                "contestant": name,
-                "source": one.source,
-                "runs": runs,
-            }
-        )
-    told = progress and partial(progress, "episodes run again")
-    done = run_jobs(rerun_job, jobs, workers=workers, progress=told)
-    found |= {
-        (job["contestant"], job["task"]): one
-        for job, one in zip(jobs, done, strict=True)
+        if entry.is_text:
+            job = {"task": task.to_dict(), "entry": name, "source": entry.source}
+            jobs.append({**job, "runs": runs})
+        else:
+            answers[name, task_name] = _record(entry, task, runs)
+
+    tell = progress and partial(progress, "episodes run again")
+    for job, answer in zip(
+        jobs, run_jobs(rerun_job, jobs, JobEngine(workers=workers), tell), strict=True
+    ):
+        answers[job["entry"], job["task"]["name"]] = answer
+    return _collect(result, answers)
+
+
+def _by_cell(
+    episodes: Sequence[EpisodeId],
+) -> dict[tuple[str, str], list[list[int]]]:
+    """Training runs by controller and task, each followed by its seeds."""
+    seeds: dict[tuple[str, str], dict[int, list[int]]] = {}
+    for name, task, run, seed in episodes:
+        seeds.setdefault((name, task), {}).setdefault(run, []).append(seed)
+    return {
+        cell: [[run, *of_run] for run, of_run in runs.items()]
+        for cell, runs in seeds.items()
     }
-    return _gathered(result, found)
 
 
 def rerun_job(job: dict[str, Any]) -> dict[str, Any]:
-    """Run chosen episodes of one contestant and task, in any process; see `_recorded`."""
-    one, task = (
-        Contestant(job["contestant"], job["source"]),
-        load_suite(job["suite"]).task(job["task"]),
-    )
-    return _recorded(one, task, job["suite"], job["runs"])
+    """Run chosen episodes of a controller and task, in any process; see `_record`."""
+    entry = Entry(job["entry"], job["source"])
+    return _record(entry, BenchmarkTask.from_dict(job["task"]), job["runs"])
 
 
-def _recorded(
-    one: Contestant, task: BenchmarkTask, suite: str, runs: Sequence[Sequence[int]]
+def _record(
+    entry: Entry, task: BenchmarkTask, runs: Sequence[Sequence[int]]
 ) -> dict[str, Any]:
-    """Why it cannot be, or of each training run, given with its seeds, costs and fields of the episodes."""
-    done = []
+    """Return `refused`, or for each of `runs` the costs and fields of its episodes."""
+    records = []
     try:
-        policies = one.policies(task, suite)
+        policies = entry.policies(task)
         for run, *seeds in runs:
             found = recorded(policies[run], task, seeds)
-            episodes = [
-                None if episode is None else vars(episode) for episode in found.episodes
-            ]
-            done.append(
+            episodes = [one and vars(one) for one in found.episodes]
+            records.append(
                 {"run": run, "seeds": seeds, "costs": found.costs, "episodes": episodes}
             )
-    except (
-        Exception
-    ) as error:  # one that cannot be made again is no reason to have no page
-        said = (
-            str(error)
-            if isinstance(error, InputError)
-            else f"{type(error).__name__}: {error}"
-        )
-        return {"refused": said}
-    return {"refused": "", "runs": done}
+    except InputError as error:
+        return {"refused": str(error)}
+    except Exception as error:  # it cannot be run again, which is no reason for no page
+        return {"refused": f"{type(error).__name__}: {error}"}
+    return {"refused": "", "runs": records}
 
 
-def _gathered(
-    result: BenchmarkResult, found: Mapping[tuple[str, str], Mapping[str, Any]]
+def _collect(
+    result: BenchmarkResult, answers: Mapping[tuple[str, str], Mapping[str, Any]]
 ) -> Rerun:
     episodes: dict[EpisodeId, Episode] = {}
     different: list[EpisodeId] = []
-    for (name, task), one in found.items():
-        for run in one.get("runs", ()):
-            for seed, cost, content in zip(
-                run["seeds"], run["costs"], run["episodes"], strict=True
-            ):
+    for (name, task), answer in answers.items():
+        for run in answer.get("runs", ()):
+            rows = zip(run["seeds"], run["costs"], run["episodes"], strict=True)
+            for seed, cost, content in rows:
                 key = EpisodeId(name, task, run["run"], seed)
                 if content is not None:
                     episodes[key] = Episode(**content)
-                if np.isfinite(cost) and not np.isclose(
-                    cost, cost_of(result, key), rtol=SAME_COST
-                ):
+                is_same = np.isclose(cost, cost_of(result, key), rtol=SAME_COST)
+                if np.isfinite(cost) and not is_same:
                     different.append(key)
-    refused = {pair: one["refused"] for pair, one in found.items() if one["refused"]}
+    refused = {
+        cell: answer["refused"] for cell, answer in answers.items() if answer["refused"]
+    }
     return Rerun(episodes, refused, tuple(different))
 
 
 def cost_of(result: BenchmarkResult, episode: EpisodeId) -> float:
-    """What an episode cost in the results."""
-    first = result.summary["seeds"]["first"]
-    return float(
-        result.figures(episode.contestant, episode.task)[
-            episode.run, episode.seed - first
-        ]
-    )
+    """Return the cost of an episode in the results."""
+    costs = result.figures(episode.controller, episode.task)
+    return float(costs[episode.run, episode.seed - result.summary["seeds"]["first"]])
+
+
+def rebuild(
+    name: str,
+    about: Mapping[str, Any],
+    task: BenchmarkTask,
+    allow_code: Collection[str],
+) -> Entry:
+    """Make an entry of a file of results again, to run it in a task.
+
+    By name, or from files that still have the SHA-256 in the results. Raises InputError
+    for other files, for objects, and for functions that the user has not named.
+
+    Parameters
+    ----------
+    name : str
+        Name of the entry.
+    about : mapping
+        What the results say of it.
+    task : BenchmarkTask
+    allow_code : collection of str
+        Functions that the user has named, module:function.
+    """
+    if about.get("source") is None:
+        raise InputError(f"'{name}' was an object, which results do not hold")
+    source = check_text(about["source"], f"'{name}': source")
+    if names_code(source) and source not in allow_code:
+        raise InputError(
+            f"'{name}': expected no code that you have not named yourself, got"
+            f" '{source}'; give it as `controllers`"
+        )
+    if names_code(source) or source in known_names():
+        return Entry(name, source)
+
+    hashes = check_table(about.get("files"), f"'{name}': files")
+    design_name = task.design_task.name
+    paths = [
+        path
+        for pattern in source.split("+")
+        for path in sorted(hashes)
+        if _is_match(path, pattern.replace("{task}", design_name))
+    ]
+    for path in paths:
+        if not Path(path).is_file() or file_hash(path) != hashes[path]:
+            raise InputError(f"'{path}': expected the file that took part, got another")
+    if not paths:
+        raise InputError(f"'{source}': expected files that took part, got none")
+    return Entry(name, "+".join(glob.escape(path) for path in paths))
+
+
+def _is_match(path: str, pattern: str) -> bool:
+    parts, patterns = Path(path).parts, Path(pattern).parts
+    return len(parts) == len(patterns) and all(map(fnmatchcase, parts, patterns))

@@ -1,13 +1,12 @@
-"""What a benchmark found: one row an episode, and the summary with its intervals; both as files.
+"""Results of a benchmark: a row for each episode, and the summary; both as files.
 
-What stands in `results.json` is told by `agents.benchmarking.results_shape`.
-`episodes.parquet` has one row for each contestant, task, run and seed, with the figures
-of `metrics`.
+`results.json` is described in `agents.benchmarking.results_format`, `episodes.parquet`
+has one row for each controller, task, training run and seed.
 """
 
 import platform
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,184 +16,209 @@ from typing import Any, Self
 
 import numpy as np
 
-from agents.benchmarking.contestants import Contestant, file_hash, names_code
+from agents.benchmarking.cells import Cell
+from agents.benchmarking.entries import Entry
 from agents.benchmarking.episode_table import (
     Columns,
-    joined,
+    episode_table,
     pyarrow,
     read_episodes,
     write_episodes,
 )
-from agents.benchmarking.results_shape import SHAPE, check_summary
-from agents.benchmarking.summary import Done, summary_of
+from agents.benchmarking.results_format import (
+    FIELDS,
+    FORMAT,
+    KIND,
+    check_summary,
+)
+from agents.benchmarking.sources import file_hash, names_code
+from agents.benchmarking.summary import summarise
 from agents.controllers.controller import model_hash
 from agents.output import check_writable, present
-from agents.suites.suite import FIRST_SEED, BenchmarkTask, suite_hash
+from agents.suites.suite import (
+    FIRST_SEED,
+    BenchmarkTask,
+    Suite,
+    list_suites,
+    load_suite,
+)
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_fields, check_format
 from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
 
-FORMAT, KIND = 2, "shipgym-benchmark"
 RESULTS, EPISODES, PARTS = "results.json", "episodes.parquet", "parts"
-FIELDS = ("format", "kind", *SHAPE)
-PACKAGES = ("shipgym", "numpy", "numba", "scipy", "control", "osqp")
+PACKAGES = ("shipgym", "numpy", "numba", "scipy", "control")
 REMEDY = "run `shipgym benchmark` again"
 
 
 @dataclass(frozen=True, eq=False)
 class BenchmarkResult:
-    """Result of a benchmark.
+    """Results of a benchmark.
 
     Attributes
     ----------
     summary : dict
-        What `results.json` holds (`agents.benchmarking.results_shape`).
+        Content of `results.json` (`agents.benchmarking.results_format`).
     episodes : dict of str to array
-        One row an episode: contestant, task, run, seed, and figures by name
-        (`metrics`).
+        One row for each episode: controller, task, run, seed, and figures by name.
+    suite : Suite or None
+        Suite that it was run on, if it is known.
     allow_code : tuple of str
-        Functions of contestants that the user named when it was made; none of a file.
+        Functions that the user named as controllers; none if it was read from a file.
     """
 
     summary: dict[str, Any]
     episodes: Columns
+    suite: Suite | None = None
     allow_code: tuple[str, ...] = ()
 
     @property
     def ranking(self) -> list[str]:
-        """Names of the contestants, the best first."""
-        return [entry["name"] for entry in self.summary["ranking"]]
+        """Names of the controllers, the best first."""
+        return [ranked["name"] for ranked in self.summary["ranking"]]
 
     @cached_property
     def tasks(self) -> tuple[str, ...]:
         """Names of the tasks."""
         return tuple(self.summary["tasks"])
 
+    def task(self, name: str) -> BenchmarkTask:
+        """Return a task to run again.
+
+        Raises InputError if its suite is not known.
+        """
+        if self.suite is not None:
+            return self.suite.task(name)
+        suite = self.summary["suite"]["name"]
+        if suite not in list_suites():
+            raise InputError(
+                f"suite: '{suite}' is none of shipgym's; load_results(path,"
+                " suite='your_suite.toml')"
+            )
+        return load_suite(suite).task(name)
+
     @property
     def failures(self) -> list[str]:
-        """In words, who failed or could not take part."""
+        """Sentences about the controllers that failed or could not run a task."""
         failures = []
-        for name, one in self.summary["contestants"].items():
-            failures += [
-                f"{name} did not take part in {task}: {why}"
-                for task, why in one["refused"].items()
-            ]
-            failures += [
-                f"{name} failed in {found[name]['failed']} episodes of {task}:"
-                f" {found[name]['failure']}"
-                for task, found in self.summary["tasks"].items()
-                if name in found and found[name]["failed"]
-            ]
+        for name, about in self.summary["controllers"].items():
+            for task, why in about["refused"].items():
+                failures.append(f"{name} could not run {task}: {why}")
+            for task, cells in self.summary["tasks"].items():
+                if name in cells and cells[name]["failed"]:
+                    failures.append(
+                        f"{name} failed in {cells[name]['failed']} episodes of {task}:"
+                        f" {cells[name]['failure']}"
+                    )
         return failures
 
-    def figures(self, contestant: str, task: str, name: str = "cost") -> Floats:
-        """A figure of each episode, shape (n_runs, n_episodes); of no runs where it took no part.
+    def figures(self, controller: str, task: str, name: str = "cost") -> Floats:
+        """Return a figure of each episode, shape (n_runs, n_episodes).
 
-        Raises InputError for an unknown contestant, task or figure.
+        There are no runs where the controller could not run the task. Raises InputError
+        for an unknown controller, task or figure.
         """
-        check_choice(contestant, self.summary["contestants"], "contestant")
+        check_choice(controller, self.summary["controllers"], "controller")
         check_choice(task, self.tasks, "task")
         check_choice(name, self.episodes, "figure")
-        rows = (self.episodes["contestant"] == contestant) & (
-            self.episodes["task"] == task
-        )
-        return np.asarray(
-            self.episodes[name][rows].reshape(-1, self.summary["seeds"]["count"])
-        )
+        is_controller = self.episodes["controller"] == controller
+        rows = is_controller & (self.episodes["task"] == task)
+        n_episodes = self.summary["seeds"]["count"]
+        return np.asarray(self.episodes[name][rows].reshape(-1, n_episodes))
 
-    def save(self, folder: str | Path | None) -> Self:
-        """Write `episodes.parquet` and then `results.json`, each whole or not at all; None: nowhere.
+    def save(self, folder: str | Path) -> Self:
+        """Write `episodes.parquet` and then `results.json`, each whole or not at all.
 
-        Returns the result with the hash of `episodes.parquet` in its summary.
-
-        Raises InputError if pyarrow is missing or the folder cannot be written.
+        Returns the result with the hash of `episodes.parquet` in its summary. Raises
+        InputError if pyarrow is missing or the folder cannot be written.
         """
-        if folder is None:
-            return self
         target = Path(folder)
         pyarrow()
         make_folder(target)
         write_episodes(self.episodes, target / EPISODES)
-        about = {**self.summary["episodes"], "sha256": file_hash(target / EPISODES)}
-        saved = replace(self, summary={**self.summary, "episodes": about})
+        sha256 = file_hash(target / EPISODES)
+        episodes = {**self.summary["episodes"], "sha256": sha256}
+        saved = replace(self, summary={**self.summary, "episodes": episodes})
         write_json(saved.summary, target / RESULTS)
         return saved
 
 
 def check_new(folder: Path, resume: bool, suite: str) -> Path:
-    """Refuse a folder that cannot take results, or holds some, unless of this suite and to be gone on with.
+    """Refuse a folder that cannot take results.
 
-    Raises InputError saying what to do.
+    One that holds results is for `resume`, if they are of this suite. Raises InputError
+    saying what to do.
     """
     pyarrow()  # a missing extra is reported now, not after the work
     if folder.exists() and not folder.is_dir():
         raise InputError(
-            f"{folder}: is not a folder, expected one to write the results to; choose"
-            " another"
+            f"{folder}: expected a folder for the results, got a file; choose another"
         )
     check_writable(folder)
-    found = present(folder) if folder.exists() else []
-    ours = any(name in (RESULTS, EPISODES, PARTS) for name in found)
-    if ours and not resume:
+    names = present(folder) if folder.exists() else []
+    has_results = any(name in (RESULTS, EPISODES, PARTS) for name in names)
+    if names and not has_results:
+        raise InputError(
+            f"{folder}: expected results of a benchmark or nothing, got '{names[0]}';"
+            " choose another folder"
+        )
+    if has_results and not resume:
         raise InputError(
             f"{folder}: already contains results; continue with --resume (resume=True),"
             " or choose another folder"
         )
-    if (
-        ours
-        and (folder / RESULTS).is_file()
-        and load_results(folder).summary["suite"]["name"] != suite
-    ):
-        raise InputError(
-            f"{folder}: holds results of another suite than '{suite}'; choose another"
-            " folder"
-        )
-    if found and not ours:
-        raise InputError(
-            f"{folder}: holds '{found[0]}', not a result of a benchmark; choose another"
-            " folder"
-        )
+    if RESULTS in names:
+        other = load_results(folder).summary["suite"]["name"]
+        if other != suite:
+            raise InputError(
+                f"{folder}: expected results of suite '{suite}', got those of"
+                f" '{other}'; choose another folder"
+            )
     return folder
 
 
-def gathered(
-    suite: str,
+def collect(
+    suite: Suite,
     tasks: Sequence[BenchmarkTask],
-    who: Sequence[Contestant],
-    done: Done,
-    episodes: int,
+    entries: Sequence[Entry],
+    cells: Mapping[tuple[str, str], Cell],
+    n_episodes: int,
 ) -> BenchmarkResult:
-    """Put together what was done.
+    """Put together what was run.
 
-    `suite`: its name; `tasks`: those that were run; `done`: see
-    `agents.benchmarking.run.results_of`; `episodes`: number of episodes of each task.
+    `cells` has every entry in every task, by the names of both.
     """
-    seeds = FIRST_SEED + np.arange(episodes)
-    rows = [
-        (one.name, task.name, number, seeds, run["episodes"])
-        for one in who
-        for task in tasks
-        for number, run in enumerate(done[one.name, task.name]["runs"])
-    ]
-    table = joined(rows)
-    about_tasks = {task.name: _about_task(task) for task in tasks}
-    about = {
+    names = [entry.name for entry in entries]
+    in_order = {
+        (name, task.name): cells[name, task.name] for name in names for task in tasks
+    }
+    table = episode_table(in_order, FIRST_SEED + np.arange(n_episodes))
+    summary = {
         "format": FORMAT,
         "kind": KIND,
         "versions": versions(),
-        "suite": {"name": suite, "sha256": suite_hash(suite), "tasks": about_tasks},
-        "seeds": {"first": FIRST_SEED, "count": episodes},
-        "contestants": {one.name: _about_contestant(one, tasks, done) for one in who},
+        "suite": {
+            "name": suite.name,
+            "sha256": suite.sha256,
+            "file": Path(suite.source).name if suite.source.endswith(".toml") else "",
+            "complete": len(tasks) == len(suite.tasks),
+            "tasks": {task.name: _about_task(task) for task in tasks},
+        },
+        "seeds": {"first": FIRST_SEED, "count": n_episodes},
+        "controllers": {
+            entry.name: _about_entry(entry, tasks, cells) for entry in entries
+        },
+        **summarise(tasks, names, cells),
+        "episodes": {"file": EPISODES, "rows": len(table["seed"]), "sha256": None},
     }
-    found = summary_of(suite, tasks, [one.name for one in who], done)
-    file = {"file": EPISODES, "rows": len(table["seed"]), "sha256": None}
-    code = tuple(one.source for one in who if one.is_text and names_code(one.source))
-    return BenchmarkResult({**about, **found, "episodes": file}, table, code)
+    texts = [entry.source for entry in entries if entry.is_text]
+    code = tuple(text for text in texts if names_code(text))
+    return BenchmarkResult(summary, table, suite, code)
 
 
 def versions() -> dict[str, str]:
-    """Versions of what the results depend on, and the processor."""
+    """Return the versions of what the results depend on, and the processor."""
     from llvmlite import binding
 
     found = {
@@ -214,28 +238,33 @@ def _about_task(task: BenchmarkTask) -> dict[str, Any]:
         "model_sha256": model_hash(task.ship),
         "why": task.why,
         "on": task.on,
-        "ship": task.behind,
+        "ship": task.true_ship,
     }
 
 
-def _about_contestant(
-    one: Contestant, tasks: Sequence[BenchmarkTask], done: Done
+def _about_entry(
+    entry: Entry,
+    tasks: Sequence[BenchmarkTask],
+    cells: Mapping[tuple[str, str], Cell],
 ) -> dict[str, Any]:
-    files = {
-        path: code for task in tasks for path, code in one.fingerprint(task).items()
-    }
-    parts = {task.name: done[one.name, task.name] for task in tasks}
+    files: dict[str, str] = {}
+    refused: dict[str, str] = {}
+    n_runs = 0
+    for task in tasks:
+        cell = cells[entry.name, task.name]
+        files |= entry.fingerprint(task)
+        n_runs = max(n_runs, len(cell.runs))
+        if cell.refused:
+            refused[task.name] = cell.refused
     return {
-        "source": one.source if one.is_text else None,
+        "source": entry.source if entry.is_text else None,
         "files": files,
-        "runs": max(len(part["runs"]) for part in parts.values()),
-        "refused": {
-            name: part["refused"] for name, part in parts.items() if part["refused"]
-        },
+        "runs": n_runs,
+        "refused": refused,
     }
 
 
-def load_results(path: str | Path) -> BenchmarkResult:
+def load_results(path: str | Path, suite: Suite | None = None) -> BenchmarkResult:
     """Read the results of a benchmark.
 
     Raises InputError naming the file and the field at fault.
@@ -244,47 +273,48 @@ def load_results(path: str | Path) -> BenchmarkResult:
     ----------
     path : str or Path
         Their folder, or `results.json` in it.
+    suite : Suite, optional
+        Your own suite that they are of (`load_suite`), to run episodes again.
     """
     where = Path(path)
-    where = where / RESULTS if where.is_dir() else where
-    content = read_json(where, "file of benchmark results", REMEDY)
-    if content.get("kind") != KIND:
+    if where.is_dir():
+        where = where / RESULTS
+    summary = read_json(where, "file of benchmark results", REMEDY)
+    if summary.get("kind") != KIND:
         raise InputError(
-            f"{where}: kind {content.get('kind')!r} found, expected '{KIND}': not"
-            " benchmark results"
+            f"{where}: kind: expected '{KIND}', got {summary.get('kind')!r}"
         )
-    check_format(content, FORMAT, str(where))
-    check_fields(content, FIELDS, str(where), REMEDY)
-    check_summary(content, str(where))
+    check_format(summary, FORMAT, str(where))
+    check_fields(summary, FIELDS, str(where), REMEDY)
+    check_summary(summary, str(where))
+    if suite is not None and suite.sha256 != summary["suite"]["sha256"]:
+        raise InputError(f"{where}: expected results of this suite, got of another")
+
     table = where.with_name(EPISODES)
-    if content["episodes"]["sha256"] != file_hash(table):
+    if summary["episodes"]["sha256"] != file_hash(table):
         raise InputError(
-            f"{table}: is not the one that {RESULTS} was written with, or is cut short;"
-            f" {REMEDY}"
+            f"{table}: expected the file that {RESULTS} was written with, got another"
+            f" or one that is cut short; {REMEDY}"
         )
-    result = BenchmarkResult(
-        dict(content), read_episodes(table, content["episodes"]["rows"])
-    )
-    _check_agree(result, str(where))
-    return result
+    episodes = read_episodes(table, summary["episodes"]["rows"])
+    _check_rows(summary, episodes, str(where))
+    return BenchmarkResult(dict(summary), episodes, suite)
 
 
-def _check_agree(result: BenchmarkResult, where: str) -> None:
-    """The rows must be those of the contestants, tasks and seeds that the summary names."""
-    count, episodes = result.summary["seeds"]["count"], result.episodes
-    tasks = result.summary["tasks"]
-    told = {
-        (one, task): found["runs"]
-        for task in tasks
-        for one, found in tasks[task].items()
+def _check_rows(summary: Mapping[str, Any], episodes: Columns, where: str) -> None:
+    """Refuse a table whose rows are not those that the summary counts."""
+    expected = {
+        (name, task): cell["runs"]
+        for task, cells in summary["tasks"].items()
+        for name, cell in cells.items()
     }
-    rows = Counter(
-        zip(episodes["contestant"].tolist(), episodes["task"].tolist(), strict=True)
-    )
-    for one, task in [*told, *rows]:  # in the order of the summary, then of the table
-        runs = told.get((one, task), 0)
-        if rows[one, task] != runs * count:
+    names, tasks = episodes["controller"].tolist(), episodes["task"].tolist()
+    rows = Counter(zip(names, tasks, strict=True))
+    count = summary["seeds"]["count"]
+    for name, task in [*expected, *rows]:
+        runs = expected.get((name, task), 0)
+        if rows[name, task] != runs * count:
             raise InputError(
-                f"{where}: {rows[one, task]} episodes of '{one}' on '{task}' found in"
-                f" {EPISODES}, expected {runs} runs of {count}; {REMEDY}"
+                f"{where}: expected {runs} runs of {count} episodes of '{name}' on"
+                f" '{task}' in {EPISODES}, got {rows[name, task]} episodes; {REMEDY}"
             )

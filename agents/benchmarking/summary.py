@@ -1,242 +1,259 @@
-"""The summary of a benchmark: per task and contestant, the ranking, and who improves on which other."""
+"""The summary of a benchmark: totals, the ranking, and who improves on whom."""
 
 from collections.abc import Mapping, Sequence
-from itertools import permutations
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from agents.benchmarking import statistics
-from agents.benchmarking.contestants import BEST_KNOWN
+from agents.benchmarking.cells import Cell
+from agents.benchmarking.sources import BEST_KNOWN
 from agents.benchmarking.statistics import NOTHING, Draws, Interval, score
 from agents.suites.reference import reference_costs
 from agents.suites.suite import N_EPISODES, SETS, BenchmarkTask
 from shipgym.arrays import Floats, finite
 
-#: By contestant and task what `agents.benchmarking.run.results_of` answers.
-Done = Mapping[tuple[str, str], Mapping[str, Any]]
-
 THRESHOLDS = np.arange(-20, 31) / 20.0  # scores of the performance profile
 
 
-def summary_of(
-    suite: str, tasks: Sequence[BenchmarkTask], names: Sequence[str], done: Done
+def summarise(
+    tasks: Sequence[BenchmarkTask],
+    names: Sequence[str],
+    cells: Mapping[tuple[str, str], Cell],
 ) -> dict[str, Any]:
-    """The fields `tasks`, `reference`, `ranking`, `improvement` and `profile` of the results.
+    """Return the fields `tasks`, `reference`, `ranking`, `improvement` and `profile`.
 
-    `suite`: its name; `tasks`: those that were run; `names`: of the contestants;
-    `done`: see `agents.benchmarking.run.results_of`. Ranking, improvements and profiles
-    are of the episodes on the ship; what each contestant came to on the model and far
-    from the design stands beside its place, `elsewhere`.
+    Ranking, improvements and profiles are of the episodes on the ship; totals of the
+    other sets of episodes stand in `elsewhere`.
+
+    Parameters
+    ----------
+    tasks : sequence of BenchmarkTask
+        Those that were run.
+    names : sequence of str
+        Of the controllers.
+    cells : mapping
+        Every controller in every task, by the names of both.
     """
-    found = _Summary(suite, tasks, names, done)
-    by_task = {task.name: found.task(k) for k, task in enumerate(tasks)}
-    known = {
-        tasks[k].name: {"zero": zero, "best": best}
-        for k, (zero, best) in found.reference.items()
+    costs = _Costs(tuple(tasks), tuple(names), cells)
+    by_task = {task.name: costs.cells_of(k) for k, task in enumerate(tasks)}
+    reference = {
+        tasks[task].name: {"zero": zero, "best": best}
+        for task, (zero, best) in costs.reference.items()
     }
     return {
         "tasks": by_task,
-        "reference": known,
-        "ranking": found.ranking(by_task),
-        "improvement": found.improvements(),
-        "profile": found.profiles(),
+        "reference": reference,
+        "ranking": costs.ranking(by_task),
+        "improvement": costs.improvements(),
+        "profile": costs.profiles(),
     }
 
 
-class _Summary:
-    """Costs of everybody in all tasks, and the draws of the bootstrap that are common to them."""
+@dataclass(frozen=True)
+class _Costs:
+    """Costs of all controllers in all tasks, both known by their numbers in order."""
 
-    def __init__(
-        self,
-        suite: str,
-        tasks: Sequence[BenchmarkTask],
-        names: Sequence[str],
-        done: Done,
-    ) -> None:
-        self.tasks, self.names, self.done = (
-            [task.name for task in tasks],
-            list(names),
-            done,
-        )
-        #: Numbers of the tasks of each set of episodes.
-        self.sets = {
-            on: [k for k, task in enumerate(tasks) if task.on == on] for on in SETS
-        }
-        #: By numbers of contestant and task, each of shape (n_runs, n_episodes).
-        self.costs: dict[tuple[int, int], Floats] = {
-            (who, k): np.stack(
-                [run["episodes"]["cost"] for run in done[name, task]["runs"]]
-            )
-            for who, name in enumerate(names)
-            for k, task in enumerate(self.tasks)
-            if done[name, task]["runs"]
-        }
-        n_episodes = next((cost.shape[1] for cost in self.costs.values()), 1)
-        known = (
-            reference_costs(suite) if n_episodes == N_EPISODES else {}
-        )  # which are of all scored episodes
-        self.reference = {
-            k: known[task] for k, task in enumerate(self.tasks) if task in known
-        }
-        self.draws = Draws(len(tasks), n_episodes)
+    tasks: tuple[BenchmarkTask, ...]
+    names: tuple[str, ...]
+    cells: Mapping[tuple[str, str], Cell]
 
-    def task(self, number: int) -> dict[str, Any]:
-        """What each contestant did in one task."""
-        taking_part = {
-            who: cost for (who, k), cost in self.costs.items() if k == number
+    def cell(self, controller: int, task: int) -> Cell:
+        """Return the cell of a controller in a task."""
+        return self.cells[self.names[controller], self.tasks[task].name]
+
+    @cached_property
+    def costs(self) -> dict[tuple[int, int], Floats]:
+        """Costs by controller and task, each of shape (n_runs, n_episodes)."""
+        return {
+            (controller, task): self.cell(controller, task).costs
+            for controller in range(len(self.names))
+            for task in range(len(self.tasks))
+            if self.cell(controller, task).runs
         }
+
+    @cached_property
+    def n_episodes(self) -> int:
+        """Number of episodes of each task."""
+        return next((costs.shape[1] for costs in self.costs.values()), 1)
+
+    @cached_property
+    def draws(self) -> Draws:
+        """Bootstrap draws that all controllers share."""
+        return Draws(len(self.tasks), self.n_episodes)
+
+    @cached_property
+    def reference(self) -> dict[int, tuple[float, float]]:
+        """Costs whose scores are 0 and 1 by task; they are of all scored episodes."""
+        if self.n_episodes < N_EPISODES or not self.tasks[0].suite:
+            return {}
+        known = reference_costs(self.tasks[0].suite)
+        return {
+            number: known[task.name]
+            for number, task in enumerate(self.tasks)
+            if task.name in known
+        }
+
+    def tasks_on(self, on: str) -> list[int]:
+        """Return the numbers of the tasks of a set of episodes."""
+        return [number for number, task in enumerate(self.tasks) if task.on == on]
+
+    def cells_of(self, task: int) -> dict[str, dict[str, Any]]:
+        """Return what each controller came to in a task, by name."""
+        controllers = [who for who, number in self.costs if number == task]
         means = [
-            cost.mean()
-            for who, cost in taking_part.items()
+            self.costs[who, task].mean()
+            for who in controllers
             if self.names[who] != BEST_KNOWN
         ]
-        lowest, reference, found = (
-            min(means, default=np.nan),
-            self.reference.get(number),
-            {},
-        )
-        for who, cost in taking_part.items():
-            runs = self.done[self.names[who], self.tasks[number]]["runs"]
-            mean = statistics.mean_cost(cost, self.draws, number, who)
-            usual = statistics.interquartile_cost(cost, self.draws, number, who)
-            seconds = float(np.mean([run["seconds_per_action"] for run in runs]))
-            found[self.names[who]] = {
-                "cost": mean.to_dict(),
-                "cost_iqm": usual.to_dict(),
-                "score": (
-                    (
-                        NOTHING if reference is None else _score(mean, reference)
-                    ).to_dict()
-                ),
-                "relative_cost": finite(mean.value / lowest),
-                "runs": len(runs),
-                "lost": _count(runs, "terminated"),
-                "failed": _count(runs, "failed"),
-                "failure": next((run["failure"] for run in runs if run["failure"]), ""),
-                "policy_sha256": [run["policy_sha256"] for run in runs],
-                "microseconds_per_action": finite(1e6 * seconds),
-                "metrics": _figures([run["episodes"] for run in runs]),
-            }
-        return found
+        lowest = min(means, default=np.nan)
+        return {self.names[who]: self._about(who, task, lowest) for who in controllers}
 
-    def ranking(self, by_task: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
-        """The contestants, those that took part in all tasks first, the best first.
-
-        By score if every task has its references, else by the geometric mean of their
-        costs over the lowest.
-        """
-        others, found = [on for on in SETS if on != "ship" and self.sets[on]], []
-        for who, name in enumerate(self.names):
-            elsewhere = {on: self._entry(who, on, by_task) for on in others}
-            found.append(
-                {
-                    "name": name,
-                    **self._entry(who, "ship", by_task),
-                    "elsewhere": elsewhere,
-                }
-            )
-        by_score = all(k in self.reference for k in self.sets["ship"])
-        return sorted(found, key=lambda entry: _place(entry, by_score))
-
-    def _entry(
-        self, who: int, on: str, by_task: Mapping[str, Mapping[str, Any]]
-    ) -> dict[str, Any]:
-        """What a contestant came to in the tasks of a set."""
-        part = [k for k in self.sets[on] if (who, k) in self.costs]
-        scored = [
-            k for k in part if k in self.reference and np.greater(*self.reference[k])
-        ]
-        costs, known = (
-            [self.costs[who, k] for k in scored],
-            [self.reference[k] for k in scored],
-        )
-        found = [by_task[self.tasks[k]][self.names[who]] for k in part]
-        relative = [one["relative_cost"] for one in found if one["relative_cost"]]
+    def _about(self, controller: int, task: int, lowest: float) -> dict[str, Any]:
+        """Return what a controller came to in a task whose lowest mean cost is given."""
+        cell, costs = self.cell(controller, task), self.costs[controller, task]
+        cost = statistics.mean_cost(costs, self.draws, task, controller)
+        cost_iqm = statistics.interquartile_cost(costs, self.draws, task, controller)
+        reference = self.reference.get(task)
+        seconds = float(np.mean([run.seconds_per_action for run in cell.runs]))
+        failures = [run.failure for run in cell.runs if run.failure]
         return {
-            "score": (
-                statistics.aggregate_score(
-                    costs, known, self.draws, scored, who
-                ).to_dict()
-            ),
-            "scored_tasks": len(scored),
-            "relative_cost": (
-                finite(np.exp(np.mean(np.log(relative)))) if relative else None
-            ),
-            "tasks": len(part),
-            "lost": sum(one["lost"] for one in found),
-            "failed": sum(one["failed"] for one in found),
+            "cost": cost.to_dict(),
+            "cost_iqm": cost_iqm.to_dict(),
+            "score": _score_of(cost, reference).to_dict(),
+            "relative_cost": finite(cost.value / lowest),
+            "runs": len(cell.runs),
+            "lost": cell.count("terminated"),
+            "failed": cell.count("failed"),
+            "failure": failures[0] if failures else "",
+            "policy_sha256": [run.policy_sha256 for run in cell.runs],
+            "microseconds_per_action": finite(1e6 * seconds),
+            "metrics": _metrics(cell),
         }
 
-    def improvements(self) -> dict[str, dict[str, Any]]:
-        """Probability that one costs less than another, for all pairs."""
-        ship, n = self.sets["ship"], len(self.names)
-        costs = [
-            {k: self.costs[who, k] for k in ship if (who, k) in self.costs}
-            for who in range(n)
+    def ranking(self, by_task: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Return the controllers, the best first.
+
+        Those that could run all tasks come first; they are ordered by score if every
+        task has references, otherwise by relative cost.
+        """
+        others = [on for on in SETS if on != "ship" and self.tasks_on(on)]
+        ranked = [
+            {
+                "name": name,
+                **self._total(controller, "ship", by_task),
+                "elsewhere": {
+                    on: self._total(controller, on, by_task) for on in others
+                },
+            }
+            for controller, name in enumerate(self.names)
         ]
-        found: dict[str, dict[str, Any]] = {name: {} for name in self.names}
-        for i, k in permutations(range(n), 2):
-            better = statistics.improvement(costs[i], costs[k], self.draws, (i, k))
-            found[self.names[i]][self.names[k]] = better.to_dict()
-        return found
+        by_score = all(task in self.reference for task in self.tasks_on("ship"))
+        return sorted(ranked, key=lambda one: _sort_key(one, by_score))
+
+    def _total(
+        self, controller: int, on: str, by_task: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Return what a controller came to in all tasks of a set of episodes."""
+        tasks = [task for task in self.tasks_on(on) if (controller, task) in self.costs]
+        scored = [task for task in tasks if self._has_room(task)]
+        score = statistics.aggregate_score(
+            [self.costs[controller, task] for task in scored],
+            [self.reference[task] for task in scored],
+            self.draws,
+            scored,
+            controller,
+        )
+        cells = [
+            by_task[self.tasks[task].name][self.names[controller]] for task in tasks
+        ]
+        relative = [cell["relative_cost"] for cell in cells if cell["relative_cost"]]
+        geometric_mean = np.exp(np.mean(np.log(relative))) if relative else np.nan
+        return {
+            "score": score.to_dict(),
+            "scored_tasks": len(scored),
+            "relative_cost": finite(geometric_mean),
+            "tasks": len(tasks),
+            "lost": sum(cell["lost"] for cell in cells),
+            "failed": sum(cell["failed"] for cell in cells),
+        }
+
+    def _has_room(self, task: int) -> bool:
+        """Tell whether the best known cost of a task is below that of wheel-over."""
+        if task not in self.reference:
+            return False
+        zero, best = self.reference[task]
+        return zero > best
+
+    def improvements(self) -> dict[str, dict[str, Any]]:
+        """Return the probability that one costs less than another, for all pairs."""
+        on_ship = [
+            {
+                task: self.costs[controller, task]
+                for task in self.tasks_on("ship")
+                if (controller, task) in self.costs
+            }
+            for controller in range(len(self.names))
+        ]
+        improvements: dict[str, dict[str, Any]] = {name: {} for name in self.names}
+        for first, name in enumerate(self.names):
+            for second, other in enumerate(self.names):
+                if first != second:
+                    pair = (first, second)
+                    better = statistics.improvement(
+                        on_ship[first], on_ship[second], self.draws, pair
+                    )
+                    improvements[name][other] = better.to_dict()
+        return improvements
 
     def profiles(self) -> dict[str, Any]:
-        """Share of episodes whose score is above each threshold."""
+        """Return the share of episodes whose score is above each threshold."""
         shares = {}
-        for who, name in enumerate(self.names):
+        for controller, name in enumerate(self.names):
             scores = [
-                score(self.costs[who, k], *known).ravel()
-                for k, known in self.reference.items()
-                if (who, k) in self.costs and k in self.sets["ship"]
+                score(self.costs[controller, task], *self.reference[task]).ravel()
+                for task in self.tasks_on("ship")
+                if task in self.reference and (controller, task) in self.costs
             ]
-            every = np.concatenate([np.zeros(0), *scores])
-            every = every[np.isfinite(every)]
-            if len(every):
-                shares[name] = statistics.performance_profile(
-                    every, THRESHOLDS
-                ).tolist()
+            finite_scores = np.concatenate([np.zeros(0), *scores])
+            finite_scores = finite_scores[np.isfinite(finite_scores)]
+            if len(finite_scores):
+                profile = statistics.performance_profile(finite_scores, THRESHOLDS)
+                shares[name] = profile.tolist()
         return {"thresholds": THRESHOLDS.tolist(), "shares": shares}
 
 
-def _count(runs: Sequence[Mapping[str, Any]], figure: str) -> int:
-    """Episodes of which a figure is true."""
-    return int(sum(np.nansum(run["episodes"].get(figure, 0.0)) for run in runs))
+def _score_of(cost: Interval, reference: tuple[float, float] | None) -> Interval:
+    """Score of a mean cost; it falls as the cost rises, so that the bounds swap."""
+    if reference is None:
+        return NOTHING
+    value, low, high = score([cost.value, cost.high, cost.low], *reference).tolist()
+    return Interval(value, low, high)
 
 
-def _score(cost: Interval, reference: tuple[float, float]) -> Interval:
-    """Score of a mean cost; a score falls as the cost rises, so its bounds change places."""
-    return Interval(
-        *(
-            float(score(number, *reference))
-            for number in (cost.value, cost.high, cost.low)
-        )
-    )
-
-
-def _figures(
-    runs: Sequence[Mapping[str, Floats]],
-) -> dict[str, dict[str, float | None]]:
-    """Mean, median and 95th percentile of each figure that at least one episode has."""
-    found = {}
-    for name in runs[0]:
-        values = np.concatenate([run[name] for run in runs])
-        values = values[np.isfinite(values)]
+def _metrics(cell: Cell) -> dict[str, dict[str, float | None]]:
+    """Mean, median and 95th percentile of each figure that an episode has."""
+    metrics = {}
+    for name in cell.runs[0].figures:
+        values = cell.values(name)
         if len(values):
             median, p95 = np.percentile(values, [50.0, 95.0])
-            found[name] = {
+            metrics[name] = {
                 "mean": finite(values.mean()),
                 "median": finite(median),
                 "p95": finite(p95),
             }
-    return found
+    return metrics
 
 
-def _place(entry: Mapping[str, Any], by_score: bool) -> tuple[float, ...]:
-    points = entry["score"]["value"] if by_score else None
-    cost = entry["relative_cost"]
+def _sort_key(ranked: Mapping[str, Any], by_score: bool) -> tuple[float, ...]:
+    """Return what controllers are sorted by: tasks, score, relative cost."""
+    score = ranked["score"]["value"] if by_score else None
+    cost = ranked["relative_cost"]
     return (
-        -entry["tasks"],
-        -points if points is not None else np.inf,
-        cost if cost is not None else np.inf,
+        -ranked["tasks"],
+        np.inf if score is None else -score,
+        np.inf if cost is None else cost,
     )

@@ -8,32 +8,35 @@ from __future__ import annotations
 
 import os
 import sys
-import tomllib
 import warnings
+from collections.abc import Callable
 from io import TextIOWrapper
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer import Argument, Option
 
-from agents.cli import command
+from agents.cli.autopilot import autopilot_command
 from agents.cli.benchmark import benchmark_command
-from agents.cli.command import FAILED, answered, fail
+from agents.cli.command import (
+    FAILED,
+    Commands,
+    IdentifyCommand,
+    report_os_error,
+    shared_options,
+)
 from agents.cli.export import export_command
 from agents.cli.identification import advise_command, identify_command, reduce_command
 from agents.cli.logs import look_command, new_ship_command
 from agents.cli.reproduction import reproduce_command
 from agents.cli.steer import simulate_command, steer_command
 from agents.cli.training import train_command, tune_command
+from agents.cli.trials import trials_command
 from agents.cli.warm import warm_command
 
-if TYPE_CHECKING:
-    from agents.cli.standard_trials import StandardTrials
-    from agents.verification.result import AutopilotResult
-
 app = typer.Typer(
-    cls=command.Commands,
+    cls=Commands,
     epilog=(
         "Example: shipgym new-ship zigzag.csv, then shipgym autopilot ship.toml --out"
         " report/"
@@ -45,7 +48,7 @@ app = typer.Typer(
 )
 
 
-def _version(wanted: bool) -> None:
+def _print_version(wanted: bool) -> None:
     if wanted:
         import shipgym
 
@@ -59,7 +62,7 @@ def shipgym_command(
         bool,
         Option(
             "--version",
-            callback=_version,
+            callback=_print_version,
             is_eager=True,
             help="Print the version and exit.",
         ),
@@ -68,199 +71,6 @@ def shipgym_command(
     """From recorded ship trials to an identified model, its uncertainty and verified autopilots."""
 
 
-@answered
-def trials_command(
-    model: Annotated[
-        str,
-        Argument(metavar="MODEL", help="A model file, or the name of a shipped model."),
-    ],
-    out: Annotated[
-        Path | None, Option(metavar="PLOTS.HTML", help="Write figures to this file.")
-    ] = None,
-    draws: Annotated[
-        int, Option(min=0, help="Models drawn from an identified model's covariance.")
-    ] = 100,
-    seed: Annotated[int, Option(min=0, help="Random seed of the draws.")] = 0,
-    depth: Annotated[
-        float | None, Option(metavar="M", help="Water depth, m; default: deep.")
-    ] = None,
-) -> None:
-    """Simulate the standard manoeuvres of a model. Assesses them by the IMO criteria.
-
-    Zigzags, turning circles, spirals, pull-outs, and, with a shaft, stops and an
-    acceleration. The indices of an identified model come with their 95 % intervals.
-    """
-    from agents.cli.standard_trials import standard_trials
-    from agents.cli.terminal import answer, progress_bars
-    from agents.cli.trials_page import write_page
-    from agents.output import check_page
-    from shipgym.ships import load_model
-
-    ship = load_model(model)
-    water_depth = float("inf") if depth is None else depth
-    ship.check_depth(water_depth)
-    if out is not None:
-        check_page(out, plots=True)
-    with progress_bars() as progress:
-        tell = (
-            None
-            if progress is None
-            else (lambda done: progress("models drawn", done, draws))
-        )
-        found = standard_trials(ship, draws, seed, tell, water_depth)
-    if out is not None:
-        write_page(ship, found, out)
-    answer({"model": ship.name, "seed": seed, **found.to_dict()})
-    _print_trials(found, out)
-
-
-def _print_trials(found: StandardTrials, page: Path | None) -> None:
-    """Print tables of the standard manoeuvres, and where the page was written."""
-    from agents.cli.terminal import (
-        console,
-        criteria_notes,
-        criteria_table,
-        manoeuvre_table,
-        say,
-        warn,
-    )
-
-    console.print(manoeuvre_table(found.indices, found.water))
-    console.print()
-    if found.criteria:
-        console.print(criteria_table(found.criteria))
-    else:
-        console.print(
-            "The IMO criteria are made for deep water: leave --depth out to assess"
-            " them."
-        )
-    say(*criteria_notes(found.criteria))
-    for name, reason in found.refused.items():
-        warn(f"no {name}: {reason}")
-    if page is not None:
-        say(f"\nwritten: {page}")
-
-
-@answered
-def autopilot_command(
-    ship: command.ShipFileArgument,
-    out: Annotated[
-        Path,
-        Option(metavar="FOLDER", help="Folder for the report, model and autopilots."),
-    ],
-    draws: Annotated[
-        int, Option(min=2, help="Models drawn from the coefficient covariance.")
-    ] = 200,
-    seed: Annotated[int, Option(min=0, help="Random seed of draws and episodes.")] = 0,
-    *,
-    options: command.IdentifyOptions,
-    agents: Annotated[
-        list[str] | None,
-        Option(
-            "--agent",
-            metavar="AGENT",
-            help="Also run this autopilot, a file or a name; repeatable.",
-        ),
-    ] = None,
-    autopilots: Annotated[
-        str | None,
-        Option(
-            metavar="NAMES",
-            help=(
-                "Autopilots to design; default:"
-                " pid,lq,lq-scheduled,turn-rate,wheel-over. "
-                "Others: preview-mpc, lqg."
-            ),
-        ),
-    ] = None,
-    standards: Annotated[
-        bool,
-        Option(
-            "--standards",
-            help="Simulate topics of ISO 11674 and IEC 62065, with our own limits.",
-        ),
-    ] = False,
-    engine: command.EngineName = "local",
-    workers: command.Workers = 1,
-    address: command.Address = None,
-) -> None:
-    """Go from trials to a report on autopilots. Identifies, predicts, designs, runs them on drawn models.
-
-    Options not given here are taken from the ship file's table [identify]. Exits with 1
-    if the identified model is unstable, or no autopilot designed on it can be trusted;
-    the report then says why.
-    """
-    from agents.cli.terminal import progress_bars
-    from agents.engines.jobs import JobEngine
-    from agents.verification.chain import DESIGNS, build_autopilot
-
-    designs = (
-        DESIGNS
-        if autopilots is None
-        else [name.strip() for name in autopilots.split(",")]
-    )
-    with progress_bars() as progress:
-        result = build_autopilot(
-            ship,
-            out,
-            draws=draws,
-            seed=seed,
-            options=options,
-            agents=agents or (),
-            designs=designs,
-            standards=standards,
-            progress=progress,
-            where=JobEngine(engine, workers, address),
-        )
-    _print_result(result, out / "report.html", draws)
-
-
-def _print_result(result: AutopilotResult, report: Path, draws: int) -> None:
-    """Print the result of the chain; fail for an unstable model, and where every design is refused."""
-    from agents.cli import terminal
-    from agents.cli.terminal import answer, console, say, warn
-    from identification.validation.warnings import held_out_error, model_warnings
-
-    answer({**result.metrics, "report": str(report)})
-    if result.verification is not None:
-        found = result.verification.manoeuvres
-        say(held_out_error(result.identification))
-        console.print(terminal.prediction_table(result.identification))
-        console.print()
-        console.print(terminal.criteria_table(found.criteria))
-        say(*terminal.criteria_notes(found.criteria))
-        console.print(f"\nunstable draws: {int(found.unstable.sum())} of {draws}\n")
-        console.print(terminal.ranking_table(result))
-        console.print()
-        for row in result.verification.standards:
-            if not row.passed:
-                warn(
-                    f"{row.standard}, {row.topic.lower()}: {row.value} {row.unit},"
-                    f" limit {row.limit:g}"
-                )
-        for name, track in result.metrics["tracks"].items():
-            console.print(
-                f"{name.upper()} on the track: largest cross-track error"
-                f" {track['cross_track_largest_m']:.1f} m, rms"
-                f" {track['cross_track_rmse_m']:.1f} m\n"
-            )
-    if not result.stable:
-        fail(
-            f"the identified model is unstable: {result.instability}; see {report}",
-            FAILED,
-        )
-    if result.refusal is not None:
-        fail(f"no autopilot is given: {result.refusal}; see {report}", FAILED)
-    for warning in model_warnings(result.identification):
-        warn(warning)
-    for name, reason in (
-        result.verification.refused if result.verification else {}
-    ).items():
-        warn(f"no {name.upper()} autopilot: {reason}")
-    say(f"report: {report}")
-
-
-@answered
 def replay_command(
     episodes: Annotated[
         list[Path],
@@ -277,7 +87,6 @@ def replay_command(
     say(f"written: {out}")
 
 
-@answered
 def doctor_command() -> None:
     """Check the installation. Versions, cache, optional packages, the import name agents.
 
@@ -293,39 +102,47 @@ def doctor_command() -> None:
         raise typer.Exit(FAILED)
 
 
-#: An example of each command, which stands below its help.
-EXAMPLES = tomllib.loads(Path(__file__).with_name("examples.toml").read_text("utf-8"))
-COMMANDS = (
-    new_ship_command,
-    look_command,
-    identify_command,
-    advise_command,
-    reduce_command,
-    trials_command,
-    autopilot_command,
-    export_command,
-    steer_command,
-    simulate_command,
-    train_command,
-    tune_command,
-    benchmark_command,
-    reproduce_command,
-    warm_command,
-    replay_command,
-    doctor_command,
-)
-IDENTIFYING = (
-    "identify",
-    "advise",
-    "reduce",
-    "autopilot",
-)  # they take the options of `identify`
+#: Commands by name, in the order of the help, each with an example of its arguments.
+COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
+    "new-ship": (new_ship_command, "zigzag.csv circle.csv --length 160.9"),
+    "look": (look_command, "ship.toml --out look.html"),
+    "identify": (identify_command, "ship.toml --structure abkowitz --out my_ship/"),
+    "advise": (advise_command, "ship.toml --criterion c --number 2"),
+    "reduce": (reduce_command, "ship.toml --direction backward --out my_ship/"),
+    "trials": (trials_command, "my_ship/model.json --out trials.html"),
+    "autopilot": (autopilot_command, "ship.toml --draws 200 --out report/"),
+    "export": (export_command, "report/lq.json --c lq/"),
+    "steer": (
+        steer_command,
+        "report/lq.json --nmea tcp:192.168.1.20:10110 --heading 45",
+    ),
+    "simulate": (
+        simulate_command,
+        "my_ship/model.json --nmea tcp:127.0.0.1:10110 --sea moderate",
+    ),
+    "train": (
+        train_command,
+        "sac --env path-following --model my_ship/model.json --out run/",
+    ),
+    "tune": (tune_command, "sac --trials 40 --workers 2 --out study/"),
+    "benchmark": (
+        benchmark_command,
+        "--suite shipgym-v1 --controllers pid,lq,ppo --out results/",
+    ),
+    "reproduce": (reproduce_command, "cao2015 --markdown tables.md"),
+    "warm": (warm_command, "my_ship/model.json"),
+    "replay": (replay_command, "recordings/episode-0.json --out replay.html"),
+    "doctor": (doctor_command, "--json"),
+}
+#: Commands that take the options of `identify`.
+IDENTIFYING = ("identify", "advise", "reduce", "autopilot")
 
-for name, function in zip(EXAMPLES, COMMANDS, strict=True):
-    kind = command.IdentifyCommand if name in IDENTIFYING else None
-    app.command(name, epilog=f"Example: shipgym {name} {EXAMPLES[name]}", cls=kind)(
-        function
-    )
+for name, (command, example) in COMMANDS.items():
+    app.command(
+        name,
+        epilog=f"Example: shipgym {name} {example}",
+        cls=IdentifyCommand if name in IDENTIFYING else None,
+    )(shared_options(command))
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
@@ -340,12 +157,10 @@ def main() -> None:
         sys.exit("error: standard output is closed")
     sys.stderr = sys.stderr or Path(os.devnull).open("w")  # noqa: SIM115 - until the end
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(
-                errors="backslashreplace"
-            )  # names of files may have any bytes
+        if isinstance(stream, TextIOWrapper):  # names of files may have any bytes
+            stream.reconfigure(errors="backslashreplace")
     warnings.showwarning = _show_warning  # names in it come from files
     try:
         app(prog_name="shipgym")
-    except OSError as error:  # of the help, which no command answers for
-        sys.exit(command.told_failure(error))
+    except OSError as error:  # of the help, which no command prints
+        sys.exit(report_os_error(error))

@@ -1,4 +1,4 @@
-"""What all commands share: what goes wrong becomes one message and an exit code; options of several."""
+"""What all commands share: one message for an error, the options --json and --quiet, and options of several."""
 
 import functools
 import inspect
@@ -15,9 +15,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from agents.cli.parameters import take_parameters, typed_parameters
 
-FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130
-OUTPUT_GONE = (EPIPE, ENOSPC, EBADF)
-LONGEST_NAME = 200  # characters of a path that are told
+FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130  # exit codes
 
 ShipFileArgument = Annotated[
     Path, Argument(metavar="SHIP.TOML", help="The ship file with its trials.")
@@ -34,92 +32,112 @@ Address = Annotated[
         metavar="HOST:PORT", help="Ray cluster; default: start Ray on this computer."
     ),
 ]
-IdentifyOptions = Annotated[
-    dict[str, Any], Option(parser=dict, hidden=True)
-]  # see IdentifyCommand
+AllowCode = Annotated[
+    list[str] | None,
+    Option(
+        metavar="CODE",
+        help="Python file or module that your suite may name; repeatable.",
+    ),
+]
+Out = Annotated[Path, Option(metavar="FOLDER", help="Folder for the results.")]
+#: The options of `identify`; see `IdentifyCommand`.
+IdentifyOptions = Annotated[dict[str, Any], Option(parser=dict, hidden=True)]
 Json = Annotated[
     bool, Option("--json", help="Print JSON for programs instead of tables.")
 ]
 Quiet = Annotated[
     bool, Option("--quiet", "-q", help="Print only errors, and the result with --json.")
 ]
-SHARED = {"as_json": Json, "quiet": Quiet}  # options of every command
 
 
-def answered(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options that all share, and turn what goes wrong into one message and an exit code.
-
-    It prints to the terminal's `out`, which is silent with `--json` and `--quiet`, and
-    gives its result as fields to `answer`.
-    """
+def shared_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command --json and --quiet, and let an expected error be one message and an exit code."""
 
     @functools.wraps(command)
-    def wrapped(*args: Any, **kwargs: Any) -> None:
+    def wrapped(*, as_json: bool = False, quiet: bool = False, **options: Any) -> None:
         from agents.cli.terminal import printing
-        from agents.engines.jobs import WorkerDiedError
-        from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 
         try:
-            with printing(*(kwargs.pop(name, False) for name in SHARED)):
-                command(*args, **kwargs)
+            with printing(as_json, quiet):
+                command(**options)
             sys.stdout.flush()
-        except InputError as error:
-            fail(str(error), WRONG_INPUT)
-        except (ManoeuvreError, UnstableModelError, WorkerDiedError) as error:
-            fail(str(error), FAILED)
         except KeyboardInterrupt:
             fail("interrupted, nothing was written", INTERRUPTED)
-        except OSError as error:
-            raise typer.Exit(told_failure(error)) from None
+        except Exception as error:
+            code = report(error)
+            if code is None:
+                raise
+            raise typer.Exit(code) from None
 
-    shared = {
-        name: inspect.Parameter(
-            name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind
+    parameters = typed_parameters(command)
+    for name, annotation in {"as_json": Json, "quiet": Quiet}.items():
+        parameters[name] = inspect.Parameter(
+            name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=annotation
         )
-        for name, kind in SHARED.items()
-    }
-    return take_parameters(wrapped, typed_parameters(command) | shared)
+    return take_parameters(wrapped, parameters)
 
 
-def told_failure(error: OSError) -> int:
-    """Say what could not be read or written; the exit code."""
-    from agents.cli.terminal import fail as tell
+def report(error: Exception) -> int | None:
+    """Print the message of an expected error; its exit code, None for an unexpected error."""
+    from agents.cli.terminal import print_error
+    from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 
-    if error.filename is None and error.errno in OUTPUT_GONE:
-        os.dup2(
-            os.open(os.devnull, os.O_WRONLY), 1
-        )  # what is left in buffers fails no more
-        if error.errno != EPIPE:  # the reader of the output went away
-            tell(f"the output cannot be written ({error.strerror})")
+    if isinstance(error, InputError):
+        print_error(str(error))
+        return WRONG_INPUT
+    if isinstance(error, OSError):
+        return report_os_error(error)
+
+    from agents.jobs import JobError
+
+    if isinstance(error, (ManoeuvreError, UnstableModelError, JobError)):
+        print_error(str(error))
         return FAILED
-    name = "" if error.filename is None else f"{str(error.filename)[:LONGEST_NAME]}: "
-    tell(f"{name}{error.strerror or error}")
-    return WRONG_INPUT
+    return None
 
 
-class Commands(TyperGroup):
-    """The commands; an argument without text is refused before any of them is called."""
+def report_os_error(error: OSError) -> int:
+    """Print what could not be read or written; the exit code."""
+    from agents.cli.terminal import print_error
 
-    def parse_args(self, ctx: Any, args: list[str]) -> Any:
-        """Refuse empty arguments, and those that no name of a file can be."""
-        for k, text in enumerate(args):
-            name, sign, value = (
-                text.partition("=") if text.startswith("--") else ("", "", text)
-            )
-            if "\0" in text or (not value and (sign or not name)):
-                name = name or (
-                    args[k - 1] if k and args[k - 1].startswith("-") else "argument"
-                )
-                ctx.fail(f"{name}: {value!r} found, expected a text that is not empty")
-        return super().parse_args(ctx, args)
+    reason = error.strerror or error
+    if error.filename is not None:
+        longest = 200  # characters of a path
+        print_error(f"{str(error.filename)[:longest]}: {reason}")
+        return WRONG_INPUT
+    if error.errno not in (EPIPE, ENOSPC, EBADF):
+        print_error(str(reason))
+        return WRONG_INPUT
+
+    # standard output failed: what is still in its buffer must not fail again
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    if error.errno != EPIPE:  # whoever reads the output has not just gone away
+        print_error(f"the output cannot be written ({reason})")
+    return FAILED
 
 
 def fail(message: str, code: int) -> NoReturn:
     """Print the message of an error and leave with an exit code."""
-    from agents.cli.terminal import fail as tell
+    from agents.cli.terminal import print_error
 
-    tell(message)
+    print_error(message)
     raise typer.Exit(code) from None
+
+
+class Commands(TyperGroup):
+    """The commands; an empty argument is refused before any of them runs."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> Any:
+        """Refuse empty arguments, and those with a null byte, which no file name has."""
+        for position, text in enumerate(args):
+            name, value = "argument", text
+            if text.startswith("--") and "=" in text:
+                name, _, value = text.partition("=")
+            elif position > 0 and args[position - 1].startswith("-"):
+                name = args[position - 1]
+            if not value or "\0" in text:
+                ctx.fail(f"{name}: expected a non-empty string, got {value!r}")
+        return super().parse_args(ctx, args)
 
 
 class IdentifyCommand(TyperCommand):
@@ -132,6 +150,6 @@ class IdentifyCommand(TyperCommand):
         app = typer.Typer(
             add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
         )
-        whole = takes_identify_options(inspect.unwrap(self.callback))  # type: ignore[arg-type]
-        app.command(self.name, epilog=self.epilog)(answered(whole))
+        command = takes_identify_options(inspect.unwrap(self.callback))  # type: ignore[arg-type]
+        app.command(self.name, epilog=self.epilog)(shared_options(command))
         return typer.main.get_command(app).make_context(*args, **kwargs)

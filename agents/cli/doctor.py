@@ -6,7 +6,6 @@ import os
 import platform
 import re
 import tempfile
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,25 +20,33 @@ from shipgym.engine.cache_folder import (
     open_folder,
 )
 
-OTHERS = ("dev", "docs")  # extras that are no part of what users do
+#: Marks and colours of the states of a finding: it works; an optional package is not
+#: installed; something may be removed; something does not work.
 MARKS = {
     "fine": ("ok", "green"),
     "absent": ("absent", "dim"),
     "left": ("left", "yellow"),
     "wrong": ("wrong", "bold red"),
 }
-OURS = ("shipgym", "identification", "agents")
 
 
 @dataclass(frozen=True)
 class Finding:
-    """The result of one check."""
+    """The result of one check.
+
+    Attributes
+    ----------
+    what : str
+        What was checked.
+    state : str
+        A key of `MARKS`.
+    detail : str
+        What was found and, where needed, what to do.
+    """
 
     what: str
-    #: "fine"; "absent": an option that is not installed; "left": something that may be
-    #: removed; "wrong": something does not work
     state: str
-    detail: str  # what was found and, where needed, what to do
+    detail: str
 
     def line(self) -> Text:
         """One line for the terminal."""
@@ -53,39 +60,42 @@ def examine_installation() -> list[Finding]:
         f"{shipgym.__version__}, Python {platform.python_version()},"
         f" {platform.platform()}"
     )
-    needed = _declared()
-    return [
-        Finding("shipgym", "fine", system),
-        *(_installed(name, [name], "wrong", "shipgym") for name in needed.pop("", [])),
-        *(
-            _installed(f"extra {extra}", names, "absent", f"'shipgym[{extra}]'")
-            for extra, names in needed.items()
-            if extra not in OTHERS
-        ),
-        Finding("cache", *_cache()),
-        *left_findings(),
-        *(name_finding(name) for name in OURS),
-    ]
+    findings = [Finding("shipgym", "fine", system)]
+    for extra, names in declared_packages().items():
+        if extra == "":
+            findings += [
+                package_finding(one, [one], "wrong", "shipgym") for one in names
+            ]
+        elif extra not in ("dev", "docs"):
+            remedy = f"'shipgym[{extra}]'"
+            findings.append(package_finding(f"extra {extra}", names, "absent", remedy))
+    findings.append(cache_finding())
+    findings += left_findings()
+    findings += [name_finding(name) for name in ("shipgym", "identification", "agents")]
+    return findings
 
 
-def _declared() -> dict[str, list[str]]:
-    """The distributions that shipgym declares to need, by extra, those of no extra by an empty text."""
-    found: dict[str, list[str]] = {}
-    with suppress(
-        importlib.metadata.PackageNotFoundError
-    ):  # run from a checkout without installing it
-        for line in importlib.metadata.requires("shipgym") or ():
-            name, _, extra = re.fullmatch(
-                r'([\w.-]+)(.*?extra == "(\w+)")?.*', line
-            ).groups()  # type: ignore[union-attr]
-            if name != "shipgym":
-                found.setdefault(extra or "", []).append(name)
-    return found
+def declared_packages() -> dict[str, list[str]]:
+    """Packages that shipgym declares to need, by extra, those of no extra by an empty text."""
+    try:
+        requirements = importlib.metadata.requires("shipgym") or []
+    except importlib.metadata.PackageNotFoundError:  # run from a checkout
+        return {}
+    packages: dict[str, list[str]] = {}
+    for line in requirements:
+        name = re.match(r"[\w.-]+", line)
+        extra = re.search(r'extra == "(\w+)"', line)
+        if name is not None and name[0] != "shipgym":
+            packages.setdefault(extra[1] if extra else "", []).append(name[0])
+    return packages
 
 
-def _installed(what: str, names: list[str], otherwise: str, remedy: str) -> Finding:
-    """Versions of distributions, or which of them are missing."""
-    versions, missing = [], []
+def package_finding(
+    what: str, names: list[str], otherwise: str, remedy: str
+) -> Finding:
+    """Versions of packages, or which of them are missing, with the state `otherwise`."""
+    versions = []
+    missing = []
     for name in names:
         try:
             version = importlib.metadata.version(name)
@@ -93,86 +103,82 @@ def _installed(what: str, names: list[str], otherwise: str, remedy: str) -> Find
         except importlib.metadata.PackageNotFoundError:
             missing.append(name)
     if missing:
-        return Finding(
-            what, otherwise, f"{', '.join(missing)} not installed: pip install {remedy}"
-        )
+        detail = f"{', '.join(missing)} not installed: pip install {remedy}"
+        return Finding(what, otherwise, detail)
     return Finding(what, "fine", ", ".join(versions))
 
 
-def _cache() -> tuple[str, str]:
-    """Whether compiled ships can be kept, so that a second start is fast, where they are, and how much."""
-    folder, kept = cache_folder(), ""
+def cache_finding() -> Finding:
+    """Place and size of the cache of compiled ships, and what is wrong with it."""
+    folder = cache_folder()
+    content = ""
     try:
         folder = open_folder()
         files = [path for path in folder.iterdir() if path.is_file()]
-        kept = (
-            f"{folder}, {len(files)} files,"
-            f" {sum(path.stat().st_size for path in files) / 1e6:.1f} MB"
-        )
-        if wrong := [
-            f"{path.name} {why}" for path in files if (why := loop_fault(path))
-        ]:
-            told = (
-                f"{kept}, {len(wrong)} of them not usable: {wrong[0]}; delete what is"
-                " not, or wait until"
+        size = sum(path.stat().st_size for path in files) / 1e6
+        content = f"{folder}, {len(files)} files, {size:.1f} MB"
+        faults = [(path.name, loop_fault(path)) for path in files]
+        unusable = [f"{name} {fault}" for name, fault in faults if fault]
+        if unusable:
+            return Finding(
+                "cache",
+                "wrong",
+                f"{content}, {len(unusable)} of them not usable: {unusable[0]}; delete"
+                " what is not, or wait until it is compiled again",
             )
-            return "wrong", f"{told} it is compiled again"
-        with tempfile.NamedTemporaryFile(dir=folder):
+        with tempfile.NamedTemporaryFile(dir=folder):  # it can be written
             pass
     except ValueError as error:
-        return "wrong", str(error)
+        return Finding("cache", "wrong", str(error))
     except OSError as error:
-        if (
-            folder.is_dir()
-            and os.access(folder, os.R_OK | os.X_OK)
-            and any(folder.iterdir())
-        ):
-            return (
-                "fine",
-                f"{kept}, to be read only: what is missing is compiled in memory",
+        is_readable = folder.is_dir() and os.access(folder, os.R_OK | os.X_OK)
+        if is_readable and any(folder.iterdir()):
+            detail = (
+                f"{content}, to be read only: what is missing is compiled in memory"
             )
-        told = (
+            return Finding("cache", "fine", detail)
+        return Finding(
+            "cache",
+            "wrong",
             f"{folder} cannot be written ({error.strerror}): every process compiles its"
-            " ships again"
+            f" ships again; set {CACHE_VARIABLE} to a folder that can be",
         )
-        return "wrong", f"{told}; set {CACHE_VARIABLE} to a folder that can be"
-    return "fine", kept
+    return Finding("cache", "fine", content)
 
 
 def left_findings() -> list[Finding]:
     """Folders in use, and what dead processes left: here, one level below, and in the cache."""
     here = Path.cwd()
-    return [
-        Finding("left over" if dead else "in use", "left" if dead else "fine", told)
-        for folder in [
-            here,
-            *(path for path in sorted(here.iterdir()) if path.is_dir()),
-            cache_folder(),
-        ]
-        for told, dead in locks_and_drafts(folder)
-    ]
+    below = sorted(path for path in here.iterdir() if path.is_dir())
+    findings = []
+    for folder in (here, *below, cache_folder()):
+        for description, is_dead in locks_and_drafts(folder):
+            if is_dead:
+                findings.append(Finding("left over", "left", description))
+            else:
+                findings.append(Finding("in use", "fine", description))
+    return findings
 
 
 def name_finding(name: str) -> Finding:
-    """Whether an import name is this project's alone; `agents` is also that of other distributions."""
+    """Check that an import name is this project's alone; `agents` is also that of other packages."""
     what = f"import {name}"
-    others = sorted(
-        {*importlib.metadata.packages_distributions().get(name, ())} - {"shipgym"}
-    )
+    packages = importlib.metadata.packages_distributions().get(name, ())
+    others = sorted(set(packages) - {"shipgym"})
     if others:
-        told = f"also a package of {', '.join(others)}, they overwrite each other"
-        return Finding(what, "wrong", f"{told}: use an environment without")
-    found = importlib.util.find_spec(name)
-    folder = (
-        None
-        if found is None or found.origin is None
-        else Path(found.origin).resolve().parent
-    )
-    home = Path(shipgym.__file__).resolve().parents[1]
-    if folder is None or folder.parent != home:
         return Finding(
             what,
             "wrong",
-            f"leads to {folder}, expected {home / name}: install shipgym again",
+            f"also a package of {', '.join(others)}, they overwrite each other: use an"
+            " environment without",
         )
+
+    spec = importlib.util.find_spec(name)
+    folder = None
+    if spec is not None and spec.origin is not None:
+        folder = Path(spec.origin).resolve().parent
+    home = Path(shipgym.__file__).resolve().parents[1]
+    if folder is None or folder.parent != home:
+        detail = f"leads to {folder}, expected {home / name}: install shipgym again"
+        return Finding(what, "wrong", detail)
     return Finding(what, "fine", os.fspath(folder))

@@ -8,13 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from agents.cli.command import answered
-
 if TYPE_CHECKING:
     from agents.deployment.c99 import Source
 
 
-@answered
 def export_command(
     what: Annotated[
         str,
@@ -42,66 +39,86 @@ def export_command(
     ] = inf,
 ) -> None:
     """Write an autopilot or a ship model as C99 or FMU. Learned policies also as ONNX."""
-    from agents.agent_file import load_agent
     from agents.cli.terminal import answer, say, warn
-    from agents.deployment.fmu import write_fmu
-    from agents.output import check_file, check_folder, whole_folder
-    from agents.policies.onnx_export import onnx_model
     from shipgym.errors import InputError
-    from shipgym.files import write_bytes
 
-    if not (onnx or c or fmu):
+    has_source = c is not None or fmu is not None
+    if onnx is None and not has_source:
         raise InputError(
             "nothing to write: give --c FOLDER, --fmu OUT.FMU or --onnx OUT.ONNX"
         )
-    if not (c or fmu) and (name, depth) != (None, inf):
+    if not has_source and (name is not None or depth != inf):
         raise InputError(
-            "--name and --depth found, which are for --c and --fmu alone; leave"
-            " them out"
+            "--name, --depth: expected with --c or --fmu, got neither; leave them out"
         )
-    if not fmu and fmi != "3.0":
-        raise InputError(f"--fmi: {fmi} found, which is for --fmu alone; leave it out")
-    if c or fmu:
-        source = _source(what, name, depth)
+    if fmu is None and fmi != "3.0":
+        raise InputError(f"--fmi: expected with --fmu, got {fmi} alone; leave it out")
+
+    source = _source(what, name, depth) if has_source else None
+    if source is not None:
         for note in source.notes:
             warn(note)
-        texts = {f"{source.name}.h": source.header, f"{source.name}.c": source.source}
-    for file in filter(None, (fmu, onnx)):
-        check_file(file)
-    if c:
-        check_folder(c, texts)
-    graph = onnx_model(load_agent(what)) if onnx else None
-    if fmu:  # first what may still fail
-        write_fmu(source, fmu, fmi)
-    if onnx and graph:
-        write_bytes(graph.SerializeToString(), onnx)
-    if c:
-        with whole_folder(c, texts) as draft:
-            for name, text in texts.items():
-                (draft / name).write_text(text, encoding="utf-8")
-    written = [str(path) for path in (onnx, c, fmu) if path]
+    _write(what, source, c, fmu, fmi, onnx)
+
+    written = [str(path) for path in (onnx, c, fmu) if path is not None]
     answer({"written": written})
     say(*(f"written: {path}" for path in written))
 
 
+def _write(
+    what: str,
+    source: Source | None,
+    c: Path | None,
+    fmu: Path | None,
+    fmi: str,
+    onnx: Path | None,
+) -> None:
+    """Check all files before the first is written, and write first what may still fail."""
+    from agents.agent_file import load_agent
+    from agents.deployment.fmu import write_fmu
+    from agents.output import check_file, check_folder, whole_folder
+    from agents.policies.onnx_export import onnx_model
+    from shipgym.files import write_bytes
+
+    texts = {}
+    if source is not None:
+        texts = {f"{source.name}.h": source.header, f"{source.name}.c": source.source}
+    for file in (fmu, onnx):
+        if file is not None:
+            check_file(file)
+    if c is not None:
+        check_folder(c, texts)
+
+    graph = onnx_model(load_agent(what)) if onnx is not None else None
+    if fmu is not None and source is not None:
+        write_fmu(source, fmu, fmi)
+    if onnx is not None and graph is not None:
+        write_bytes(graph.SerializeToString(), onnx)
+    if c is not None:
+        with whole_folder(c, texts) as draft:
+            for file_name, text in texts.items():
+                (draft / file_name).write_text(text, encoding="utf-8")
+
+
 def _source(what: str, name: str | None, depth: float) -> Source:
-    """C99 of whatever a file or a name stands for."""
+    """C99 of the controller, policy or model of a file or a name."""
     from agents.agent_file import list_pretrained, load_agent
-    from agents.deployment.c99 import autopilot_source, ship_source
+    from agents.deployment.autopilot_c99 import autopilot_source
+    from agents.deployment.ship_c99 import ship_source
     from shipgym.errors import InputError
     from shipgym.files import read_json
     from shipgym.ships import load_model
 
-    file, what_it_is = Path(what), "file of a controller or a model"
-    content = (
-        read_json(file, what_it_is, "take another copy")
-        if file.suffix == ".json"
-        else {}
-    )
-    if "kind" in content or what in list_pretrained():
-        if depth != inf:
-            raise InputError(
-                f"--depth: {depth:g} found, but {what} is an autopilot; leave it out"
-            )
-        return autopilot_source(load_agent(what), name or file.stem)
-    return ship_source(load_model(what), name or file.stem, depth)
+    file = Path(what)
+    is_agent = what in list_pretrained()
+    if file.suffix == ".json":
+        expected = "file of a controller or a model"
+        is_agent |= "kind" in read_json(file, expected, "take another copy")
+    if not is_agent:
+        return ship_source(load_model(what), name or file.stem, depth)
+    if depth != inf:
+        raise InputError(
+            f"--depth: expected none for an autopilot, got {depth:g} for {what}; leave"
+            " it out"
+        )
+    return autopilot_source(load_agent(what), name or file.stem)

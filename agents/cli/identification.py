@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Option
 
-from agents.cli.command import FAILED, IdentifyOptions, ShipFileArgument, answered, fail
+from agents.cli.command import FAILED, IdentifyOptions, ShipFileArgument, fail
 
 if TYPE_CHECKING:
     from identification import IdentificationResult
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 Out = Annotated[Path, Option(metavar="FOLDER", help="Folder for the results.")]
 
 
-@answered
 def identify_command(
     ship: ShipFileArgument,
     out: Out,
@@ -70,14 +69,8 @@ def _chosen(
 
 
 def _identify(read: ShipFile, settings: dict[str, Any], out: Path) -> None:
-    from agents.cli.terminal import (
-        answer,
-        console,
-        identifying,
-        prediction_table,
-        say,
-        selection_table,
-    )
+    from agents.cli.tables import prediction_table, selection_table
+    from agents.cli.terminal import answer, console, identifying, say
     from agents.identifying import identify_ship
     from agents.output import whole_folder
     from identification.result import FILES
@@ -127,14 +120,8 @@ def _compare(
     out: Path,
     names: tuple[str | None, str | None],
 ) -> None:
-    from agents.cli.terminal import (
-        answer,
-        console,
-        identifying,
-        say,
-        selection_table,
-        warn,
-    )
+    from agents.cli.tables import selection_table
+    from agents.cli.terminal import answer, console, identifying, say, warn
     from agents.identifying import compare_ship
     from agents.output import whole_folder
     from identification.validation.comparison import COMPARISON_FILES
@@ -156,14 +143,13 @@ def _compare(
             f"{name} has no setting of these names and was fitted without them:"
             f" {', '.join(left)}"
         )
-    first = found.standings[0]
+    first = found.ranked[0]
     if not first.stable or first.error is None:
         fail(
             "no method gives a model that stays stable on every held-out trial", FAILED
         )
 
 
-@answered
 def advise_command(
     ship: ShipFileArgument,
     criterion: Annotated[
@@ -199,7 +185,6 @@ def advise_command(
     say(str(advice), f"run next: {', then '.join(advice.chosen)}")
 
 
-@answered
 def reduce_command(
     ship: ShipFileArgument,
     out: Out,
@@ -217,7 +202,8 @@ def reduce_command(
     Writes the reduced model's files and reduction.json, with all steps. Exits with 1 if
     the reduced model is unstable.
     """
-    from agents.cli.terminal import answer, console, identifying, prediction_table, say
+    from agents.cli.tables import prediction_table
+    from agents.cli.terminal import answer, console, identifying, say
     from agents.identifying import reduce_ship
     from agents.output import whole_folder
     from identification.result import FILES

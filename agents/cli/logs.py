@@ -1,21 +1,19 @@
 """Commands for logs as ships make them: `new-ship` and `look`."""
 
+from __future__ import annotations
+
 import json
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
-from agents.cli.command import answered
-
-NO_FILE_YET = (
-    "; new-ship has written no ship file in which to do so: write one as in"
-    " docs/ship_file.md"
-)
+if TYPE_CHECKING:
+    from shipgym import Trial
+    from shipgym.trials.guesses import TrialGuess
 
 
-@answered
 def new_ship_command(
     logs: Annotated[
         list[Path],
@@ -36,74 +34,102 @@ def new_ship_command(
     ] = None,
 ) -> None:
     """Write a ship file for recorded trials. Guesses columns, units and signs, and reports the guesses."""
-    import numpy as np
-
     from agents.cli.terminal import answer, say, warn
     from shipgym.checks import shown
     from shipgym.errors import InputError
     from shipgym.files import write_text
     from shipgym.pages import render
-    from shipgym.trials.guesses import guess_trial
 
     if out.exists():
         raise InputError(
             f"{out}: exists already; choose another name with --out, or remove it"
         )
-    try:
-        read = [guess_trial(logs[0])]
-    except InputError as error:
-        declared = any(
-            word in str(error)
-            for word in ("[columns]", "[conventions]", "[sensors]", "declare ")
-        )
-        raise InputError(f"{error}{NO_FILE_YET if declared else ''}") from None
-    for log in logs[1:]:
-        try:
-            read.append(guess_trial(log))
-        except InputError as error:
-            warn(str(error))
-    guesses, trial, unused = read[0].columns, read[0].trial, read[0].unused
-    # one log with another convention is enough: the usual one is also what a log says
-    # that does not tell
-    found = {one.name: one.value for log in read for one in log.conventions}
-    side = found.pop("rudder_positive", "starboard")
-    known = [
-        [one.trial[name] for name in ("u", "stw", "sog") if name in one.trial.channels]
-        for one in read
-    ]
-    speeds = [float(np.quantile(speed[0], 0.9)) for speed in known if speed]
+    guessed = _guess_trials(logs)
+    first = guessed[0]
+
+    # one log with another convention is enough: the usual one is also guessed from a
+    # log that does not tell
+    conventions: dict[str, str] = {}
+    for one in guessed:
+        for convention in one.conventions:
+            conventions[convention.name] = convention.value
+    rudder_side = conventions.pop("rudder_positive", "starboard")
+
     facts: dict[str, Any] = {
         "out": out,
         "length": length,
-        "guesses": guesses,
-        "side": side,
-        "conventions": found,
-        "trial": trial,
-        "unused": ", ".join(map(shown, unused)),
-        "speed": max(speeds, default=None),
-        "files": [
-            json.dumps(os.path.relpath(log, out.parent), ensure_ascii=False)
-            for log in logs
-        ],
+        "guesses": first.columns,
+        "side": rudder_side,
+        "conventions": conventions,
+        "trial": first.trial,
+        "unused": ", ".join(map(shown, first.unused)),
+        "speed": _service_speed([one.trial for one in guessed]),
+        "files": [_toml_path(log, out.parent) for log in logs],
     }
     write_text(render("shipgym.pages/ship.toml.jinja", **facts), out)
-    columns = {one.channel: {"column": one.column, "unit": one.unit} for one in guesses}
-    words = {"rudder_positive": side, **found}
+
+    columns = {}
+    for guess in first.columns:
+        columns[guess.channel] = {"column": guess.column, "unit": guess.unit}
     answer(
         {
             "written": str(out),
             "columns": columns,
-            "unused": unused,
-            **words,
-            "notes": [*trial.notes],
+            "unused": first.unused,
+            "rudder_positive": rudder_side,
+            **conventions,
+            "notes": [*first.trial.notes],
         }
     )
     say(render("shipgym.pages/new_ship.txt.jinja", **facts).strip())
-    for note in trial.notes:
+    for note in first.trial.notes:
         warn(note)
 
 
-@answered
+def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
+    """Logs read with guessed columns; the first has to be readable, others may not be."""
+    from agents.cli.terminal import warn
+    from shipgym.errors import InputError
+    from shipgym.trials.guesses import guess_trial
+
+    try:
+        guessed = [guess_trial(logs[0])]
+    except InputError as error:
+        message = str(error)
+        remedies = ("[columns]", "[conventions]", "[sensors]", "declare ")
+        if any(remedy in message for remedy in remedies):
+            message += (
+                "; new-ship has written no ship file in which to do so: write one as in"
+                " docs/ship_file.md"
+            )
+        raise InputError(message) from None
+
+    for log in logs[1:]:
+        try:
+            guessed.append(guess_trial(log))
+        except InputError as error:
+            warn(str(error))
+    return guessed
+
+
+def _service_speed(trials: list[Trial]) -> float | None:
+    """Speed, m/s, that is exceeded for a tenth of the time in the fastest trial."""
+    import numpy as np
+
+    speeds = []
+    for trial in trials:
+        for channel in ("u", "stw", "sog"):
+            if channel in trial.channels:
+                speeds.append(float(np.quantile(trial[channel], 0.9)))
+                break
+    return max(speeds, default=None)
+
+
+def _toml_path(path: Path, folder: Path) -> str:
+    """A path relative to a folder, as a text of TOML."""
+    return json.dumps(os.path.relpath(path, folder), ensure_ascii=False)
+
+
 def look_command(
     log: Annotated[
         Path,
@@ -122,29 +148,29 @@ def look_command(
     from shipgym.trials.ship_file import ShipFile
 
     check_page(out, plots=True)
-    trials = (
-        ShipFile.load(log).trials()
-        if log.suffix == ".toml"
-        else [guess_trial(log).trial]
-    )
+    if log.suffix == ".toml":
+        trials = ShipFile.load(log).trials()
+    else:
+        trials = [guess_trial(log).trial]
+
     write_text(look_page(log.name, trials), out)
-    fields = [
-        {
-            "name": one.name,
-            "samples": len(one),
-            "duration_s": one.duration,
-            "channels": [*one.channels],
-            "notes": [*one.notes],
-        }
-        for one in trials
-    ]
+    fields = []
+    for trial in trials:
+        fields.append(
+            {
+                "name": trial.name,
+                "samples": len(trial),
+                "duration_s": trial.duration,
+                "channels": [*trial.channels],
+                "notes": [*trial.notes],
+            }
+        )
     answer({"written": str(out), "trials": fields})
     for trial in trials:
-        about = (
-            f"{len(trial)} samples over {trial.duration:.5g} s:"
+        say(
+            f"{trial.name}: {len(trial)} samples over {trial.duration:.5g} s:"
             f" {', '.join(trial.channels)}"
         )
-        say(f"{trial.name}: {about}")
         for note in trial.notes:
             warn(f"{trial.name}: {note}")
     say(f"written: {out}")

@@ -8,12 +8,11 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from agents.cli.command import WRONG_INPUT, answered, fail
+from agents.cli.command import WRONG_INPUT, fail
 
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "reproduce.py"
 
 
-@answered
 def reproduce_command(
     paper: Annotated[
         str,
@@ -34,18 +33,22 @@ def reproduce_command(
     Shows the printed numbers, ours by the paper's method and at best, and whether the
     aim is met. Needs a checkout of the project. Exits with 1 if an aim is missed.
     """
-    from agents.cli.terminal import AS_JSON, out
+    from agents.cli.terminal import AS_JSON, console
 
     if not SCRIPT.is_file():
-        told = (
+        fail(
             "the papers' tables are not part of the installed package: in a checkout of"
-            " the project run"
+            f" the project run python scripts/reproduce.py {paper}",
+            WRONG_INPUT,
         )
-        fail(f"{told} python scripts/reproduce.py {paper}", WRONG_INPUT)
-    options = [
-        *(["--markdown", str(markdown)] if markdown else []),
-        *(["--json"] if AS_JSON.get() else []),
-    ]
-    command = [sys.executable, str(SCRIPT), paper, *options]
-    printed = subprocess.DEVNULL if out.quiet and not AS_JSON.get() else None
-    raise typer.Exit(subprocess.run(command, stdout=printed, check=False).returncode)
+    arguments = [sys.executable, str(SCRIPT), paper]
+    if markdown is not None:
+        arguments += ["--markdown", str(markdown)]
+    as_json = AS_JSON.get()
+    if as_json:
+        arguments.append("--json")
+    is_silent = console.quiet and not as_json
+    done = subprocess.run(
+        arguments, stdout=subprocess.DEVNULL if is_silent else None, check=False
+    )
+    raise typer.Exit(done.returncode)

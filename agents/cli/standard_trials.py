@@ -18,44 +18,53 @@ from shipgym.trials.trial import Trial
 
 @dataclass(frozen=True, eq=False)
 class StandardTrials:
-    """Standard manoeuvres of a model, and of models drawn from its covariance."""
+    """Standard manoeuvres of a model, and of models drawn from its covariance.
 
-    families: dict[str, dict[str, Manoeuvre]]  # the manoeuvres by family and name
-    sailed: dict[
-        str, Trial | Spiral
-    ]  # by manoeuvre, as simulated with the model itself
-    indices: dict[
-        str, dict[str, IndexInterval]
-    ]  # by manoeuvre and index, units in the names
-    #: the criteria of IMO resolution MSC.137(76); none in shallow water, which they are
-    #: not made for
+    Attributes
+    ----------
+    families : dict
+        Manoeuvres by family and name.
+    runs : dict
+        Simulation of each manoeuvre with the model itself.
+    indices : dict
+        Indices by manoeuvre and name, units in the names.
+    criteria : dict
+        Criteria of IMO resolution MSC.137(76); none in shallow water, which they are
+        not made for.
+    refused : dict
+        Why a manoeuvre could not be simulated, or has no indices.
+    draws : int
+        Number of models drawn.
+    water_depth : float
+        Water depth, m.
+    """
+
+    families: dict[str, dict[str, Manoeuvre]]
+    runs: dict[str, Trial | Spiral]
+    indices: dict[str, dict[str, IndexInterval]]
     criteria: dict[str, Criterion]
-    refused: dict[str, str]  # why a manoeuvre could not be sailed
-    draws: int  # models drawn
-    water_depth: float = np.inf  # m
+    refused: dict[str, str]
+    draws: int
+    water_depth: float = np.inf
 
     @property
     def water(self) -> str:
-        """Where they were sailed, in words."""
-        return (
-            "deep water"
-            if np.isinf(self.water_depth)
-            else f"water of {self.water_depth:g} m"
-        )
+        """The water depth in words."""
+        if np.isinf(self.water_depth):
+            return "deep water"
+        return f"water of {self.water_depth:g} m"
 
     def to_dict(self) -> dict[str, Any]:
-        """As `--json` prints it."""
+        """The content for `--json`."""
+        manoeuvres = {}
+        for name, indices in self.indices.items():
+            manoeuvres[name] = {key: index.to_dict() for key, index in indices.items()}
         return {
             "draws": self.draws,
             "water_depth": None if np.isinf(self.water_depth) else self.water_depth,
-            "manoeuvres": {
-                name: {index: found.to_dict() for index, found in indices.items()}
-                for name, indices in self.indices.items()
-            },
+            "manoeuvres": manoeuvres,
             "refused": self.refused,
-            "imo": {
-                name: criterion.to_dict() for name, criterion in self.criteria.items()
-            },
+            "imo": {name: one.to_dict() for name, one in self.criteria.items()},
         }
 
 
@@ -66,36 +75,50 @@ def standard_trials(
     progress: Callable[[int], None] | None = None,
     water_depth: float = np.inf,
 ) -> StandardTrials:
-    """Sail every standard manoeuvre that suits the ship, with the model and with models drawn from it.
+    """Simulate every standard manoeuvre that suits a ship, with the model and with models drawn from it.
 
-    `model`: the ship; `draws`: models drawn from its covariance; a ship without one has
-    none; `seed`: of the draws; `progress`: told the number of draws done;
-    `water_depth`: m, for ships with shallow-water equations. Raises InputError for
-    water too shallow, or a ship without such equations; UnstableModelError if the ship
-    itself runs away in every manoeuvre; where she does in some, or an index cannot be
-    read, these are in `refused` and the others stay.
+    A manoeuvre that cannot be simulated, or has no indices, is in `refused`. Raises
+    InputError for water too shallow, or for a ship without shallow-water equations;
+    UnstableModelError if the model runs away in every manoeuvre.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship.
+    draws : int
+        Models drawn from the covariance; a model without one has none.
+    seed : int
+        Seed of the draws.
+    progress : callable, optional
+        Called with the number of draws done.
+    water_depth : float
+        Water depth, m.
     """
     families = families_of(model, water_depth)
-    manoeuvres = {
-        name: one for family in families.values() for name, one in family.items()
-    }
-    sailed: dict[str, Trial | Spiral] = {}
-    own: dict[str, dict[str, float | None]] = {}
+    manoeuvres: dict[str, Manoeuvre] = {}
+    for family in families.values():
+        manoeuvres |= family
+
+    runs: dict[str, Trial | Spiral] = {}
+    nominal: dict[str, dict[str, float | None]] = {}
     refused: dict[str, str] = {}
-    lost: Exception | None = None
     for name, manoeuvre in manoeuvres.items():
-        own[name] = manoeuvre.no_indices
+        nominal[name] = manoeuvre.no_indices
         try:
-            sailed[name] = manoeuvre.sail(model)
-            own[name] = asdict(manoeuvre.indices(sailed[name]))
+            runs[name] = manoeuvre.sail(model)
+            nominal[name] = asdict(manoeuvre.indices(runs[name]))
         except (InputError, ManoeuvreError, UnstableModelError) as error:
-            refused[name], lost = str(error), error
-    if not sailed and lost is not None:
-        raise lost
-    drawn = model.sample(draws, seed) if draws and model.covariance is not None else []
-    evaluated = {name: manoeuvre.evaluate for name, manoeuvre in manoeuvres.items()}
-    found = intervals_of(own, drawn, evaluated, progress)
-    criteria = imo_criteria(model, found) if np.isinf(water_depth) else {}
+            refused[name] = str(error)
+            last_error = error
+    if not runs and manoeuvres:
+        raise last_error
+
+    drawn = []
+    if draws and model.covariance is not None:
+        drawn = model.sample(draws, seed)
+    evaluate = {name: manoeuvre.evaluate for name, manoeuvre in manoeuvres.items()}
+    indices = intervals_of(nominal, drawn, evaluate, progress)
+    criteria = imo_criteria(model, indices) if np.isinf(water_depth) else {}
     return StandardTrials(
-        families, sailed, found, criteria, refused, len(drawn), water_depth
+        families, runs, indices, criteria, refused, len(drawn), water_depth
     )

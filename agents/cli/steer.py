@@ -6,7 +6,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from agents.cli.command import FAILED, answered, fail
+from agents.cli.command import FAILED, fail
 
 Address = Annotated[
     str,
@@ -23,7 +23,6 @@ SpeedUp = Annotated[
 ]
 
 
-@answered
 def steer_command(
     agent: Annotated[
         str,
@@ -79,34 +78,37 @@ def steer_command(
     from agents.agent_file import load_agent
     from agents.cli.terminal import answer, say
     from agents.deployment.route import Route
-    from agents.deployment.steering import Limits, steer
+    from agents.deployment.sensors import Limits
+    from agents.deployment.steering import steer
     from shipgym.checks import check_keys
     from shipgym.files import named_values
 
     limits = named_values(limit or (), "--limit", "silence_s=3")
     check_keys(limits, Limits.__dataclass_fields__, "--limit")
-    course = None if heading is None else radians(heading)
     pilot = load_agent(agent)
-    radius = getattr(pilot, "gains", {}).get("path_radius", 0.0)
-    track = None if route is None else Route.from_csv(route, radius)
-    steering = steer(
-        pilot,
-        nmea,
-        heading=course,
-        limits=Limits(**limits),
-        duration=duration,
-        speed_up=speed_up,
-        told=say,
-        route=track,
-        rate=None if rate is None else radians(rate) / 60.0,
+    track = None
+    if route is not None:
+        radius = getattr(pilot, "gains", {}).get("path_radius", 0.0)
+        track = Route.from_csv(route, radius)
+
+    helm = asyncio.run(
+        steer(
+            pilot,
+            nmea,
+            heading=None if heading is None else radians(heading),
+            limits=Limits(**limits),
+            duration=duration,
+            speed_up=speed_up,
+            log=say,
+            route=track,
+            rate=None if rate is None else radians(rate) / 60.0,
+        )
     )
-    found = asyncio.run(steering)
-    answer({"state": found.state, "alarm": found.alarm, **found.counts})
-    if found.alarm:
-        fail(f"handed over: {found.alarm}", FAILED)
+    answer({"state": helm.state, "alarm": helm.alarm, **helm.counts})
+    if helm.alarm:
+        fail(f"handed over: {helm.alarm}", FAILED)
 
 
-@answered
 def simulate_command(
     model: Annotated[
         str,
@@ -141,20 +143,19 @@ def simulate_command(
     from shipgym.files import named_values
     from shipgym.ships import load_model
 
-    given = named_values(drop or (), "--drop", "HDT=60")
-    dropped = {
-        kind.upper(): check_number(after, f"--drop {kind}", at_least=0.0)
-        for kind, after in given.items()
-    }
+    dropped = {}
+    for kind, after in named_values(drop or (), "--drop", "HDT=60").items():
+        dropped[kind.upper()] = check_number(after, f"--drop {kind}", at_least=0.0)
     ship = SimulatedShip(load_model(model), radians(leg), sea, seed)
     asyncio.run(
         simulate_ship(ship, nmea, duration=duration, speed_up=speed_up, drop=dropped)
     )
+    seconds = ship.steps * STEP
     answer(
         {
             "model": ship.model.name,
-            "duration_s": round(ship.steps * STEP, 1),
+            "duration_s": round(seconds, 1),
             "state": ship.now,
         }
     )
-    say(f"{ship.model.name}: sailed for {ship.steps * STEP:.1f} s")
+    say(f"{ship.model.name}: sailed for {seconds:.1f} s")

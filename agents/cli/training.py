@@ -6,22 +6,33 @@ import shlex
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
-from agents.cli.command import INTERRUPTED, Address, EngineName, Workers, answered, fail
+from agents.cli.command import (
+    INTERRUPTED,
+    Address,
+    AllowCode,
+    EngineName,
+    Workers,
+    fail,
+)
 
 if TYPE_CHECKING:
-    from agents.training.plan import Given
+    from agents.training.plan import Given, Plan
     from agents.training.training import TrainingResult
     from agents.training.tuning import Tuning
 
-EXAMPLE = "gamma=0.98"
 Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
 Environment = Annotated[
     str | None,
-    Option(help="course-keeping (default), path-following-v1, or an environment id."),
+    Option(
+        help=(
+            "course-keeping (default), path-following, an environment id, module:id, or"
+            " the file of your own task."
+        )
+    ),
 ]
 Model = Annotated[
     str | None,
@@ -30,6 +41,9 @@ Model = Annotated[
 Sea = Annotated[str | None, Option(help="calm (default), slight, moderate or rough.")]
 TaskName = Annotated[
     str | None, Option(help="A benchmark task, instead of --env, --model and --sea.")
+]
+SuiteName = Annotated[
+    str, Option(help="Suite of the task: a name, or the TOML file of your own.")
 ]
 EnvironmentOptions = Annotated[
     list[str] | None,
@@ -69,7 +83,6 @@ Randomise = Annotated[
 ]
 
 
-@answered
 def train_command(
     algorithm: Algorithm,
     out: Annotated[Path, Option(metavar="FOLDER", help="Folder of the run.")],
@@ -77,6 +90,8 @@ def train_command(
     model: Model = None,
     sea: Sea = None,
     task: TaskName = None,
+    suite: SuiteName = "shipgym-v1",
+    allow_code: AllowCode = None,
     environment_options: EnvironmentOptions = None,
     total_steps: TotalSteps = None,
     settings: Settings = None,
@@ -105,89 +120,109 @@ def train_command(
     keep their values; others must be the same.
     """
     from agents.training.plan import Given
-    from shipgym.files import named_values
 
-    own = named_values(set_ or (), "--set", EXAMPLE)
-    own |= {} if total_steps is None else {"total_steps": total_steps}
-    own |= {"base": "none"} if from_nothing else {}
+    overrides = _named(set_, "--set")
+    if total_steps is not None:
+        overrides["total_steps"] = total_steps
+    if from_nothing:
+        overrides["base"] = "none"
     given = Given(
         algorithm,
-        env,
-        model,
-        sea,
-        task,
-        named_values(environment_options or (), "--option", EXAMPLE),
-        settings,
-        own,
-        seed,
-        randomise,
-        threads,
+        environment=env,
+        model=model,
+        sea=sea,
+        task=task,
+        options=_named(environment_options, "--option"),
+        settings_file=settings,
+        settings=overrides,
+        seed=seed,
+        randomise=randomise,
+        threads=threads,
+        suite=suite,
+        allow_code=allow_code or (),
     )
     _print_result(_train(given, out, resume, max_seconds), out)
+
+
+def _named(texts: list[str] | None, option: str) -> dict[str, Any]:
+    """Values of a repeatable option NAME=VALUE by name."""
+    from shipgym.files import named_values
+
+    return named_values(texts or (), option, "gamma=0.98")
 
 
 def _train(
     given: Given, out: Path, resume: bool, max_seconds: float | None
 ) -> TrainingResult:
-    """Check what is given before anything heavy is imported or written, then train."""
-    from agents.cli.terminal import training_bar, warn
+    """Check what is given before torch is imported or anything is written, then train."""
+    from agents.cli.terminal import training_bar
+
+    plan = _checked_plan(given, out, resume)
+
+    from agents.training.run_folder import CHECKPOINT
+    from agents.training.training import train
+
+    try:
+        with training_bar() as on_progress:
+            return train(
+                plan,
+                out,
+                resume=resume,
+                max_seconds=max_seconds,
+                tell=on_progress,
+                command=shlex.join(["shipgym", *sys.argv[1:]]),
+            )
+    except KeyboardInterrupt:
+        message = "interrupted"
+        if (out / CHECKPOINT).is_file():
+            message += f"; continue with --resume --out {out}"
+        fail(message, INTERRUPTED)
+
+
+def _checked_plan(given: Given, out: Path, resume: bool) -> Plan:
+    """The plan of a new run, or of one that is resumed, with warnings of what differs."""
+    from agents.cli.terminal import warn
     from agents.training import run_folder
     from agents.training.plan import make_plan
 
-    if not resume:
-        run_folder.check_new(out)
-    plan = make_plan(given, run_folder.read_plan(out, given) if resume else None)
     if resume:
+        plan = make_plan(given, run_folder.read_plan(out, given))
         run_folder.check_resumable(out, plan)
         for line in run_folder.other_versions(out):
             warn(
                 f"the run began with other versions: {line}; the result may differ in"
                 " the last digits"
             )
-    asked, rollout = given.settings.get("total_steps", 0), plan.settings.rollout
-    if asked % rollout:
-        whole = (
-            f"{-(-asked // rollout) * rollout:,}: rollouts of {plan.settings.ships}"
-            " ships"
-        )
-        warn(f"total_steps: {asked:,} is rounded up to {whole} have {rollout:,} steps")
-    from agents.training.training import train
+    else:
+        run_folder.check_new(out)
+        plan = make_plan(given)
 
-    command = shlex.join(["shipgym", *sys.argv[1:]])
-    try:
-        with training_bar() as tell:
-            return train(
-                plan,
-                out,
-                resume=resume,
-                max_seconds=max_seconds,
-                tell=tell,
-                command=command,
-            )
-    except KeyboardInterrupt:
-        kept = (out / run_folder.CHECKPOINT).is_file()
-        fail(
-            (
-                f"interrupted; continue with --resume --out {out}"
-                if kept
-                else "interrupted"
-            ),
-            INTERRUPTED,
+    steps = given.settings.get("total_steps", 0)
+    rollout = plan.settings.rollout
+    if steps % rollout:
+        rounded = -(-steps // rollout) * rollout
+        warn(
+            f"total_steps: {steps:,} is rounded up to {rounded:,}: rollouts of"
+            f" {plan.settings.ships} ships have {rollout:,} steps"
         )
+    return plan
 
 
 def _print_result(result: TrainingResult, out: Path) -> None:
     """Print costs, and where the agent was written."""
-    from agents.cli.terminal import answer, console, say
+    from agents.cli.terminal import answer, say
 
-    answer({**result.to_dict(), "agent": str(out / "agent.json")})
+    agent = out / "agent.json"
+    answer({**result.to_dict(), "agent": str(agent)})
     if result.resumed_from is not None:
-        console.print(f"resumed at step {result.resumed_from:,}")
-    lq = "" if result.lq_cost is None else f"; LQ's: {result.lq_cost:.2f}"
-    found = f"cost of a held-out episode: {result.best_cost:.2f}{lq}"
-    say(f"{found} (step {result.best_steps:,} of {result.steps:,})")
-    if (reached := result.lq_reached) is not None:
-        console.print(
+        say(f"resumed at step {result.resumed_from:,}")
+    costs = f"cost of a held-out episode: {result.best_cost:.2f}"
+    if result.lq_cost is not None:
+        costs += f"; LQ's: {result.lq_cost:.2f}"
+    say(f"{costs} (step {result.best_steps:,} of {result.steps:,})")
+    reached = result.lq_reached
+    if reached is not None:
+        say(
             f"LQ's cost reached at step {reached['steps']:,}, after"
             f" {reached['seconds']:.0f} s"
         )
@@ -197,10 +232,9 @@ def _print_result(result: TrainingResult, out: Path) -> None:
             f"stopped at step {result.steps:,} of {total:,}: continue with --resume"
             f" --out {out}"
         )
-    say(f"written: {out / 'agent.json'}")
+    say(f"written: {agent}")
 
 
-@answered
 def tune_command(
     algorithm: Algorithm,
     out: Annotated[
@@ -211,6 +245,8 @@ def tune_command(
     model: Model = None,
     sea: Sea = None,
     task: TaskName = None,
+    suite: SuiteName = "shipgym-v1",
+    allow_code: AllowCode = None,
     environment_options: EnvironmentOptions = None,
     trials: Annotated[
         int, Option(min=1, help="Trials in all, with those already done.")
@@ -232,72 +268,77 @@ def tune_command(
     is killed, the same command continues with the trials that are not done.
     """
     from agents.cli.terminal import progress_bars
-    from agents.engines.jobs import JobEngine
+    from agents.jobs import JobEngine
     from agents.training.plan import Given, make_plan
     from agents.training.tuning import evaluated_evenly, tune
-    from shipgym.files import named_values
 
-    fixed = named_values(set_ or (), "--set", EXAMPLE)
-    own = fixed | ({} if total_steps is None else {"total_steps": total_steps})
-    options = named_values(environment_options or (), "--option", EXAMPLE)
-    where = JobEngine(engine, workers, address)
-    where.check()
+    fixed = _named(set_, "--set")
+    overrides = dict(fixed)
+    if total_steps is not None:
+        overrides["total_steps"] = total_steps
     given = Given(
         algorithm,
-        env,
-        model,
-        sea,
-        task,
-        options,
-        settings,
-        own,
-        seed,
-        randomise,
+        environment=env,
+        model=model,
+        sea=sea,
+        task=task,
+        options=_named(environment_options, "--option"),
+        settings_file=settings,
+        settings=overrides,
+        seed=seed,
+        randomise=randomise,
         threads=1,
+        suite=suite,
+        allow_code=allow_code or (),
     )
+    where = JobEngine(engine, workers, address)
     plan = make_plan(given)
     if "evaluate_every" not in fixed:
         plan = evaluated_evenly(plan)
+
     try:
         with progress_bars() as bars:
-            tell = (
-                None
-                if bars is None
-                else (lambda done, total, _: bars("trials", done, total))
-            )
-            found = tune(
-                plan, out, trials, fixed=tuple(fixed), where=where, progress=tell
+
+            def on_progress(done: int, total: int, best: float | None) -> None:
+                if bars is not None:
+                    bars("trials", done, total)
+
+            tuning = tune(
+                plan, out, trials, fixed=tuple(fixed), where=where, progress=on_progress
             )
     except KeyboardInterrupt:
         fail(
             "interrupted; the same command continues with the trials that are not done",
             INTERRUPTED,
         )
-    _print_tuning(found, out)
+    print_tuning(tuning, out)
 
 
-def _print_tuning(found: Tuning, out: Path) -> None:
+def print_tuning(tuning: Tuning, out: Path) -> None:
     """Print trials and where the best settings are."""
-    from agents.cli.terminal import answer, console, plain_table, say
+    from agents.cli.tables import plain_table
+    from agents.cli.terminal import answer, console, say
     from agents.training.tuning import BEST
 
-    trials = [asdict(trial) for trial in found.trials]
-    answer({"trials": trials, "best": found.best.number, "settings": str(out / BEST)})
+    best = out / BEST
+    trials = [asdict(trial) for trial in tuning.trials]
+    answer({"trials": trials, "best": tuning.best.number, "settings": str(best)})
+
     title = "Trials by the mean cost of a held-out episode, best first"
     table = plain_table(title, ">trial", ">cost", "ended", "what was varied")
-    for trial in sorted(
-        found.trials, key=lambda one: (one.cost is None, one.cost or 0.0)
-    ):
-        varied = ", ".join(
-            f"{name} {_short(value)}" for name, value in trial.parameters.items()
-        )
-        cost = "-" if trial.cost is None else f"{trial.cost:.3f}"
+    by_cost = sorted(
+        tuning.trials, key=lambda trial: (trial.cost is None, trial.cost or 0.0)
+    )
+    for trial in by_cost:
+        varied = []
+        for name, value in trial.parameters.items():
+            shown = f"{value:.3g}" if isinstance(value, float) else str(value)
+            varied.append(f"{name} {shown}")
         table.add_row(
-            str(trial.number), cost, trial.ended, varied or "nothing: as it was"
+            str(trial.number),
+            "-" if trial.cost is None else f"{trial.cost:.3f}",
+            trial.ended,
+            ", ".join(varied) or "nothing: as it was",
         )
     console.print(table)
-    say(f"\nwritten: {out / BEST}")
-
-
-def _short(value: object) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    say(f"\nwritten: {best}")

@@ -13,88 +13,94 @@ from shipgym.plots import history_figure, manoeuvre_figure, path_figure, pull_ou
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
 
-HISTORIES = ("psi", "delta", "r", "speed", "drift")
-UNITS = {"_deg_s": "deg/s", "_deg": "deg", "_lengths": "ship lengths", "_s": "s"}
+#: Name in the page, plotly figure, and caption.
+Figure = tuple[str, Any, str]
 
 
-def write_page(model: ShipModel, found: StandardTrials, path: Path) -> None:
+def write_page(model: ShipModel, trials: StandardTrials, path: Path) -> None:
     """Write indices, criteria and figures as one self-contained page."""
+    criteria = {}
+    for name, criterion in trials.criteria.items():
+        criteria[criterion_name(name, criterion)] = criterion
+    sections = []
+    for name, family in trials.families.items():
+        if family:
+            sections.append(_section(name, family, trials))
     page = render(
         "agents.cli/trials.html",
         model=model,
-        water=found.water,
-        draws=found.draws,
-        criteria={
-            criterion_name(name, one): one for name, one in found.criteria.items()
-        },
-        sections=[
-            _section(name, family, found)
-            for name, family in found.families.items()
-            if family
-        ],
+        water=trials.water,
+        draws=trials.draws,
+        criteria=criteria,
+        sections=sections,
     )
     write_text(page, path)
 
 
 def _section(
-    name: str, family: dict[str, Manoeuvre], found: StandardTrials
+    name: str, family: dict[str, Manoeuvre], trials: StandardTrials
 ) -> dict[str, Any]:
-    """What the page shows of one family of manoeuvres: a row for each index, and figures."""
-    keys = list(family)
-    indices = dict.fromkeys(index for key in keys for index in found.indices[key])
+    """The section of one family of manoeuvres: a row for each index, and figures."""
+    rows: dict[str, list[Any]] = {}
+    for manoeuvre in family:
+        for index in trials.indices[manoeuvre]:
+            by_manoeuvre = [trials.indices[other].get(index) for other in family]
+            rows[readable_index(index)] = by_manoeuvre
     return {
         "name": name,
         "title": FAMILIES[name].title,
-        "manoeuvres": keys,
-        "indices": {
-            _readable(index): [found.indices[key].get(index) for key in keys]
-            for index in indices
+        "manoeuvres": list(family),
+        "indices": rows,
+        "refused": {
+            key: trials.refused[key] for key in family if key in trials.refused
         },
-        "refused": {key: found.refused[key] for key in keys if key in found.refused},
-        "figures": _figures(
-            name,
-            family,
-            {key: found.sailed[key] for key in keys if key in found.sailed},
-        ),
+        "figures": _figures(name, family, trials),
     }
 
 
 def _figures(
-    name: str, family: dict[str, Manoeuvre], sailed: dict[str, Trial | Spiral]
-) -> list[tuple[str, Any, str]]:
-    """Name in the page, figure and caption of all there is to draw of one family of manoeuvres."""
-    trials = {key: run for key, run in sailed.items() if isinstance(run, Trial)}
-    if name == "pull-outs" and trials:
-        found = [(name, pull_out_figure(trials), family[next(iter(trials))].caption)]
+    name: str, family: dict[str, Manoeuvre], trials: StandardTrials
+) -> list[Figure]:
+    """All figures of one family of manoeuvres."""
+    runs = {key: trials.runs[key] for key in family if key in trials.runs}
+    simulated = {key: run for key, run in runs.items() if isinstance(run, Trial)}
+    if name == "pull-outs" and simulated:
+        caption = family[next(iter(simulated))].caption
+        figures = [(name, pull_out_figure(simulated), caption)]
     else:
-        found = []
-        for k, (key, run) in enumerate(sailed.items()):
-            caption = f"{key[0].upper()}{key[1:]}. {family[key].caption}"
-            found.append(
-                (f"{name}-{k}", (family[key].figure or manoeuvre_figure)(run), caption)
-            )
-        if trials:
-            found.append(
-                (
-                    f"{name}-paths",
-                    path_figure(trials),
-                    "Paths from above, north up, in metres.",
-                )
-            )
-    histories = trials or {
-        key: run.trial for key, run in sailed.items() if isinstance(run, Spiral)
-    }
+        figures = _manoeuvre_figures(name, family, runs)
+        if simulated:
+            caption = "Paths from above, north up, in metres."
+            figures.append((f"{name}-paths", path_figure(simulated), caption))
+
+    histories = simulated
+    if not histories:
+        spirals = {key: run for key, run in runs.items() if isinstance(run, Spiral)}
+        histories = {key: run.trial for key, run in spirals.items()}
     if histories:
+        figure = history_figure(histories, ("psi", "delta", "r", "speed", "drift"))
         caption = "Time histories: heading, rudder, yaw rate, speed and drift angle."
-        found.append(
-            (f"{name}-histories", history_figure(histories, HISTORIES), caption)
-        )
-    return found
+        figures.append((f"{name}-histories", figure, caption))
+    return figures
 
 
-def _readable(name: str) -> str:
+def _manoeuvre_figures(
+    name: str, family: dict[str, Manoeuvre], runs: dict[str, Trial | Spiral]
+) -> list[Figure]:
+    """A figure of each manoeuvre."""
+    figures = []
+    for number, (key, run) in enumerate(runs.items()):
+        draw = family[key].figure or manoeuvre_figure
+        caption = f"{key[0].upper()}{key[1:]}. {family[key].caption}"
+        figures.append((f"{name}-{number}", draw(run), caption))
+    return figures
+
+
+def readable_index(name: str) -> str:
     """The name of an index as words with its unit."""
-    for ending, unit in UNITS.items():
+    units = {"_deg_s": "deg/s", "_deg": "deg", "_lengths": "ship lengths", "_s": "s"}
+    for ending, unit in units.items():
         if name.endswith(ending):
             return f"{name.removesuffix(ending).replace('_', ' ')}, {unit}"
-    return name.replace("_", " ") + (", m/s" if name == "final_speed" else "")
+    words = name.replace("_", " ")
+    return f"{words}, m/s" if name == "final_speed" else words

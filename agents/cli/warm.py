@@ -2,41 +2,34 @@
 
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 from typer import Argument, Option
 
-from agents.cli.command import answered
 
-Wanted = Annotated[
-    list[str] | None,
-    Argument(
-        metavar="[ID|MODEL|FILE]...",
-        help="Ids of environments, models, files of models, ships and tasks.",
-    ),
-]
-Ship = Annotated[
-    str | None,
-    Option("--model", help="Ship of the environments and tasks, by default their own."),
-]
-All = Annotated[
-    bool,
-    Option(
-        "--all", help="All environments, calm and in a sea, and all shipped models."
-    ),
-]
-SEAS: dict[str, Any] = {
-    "calm water": {},
-    "a sea": {"sea": "rough"},
-}  # every sea but the calm one shares what is compiled
-
-
-@answered
 def warm_command(
-    wanted: Wanted = None, everything: All = False, model: Ship = None
+    wanted: Annotated[
+        list[str] | None,
+        Argument(
+            metavar="[ID|MODEL|FILE]...",
+            help="Ids of environments, models, files of models, ships and tasks.",
+        ),
+    ] = None,
+    everything: Annotated[
+        bool,
+        Option(
+            "--all", help="All environments, calm and in a sea, and all shipped models."
+        ),
+    ] = False,
+    model: Annotated[
+        str | None,
+        Option(
+            "--model", help="Ship of the environments and tasks, by default their own."
+        ),
+    ] = None,
 ) -> None:
     """Compile ships in advance. Without arguments, both tasks with the Mariner.
 
@@ -48,80 +41,85 @@ def warm_command(
     from shipgym.engine.cache_folder import CacheWarning, usable_folder
     from shipgym.errors import InputError
 
-    if (folder := usable_folder()) is None:
+    folder = usable_folder()
+    if folder is None:
         raise InputError("there is no cache to fill, for the reason above")
-    jobs = dict(
-        job for name in _names(wanted, everything) for job in _jobs(name, model)
-    )
-    done: list[dict[str, Any]] = []
-    for number, (what, job) in enumerate(jobs.items(), start=1):
-        begin, refused = time.perf_counter(), ""
+    jobs: dict[str, Callable[[], Any]] = {}
+    for name in warm_names(wanted, everything):
+        jobs |= warm_jobs(name, model)
+
+    ready: list[dict[str, Any]] = []
+    for number, (what, compile_it) in enumerate(jobs.items(), start=1):
+        begin = time.perf_counter()
+        refused = ""
         try:
             with warnings.catch_warnings(action="error", category=CacheWarning):
-                job()
+                compile_it()
         except CacheWarning as error:
             raise InputError(f"{what}: {error}") from None
         except InputError as error:
             if not everything:
                 raise
-            refused = str(
-                error
-            )  # not every ship has the particulars that a sea asks for
-        seconds = (
-            time.perf_counter() - begin
-        )  # that compiling took; few if it was in the cache
-        done.append({"what": what, "seconds": round(seconds, 2), "refused": refused})
+            refused = str(error)  # not every ship has what a sea asks for
+        seconds = time.perf_counter() - begin
+        ready.append({"what": what, "seconds": round(seconds, 2), "refused": refused})
         say(f"{number}/{len(jobs)}  {what}: {refused or f'{seconds:.1f} s'}")
-    answer({"cache": str(folder), "ready": done})
+    answer({"cache": str(folder), "ready": ready})
     say(f"kept in {folder}")
 
 
-def _names(wanted: list[str] | None, everything: bool) -> list[str]:
-    """Environments and models that are asked for."""
-    from shipgym.envs.registration import TASKS, env_id, environments
+def warm_names(wanted: list[str] | None, everything: bool) -> list[str]:
+    """Environments and models to compile; by default both tasks and the Mariner."""
+    from shipgym.envs.registration import ENVIRONMENTS, env_id
     from shipgym.ships import list_models
+    from shipgym.tasks.definition import TASKS
 
     if everything:
-        return [*environments(), *list_models()]
+        return [*ENVIRONMENTS, *list_models()]
     return wanted or [*map(env_id, TASKS), "mariner"]
 
 
-def _jobs(
-    name: str, ship: str | None = None
-) -> Iterator[tuple[str, Callable[[], Any]]]:
-    """What is to be compiled for an id or a model, each with words for it."""
+def warm_jobs(name: str, ship: str | None = None) -> dict[str, Callable[[], Any]]:
+    """Functions that compile what an environment's id, a model or a file needs, by a description.
+
+    Raises InputError for what is none of these.
+    """
     import shipgym
     from shipgym.engine.loops import LOOPS, ship_loop
     from shipgym.envs.environment import DEFAULT_TASK
-    from shipgym.envs.registration import env_id, environments
+    from shipgym.envs.registration import ENVIRONMENTS, env_id
     from shipgym.errors import InputError
     from shipgym.python_files import load_file
 
-    path, expected = Path(name), "the Python file of a task or a ship"
-    task = path.suffix == ".py" and not hasattr(load_file(path, expected), "SHIP")
-    if task or name in environments():
-        given: dict[str, Any] = {"model": ship} if ship else {}
-        given |= {"task": name} if task else {}
-        for water, sea in SEAS.items():
-            yield (
-                f"{name} in {water}",
-                partial(_make, env_id(DEFAULT_TASK) if task else name, given | sea),
-            )
-        return
+    is_task = False
+    if Path(name).suffix == ".py":
+        content = load_file(Path(name), "the Python file of a task or a ship")
+        is_task = not hasattr(content, "SHIP")
+    if is_task or name in ENVIRONMENTS:
+        options: dict[str, Any] = {"model": ship} if ship else {}
+        environment = name
+        if is_task:
+            environment = env_id(DEFAULT_TASK)
+            options["task"] = name
+        rough = {**options, "sea": "rough"}  # every sea but the calm one is compiled so
+        return {
+            f"{name} in calm water": partial(_make, environment, options),
+            f"{name} in a sea": partial(_make, environment, rough),
+        }
+
     try:
         model = shipgym.load_model(name)
     except InputError as error:
         raise InputError(
-            f"{name!r} found, expected an environment's id or a model: {error}"
+            f"argument: expected an environment's id or a model, got {name!r}: {error}"
         ) from None
-    for loop in LOOPS:
-        yield f"{model.name}: {loop}", partial(ship_loop, model.vessel, loop)
+    return {
+        f"{model.name}: {loop}": partial(ship_loop, model.vessel, loop)
+        for loop in LOOPS
+    }
 
 
-def _make(env_id: str, options: dict[str, Any]) -> None:
+def _make(environment: str, options: dict[str, Any]) -> None:
     import gymnasium
 
-    with warnings.catch_warnings(
-        action="ignore", category=DeprecationWarning
-    ):  # of older ids
-        gymnasium.make(env_id, **options).close()
+    gymnasium.make(environment, **options).close()

@@ -1,58 +1,57 @@
-"""The classical autopilots' common part: from what the environment shows to the rudder.
-
-A controller is a list of gains on deviations from straight running. By itself it keeps
-no state: the integral of the heading error, with its anti-windup, is part of the
-observation.
-"""
+"""The classical autopilots' common part: from what the environment shows to the rudder."""
 
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.linear_loop import (
-    SIGNALS,
-    Compensator,
-    Margins,
-    SampledShip,
-    sample_ship,
+from agents.controllers.law import (
+    Gains,
+    Law,
+    LinearFeedback,
+    Nothing,
+    Number,
+    Signals,
+    linear_law,
 )
+from agents.controllers.linear_loop import SIGNALS, SampledShip, sample_ship
+from agents.controllers.margins import Compensator, Margins
 from agents.controllers.memory import (
-    Flags,
-    Floats,
-    begun,
     checked_observation,
-    deviations,
+    from_columns,
+    recalled,
     size_of,
+    to_rows,
 )
 from shipgym import InputError, ShipModel
-from shipgym.arrays import finite
+from shipgym.arrays import Floats, finite
+from shipgym.engine.records import Record, leaves
 from shipgym.files import write_json
-from shipgym.tasks.task import OBSERVATION_NAMES, observation_scales
+from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 
 Action = NDArray[np.float32]
 
 FORMAT = 1  # of the controller file
 SMALL = 1e-5  # rad, and other SI units, of motions about straight running
 SCALE_TOLERANCE = 1e-6  # relative difference of observation scales that is rounding
+UNKNOWN_MARGINS = Margins(np.nan, np.nan, np.nan, np.nan)
 
 
-class Range(NamedTuple):
-    """Least and largest value of a number, and what it is where an older file lacks it."""
+class Bounds(NamedTuple):
+    """Least and largest value of a number in a controller file."""
 
     least: float
     largest: float
-    default: float | None = None
 
 
-#: Of gains and other numbers that no controller says more about, and of observation
-#: scales; SI units.
-NUMBERS, SCALES = Range(-1e9, 1e9), Range(1e-9, 1e9)
+#: Of gains and other numbers that no controller says more about, SI units.
+ANY_NUMBER = Bounds(-1e9, 1e9)
 
 
 class Policy(Protocol):
@@ -65,7 +64,7 @@ class Policy(Protocol):
         episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[Any, Any]:
-        """Commands for one or many observations, with the signature of stable-baselines3.
+        """Return commands for one or many observations, with the signature of stable-baselines3.
 
         Raises InputError if the observation has fewer entries or another number of
         dimensions, or the state is not one of as many ships.
@@ -96,6 +95,10 @@ class Policy(Protocol):
 class Controller:
     """Feedback of deviations from straight running to the commanded rudder.
 
+    A controller keeps no state: what there is to remember of each ship is in the state
+    that `predict` returns, so one controller may steer any number of episodes side by
+    side.
+
     Attributes
     ----------
     gains : dict of str to float
@@ -121,28 +124,26 @@ class Controller:
     kind: ClassVar[str] = ""
     #: For each gain the signal it acts on and the sign with which it does.
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {}
-    #: What it observes, also in other tasks, and names of its gains where not those of
-    #: `feedback`.
-    observes: ClassVar[tuple[str, ...]] = OBSERVATION_NAMES
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    #: Names of its gains, where they are not those of `feedback`.
     gain_names: ClassVar[tuple[str, ...]] = ()
-    #: What it reads of the ship beside her heading, where that does not follow from
-    #: `feedback`.
-    reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "sway", "surge", "rudder")
-    #: Numbers that it remembers of each ship, by name
-    #: (`agents.controllers.memory.records`).
-    record: ClassVar[np.dtype[Any]] = np.dtype([])
+    #: What it observes of the environment.
+    observes: ClassVar[tuple[str, ...]] = OBSERVATION_NAMES
+    #: Its law (`agents.controllers.law`), and the record of what that remembers of each
+    #: ship.
+    law: ClassVar[Law] = staticmethod(linear_law)
+    memory_record: ClassVar[Record] = Nothing
+    #: What its law reads of `Signals` beside the heading error and its integral.
+    reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "sway", "rudder")
     #: Whether it leads another controller, its `autopilot`, which the file holds too.
     has_autopilot: ClassVar[bool] = False
-    has_ship: ClassVar[bool] = (
-        False  # whether the file holds its design model, its `ship`, too
-    )
+    #: Whether the file holds its design model too, its `ship`.
+    has_ship: ClassVar[bool] = False
     #: Arrays that the file holds beside the gains: names of fields, and their axes: a
     #: length, or its name.
     arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {}
-    #: What it needs of `design`, with its range; also ranges of gains that are not any
+    #: What it needs of `design`, with bounds; also bounds of gains that are not any
     #: number.
-    ranges: ClassVar[Mapping[str, Range]] = {"dt": Range(1e-3, 1e4)}
+    bounds: ClassVar[Mapping[str, Bounds]] = {"dt": Bounds(1e-3, 1e4)}
 
     gains: dict[str, float]
     neutral_rudder: float
@@ -163,92 +164,97 @@ class Controller:
         design: dict[str, float],
         **more: Any,
     ) -> Self:
-        """The controller with these gains, its margins computed.
+        """Make the controller with these gains, and compute its margins.
 
-        `model`: that it was designed on; `ship`: the same, linearised and sampled;
-        `gains`: by the names of `feedback`; `design`: how they were found; `more`:
-        further fields of the class. Raises InputError if the closed loop is unstable.
+        Raises InputError if the closed loop is unstable.
+
+        Parameters
+        ----------
+        model : ShipModel
+            What it was designed on.
+        ship : SampledShip
+            The same, linearised and sampled.
+        gains : dict of str to float
+            By the names of `feedback`.
+        design : dict of str to float
+            How they were found.
+        **more
+            Further fields of the class.
         """
-        unknown, scales = (
-            Margins(np.nan, np.nan, np.nan, np.nan),
-            tuple(observation_scales(model).tolist()),
-        )
-        found = cls(
+        made = cls(
             gains=gains,
             neutral_rudder=ship.about.rudder,
             neutral_sway=ship.about.sway,
-            margins=unknown,
-            observation_scales=scales,
+            margins=UNKNOWN_MARGINS,
+            observation_scales=tuple(observation_scales(model).tolist()),
             model_name=model.name,
             model_sha256=model_hash(model),
             design={"dt": ship.dt, **design},
             **more,
         )
-        return replace(found, margins=found._margins(ship, model))
-
-    def _margins(self, ship: SampledShip, model: ShipModel) -> Margins:
-        return self.loop().margins(
-            ship, f"{type(self).__name__} on model '{model.name}'"
-        )
-
-    def loop(self) -> Compensator:
-        """The controller for small motions, without limits: what its margins are computed from."""
-        return Compensator.static(self.row[None])
-
-    def linearised(self) -> Compensator:
-        """Its law about straight running, by central differences: `loop` where the law is linear there."""
-        n, size = len(SIGNALS), self.memory_size
-        small = SMALL * np.concatenate([np.eye(n + size), -np.eye(n + size)])
-        sway, rate, error, rudder, integral = small[:, :n].T
-        seen = {
-            "heading_error_sin": np.sin(error),
-            "heading_error_cos": np.cos(error),
-            "yaw_rate": rate,
-            "sway": self.neutral_sway + sway,
-            "rudder": self.neutral_rudder + rudder,
-            "heading_error_integral": integral,
-        }
-        order, kept = self.steer(
-            seen, small[:, n:], np.zeros(len(small), dtype=np.bool_)
-        )
-        above, below = np.split(np.column_stack([order, kept]), 2)
-        slopes = (above - below).T / (2.0 * SMALL)
-        return Compensator(
-            slopes[1:, n:], slopes[1:, :n], slopes[:1, n:], slopes[:1, :n]
-        )
-
-    @property
-    def row(self) -> Floats:
-        """Feedback of the deviations in the order of `linear_loop.SIGNALS`, shape (5,).
-
-        With gains of n ships at once, as arrays of shape (n,), it is of shape (5, n).
-        """
-        by_signal = {
-            signal: sign * self.gains[gain]
-            for gain, (signal, sign) in self.feedback.items()
-        }
-        nothing = 0.0 * next(iter(by_signal.values()), 0.0)  # of each ship
-        return np.array([by_signal.get(signal, nothing) for signal in SIGNALS])
-
-    def margins_on(self, model: ShipModel) -> Margins:
-        """Margins and bandwidth of the same controller on another ship.
-
-        Raises InputError if the closed loop is unstable, or the model has no straight
-        course.
-        """
-        return self._margins(sample_ship(model, self.design["dt"]), model)
-
-    def reset(self) -> None:
-        """The state with which an episode begins: None, whatever the number of ships.
-
-        What there is to remember is in the state that `predict` returns, so one
-        controller may steer any number of episodes side by side.
-        """
+        return replace(made, margins=made._margins(ship, model))
 
     @property
     def name(self) -> str:
         """Short name: `pid`, `lq`."""
         return self.kind
+
+    @property
+    def rudder_limit(self) -> float:
+        """Largest rudder angle, rad."""
+        return self.observation_scales[self.observation_names.index("rudder")]
+
+    @property
+    def memory_size(self) -> int:
+        """How many numbers of each ship are in the state that `predict` returns."""
+        return size_of(self.memory_record)
+
+    @cached_property
+    def parameters(self) -> Any:
+        """Parameters of its law, a record."""
+        return self.linear_feedback
+
+    @property
+    def linear_feedback(self) -> LinearFeedback:
+        """Gains by the signals that they act on, and the neutral point."""
+        by_signal = dict.fromkeys(SIGNALS, 0.0)
+        for gain, (signal, sign) in self.feedback.items():
+            by_signal[signal] = sign * self.gains[gain]
+        return LinearFeedback(
+            Gains(**by_signal), self.neutral_rudder, self.neutral_sway
+        )
+
+    @property
+    def needed_signals(self) -> tuple[str, ...]:
+        """What it reads of the ship beside her heading: of `reads`, what has an effect."""
+        if not self.is_closed_form() or type(self).law is not linear_law:
+            return self.reads
+        gains = self.parameters.gains
+        return tuple(name for name in self.reads if getattr(gains, name) != 0.0)
+
+    @classmethod
+    def is_closed_form(cls) -> bool:
+        """Whether it steers by its `law` alone, which can be written in another language."""
+        return cls.steer is Controller.steer
+
+    def steer(self, seen: Signals, memory: Any) -> tuple[Number, Any]:
+        """Evaluate the law once.
+
+        Parameters
+        ----------
+        seen : Signals
+            SI units, each number an array of shape (n_ships,).
+        memory : NamedTuple
+            A `memory_record` of such arrays; zeros where an episode begins.
+
+        Returns
+        -------
+        order : array of shape (n_ships,)
+            Rudder, rad, not yet limited.
+        memory : NamedTuple
+            For the next interval.
+        """
+        return type(self).law(seen, memory, self.parameters)
 
     def predict(
         self,
@@ -261,70 +267,123 @@ class Controller:
 
         A controller that remembers nothing returns the state as given.
         """
-        n, size = len(self.observation_names), self.memory_size
         given = checked_observation(observation, self.observation_names)
-        shape, rows = (
-            given.shape[:-1],
-            np.atleast_2d(given)[:, :n] * self.observation_scales,
+        shape, size = given.shape[:-1], self.memory_size
+        kept = recalled(state if size else None, episode_start, shape, size)
+
+        seen = self.signals(np.atleast_2d(given))
+        n_ships = len(seen.heading_error)
+        columns = kept.reshape(n_ships, size).T
+        memory = from_columns(self.memory_record, iter(columns))
+        order, memory = self.steer(seen, memory)
+
+        part = np.clip(order / self.rudder_limit, -1.0, 1.0)
+        action = part.astype(np.float32).reshape(*shape, 1)
+        if size:
+            state = to_rows(memory, n_ships).reshape(*shape, size)
+        return action, state
+
+    def signals(self, observations: Floats) -> Signals:
+        """What observations, shape (n_ships, n_observations), say of the ships, SI units."""
+        known = self.observed(observations)
+        return Signals(
+            sway=known["sway"],
+            yaw_rate=known["yaw_rate"],
+            heading_error=np.arctan2(
+                known["heading_error_sin"], known["heading_error_cos"]
+            ),
+            rudder=known["rudder"],
+            heading_error_integral=known["heading_error_integral"],
+            surge=known["surge"],
+            rate_of_turn=np.zeros(len(observations)),
         )
-        memory, begins = begun(state if size else None, episode_start, shape, size)
-        seen = dict(zip(self.observation_names, rows.T, strict=True))
-        order, kept = self.steer(
-            seen, memory.reshape(len(rows), size), begins.reshape(-1)
+
+    def observed(self, observations: Floats) -> dict[str, Floats]:
+        """Observations by name in SI units, each of shape (n_ships,)."""
+        first = observations[:, : len(self.observation_names)]
+        columns = (first * self.observation_scales).T
+        return dict(zip(self.observation_names, columns, strict=True))
+
+    def reset(self) -> None:
+        """Return the state with which an episode begins: None, whatever the number of ships."""
+
+    def loop(self) -> Compensator:
+        """Linear controller for small motions, without limits, from which the margins are computed."""
+        if type(self).law is linear_law:
+            return Compensator.static(np.array(self.parameters.gains))
+        return self._linearised()
+
+    def _linearised(self) -> Compensator:
+        """Law about straight running by central differences; the episode has begun."""
+        paths = leaves(self.memory_record)
+        varied = [path for path in paths if path != "started"]
+        n, size = len(SIGNALS), len(SIGNALS) + len(varied)
+        small = SMALL * np.concatenate([np.eye(size), -np.eye(size)])
+        signals = dict(zip(SIGNALS, small[:, :n].T, strict=True))
+        kept = dict(zip(varied, small[:, n:].T, strict=True))
+
+        seen = Signals(
+            sway=self.neutral_sway + signals["sway"],
+            yaw_rate=signals["yaw_rate"],
+            heading_error=signals["heading_error"],
+            rudder=self.neutral_rudder + signals["rudder"],
+            heading_error_integral=signals["heading_error_integral"],
+            surge=np.zeros(2 * size),
+            rate_of_turn=np.zeros(2 * size),
         )
-        action = np.clip(order / self.rudder_limit, -1.0, 1.0)[:, None].astype(
-            np.float32
+        started = np.ones(2 * size)
+        columns = [kept.get(path, started) for path in paths]
+        memory = from_columns(self.memory_record, iter(columns))
+
+        order, after = self.steer(seen, memory)
+        rows = to_rows(after, 2 * size)
+        outputs = [order, *(rows[:, paths.index(path)] for path in varied)]
+        above, below = np.split(np.column_stack(outputs), 2)
+        slopes = (above - below).T / (2.0 * SMALL)
+        return Compensator(
+            A=slopes[1:, n:], B=slopes[1:, :n], C=slopes[:1, n:], D=slopes[:1, :n]
         )
-        return action.reshape(*shape, 1), kept.reshape(*shape, size) if size else state
 
-    @property
-    def rudder_limit(self) -> float:
-        """Largest rudder angle, rad."""
-        return self.observation_scales[self.observation_names.index("rudder")]
+    def margins_on(self, model: ShipModel) -> Margins:
+        """Margins and bandwidth of the same controller on another ship.
 
-    @property
-    def memory_size(self) -> int:
-        """How many numbers it remembers of each ship: in the state, never in the controller itself."""
-        return size_of(self.record)
-
-    def steer(
-        self, seen: dict[str, Floats], memory: Floats, begins: Flags
-    ) -> tuple[Floats, Floats]:
-        """Commanded rudder and what is remembered next.
-
-        `seen`: what is observed by name, SI units, each of shape (n,); `memory`: zeros
-        where an episode begins, shape (n, memory_size); `begins`: whether it does,
-        shape (n,). Returns `order`: rad, not yet limited, shape (n,); `memory`: shape
-        (n, memory_size).
+        Raises InputError if the closed loop is unstable, or the model has no straight
+        course.
         """
-        found = deviations(seen, self.neutral_rudder, self.neutral_sway)
-        rows = np.broadcast_to(self.row.T, found.shape)
-        return self.neutral_rudder + np.einsum("ij,ij->i", found, rows), memory
+        return self._margins(sample_ship(model, self.design["dt"]), model)
+
+    def _margins(self, ship: SampledShip, model: ShipModel) -> Margins:
+        name = f"{type(self).__name__} on model '{model.name}'"
+        return self.loop().margins(ship, name)
 
     def check_fits(
         self, names: Sequence[str], scales: Sequence[float], where: str = "observations"
     ) -> None:
-        """Refuse to steer what shows other quantities first, or in other scales, than those designed for.
+        """Refuse other quantities or scales than those designed for; InputError names the first difference.
 
-        `names`, `scales`: `observation_names` and `observation_scales` of an
-        environment; it may show more than what is steered by; `where`: start of the
-        message. Raises InputError naming the first difference.
+        Parameters
+        ----------
+        names, scales : sequence
+            `observation_names` and `observation_scales` of an environment; it may show
+            more than what is steered by.
+        where : str
+            Start of the message.
         """
-        meant = (
-            f"controller '{self.name}' was designed for {{}} (model"
-            f" '{self.model_name}'): another ship or rudder limit; design a controller"
-            f" on this model with {type(self).__name__}.from_model"
-        )
         check_names(names[: len(self.observation_names)], self.observation_names, where)
-        check_scales(names, scales, self.observation_scales, where, meant)
+        check_scales(
+            names,
+            scales,
+            self.observation_scales,
+            where,
+            f"controller '{self.name}' was designed on another ship or rudder limit"
+            f" (model '{self.model_name}'); design one on this model with"
+            f" {type(self).__name__}.from_model",
+        )
 
     def check_fits_model(self, model: ShipModel) -> None:
         """Refuse a ship with other observation scales (length, service speed, rudder limit)."""
-        self.check_fits(
-            OBSERVATION_NAMES,
-            observation_scales(model).tolist(),
-            f"model '{model.name}'",
-        )
+        scales = observation_scales(model).tolist()
+        self.check_fits(OBSERVATION_NAMES, scales, f"model '{model.name}'")
 
     def save(self, path: str | Path) -> None:
         """Write the controller as a JSON file, whose fields are listed in docs/deployment.md.
@@ -333,15 +392,10 @@ class Controller:
         """
         write_json(self.to_dict(), Path(path))
 
-    def file_fields(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        """What stands in its JSON, and its weights by name: it has none."""
-        return self.to_dict(), {}
-
     def to_dict(self) -> dict[str, Any]:
-        """What the controller's file holds."""
+        """Content of the controller's file."""
         margins = asdict(self.margins)
-        arrays = {name: getattr(self, name).tolist() for name in self.arrays}
-        return {
+        content = {
             "format": FORMAT,
             "kind": self.kind,
             "observation_names": list(self.observation_names),
@@ -352,24 +406,26 @@ class Controller:
             "model": {"name": self.model_name, "sha256": self.model_sha256},
             "margins": {name: finite(value) for name, value in margins.items()},
             "design": self.design,
-            **({"arrays": arrays} if arrays else {}),
         }
+        if self.arrays:
+            arrays = {name: getattr(self, name).tolist() for name in self.arrays}
+            content["arrays"] = arrays
+        return content
 
 
 def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> None:
-    """Refuse observations by other names or in another order, naming the first difference."""
-    for i, (one, other) in enumerate(zip(found, expected, strict=False)):
-        if one != other:
-            raise InputError(f"{where}: observation {i} is '{one}', expected '{other}'")
+    """Refuse observations by other names or in another order; InputError names the first difference."""
+    for i, (name, wanted) in enumerate(zip(found, expected, strict=False)):
+        if name != wanted:
+            raise InputError(
+                f"{where}: observation {i}: expected '{wanted}', got '{name}'"
+            )
     if len(found) != len(expected):
-        difference = [
-            name
-            for name in (*found, *expected)
-            if (name in found) != (name in expected)
-        ]
+        missing = [name for name in expected if name not in found]
+        unknown = [name for name in found if name not in expected]
         raise InputError(
-            f"{where}: {len(found)} observations found, expected {len(expected)}; "
-            f"in one and not in the other: {', '.join(difference)}"
+            f"{where}: expected {len(expected)} observations, got {len(found)}; in one"
+            f" and not in the other: {', '.join(unknown + missing)}"
         )
 
 
@@ -378,17 +434,22 @@ def check_scales(
     scales: Sequence[float],
     own: Sequence[float],
     where: str,
-    meant: str,
+    remedy: str,
 ) -> None:
-    """Refuse observations in other scales than an agent's own; `meant` says more, with {} for its scale."""
-    for name, one, other in zip(names, scales, own, strict=False):
-        if abs(one - other) > SCALE_TOLERANCE * abs(other):
-            said = meant.replace("{}", f"{other:g}")
-            raise InputError(f"{where}: the scale of '{name}' is {one:g}, but {said}")
+    """Refuse observations in other scales than an agent's own; InputError names the first of them."""
+    for name, scale, wanted in zip(names, scales, own, strict=False):
+        if abs(scale - wanted) > SCALE_TOLERANCE * abs(wanted):
+            raise InputError(
+                f"{where}: scale of '{name}': expected {wanted:g}, got {scale:g}: {remedy}"
+            )
 
 
 def model_hash(model: ShipModel) -> str:
     """SHA-256 of a model's structure, coefficients, particulars and steering gear."""
-    ship, gear = model.particulars.to_dict(), model.steering.to_dict()
-    content = [model.dynamics.to_dict(), model.coefficients, ship, gear]
+    content = [
+        model.dynamics.to_dict(),
+        model.coefficients,
+        model.particulars.to_dict(),
+        model.steering.to_dict(),
+    ]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

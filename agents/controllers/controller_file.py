@@ -1,4 +1,4 @@
-"""The controller file as it is read: JSON, versioned, checked by fields (listed in docs/deployment.md)."""
+"""Read a controller file: JSON, versioned, checked field by field (docs/deployment.md lists the fields)."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 
 from agents.controllers.controller import (
+    ANY_NUMBER,
     FORMAT,
-    NUMBERS,
-    SCALES,
+    Bounds,
     Controller,
-    Range,
     check_names,
 )
-from agents.controllers.linear_loop import Margins
+from agents.controllers.margins import Margins
 from agents.controllers.registry import controller_class, controller_kinds
 from shipgym import InputError, ShipModel
+from shipgym.arrays import Floats
 from shipgym.checks import (
     check_array,
     check_choice,
@@ -31,7 +31,11 @@ from shipgym.checks import (
 )
 
 REMEDY = "design the controller again or take another copy"
-RUDDER, ANY = Range(-np.pi, np.pi), Range(-np.inf, np.inf)  # rad; any finite number
+#: The kind of file that `agents.policies.policy_file` reads.
+LEARNED = "learned"
+RUDDER = Bounds(-np.pi, np.pi)  # rad
+SCALE = Bounds(1e-9, 1e9)
+FINITE = Bounds(-np.inf, np.inf)
 FIELDS = (
     "format",
     "kind",
@@ -44,160 +48,167 @@ FIELDS = (
     "margins",
     "design",
 )
-#: Kinds that `agents.policies.policy_file` reads.
-POLICIES = ("learned", "shielded", "one-for-all")
 
 
 def read_controller(content: Mapping[str, Any], where: str) -> Controller:
-    """A classical controller from what `Controller.to_dict` returned; InputError names the field at fault."""
+    """Controller from what `Controller.to_dict` returned; InputError names the field at fault."""
+    check_keys(content, content, where, ("format", "kind"))
     check_format(content, FORMAT, where)
-    if "kind" in content:
-        kinds = controller_kinds()
-        kind = check_choice(content["kind"], (*kinds, *POLICIES), f"{where}: kind")
-        if kind in POLICIES:
-            raise InputError(
-                f"{where}: kind: '{kind}' found, expected a classical one:"
-                f" {quoted(kinds)}"
-            )
-    check_keys(content, content, where, FIELDS)
-    design = controller_class(content["kind"])
-    has = {
-        "arrays": bool(design.arrays),
-        "autopilot": design.has_autopilot,
-        "ship": design.has_ship,
-    }
-    expected = (*FIELDS, *(name for name in has if has[name]))
-    check_keys(content, expected, where, expected)
-    names = content["observation_names"]
-    if not isinstance(names, list):
+    known_kinds = controller_kinds()
+    kind = check_choice(content["kind"], (*known_kinds, LEARNED), f"{where}: kind")
+    if kind == LEARNED:
         raise InputError(
-            f"{where}: observation_names: {shown(names)} found, expected a list of"
-            " names"
+            f"{where}: kind: expected a classical controller, {quoted(known_kinds)},"
+            f" got '{kind}'"
         )
-    observes = next(
-        (some for some in design.alternatives if list(some) == names), design.observes
-    )
-    check_names([str(name) for name in names], observes, f"{where}: observation_names")
-    known = design.gain_names or tuple(design.feedback)
-    gains = {name: design.ranges.get(name, NUMBERS) for name in known}
-    needed = {name: one for name, one in design.ranges.items() if name not in gains}
+
+    design = controller_class(kind)
+    expected = (*FIELDS, *_further_fields(design))
+    check_keys(content, expected, where, expected)
+    names = _names(content["observation_names"], where)
+    check_names(names, design.observes, f"{where}: observation_names")
+
     with placed(where):
         return design(
-            gains=_numbers(
-                check_table(content["gains"], "gains", known), gains, "gains"
-            ),
+            gains=_gains(content["gains"], design),
             neutral_rudder=_number(content["neutral_rudder"], RUDDER, "neutral_rudder"),
-            neutral_sway=_number(content["neutral_sway"], NUMBERS, "neutral_sway"),
+            neutral_sway=_number(content["neutral_sway"], ANY_NUMBER, "neutral_sway"),
             margins=_margins(content["margins"]),
-            observation_scales=read_scales(content["observation_scales"], observes),
-            design=_numbers(content["design"], needed, "design"),
-            observation_names=observes,
+            observation_scales=read_scales(content["observation_scales"], names),
+            design=_design(content["design"], design),
+            observation_names=design.observes,
             **read_model(content["model"]),
             **_arrays(content.get("arrays", {}), design.arrays),
             **_parts(content, design),
         )
 
 
+def _further_fields(design: type[Controller]) -> list[str]:
+    """Fields that a kind of controller has in addition to `FIELDS`."""
+    fields_of_kind = {
+        "arrays": bool(design.arrays),
+        "autopilot": design.has_autopilot,
+        "ship": design.has_ship,
+    }
+    return [name for name, present in fields_of_kind.items() if present]
+
+
+def _names(value: Any, where: str) -> tuple[str, ...]:
+    if not isinstance(value, list):
+        raise InputError(
+            f"{where}: observation_names: expected a list of names, got {shown(value)}"
+        )
+    return tuple(str(name) for name in value)
+
+
+def _gains(value: Any, design: type[Controller]) -> dict[str, float]:
+    names = design.gain_names or tuple(design.feedback)
+    table = check_table(value, "gains", names)
+    bounds = {name: design.bounds.get(name, ANY_NUMBER) for name in names}
+    return _numbers(table, bounds, "gains")
+
+
+def _design(value: Any, design: type[Controller]) -> dict[str, float]:
+    """How it was designed: any numbers, and those that its law needs within their bounds."""
+    gains = design.gain_names or tuple(design.feedback)
+    needed = {name: one for name, one in design.bounds.items() if name not in gains}
+    return _numbers(check_table(value, "design"), needed, "design")
+
+
 def _parts(content: Mapping[str, Any], design: type[Controller]) -> dict[str, Any]:
-    """The autopilot that guidance leads, and its design model, where it has them."""
+    """Autopilot that guidance leads, and its design model, where it has them."""
     parts: dict[str, Any] = {}
     if design.has_autopilot:
-        parts["autopilot"] = read_controller(
-            check_table(content["autopilot"], "autopilot"), "autopilot"
-        )
-        if parts["autopilot"].has_autopilot:
-            kind = parts["autopilot"].kind
+        table = check_table(content["autopilot"], "autopilot")
+        autopilot = read_controller(table, "autopilot")
+        if autopilot.has_autopilot:
             raise InputError(
-                f"autopilot: '{kind}' found, expected one that keeps a heading"
+                "autopilot: expected a controller that keeps a heading, got"
+                f" '{autopilot.kind}'"
             )
+        parts["autopilot"] = autopilot
     if design.has_ship:
-        parts["ship"] = ShipModel.from_dict(
-            check_table(content["ship"], "ship"), "ship"
-        )
+        table = check_table(content["ship"], "ship")
+        parts["ship"] = ShipModel.from_dict(table, "ship")
     return parts
 
 
-def _arrays(value: Any, axes: Mapping[str, tuple[str | int, ...]]) -> dict[str, Any]:
+def _arrays(value: Any, axes_of: Mapping[str, tuple[str | int, ...]]) -> dict[str, Any]:
     """Arrays of numbers, whose axes of one name have one length."""
-    table = check_table(value, "arrays", axes, axes)
-    lengths: dict[str | int, int] = {}
+    table = check_table(value, "arrays", axes_of, axes_of)
+    lengths: dict[str, int] = {}
     arrays = {}
-    for name, named in axes.items():
-        shape = tuple(
-            lengths.get(axis) if isinstance(axis, str) else axis for axis in named
-        )
+    for name, axes in axes_of.items():
+        shape = tuple(lengths.get(a) if isinstance(a, str) else a for a in axes)
         array = check_array(table[name], shape, f"arrays.{name}")
-        fits = (
-            array.ndim == len(named)
-            and array.size > 0
-            and np.abs(array).max() <= NUMBERS.largest
-        )
-        if not (
-            fits
-            and all(
-                lengths.setdefault(a, n) == n
-                for a, n in zip(named, array.shape, strict=True)
-            )
-        ):
+        if not _is_array_of(array, axes, lengths):
             raise InputError(
-                f"arrays.{name}: expected numbers of magnitude {NUMBERS.largest:g} at"
-                f" most, of shape ({', '.join(map(str, named))}); {REMEDY}"
+                f"arrays.{name}: expected numbers of magnitude"
+                f" {ANY_NUMBER.largest:g} at most, of shape"
+                f" ({', '.join(map(str, axes))}), got shape {array.shape}; {REMEDY}"
             )
         arrays[name] = array
     return arrays
 
 
-def read_model(value: Any) -> dict[str, Any]:
+def _is_array_of(
+    array: Floats, axes: tuple[str | int, ...], lengths: dict[str, int]
+) -> bool:
+    """Whether an array has these axes and numbers within bounds; lengths of named axes are kept."""
+    if array.ndim != len(axes) or array.size == 0:
+        return False
+    for axis, length in zip(axes, array.shape, strict=True):
+        if isinstance(axis, str) and lengths.setdefault(axis, length) != length:
+            return False
+    return bool(np.abs(array).max() <= ANY_NUMBER.largest)
+
+
+def read_model(value: Any) -> dict[str, str]:
     """Name and hash of the model that an agent was made for, as its fields."""
     table = check_table(value, "model", ("name", "sha256"))
     return {
-        f"model_{name}": check_text(table.get(name), f"model.{name}")
-        for name in ("name", "sha256")
+        "model_name": check_text(table.get("name"), "model.name"),
+        "model_sha256": check_text(table.get("sha256"), "model.sha256"),
     }
 
 
 def read_scales(value: Any, names: tuple[str, ...]) -> tuple[float, ...]:
     """Observation scales, positive numbers, one for each name."""
     if not isinstance(value, list) or len(value) != len(names):
-        found = len(value) if isinstance(value, list) else shown(value)
+        got = len(value) if isinstance(value, list) else shown(value)
         raise InputError(
-            f"observation_scales: {found} found, expected {len(names)} numbers"
+            f"observation_scales: expected {len(names)} numbers, got {got}"
         )
-    pairs = enumerate(zip(names, value, strict=True))
-    return tuple(
-        _number(scale, SCALES, f"observation_scales[{i}] ('{name}')")
-        for i, (name, scale) in pairs
-    )
+    scales = []
+    for i, (name, scale) in enumerate(zip(names, value, strict=True)):
+        scales.append(_number(scale, SCALE, f"observation_scales[{i}] ('{name}')"))
+    return tuple(scales)
 
 
-def _number(value: Any, allowed: Range, where: str) -> float:
-    """A number within its range."""
-    return check_number(value, where, at_least=allowed.least, at_most=allowed.largest)
+def _number(value: Any, bounds: Bounds, where: str) -> float:
+    return check_number(value, where, at_least=bounds.least, at_most=bounds.largest)
 
 
-def _numbers(value: Any, needed: Mapping[str, Range], where: str) -> dict[str, float]:
-    """Numbers by name, all that are needed among them."""
-    later = {
-        name: one.default for name, one in needed.items() if one.default is not None
-    }
-    table = later | dict(check_table(value, where))
+def _numbers(
+    table: Mapping[str, Any], needed: Mapping[str, Bounds], where: str
+) -> dict[str, float]:
+    """Numbers by name, all that are needed among them; InputError names one that is missing."""
     for name in needed:
         if name not in table:
             raise InputError(
-                f"{where}: '{name}' is missing, expected {quoted(needed)}; {REMEDY}"
+                f"{where}: expected {quoted(needed)}, got no '{name}'; {REMEDY}"
             )
     return {
-        name: _number(number, needed.get(name, ANY), f"{where}.{name}")
+        name: _number(number, needed.get(name, FINITE), f"{where}.{name}")
         for name, number in table.items()
     }
 
 
 def _margins(value: Any) -> Margins:
     """Margins; null is no limit."""
-    names = dict.fromkeys((margin.name for margin in fields(Margins)), ANY)
-    table = check_table(value, "margins", names)
-    finite = {name: 0.0 if number is None else number for name, number in table.items()}
-    known = _numbers(finite, names, "margins")
-    return Margins(
-        **{name: np.inf if table[name] is None else known[name] for name in names}
-    )
+    bounds = dict.fromkeys((margin.name for margin in fields(Margins)), FINITE)
+    table = check_table(value, "margins", bounds)
+    limited = {name: number for name, number in table.items() if number is not None}
+    unlimited = dict.fromkeys(table.keys() - limited.keys(), np.inf)
+    needed = {name: one for name, one in bounds.items() if name not in unlimited}
+    return Margins(**_numbers(limited, needed, "margins"), **unlimited)

@@ -2,10 +2,7 @@
 
 Source: Norrbin 1972, On the added resistance due to steering on a straight course (the
 cost); van Amerongen 1982, Adaptive steering of ships, chapter 3; Anderson & Moore 1990,
-Optimal Control, chapters 2 and 3 (cross terms); Chu, Fan, Lin & Wang 2004,
-Structure-preserving algorithms for periodic discrete-time algebraic Riccati equations,
-International Journal of Control 77 (doubling: many designs at once, as adaptive
-autopilots make them while they sail).
+Optimal Control, chapters 2 and 3 (cross terms).
 """
 
 from collections.abc import Mapping
@@ -21,6 +18,7 @@ from agents.controllers.linear_loop import (
     RUDDER,
     SIGNALS,
     SampledShip,
+    checked_interval,
     rate_weight,
     sample_ship,
 )
@@ -28,10 +26,22 @@ from shipgym import ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.tasks.steering import RUDDER_WEIGHT
-from shipgym.tasks.task import control_interval
 
-DOUBLINGS = 40  # each doubles the horizon
-ACCURACY = 1e-13
+
+class SteeringCost(NamedTuple):
+    """What an LQ design minimises beside the squared heading error."""
+
+    rudder_weight: float  # of the squared rudder
+    rate_weight_s2: float  # of the squared rudder rate, s^2
+    integral_time: float  # for an offset to decay, s
+
+    @property
+    def weights(self) -> dict[str, float]:
+        """The two weights by name, as a controller's file has them."""
+        return {
+            "rudder_weight": self.rudder_weight,
+            "rate_weight_s2": self.rate_weight_s2,
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,156 +93,61 @@ class LQ(Controller):
         rate_weight_s2 : float, optional
             Weight of the squared rudder rate, s^2; by default `rate_weight`.
         """
-        weights = Weights.of(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
-        gains = weights.gains(without_yaw_memory(model, weights.dt), model.travel_time)
-        return cls.designed(
-            model, sample_ship(model, weights.dt), gains, weights.design
-        )
+        interval = checked_interval(model, dt)
+        cost = steering_cost(model, integral_lengths, rudder_weight, rate_weight_s2)
+        ship = measured = sample_ship(model, interval)
+        if "q" in model.state_names:
+            measured = sample_ship(model, interval, first_order=True)
+
+        design = {"integral_lengths": float(integral_lengths), **cost.weights}
+        return cls.designed(model, ship, lq_gains(measured, cost), design)
 
 
-class Weights(NamedTuple):
-    """What an LQ design weighs beside the squared heading error."""
-
-    dt: float  # control interval, s
-    integral_lengths: (
-        float  # time for an offset to decay, in times to travel one ship length
-    )
-    rudder_weight: float  # of the squared rudder
-    rate_weight_s2: float  # of the squared rudder rate, s^2
-
-    @classmethod
-    def of(
-        cls,
-        model: ShipModel,
-        dt: float | None,
-        integral_lengths: float,
-        rudder_weight: float,
-        rate_weight_s2: float | None,
-    ) -> Self:
-        """Those of a ship, as in `LQ.from_model`; raises InputError if one is out of its range."""
-        check_number(integral_lengths, "integral_lengths", above=0.0)
-        check_number(rudder_weight, "rudder_weight", above=0.0)
-        interval = (
-            control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
-        )
-        weight = rate_weight(model) if rate_weight_s2 is None else rate_weight_s2
-        weight = check_number(weight, "rate_weight_s2", above=0.0)
-        return cls(interval, float(integral_lengths), float(rudder_weight), weight)
-
-    def gains(self, ship: SampledShip, length_time: float) -> dict[str, float]:
-        """Gains of a sampled ship that travels her length in so many seconds, by signal."""
-        gain = lq_gain(
-            ship,
-            self.rate_weight_s2,
-            self.integral_lengths * length_time,
-            self.rudder_weight,
-        )
-        return dict(zip(SIGNALS, (-gain).tolist(), strict=True))
-
-    @property
-    def design(self) -> dict[str, float]:
-        """What a controller's file says of them."""
-        return {name: value for name, value in self._asdict().items() if name != "dt"}
-
-
-def without_yaw_memory(
-    model: ShipModel, dt: float, speed: float | None = None
-) -> SampledShip:
-    """The ship that gains are computed for: in first order if she has a memory of yaw, never measured."""
-    return sample_ship(model, dt, first_order="q" in model.state_names, speed=speed)
-
-
-def lq_gain(
-    ship: SampledShip,
-    rate_weight: float,
-    integral_time: float,
-    rudder_weight: float = RUDDER_WEIGHT,
-) -> Floats:
-    """Gain G of order = -G x that minimises the environment's cost on the sampled linear ship, shape (5,).
-
-    `rate_weight`: of the rudder rate, s^2; `integral_time`: for an offset to decay, s.
-    """
-    import control  # here, because it takes a second to import
-
-    (C,), (D,) = _outputs(
-        ship.A[None], ship.B.T, ship.dt, rate_weight, integral_time, rudder_weight
-    )
-    plant = control.ss(ship.A, ship.B, np.eye(len(SIGNALS)), 0.0, ship.dt)
-    gain, _, _ = control.lqr(plant, C.T @ C, D.T @ D, C.T @ D)
-    return np.asarray(gain, dtype=np.float64).reshape(-1)
-
-
-def _outputs(
-    A: Floats,
-    B: Floats,
-    dt: float,
-    rate_weight: float,
-    integral_time: float,
+def steering_cost(
+    model: ShipModel,
+    integral_lengths: float,
     rudder_weight: float,
-) -> tuple[Floats, Floats]:
-    """C, shape (n, 4, 5), and D, shape (n, 4, 1), of the outputs whose squares the cost adds up.
+    rate_weight_s2: float | None,
+) -> SteeringCost:
+    """Cost of a ship from the arguments of `LQ.from_model`; InputError if one is out of its range."""
+    check_number(integral_lengths, "integral_lengths", above=0.0)
+    check_number(rudder_weight, "rudder_weight", above=0.0)
+    if rate_weight_s2 is None:
+        rate_weight_s2 = rate_weight(model)
+    check_number(rate_weight_s2, "rate_weight_s2", above=0.0)
+    integral_time = integral_lengths * model.travel_time
+    return SteeringCost(float(rudder_weight), float(rate_weight_s2), integral_time)
+
+
+def lq_gains(ship: SampledShip, cost: SteeringCost) -> dict[str, float]:
+    """Gains on the deviations of a sampled ship, by signal."""
+    gains = (-lq_gain(ship, cost)).tolist()
+    return dict(zip(SIGNALS, gains, strict=True))
+
+
+def lq_gain(ship: SampledShip, cost: SteeringCost) -> Floats:
+    """Gain G of order = -G x that minimises the steering cost on the sampled linear ship, shape (5,).
 
     The reward of an interval is on the state at its end: z[k] = C x[k] + D order[k] =
     (error, weighted rudder, weighted rudder rate, weighted integral)[k + 1], which
-    couples state and input.
+    couples state and input (Anderson & Moore 1990, chapter 3).
     """
+    import control  # here, because it takes a second to import
+
     weights = np.array(
-        [1.0, np.sqrt(rudder_weight), np.sqrt(rate_weight) / dt, 1.0 / integral_time]
+        [
+            1.0,
+            np.sqrt(cost.rudder_weight),
+            np.sqrt(cost.rate_weight_s2) / ship.dt,
+            1.0 / cost.integral_time,
+        ]
     )
     rows = [ERROR, RUDDER, RUDDER, INTEGRAL]
-    C, D = A[:, rows].copy(), B[:, rows]
-    C[:, 2, RUDDER] -= 1.0
-    return weights[:, None] * C, (weights * D)[:, :, None]
+    next_state, next_by_order = ship.A[rows], ship.B[rows]
+    next_state[2, RUDDER] -= 1.0  # the change of the rudder
+    C = weights[:, None] * next_state
+    D = weights[:, None] * next_by_order
 
-
-def lq_rows(
-    A: Floats,
-    B: Floats,
-    dt: float,
-    rate_weight: float,
-    integral_time: float,
-    rudder_weight: float = RUDDER_WEIGHT,
-) -> Floats:
-    """The same for many ships at once, as designs made while sailing: rows of order = row x, shape (n, 5).
-
-    `A`, `B`: sampled ships, shape (n, 5, 5) and (n, 5); `dt`: control interval, s. NaN
-    where no stabilising one was found. Source: Anderson & Moore 1990, chapter 3 (cross
-    terms).
-    """
-    C, D = _outputs(A, B, dt, rate_weight, integral_time, rudder_weight)
-    column = B[:, :, None]
-    Ct, Dt, row = C.transpose(0, 2, 1), D.transpose(0, 2, 1), B[:, None, :]
-    R, S = Dt @ D, Dt @ C
-    plain = A - column @ (S / R)  # with commands that take the cross term away
-    X = riccati(plain, column @ (row / R), Ct @ C - S.transpose(0, 2, 1) @ (S / R))
-    gain: Floats = (row @ X @ A + S) / (R + row @ X @ column)
-    return -gain[:, 0]
-
-
-def riccati(A: Floats, G: Floats, H: Floats) -> Floats:
-    """Stabilising solutions X of X = A'X (I + G X)^-1 A + H, by doubling; all three are overwritten.
-
-    `G`, `H`: symmetric, not negative, as `A` of shape (n, m, m). Returns X, NaN where
-    it did not converge.
-    """
-    eye = np.eye(A.shape[-1])
-    converged = np.zeros(len(A), dtype=np.bool_)
-    with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(DOUBLINGS):
-            going = ~converged & np.isfinite(H).all(axis=(1, 2))
-            if not going.any():
-                break
-            a, g, h = A[going], G[going], H[going]
-            left = np.linalg.solve(eye + g @ h, np.concatenate([a, g], axis=2))
-            wa, wg = left[:, :, : len(eye)], left[:, :, len(eye) :]
-            at = a.transpose(0, 2, 1)
-            more = at @ h @ wa
-            A[going], G[going], H[going] = (
-                a @ wa,
-                g + a @ wg @ at,
-                h + 0.5 * (more + more.transpose(0, 2, 1)),
-            )
-            size = np.abs(H[going]).max(axis=(1, 2))
-            converged[going] = np.abs(more).max(axis=(1, 2)) < ACCURACY * size
-    H[~converged] = np.nan
-    return H
+    plant = control.ss(ship.A, ship.B, np.eye(len(SIGNALS)), 0.0, ship.dt)
+    gain, _, _ = control.lqr(plant, C.T @ C, D.T @ D, C.T @ D)
+    return np.asarray(gain, dtype=np.float64).reshape(-1)

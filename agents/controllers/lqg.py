@@ -7,40 +7,163 @@ Moore 1990, Optimal Control, chapter 8.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import Controller, Range
-from agents.controllers.linear_loop import (
-    ERROR,
-    RUDDER,
-    SIGNALS,
-    YAW_RATE,
-    Compensator,
-    check_stable,
-    sample_ship,
-    sampled_ships,
-)
-from agents.controllers.lq import LQ, Weights
-from agents.controllers.memory import Flags, Floats, heading_error
+from agents.controllers.controller import Bounds, Controller
+from agents.controllers.kalman import course_filter, with_waves
+from agents.controllers.law import Gains, Law, Number, Signals, wrapped
+from agents.controllers.linear_loop import checked_interval, sample_ship
+from agents.controllers.lq import LQ, lq_gains, steering_cost
+from agents.controllers.margins import check_stable
+from agents.controllers.memory import from_columns
 from shipgym import InputError, ShipModel
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
-from shipgym.ships.linear import StraightRunning, linearise
-from shipgym.tasks.guidance import wrapped
+from shipgym.engine.records import Record
 from shipgym.tasks.steering import RUDDER_WEIGHT
-from shipgym.trials.sensors import SEA_TRIAL
 
-OUTPUTS = (YAW_RATE, ERROR)  # measured, columns of the first three states
-STATES = (3, 5)  # how many: sway, yaw rate and heading error; in waves two more
-COURSE_NOISE = np.radians(
-    0.02
-)  # how much the course to steer may move between two measurements, rad
-NEW_COURSE = np.radians(
-    1.0
-)  # least jump of the heading error that is a new course, rad
-GATE = 6.0  # such a jump in standard deviations of what noise explains
-WAVE_DAMPING = 0.1  # of the model of first-order motion (Fossen 2011, 8.2.6)
+N_STATES = (3, 5)  # sway, yaw rate and heading error; in waves two more
+# least jump of the heading error that is a new course, rad, and the same in standard
+# deviations of what noise explains
+NEW_COURSE, GATE = np.radians(1.0), 6.0
+
+
+class Motions(NamedTuple):
+    """States of the filter, or what belongs to each of them."""
+
+    sway: Number  # m/s
+    yaw_rate: Number  # rad/s
+    heading_error: Number  # rad
+    wave_heading: Number  # rad, of the first-order motion
+    wave_yaw_rate: Number  # rad/s
+
+
+class Measured(NamedTuple):
+    """Measurements of the filter, or what belongs to each of them."""
+
+    yaw_rate: Number  # rad/s
+    heading_error: Number  # rad
+
+
+class Transition(NamedTuple):
+    """Rows of the matrix from one measurement to the next."""
+
+    sway: Motions
+    yaw_rate: Motions
+    heading_error: Motions
+    wave_heading: Motions
+    wave_yaw_rate: Motions
+
+
+class KalmanGains(NamedTuple):
+    """Rows of the gain on the innovations."""
+
+    sway: Measured
+    yaw_rate: Measured
+    heading_error: Measured
+    wave_heading: Measured
+    wave_yaw_rate: Measured
+
+
+class Output(NamedTuple):
+    """Rows of the matrix from states to measurements."""
+
+    yaw_rate: Motions
+    heading_error: Motions
+
+
+class Observer(NamedTuple):
+    """Parameters of `lqg_law`."""
+
+    transition: Transition
+    effect: Motions  # of the mean rudder between two measurements, per rad
+    kalman: KalmanGains
+    output: Output
+    gains: Gains
+    neutral_rudder: float  # rad
+    new_course: float  # rad, least jump of the heading error that is one
+
+
+class LQGMemory(NamedTuple):
+    """Memory of `lqg_law`."""
+
+    motions: Motions
+    rudder: Number  # rad, at the last measurement, from its neutral angle
+    started: Number  # 0 where an episode begins, else 1
+
+
+def lqg_law(seen: Signals, memory: LQGMemory, p: Observer) -> tuple[Number, LQGMemory]:
+    """Correct the estimate by what is measured and feed it back."""
+    rudder = seen.rudder - p.neutral_rudder
+    before = np.where(memory.started > 0.0, memory.rudder, rudder)
+    expected = predicted(seen, memory, 0.5 * (before + rudder), p)
+
+    off_rate = seen.yaw_rate - product(p.output.yaw_rate, expected)
+    off_heading = wrapped(
+        seen.heading_error - product(p.output.heading_error, expected)
+    )
+    # a jump that neither noise nor the ship can make is a new course
+    jump = np.where(np.abs(off_heading) > p.new_course, off_heading, 0.0)
+    innovation = Measured(off_rate, off_heading - jump)
+
+    gain = p.kalman
+    heading_error = expected.heading_error + jump
+    now = Motions(
+        expected.sway + corrected(gain.sway, innovation),
+        expected.yaw_rate + corrected(gain.yaw_rate, innovation),
+        wrapped(heading_error + corrected(gain.heading_error, innovation)),
+        expected.wave_heading + corrected(gain.wave_heading, innovation),
+        expected.wave_yaw_rate + corrected(gain.wave_yaw_rate, innovation),
+    )
+    order = (
+        p.neutral_rudder
+        + p.gains.rudder * rudder
+        + p.gains.heading_error_integral * seen.heading_error_integral
+        + p.gains.sway * now.sway
+        + p.gains.yaw_rate * now.yaw_rate
+        + p.gains.heading_error * now.heading_error
+    )
+    return order, LQGMemory(now, rudder, 1.0)
+
+
+def predicted(
+    seen: Signals, memory: LQGMemory, mean_rudder: Number, p: Observer
+) -> Motions:
+    """States expected at this measurement; where an episode begins, those measured."""
+    rows, effect, before = p.transition, p.effect, memory.motions
+    began = memory.started > 0.0
+    sway = product(rows.sway, before) + effect.sway * mean_rudder
+    yaw_rate = product(rows.yaw_rate, before) + effect.yaw_rate * mean_rudder
+    error = product(rows.heading_error, before) + effect.heading_error * mean_rudder
+    return Motions(
+        np.where(began, sway, 0.0),
+        np.where(began, yaw_rate, seen.yaw_rate),
+        np.where(began, error, seen.heading_error),
+        product(rows.wave_heading, before),
+        product(rows.wave_yaw_rate, before),
+    )
+
+
+def product(row: Motions, states: Motions) -> Number:
+    """Row of a matrix times the states."""
+    return (
+        row.sway * states.sway
+        + row.yaw_rate * states.yaw_rate
+        + row.heading_error * states.heading_error
+        + row.wave_heading * states.wave_heading
+        + row.wave_yaw_rate * states.wave_yaw_rate
+    )
+
+
+def corrected(row: Measured, innovation: Measured) -> Number:
+    """Row of the Kalman gain times the innovation."""
+    return (
+        row.yaw_rate * innovation.yaw_rate
+        + row.heading_error * innovation.heading_error
+    )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -68,16 +191,18 @@ class LQG(Controller):
 
     kind: ClassVar[str] = "lqg"
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
+    law: ClassVar[Law] = staticmethod(lqg_law)
+    memory_record: ClassVar[Record] = LQGMemory
+    reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "rudder")
     arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {
         "transition": ("states", "states"),
         "input": ("states",),
-        "kalman": ("states", len(OUTPUTS)),
-        "output": (len(OUTPUTS), "states"),
+        "kalman": ("states", len(Measured._fields)),
+        "output": (len(Measured._fields), "states"),
     }
-    reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "rudder")
-    ranges: ClassVar[Mapping[str, Range]] = {
-        **Controller.ranges,
-        "new_course_rad": Range(1e-6, 1e6),
+    bounds: ClassVar[Mapping[str, Bounds]] = {
+        **Controller.bounds,
+        "new_course_rad": Bounds(1e-6, 1e6),
     }
 
     transition: Floats
@@ -86,12 +211,12 @@ class LQG(Controller):
     output: Floats
 
     def __post_init__(self) -> None:
-        if len(self.input) not in STATES:
+        n = len(self.input)
+        if n not in N_STATES:
             raise InputError(
-                f"arrays.input: {len(self.input)} states found, expected one of"
-                f" {STATES}"
+                f"arrays.input: expected one of {N_STATES} states, got {n}"
             )
-        trusted = np.eye(len(self.input)) - self.kalman @ self.output
+        trusted = np.eye(n) - self.kalman @ self.output
         check_stable(
             trusted @ self.transition, "arrays: transition of the Kalman filter"
         )
@@ -110,7 +235,7 @@ class LQG(Controller):
         wave_period: float | None = None,
         wave_heading_deg: float = 1.0,
     ) -> Self:
-        """Design on a model, about straight running: LQ's gains and a Kalman filter (`control.dlqe`).
+        """Design on a model, about straight running: LQ's gains and a Kalman filter.
 
         Raises InputError if the model has no straight course, or an argument is out of
         its range.
@@ -124,151 +249,66 @@ class LQG(Controller):
             (`SEA_TRIAL`).
         disturbance_deg : float
             How much the sea pushes the ship: standard deviation of a rudder angle,
-            drawn anew each interval, that would do the same. More makes the filter
-            trust what is measured.
+            drawn in each interval, that would do the same. More makes the filter trust
+            what is measured.
         wave_period : float, optional
             Of the first-order motion, s, as it is met; by default it is not modelled.
         wave_heading_deg : float
             Standard deviation of the heading in it, degrees.
         """
-        from scipy.linalg import block_diag
-
         check_number(noise, "noise", above=0.0)
         check_number(disturbance_deg, "disturbance_deg", above=0.0)
-        weights = Weights.of(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
-        ship, interval = sample_ship(model, weights.dt), weights.dt
-        transition, effect = rudder_response(model, ship.about, interval)
-        pushed = np.radians(disturbance_deg) * effect  # by the sea
-        pushed[2] = np.hypot(pushed[2], COURSE_NOISE)
-        process, output = np.diag(pushed**2), np.eye(3)[list(OUTPUTS)]
+        interval = checked_interval(model, dt)
+        cost = steering_cost(model, integral_lengths, rudder_weight, rate_weight_s2)
+        ship = sample_ship(model, interval)
+
+        states = course_filter(model, ship.about, interval, np.radians(disturbance_deg))
         if wave_period is not None:
-            check_number(
-                wave_period,
-                "wave_period",
-                above=2.0 * interval,
-                hint="two control intervals, in s",
-            )
-            motion, drive = wave_model(
-                wave_period, np.radians(wave_heading_deg), interval
-            )
-            transition, process = (
-                block_diag(transition, motion),
-                block_diag(process, drive),
-            )
-            effect = np.append(effect, [0.0, 0.0])
-            output = np.hstack([output, [[0.0, 1.0], [-1.0, 0.0]]])
-        deviation = noise * np.array([SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise])
-        kalman, deviations = kalman_gain(
-            transition, process, output, np.diag(deviation**2)
-        )
-        design = weights.design | {
+            shortest = 2.0 * interval
+            hint = "two control intervals, in s"
+            check_number(wave_period, "wave_period", above=shortest, hint=hint)
+            check_number(wave_heading_deg, "wave_heading_deg", above=0.0)
+            deviation = np.radians(wave_heading_deg)
+            states = with_waves(states, wave_period, deviation, interval)
+        gain, deviations = states.gain(noise)
+
+        design = {
+            "integral_lengths": float(integral_lengths),
+            **cost.weights,
             "noise": float(noise),
             "disturbance_deg": float(disturbance_deg),
             "new_course_rad": max(NEW_COURSE, GATE * deviations[1]),
-            **({} if wave_period is None else {"wave_period": float(wave_period)}),
         }
-        filters = {
-            "transition": transition,
-            "input": effect,
-            "kalman": kalman,
-            "output": output,
-        }
+        if wave_period is not None:
+            design["wave_period"] = float(wave_period)
         return cls.designed(
-            model, ship, weights.gains(ship, model.travel_time), design, **filters
+            model,
+            ship,
+            lq_gains(ship, cost),
+            design,
+            transition=states.transition,
+            input=states.effect,
+            kalman=gain,
+            output=states.output,
         )
 
-    @property
-    def memory_size(self) -> int:
-        """The estimate, and the rudder at the last measurement."""
-        return len(self.input) + 1
-
-    def steer(
-        self, seen: dict[str, Floats], memory: Floats, begins: Flags
-    ) -> tuple[Floats, Floats]:
-        """Correct the estimate by what is seen and feed it back."""
-        rudder = seen["rudder"] - self.neutral_rudder
-        measured = np.stack([seen["yaw_rate"], heading_error(seen)], axis=-1)
-        estimate, before = memory[:, :-1], np.where(begins, rudder, memory[:, -1])
-        expected = (
-            _times(estimate, self.transition.T)
-            + 0.5 * (before + rudder)[:, None] * self.input
+    @cached_property
+    def parameters(self) -> Observer:
+        """Parameters of its law; without a wave model those of the wave are zero."""
+        missing = max(N_STATES) - len(self.input)
+        more_states = (0, missing)
+        as_it_is = (0, 0)
+        return Observer(
+            transition=_filled(Transition, np.pad(self.transition, more_states)),
+            effect=_filled(Motions, np.pad(self.input, more_states)),
+            kalman=_filled(KalmanGains, np.pad(self.kalman, (more_states, as_it_is))),
+            output=_filled(Output, np.pad(self.output, (as_it_is, more_states))),
+            gains=self.linear_feedback.gains,
+            neutral_rudder=self.neutral_rudder,
+            new_course=self.design["new_course_rad"],
         )
-        expected[begins] = 0.0
-        expected[begins, 1:3] = measured[begins]
-        innovation = measured - _times(expected, self.output.T)
-        innovation[:, 1] = wrapped(innovation[:, 1])
-        jump = np.where(
-            np.abs(innovation[:, 1]) > self.design["new_course_rad"],
-            innovation[:, 1],
-            0.0,
-        )
-        expected[:, ERROR] += jump
-        innovation[:, 1] -= jump
-        estimate = expected + _times(innovation, self.kalman.T)
-        estimate[:, ERROR] = wrapped(estimate[:, ERROR])
-        order = self.neutral_rudder + self.gains["rudder"] * rudder
-        order = (
-            order
-            + self.gains["heading_error_integral"] * seen["heading_error_integral"]
-        )
-        for column, signal in enumerate(SIGNALS[: ERROR + 1]):
-            order = order + self.gains[signal] * estimate[:, column]
-        return order, np.column_stack([estimate, rudder])
-
-    def loop(self) -> Compensator:
-        """Filter and feedback together; the course does not jump."""
-        return self.linearised()
 
 
-def rudder_response(
-    model: ShipModel, about: StraightRunning, dt: float
-) -> tuple[Floats, Floats]:
-    """Sway, yaw rate and heading error with the rudder held over an interval of `dt`, s.
-
-    Returns their transition, shape (3, 3), and the effect of the rudder angle, per rad,
-    shape (3,).
-    """
-    A, B = sampled_ships(np.column_stack(linearise(model, about))[None], 0.0, dt)
-    return A[0, :RUDDER, :RUDDER], B[0, :RUDDER]
-
-
-def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floats]:
-    """First-order heading in waves as a lightly damped oscillator driven by noise (Fossen 2011, 8.2.6).
-
-    `period`: s; `deviation`: standard deviation of the heading, rad; `dt`: interval, s.
-    Returns `transition`: of heading and its rate, shape (2, 2); `covariance`: of what
-    drives them in an interval, which keeps the deviation as it is, shape (2, 2).
-    """
-    from scipy.linalg import expm
-
-    check_number(deviation, "wave_heading_deg", above=0.0)
-    frequency = 2.0 * np.pi / period
-    motion = np.array([[0.0, 1.0], [-(frequency**2), -2.0 * WAVE_DAMPING * frequency]])
-    transition: Floats = np.asarray(expm(motion * dt), dtype=np.float64)
-    steady = deviation**2 * np.diag([1.0, frequency**2])
-    return transition, steady - transition @ steady @ transition.T
-
-
-def kalman_gain(
-    transition: Floats, process: Floats, output: Floats, noise: Floats
-) -> tuple[Floats, Floats]:
-    """Stationary Kalman gain on the innovation, for the estimate at the time of the measurement.
-
-    `transition`: shape (n, n); `process`: covariance of what disturbs the states in an
-    interval; `output`: shape (m, n); `noise`: covariance of the measurements' noise.
-    Returns `gain`, shape (n, m), which is that of `control.dlqe` times the inverse
-    transition, and the standard deviation of the innovations.
-    """
-    import control
-
-    _, covariance, _ = control.dlqe(
-        transition, np.eye(len(transition)), output, process, noise
-    )
-    innovation = output @ covariance @ output.T + noise
-    gain: Floats = np.linalg.solve(innovation, output @ covariance).T
-    return gain, np.sqrt(np.diag(innovation))
-
-
-def _times(rows: Floats, matrix: Floats) -> Floats:
-    """Matrix product whose rows do not depend on how many there are."""
-    return np.asarray(np.einsum("ij,jk->ik", rows, matrix))
+def _filled(record: Record, numbers: Floats) -> Any:
+    """Record of the numbers of an array, row by row."""
+    return from_columns(record, iter(numbers.ravel().tolist()))

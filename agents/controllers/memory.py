@@ -1,84 +1,113 @@
-"""Observations and memories as controllers take them: one row a ship, a single ship without that axis."""
+"""Observations and memories of many ships: arrays with one row a ship, and records of columns."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym import InputError
-from shipgym.tasks.steering import INTEGRAL_ZONE
-from shipgym.tasks.task import OBSERVATION_NAMES
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Records = NDArray[np.void]
+from shipgym.arrays import Flags, Floats
+from shipgym.engine.records import Record, field_types, is_record, is_table, leaves
+from shipgym.tasks.scales import OBSERVATION_NAMES
 
 
-def records(memory: Floats, record: np.dtype[Any]) -> Records:
-    """Memories of ships as records of named numbers, a view: (n, size) as (n,), (size,) as ()."""
-    return np.ascontiguousarray(memory).view(record)[..., 0]
+def size_of(record: Record) -> int:
+    """Return how many numbers a record has."""
+    return len(leaves(record))
 
 
-def size_of(record: np.dtype[Any]) -> int:
-    """How many numbers a record has."""
-    return record.itemsize // np.dtype(np.float64).itemsize
+def from_columns(record: Record, columns: Iterator[Any]) -> Any:
+    """Record of columns, taken in the order of its fields; a table takes one for each of its rows."""
+    values: list[Any] = []
+    for kind in field_types(record).values():
+        if is_record(kind):
+            values.append(from_columns(kind, columns))
+        elif is_table(kind):
+            values.append(np.array([next(columns) for _ in range(kind.rows)]))
+        else:
+            values.append(next(columns))
+    return record(*values)
+
+
+def to_rows(record: Any, n_ships: int) -> Floats:
+    """Array of shape (n_ships, size) from a record of columns, or of numbers that all ships share."""
+    rows = np.zeros((n_ships, size_of(type(record))))
+    for i, column in enumerate(_columns(record)):
+        rows[:, i] = column
+    return rows
+
+
+def selected(record: Any, index: Any) -> Any:
+    """Record of some of the ships, by an index of its columns."""
+    values = [
+        selected(value, index) if isinstance(value, tuple) else value[..., index]
+        for value in record
+    ]
+    return type(record)(*values)
+
+
+def _columns(record: Any) -> Iterator[Any]:
+    for value in record:
+        if isinstance(value, tuple):
+            yield from _columns(value)
+        elif np.ndim(value) == 2:  # a table
+            yield from value
+        else:
+            yield value
 
 
 def checked_observation(
     observation: ArrayLike, names: Sequence[str], dtype: type[np.generic] = np.float64
 ) -> NDArray[Any]:
-    """Observations as an array of shape (n_ships, n) or (n,), with no fewer than there are names."""
+    """Observations as an array of shape (n_ships, n) or (n,), with no fewer entries than names."""
     given, n = np.asarray(observation, dtype=dtype), len(names)
     if given.ndim not in (1, 2) or given.shape[-1] < n:
         raise InputError(
-            f"observation: shape {given.shape} found, expected ({n},) or (n, {n}), or"
-            f" more: '{names[-1]}' is the last that is needed"
+            f"observation: expected shape ({n},) or (n, {n}) or more entries, of which"
+            f" '{names[-1]}' is the last that is needed, got {given.shape}"
         )
     return given
 
 
 def checked_starts(starts: Any, shape: tuple[int, ...]) -> Flags:
-    """Where episodes begin, one for all ships or one for each, in the shape of the ships; None is nowhere."""
+    """Flags of episodes that begin, in the shape of the ships; None is nowhere, one flag is for all."""
     flags = np.asarray(False if starts is None else starts, dtype=np.bool_)
     n = int(np.prod(shape))
     if flags.size not in (1, n):
         raise InputError(
-            f"episode_start: {flags.size} found, expected one for each of {n} ships"
+            f"episode_start: expected one for each of {n} ships, got {flags.size}"
         )
     return np.full(shape, flags.reshape(shape if flags.size == n else ()))
 
 
 def checked_memory(memory: Any, shape: tuple[int, ...]) -> NDArray[Any]:
-    """Return the memory of ships, which must have a shape: not that of other ships or another controller."""
+    """Memory of ships, which must have a shape: not that of other ships or another controller."""
     if np.shape(memory) != shape:
         raise InputError(
-            f"state: shape {np.shape(memory)} found, expected {shape}: what the last"
-            " predict of as many ships returned, or None where episodes begin"
+            f"state: expected shape {shape}, what the last predict of as many ships"
+            f" returned, or None where episodes begin, got {np.shape(memory)}"
         )
     return np.asarray(memory)
 
 
-def begun(
-    memory: Any, starts: Any, shape: tuple[int, ...], size: int
-) -> tuple[Floats, Flags]:
-    """Memory of each ship, a copy with zeros where an episode begins, and where it does.
+def recalled(memory: Any, starts: Any, shape: tuple[int, ...], size: int) -> Floats:
+    """Memory of each ship, a copy with zeros where an episode begins.
 
-    `memory`: what the last `predict` returned, shape (*shape, size); None where all
-    episodes begin; `starts`: where the memory is that of the episode before; `shape`:
-    (n_ships,), or () for a single ship.
+    Parameters
+    ----------
+    memory : array of shape (*shape, size) or None
+        What the last `predict` returned; None where all episodes begin.
+    starts : bool or array of bool or None
+        Where the memory is that of the episode before.
+    shape : tuple of int
+        (n_ships,), or () for a single ship.
     """
     if memory is None:
-        return np.zeros((*shape, size)), np.ones(shape, dtype=np.bool_)
-    kept = np.array(checked_memory(memory, (*shape, size)), dtype=np.float64, order="C")
-    begins = checked_starts(starts, shape)
-    kept[begins] = 0.0
-    return kept, begins
-
-
-def heading_error(seen: dict[str, Floats]) -> Floats:
-    """Heading error of each ship, rad, in (-pi, pi]."""
-    return np.arctan2(seen["heading_error_sin"], seen["heading_error_cos"])
+        return np.zeros((*shape, size))
+    kept = np.array(checked_memory(memory, (*shape, size)), dtype=np.float64)
+    kept[checked_starts(starts, shape)] = 0.0
+    return kept
 
 
 def on_course(
@@ -86,31 +115,11 @@ def on_course(
 ) -> NDArray[np.float32]:
     """Observations of ships with another heading error, rad, and its integral of at most `reach`, rad s."""
     shown = seen.astype(np.float32)
-    angle = {"heading_error_sin": np.sin(error), "heading_error_cos": np.cos(error)}
-    for name, value in {**angle, "heading_error_integral": integral / reach}.items():
+    replaced = {
+        "heading_error_sin": np.sin(error),
+        "heading_error_cos": np.cos(error),
+        "heading_error_integral": integral / reach,
+    }
+    for name, value in replaced.items():
         shown[..., OBSERVATION_NAMES.index(name)] = value
     return shown
-
-
-def gathered(
-    integral: Floats | float,
-    error: Floats | float,
-    begins: Any,
-    dt: float,
-    reach: float,
-) -> Floats:
-    """Integral of the heading error, rad s, an interval later, as environments have it."""
-    more = np.where((np.abs(error) > INTEGRAL_ZONE) | begins, 0.0, error * dt)
-    return np.clip(integral + more, -reach, reach)
-
-
-def deviations(seen: dict[str, Floats], rudder: Any, sway: Any) -> Floats:
-    """Deviations from straight running, shape (n, 5), in the order of `linear_loop.SIGNALS`."""
-    signals = (
-        seen["sway"] - sway,
-        seen["yaw_rate"],
-        heading_error(seen),
-        seen["rudder"] - rudder,
-        seen["heading_error_integral"],
-    )
-    return np.stack(signals, axis=-1)

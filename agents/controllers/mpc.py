@@ -1,230 +1,361 @@
-"""Linear model predictive control: LQ that knows how far and how fast the rudder goes.
+"""MPC of the course: wheel-over, improved by simulating the design model.
 
-With the regulator's cost of what is left after the horizon, and commands written as
-LQ's plus a correction v, the cost of a plan is that of LQ plus the sum of (R + B'PB)
-v[k]^2: the best plan is the one nearest to LQ's that keeps to the limits. Where LQ's
-own does, it is LQ's, and nothing has to be solved.
+Each ship length the ship is simulated from where she is observed, by wheel-over with
+courses added to its own: straight between knots, drawn, and drawn again about the best
+(cross-entropy method). The cheapest is steered until the next search, which begins with
+its rest. Wheel-over itself is among them, so by the model no plan is worse. The current
+is estimated: each observation shows the part of it across the course over ground.
 
-Sources: Rawlings, Mayne & Diehl 2017, Model Predictive Control, 1.3 and 2.5 (terminal
-cost); Rossiter, Kouvaritakis & Rice 1998, A numerically robust state-space approach to
-stable-predictive control strategies, Automatica 34 (corrections of a stabilising
-feedback); Stellato et al. 2020, OSQP, Mathematical Programming Computation 12.
+Sources: Rubinstein & Kroese 2004, The Cross-Entropy Method; Bertsekas 2019,
+Reinforcement Learning and Optimal Control, 2.4 (rollout: a base policy improved by
+looking ahead); Williams, Aldrich & Theodorou 2017, Model predictive path integral
+control, Journal of Guidance, Control, and Dynamics 40 (sampling on the model).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import Controller, Range
-from agents.controllers.linear_loop import RUDDER, SIGNALS, check_stable, sample_ship
-from agents.controllers.lq import LQ, Weights, without_yaw_memory
-from agents.controllers.memory import Flags, Floats, deviations
-from shipgym import ShipModel
+from agents.controllers.controller import Bounds, Policy
+from agents.controllers.law import (
+    Nothing,
+    Number,
+    PathSignals,
+    Signals,
+    linear_law,
+    wrapped,
+)
+from agents.controllers.lq import LQ
+from agents.controllers.memory import selected
+from agents.controllers.path_ahead import FAR, PathAhead, turned
+from agents.controllers.wheel_over import WheelOver, course_over_ground
+from shipgym import InputError, ShipModel
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
-from shipgym.extras import library
-from shipgym.tasks.steering import RATE_WEIGHT, RUDDER_WEIGHT
+from shipgym.engine.records import Record, table_of
+from shipgym.envs.engine import Engine
+from shipgym.tasks.scales import STEPS_PER_LENGTH
+from shipgym.tasks.steering import HEADING_SCALE
+from shipgym.tasks.task import Task, course_keeping_task, path_following_task
 
-ACCURACY = 1e-4  # of the solver, rad
-MOST_ITERATIONS = 20_000
-# of a horizon: 20 ship lengths with any control interval that environments take
-MOST_STEPS = 640
-# of the solver (its rho), fixed so that an answer depends on the question alone
-STEP_SIZE = 2.0
+KNOTS = 6  # of a plan
+KNOT_STEPS = int(STEPS_PER_LENGTH)  # control intervals from one knot to the next
+COARSE = 2  # control intervals in a step of the simulation
+CANDIDATES, ELITES, ROUNDS = 16, 4, 2
+LEAST_DEVIATION = np.radians(0.5)  # of a knot
+CURRENT_GAIN = 0.5  # share of the current's error that is taken over in an interval
+DEEP = 1e6  # m, of water that is not shallow
 
 
-class Plan(NamedTuple):
-    """Plans over the horizon, deviations from straight running: the numbers that are limited."""
+class Current(NamedTuple):
+    """Current in the ship's axes, each number of shape (n_ships,)."""
 
-    #: commands, then changes of the rudder in an interval, of LQ's own plan, per state,
-    #: shape (2 * horizon, 5)
-    by_state: Floats
-    by_correction: (
-        Floats  # the same per correction of LQ's commands, shape (2 * horizon, horizon)
-    )
+    ahead: Number  # m/s
+    aside: Number  # m/s, to starboard
+
+
+class PlanMemory(NamedTuple):
+    """What MPC remembers of each ship."""
+
+    steps: Number  # control intervals since the last search
+    current: Current
+    plan: table_of(KNOTS)  # type: ignore[valid-type]  # rad, added to the course at the knots
+
+
+class PathCosts(NamedTuple):
+    """What a step of a plan costs, as the task has it."""
+
+    corridor: float  # m
+    rudder: float  # per rad^2
+    rudder_rate: float  # per rad^2 in the time to travel one ship length
+    rudder_travel: float  # per rad in a control interval
+    roll: float  # per rad^2
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class MPC(Controller):
-    """Plans the rudder over a horizon within its limit and rate; needs the extra `mpc` (OSQP).
-
-    Attributes
-    ----------
-    transition : array of shape (5, 5)
-    effect : array of shape (5,)
-        The sampled ship, x[k + 1] = transition x[k] + effect order[k]
-        (`agents.controllers.linear_loop`).
-    """
+class MPC(WheelOver):
+    """Wheel-over whose course is improved by sampling on the design model, its `ship`."""
 
     kind: ClassVar[str] = "mpc"
-    feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
-    arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {
-        "transition": (len(SIGNALS), len(SIGNALS)),
-        "effect": (len(SIGNALS),),
-    }
-    ranges: ClassVar[Mapping[str, Range]] = {
-        **Controller.ranges,
-        "horizon_steps": Range(2, MOST_STEPS),
-        "rudder_rate_rad_s": Range(1e-6, 1e3),
+    has_ship: ClassVar[bool] = True
+    memory_record: ClassVar[Record] = PlanMemory
+    reads: ClassVar[tuple[str, ...]] = (*WheelOver.reads, "yaw_rate", "rudder")
+    bounds: ClassVar[Mapping[str, Bounds]] = {
+        **WheelOver.bounds,
+        "horizon_steps": Bounds(1, 1000),
+        "deviation": Bounds(0.0, FAR),
+        "water_depth": Bounds(0.0, FAR),
+        "corridor": Bounds(1e-6, FAR),
+        "rudder": Bounds(0.0, FAR),
+        "rudder_rate": Bounds(0.0, FAR),
+        "rudder_travel": Bounds(0.0, FAR),
+        "roll": Bounds(0.0, FAR),
     }
 
-    transition: Floats
-    effect: Floats
+    ship: ShipModel
 
     def __post_init__(self) -> None:
-        steps = self.design["horizon_steps"]
-        check_number(
-            steps,
-            "horizon_steps",
-            at_most=MOST_STEPS,
-            hint="a shorter horizon or longer interval",
-        )
-        stays, moves = self.transition[RUDDER, RUDDER], self.effect[RUDDER]
-        check_number(
-            stays,
-            "arrays.transition: share of the rudder that stays",
-            at_least=0.0,
-            at_most=1.0,
-        )
-        check_number(
-            moves,
-            "arrays.effect: share of an order that is followed",
-            at_least=1e-6,
-            at_most=1.0,
-        )
-        check_stable(
-            self.transition + np.outer(self.effect, self.row), "arrays.transition"
-        )
+        if not isinstance(self.autopilot, LQ):
+            name = type(self.autopilot).__name__
+            raise InputError(f"autopilot: expected LQ, got {name}")
 
     @classmethod
     def from_model(
         cls,
         model: ShipModel,
         *,
-        dt: float | None = None,
-        integral_lengths: float = 20.0,
-        horizon_lengths: float = 2.0,
-        rudder_weight: float = RUDDER_WEIGHT,
-        rate_weight_s2: float | None = None,
+        autopilot: Policy | None = None,
+        task: Task | None = None,
+        horizon_lengths: float = 6.0,
+        deviation_deg: float = 3.0,
+        **settings: Any,
     ) -> Self:
-        """Design on a model, about straight running.
-
-        Raises InputError if OSQP is not installed, the model has no straight course, or
-        an argument is out of its range.
+        """Lead LQ along the paths of a task.
 
         Parameters
         ----------
-        model, dt, integral_lengths, rudder_weight
-            As in `LQ.from_model`.
+        model : ShipModel
+            The design model, which is simulated in the current observed.
+        autopilot : LQ, optional
+            By default `LQ.from_model(model)`.
+        task : Task, optional
+            Also its weights are used; by default the environment's own.
         horizon_lengths : float
-            How far it plans within the limits, in times to travel one ship length;
-            beyond, LQ's cost without limits is taken.
-        rate_weight_s2 : float, optional
-            Weight of the rudder rate, s^2; by default the environment's own. LQ's is
-            higher (`linear_loop.rate_weight`), because LQ's model has no slow gear.
+            How far it looks ahead, in times to travel one ship length.
+        deviation_deg : float
+            Standard deviation of the courses that are tried first.
+        **settings
+            Those of `WheelOver.from_model`, with its errors.
         """
-        library("osqp", "mpc", "MPC needs it")
-        check_number(horizon_lengths, "horizon_lengths", above=0.0, at_most=20.0)
-        weight = (
-            RATE_WEIGHT * model.travel_time**2
-            if rate_weight_s2 is None
-            else rate_weight_s2
-        )
-        weights = Weights.of(model, dt, integral_lengths, rudder_weight, weight)
-        interval, time = weights.dt, model.travel_time
-        reduced = without_yaw_memory(model, interval)
-        limits = {
-            "horizon_steps": float(max(2, round(horizon_lengths * time / interval))),
-            "rudder_rate_rad_s": model.steering.rate,
-        }
-        gains, design = weights.gains(reduced, time), weights.design | limits
-        ship = {"transition": reduced.A, "effect": reduced.B[:, 0]}
-        return cls.designed(model, sample_ship(model, interval), gains, design, **ship)
+        check_number(horizon_lengths, "horizon_lengths", above=0.0, at_most=40.0)
+        check_number(deviation_deg, "deviation_deg", above=0.0, at_most=60.0)
+        asked = task or path_following_task()
+        guide = super().from_model(model, autopilot=autopilot, task=asked, **settings)
 
-    def steer(
-        self, seen: dict[str, Floats], memory: Floats, begins: Flags
-    ) -> tuple[Floats, Floats]:
-        """LQ's command where its plan keeps to the limits, else the first of the nearest plan that does."""
-        change = self.design["rudder_rate_rad_s"] * self.design["dt"]
-        low, high = (
-            -self.rudder_limit - self.neutral_rudder,
-            self.rudder_limit - self.neutral_rudder,
+        step = COARSE * guide.design["dt"]
+        steps = round(horizon_lengths * model.travel_time / step)
+        search = {
+            "horizon_steps": float(max(1, steps)),
+            "deviation": float(np.radians(deviation_deg)),
+            "water_depth": min(asked.water_depth, DEEP),
+            **path_costs(asked, model)._asdict(),
+        }
+        return replace(guide, design={**guide.design, **search})
+
+    @cached_property
+    def costs(self) -> PathCosts:
+        """What a step of a plan costs."""
+        return PathCosts(*(self.design[name] for name in PathCosts._fields))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Content of the file, with the design model."""
+        return {**super().to_dict(), "ship": self.ship.to_dict()}
+
+    def course(
+        self, seen: PathSignals, memory: PlanMemory
+    ) -> tuple[Number, PlanMemory]:
+        """See `Guided.course`: that of wheel-over and what the plan adds."""
+        current = self.estimated_current(seen, memory.current)
+        plans = memory.plan.T.copy()
+        due = np.flatnonzero(memory.steps == 0.0)
+        if len(due):
+            rest = np.column_stack([plans[due, 1:], np.zeros(len(due))])
+            ships = selected(seen, due)
+            plans[due] = self.improved(ships, selected(current, due), rest)
+
+        course, _ = type(self).law(seen, Nothing(), self.parameters)
+        course = course + added(plans, memory.steps / KNOT_STEPS)
+        steps = (memory.steps + 1.0) % KNOT_STEPS
+        return course, PlanMemory(steps, current, plans.T)
+
+    def estimated_current(self, seen: PathSignals, known: Current) -> Current:
+        """Current by the last estimate, turned with the ship, and by the observed course over ground."""
+        ahead, aside = turned(
+            known.ahead, known.aside, seen.yaw_rate * self.design["dt"]
         )
-        state = deviations(seen, self.neutral_rudder, self.neutral_sway)
-        rudder = state[:, RUDDER] = np.clip(state[:, RUDDER], low, high)
-        orders: Floats = np.einsum("ij,j->i", state, self.row)
-        steps = int(self.design["horizon_steps"])
-        lowest, highest = (
-            np.repeat((low, -change), steps),
-            np.repeat((high, change), steps),
+        # across the course over ground there is no velocity over ground
+        _, across = turned(seen.surge + ahead, seen.sway + aside, seen.drift)
+        error = CURRENT_GAIN * across
+        return Current(
+            ahead + error * np.sin(seen.drift), aside - error * np.cos(seen.drift)
         )
-        planned = np.einsum("ij,kj->ik", state, self.plan.by_state)
-        stays, moves = self.transition[RUDDER, RUDDER], self.effect[RUDDER]
-        for ship in np.flatnonzero(
-            np.any((planned < lowest) | (planned > highest), axis=1)
-        ):
-            self._solver.update(l=lowest - planned[ship], u=highest - planned[ship])
-            order = (
-                orders[ship] + self._solver.solve(raise_error=False).x[0]
-            )  # the smallest correction
-            least, most = (
-                (rudder[ship] * (1.0 - stays) + way) / moves
-                for way in (-change, change)
+
+    def improved(self, seen: PathSignals, current: Current, plans: Floats) -> Floats:
+        """Plans improved by the cross-entropy method, rad, shape (n_ships, KNOTS); the first knot stays."""
+        best, least = plans, np.full(len(plans), np.inf)
+        mean = plans
+        deviation = np.full(plans.shape, self.design["deviation"])
+        ships = np.arange(len(plans))
+        for drawn in draws():
+            candidates = mean[:, None] + deviation[:, None] * drawn
+            candidates[:, 0] = best
+            candidates[:, CANDIDATES // 2] = 0.0  # wheel-over itself
+            candidates[:, :, 0] = best[:, :1]
+
+            costs = self.simulated_costs(seen, current, candidates)
+            order = np.argsort(costs, axis=1, kind="stable")
+            cheapest = order[:, 0]
+            better = costs[ships, cheapest] < least
+            best = np.where(better[:, None], candidates[ships, cheapest], best)
+            least = np.minimum(least, costs[ships, cheapest])
+
+            elites = np.take_along_axis(candidates, order[:, :ELITES, None], axis=1)
+            mean = elites.mean(axis=1)
+            deviation = np.maximum(elites.std(axis=1), LEAST_DEVIATION)
+        return best
+
+    def simulated_costs(
+        self, seen: PathSignals, current: Current, plans: Floats
+    ) -> Floats:
+        """Costs of plans of shape (n_ships, n_plans, KNOTS) on the design model, shape (n_ships, n_plans)."""
+        n_ships, n_plans, _ = plans.shape
+        lanes = np.repeat(np.arange(n_ships), n_plans)
+        seen, plan = selected(seen, lanes), plans.reshape(-1, KNOTS)
+        models = DesignModels(self, seen, selected(current, lanes))
+        path = PathAhead(seen.turns, self.gains["path_radius"])
+        weights, length = self.costs, self.ship.particulars["length"]
+        full_way = self.ship.particulars["speed"] * models.dt
+
+        cost = np.zeros(len(plan))
+        place = path.fix(models.x, models.y)
+        for step in range(int(self.design["horizon_steps"])):
+            before, rudder_before = place.along_track, models.rudder
+            course = place.course + course_over_ground(
+                place.cross_track, place.turns, self.parameters
             )
-            orders[ship] = min(max(order, least, low), most, high)  # to the last bit
-        return self.neutral_rudder + orders, memory
+            models.steer(course + added(plan, step * COARSE / KNOT_STEPS))
 
-    @cached_property
-    def plan(self) -> Plan:
-        """How commands and rudder follow from the state and from corrections of LQ's commands."""
-        steps, row = int(self.design["horizon_steps"]), self.row
-        closed = self.transition + np.outer(self.effect, row)
-        limited = np.stack(
-            [row, closed[RUDDER] - np.eye(len(SIGNALS))[RUDDER]]
-        )  # command, rudder's change
-        by_state = np.empty((2, steps, len(SIGNALS)))
-        answer = np.empty((2, steps))  # to a correction of 1 at the first step
-        power = np.eye(len(SIGNALS))
-        answer[:, 0] = 1.0, self.effect[RUDDER]
-        for k in range(steps):
-            by_state[:, k] = limited @ power
-            if k + 1 < steps:
-                answer[:, k + 1] = limited @ power @ self.effect
-            power = closed @ power
-        later = np.subtract.outer(np.arange(steps), np.arange(steps))
-        by_correction = np.where(later >= 0, answer[:, np.maximum(later, 0)], 0.0)
-        return Plan(
-            by_state.reshape(2 * steps, -1), by_correction.reshape(2 * steps, steps)
+            place = path.fix(models.x, models.y)
+            progress = np.clip((place.along_track - before) / full_way, -1.0, 1.0)
+            moved = np.abs(models.rudder - rudder_before)
+            cost += (place.cross_track / weights.corridor) ** 2 - progress
+            cost += weights.rudder * models.rudder**2
+            cost += weights.rudder_travel / COARSE * moved
+            cost += weights.rudder_rate * (moved * length / full_way) ** 2
+            if weights.roll > 0.0:
+                cost += weights.roll * models.read("phi") ** 2
+        cost = np.where(np.isfinite(cost), cost, np.inf)
+        return cost.reshape(n_ships, n_plans)
+
+
+def path_costs(task: Task, model: ShipModel) -> PathCosts:
+    """What a step costs in a task; without what it charges for reversals, grounding and extrapolation."""
+    travel_weight = getattr(task.settings, "rudder_travel_weight", 0.0)
+    return PathCosts(
+        corridor=task.corridor * model.particulars["length"],
+        rudder=task.rudder_weight / HEADING_SCALE**2,
+        rudder_rate=task.rudder_rate_weight / HEADING_SCALE**2,
+        rudder_travel=travel_weight / HEADING_SCALE,
+        roll=task.roll_weight / float(np.radians(task.roll_scale_deg)) ** 2,
+    )
+
+
+@lru_cache(maxsize=1)
+def draws() -> Floats:
+    """Deviations of plans from their mean, in standard deviations, shape (ROUNDS, CANDIDATES, KNOTS).
+
+    They are always the same, each with its mirror image.
+    """
+    random = np.random.default_rng(0)
+    half = random.standard_normal((ROUNDS, CANDIDATES // 2, KNOTS))
+    return np.concatenate([half, -half], axis=1)
+
+
+def added(plans: Floats, at: Any) -> Floats:
+    """Course that plans, shape (n, KNOTS), add at a number of knots from their beginning, rad, shape (n,).
+
+    Straight between knots; `at` is one number, or one for each plan.
+    """
+    distance = np.abs(np.asarray(at)[..., None] - np.arange(KNOTS))
+    return np.asarray((plans * np.maximum(1.0 - distance, 0.0)).sum(axis=-1))
+
+
+class DesignModels:
+    """Design models from where ships are observed, steered by LQ to courses over ground in a current.
+
+    Attributes
+    ----------
+    dt : float
+        Step, s.
+    x, y : array of shape (n,)
+        Along and to starboard of the path where the ships were observed, m.
+    rudder : array of shape (n,)
+        rad.
+    """
+
+    def __init__(self, guide: MPC, seen: PathSignals, current: Current) -> None:
+        self.dt = COARSE * guide.design["dt"]
+        self.time = 0.0
+        self.feedback = guide.heading_autopilot("MPC").linear_feedback
+        self.crab_share = guide.gains["crab_share"]
+        self.rudder_limit = guide.ship.steering.limit
+        self.engine = _engine(
+            guide.ship, len(seen.cross_track), self.dt, guide.design["water_depth"]
         )
 
-    @cached_property
-    def _solver(self) -> Any:
-        """OSQP with the corrections as unknowns; only its bounds change."""
-        from scipy import sparse
-
-        matrix = sparse.csc_matrix(self.plan.by_correction)
-        rows, steps = matrix.shape
-        solver = library("osqp", "mpc", "MPC needs it").OSQP()
-        solver.setup(
-            sparse.identity(steps, format="csc"),
-            np.zeros(steps),
-            matrix,
-            -np.ones(rows),
-            np.ones(rows),
-            verbose=False,
-            eps_abs=ACCURACY,
-            eps_rel=ACCURACY,
-            max_iter=MOST_ITERATIONS,
-            rho=STEP_SIZE,
-            adaptive_rho=False,
-            warm_starting=False,
-        )
-        return solver
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but the solver, which another process sets up again."""
-        return {
-            name: value for name, value in self.__dict__.items() if name != "_solver"
+        heading = -seen.heading_error
+        self.north, self.east = turned(current.ahead, current.aside, -heading)
+        self.engine.reset(np.zeros(len(heading), dtype=np.int64))
+        start = {
+            "x": np.zeros_like(heading),
+            "y": seen.cross_track,
+            "psi": heading,
+            "u": seen.surge,
+            "v": seen.sway,
+            "r": seen.yaw_rate,
+            "delta": seen.rudder,
         }
+        for name, values in start.items():
+            self.engine.write(name, values)
+        self._observe()
+
+    def read(self, name: str) -> Floats:
+        """A state of the models."""
+        return self.engine.read(name)
+
+    def _observe(self) -> None:
+        """Read where the models are; the current has carried them along."""
+        self.x = self.read("x") + self.north * self.time
+        self.y = self.read("y") + self.east * self.time
+        self.rudder = self.read("delta")
+
+    def steer(self, course: Floats) -> None:
+        """Take one step towards a course over ground."""
+        heading, surge, sway = self.read("psi"), self.read("u"), self.read("v")
+        ahead, aside = turned(self.north, self.east, heading)
+        # angle from the way through the water to that over ground
+        drift = np.arctan2(
+            surge * aside - sway * ahead,
+            surge * (surge + ahead) + sway * (sway + aside),
+        )
+        zero = np.zeros_like(heading)
+        seen = Signals(
+            sway=sway,
+            yaw_rate=self.read("r"),
+            heading_error=wrapped(course - self.crab_share * drift - heading),
+            rudder=self.rudder,
+            heading_error_integral=zero,
+            surge=surge,
+            rate_of_turn=zero,
+        )
+        order, _ = linear_law(seen, Nothing(), self.feedback)
+        self.engine.command[0] = np.clip(order / self.rudder_limit, -1.0, 1.0)
+        self.engine.advance()
+        self.time += self.dt
+        self._observe()
+
+
+@lru_cache(maxsize=8)
+def _engine(ship: ShipModel, n: int, dt: float, depth: float) -> Engine:
+    """Design models side by side, in calm water, whose episodes do not end."""
+    task = course_keeping_task(
+        dt=dt,
+        max_heading_error_deg=180.0,
+        max_envelope_distance=FAR,
+        episode_steps=10**6,
+        water_depth=depth if depth < DEEP else np.inf,
+    )
+    return Engine(ship, n, task)

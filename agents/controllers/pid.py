@@ -7,27 +7,23 @@ from the steering cost).
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from agents.controllers.controller import Controller
-from agents.controllers.linear_loop import rate_weight, sample_ship
+from agents.controllers.linear_loop import checked_interval, rate_weight, sample_ship
 from shipgym import ShipModel
 from shipgym.checks import check_number
 from shipgym.ships.linear import Nomoto, linearise, nomoto_of
 from shipgym.tasks.steering import RUDDER_WEIGHT
-from shipgym.tasks.task import control_interval
 
 # Measured by the environment's cost on ships stable and unstable, gears slow and fast,
 # and lags up to half a ship length: with these the PID costs at most 1.1 times its
 # best, 1.2 times in course changes of 5 deg.
-LAG_SHARE = (
-    0.5  # of the gear's lag that is made up for; all of it would make the ship slow
-)
-FREQUENCY_SHARE = (
-    0.85  # of the optimal regulator, which feeds back the rudder too and can be faster
-)
+LAG_SHARE = 0.5  # of the gear's lag that is made up for; all would make the ship slow
+# of the optimal regulator, which feeds back the rudder too and can be faster
+FREQUENCY_SHARE = 0.85
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,43 +74,53 @@ class PID(Controller):
             Time for an offset to decay, in times to travel one ship length.
         """
         check_number(integral_lengths, "integral_lengths", above=0.0)
-        interval = (
-            control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
-        )
+        interval = checked_interval(model, dt)
         ship = sample_ship(model, interval)
         response = nomoto_of(*linearise(model, ship.about))
         lag = LAG_SHARE * model.steering.time_constant + 0.5 * interval
         slow = 1.0 / (integral_lengths * model.travel_time)
-        wanted, ratio = optimal_poles(response, rate_weight(model))
-        if damping is not None:
-            ratio = check_number(damping, "damping", above=0.0)
-        # the gear's pole must stay no slower than the pair
-        largest = (1.0 / lag + 1.0 / response.T - slow) / (2.0 * ratio + 1.0)
-        wanted = min(FREQUENCY_SHARE * wanted, largest)
-        if frequency is not None:
-            wanted = check_number(frequency, "frequency", above=0.0)
+
+        optimal = optimal_poles(response, rate_weight(model))
+        if damping is None:
+            damping = optimal.damping
+        check_number(damping, "damping", above=0.0)
+        if frequency is None:
+            # the gear's pole must stay no slower than the pair
+            sum_of_roots = 1.0 / lag + 1.0 / response.T
+            largest = (sum_of_roots - slow) / (2.0 * damping + 1.0)
+            frequency = min(FREQUENCY_SHARE * optimal.frequency, largest)
+        else:
+            check_number(frequency, "frequency", above=0.0)
+
+        gains = place_poles(response, lag, frequency, damping, slow)
         design = {
-            "frequency": wanted,
-            "damping": ratio,
+            "frequency": float(frequency),
+            "damping": float(damping),
             "integral_lengths": float(integral_lengths),
             "lag": lag,
             "nomoto_K": response.K,
             "nomoto_T": response.T,
         }
-        return cls.designed(
-            model, ship, place_poles(response, lag, wanted, ratio, slow), design
-        )
+        return cls.designed(model, ship, gains, design)
 
 
-def optimal_poles(response: Nomoto, rate_weight: float) -> tuple[float, float]:
-    """Natural frequency, rad/s, and damping that the steering cost asks for.
+class Poles(NamedTuple):
+    """A pair of poles."""
 
-    They are those of the dominant poles of the LQ regulator with weights on heading
-    error, rudder and rudder rate (`rate_weight`, s^2), for the first-order Nomoto form
-    with the rudder rate as input.
+    frequency: float  # natural, rad/s
+    damping: float  # ratio
+
+
+def optimal_poles(response: Nomoto, rate_weight: float) -> Poles:
+    """Dominant poles that the steering cost asks for.
+
+    They are those of the LQ regulator with weights on heading error, rudder and rudder
+    rate (`rate_weight`, s^2), for the first-order Nomoto form with the rudder rate as
+    input.
     """
     import control  # here, because it takes a second to import
 
+    # states: yaw rate, heading error, rudder
     A = np.array(
         [
             [-1.0 / response.T, 0.0, response.rudder_effect],
@@ -125,10 +131,15 @@ def optimal_poles(response: Nomoto, rate_weight: float) -> tuple[float, float]:
     B = np.array([[0.0], [0.0], [1.0]])
     weights = np.diag([0.0, 1.0, RUDDER_WEIGHT])
     _, _, poles = control.lqr(A, B, weights, np.array([[rate_weight]]))
-    oscillating = poles[np.abs(poles.imag) > 0.0]
-    pair = oscillating if len(oscillating) else poles[np.argsort(np.abs(poles))[:2]]
+
+    pair = poles[np.abs(poles.imag) > 0.0]
+    if len(pair) == 0:
+        slowest = np.argsort(np.abs(poles))[:2]
+        pair = poles[slowest]
+    # (s - p1) (s - p2) = s^2 + 2 damping frequency s + frequency^2
     frequency = float(np.sqrt(np.prod(pair).real))
-    return frequency, float(-pair.sum().real / (2.0 * frequency))
+    damping = float(-np.sum(pair).real / (2.0 * frequency))
+    return Poles(frequency, damping)
 
 
 def place_poles(
@@ -137,17 +148,31 @@ def place_poles(
     """PID gains for a pair of poles and a slow one on Nomoto's first-order form with a gear.
 
     The characteristic polynomial s^2 (s + 1/T) (lag s + 1) + K/T (Kd s^2 + Kp s + Ki)
-    has a fixed sum of roots, which leaves the fourth to the gear. `lag`: of the gear
-    and the held command, s; `frequency`, `damping`: of the pair of poles, rad/s and
-    ratio; `slow`: the pole of the integral action, 1/s. Returns `proportional`
-    (rad/rad), `integral` (1/s), `derivative` (s).
+    has a fixed sum of roots, which leaves the fourth to the gear.
+
+    Parameters
+    ----------
+    response : Nomoto
+    lag : float
+        Of the gear and the held command, s.
+    frequency, damping : float
+        Of the pair of poles, rad/s and ratio.
+    slow : float
+        Pole of the integral action, 1/s.
+
+    Returns
+    -------
+    dict of str to float
+        `proportional` (rad/rad), `integral` (1/s), `derivative` (s).
     """
     fourth = 1.0 / lag + 1.0 / response.T - 2.0 * damping * frequency - slow
-    pair = np.array([1.0, 2.0 * damping * frequency, frequency**2])
-    wanted = np.polymul(np.polymul(pair, [1.0, slow]), [1.0, fourth])
+    pair = [1.0, 2.0 * damping * frequency, frequency**2]
+    others = np.polymul([1.0, slow], [1.0, fourth])
+    _, _, quadratic, linear, constant = np.polymul(pair, others).tolist()
+
     per_rudder = lag / response.rudder_effect
     return {
-        "proportional": float(wanted[3] * per_rudder),
-        "integral": float(wanted[4] * per_rudder),
-        "derivative": float((wanted[2] - 1.0 / (lag * response.T)) * per_rudder),
+        "proportional": linear * per_rudder,
+        "integral": constant * per_rudder,
+        "derivative": (quadratic - 1.0 / (lag * response.T)) * per_rudder,
     }

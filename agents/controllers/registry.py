@@ -6,11 +6,20 @@ from typing import TypeVar
 from agents.controllers.controller import Controller
 from shipgym import InputError
 from shipgym.checks import check_choice
-from shipgym.files import shipped_toml
 
-#: Where the classes are, by their kind.
-_HOMES: dict[str, str] = shipped_toml("agents.controllers", "kinds.toml")
-#: Controllers of this package, imported when they are first used.
+#: Module and class of the controllers of this package by kind; they are imported when
+#: they are first used.
+_HOMES = {
+    "pid": "agents.controllers.pid:PID",
+    "lq": "agents.controllers.lq:LQ",
+    "lqg": "agents.controllers.lqg:LQG",
+    "turn-rate": "agents.controllers.turn_rate:TurnRate",
+    "los": "agents.controllers.los_autopilot:LineOfSight",
+    "ilos": "agents.controllers.los_autopilot:IntegralLineOfSight",
+    "alos": "agents.controllers.los_autopilot:AdaptiveLineOfSight",
+    "wheel-over": "agents.controllers.wheel_over:WheelOver",
+    "mpc": "agents.controllers.mpc:MPC",
+}
 BUILT_IN = tuple(_HOMES)
 C = TypeVar("C", bound=Controller)
 
@@ -21,8 +30,8 @@ _REGISTERED: dict[str, type[Controller]] = {}
 def register_controller(controller: type[C]) -> type[C]:
     """Make a controller known by its `kind` to `--controllers`, files, the benchmark and learning.
 
-    Returns the class, so that this may decorate it. Raises InputError if it is not such
-    a class, or there is another controller of that kind.
+    Raises InputError if it is not such a class, or there is another controller of that
+    kind.
 
     Parameters
     ----------
@@ -30,27 +39,34 @@ def register_controller(controller: type[C]) -> type[C]:
         A subclass of `Controller` with a `kind` and `from_model(model, *, dt=None,
         ...)`. To be found by workers it is to be at the top level of a module that they
         can import.
+
+    Returns
+    -------
+    type
+        The same, so that this may be a decorator.
     """
     where = "register_controller"
     if not (isinstance(controller, type) and issubclass(controller, Controller)):
         raise InputError(
-            f"{where}: {controller!r} found, expected a subclass of agents.Controller"
+            f"{where}: expected a subclass of agents.Controller, got {controller!r}"
         )
     kind, name = controller.kind, controller.__name__
     if not kind or set(kind) & set(",=+:/{}*. "):
         raise InputError(
-            f"{where}: {name}.kind is '{kind}', expected a name such as 'my-lq'"
+            f"{where}: {name}.kind: expected a name such as 'my-lq', got '{kind}'"
         )
     if not callable(getattr(controller, "from_model", None)):
         raise InputError(
-            f"{where}: {name} has no class method 'from_model(model, *, dt=None, ...)'"
+            f"{where}: {name}: expected a class method 'from_model(model, *, dt=None,"
+            " ...)', got none"
         )
-    other = _HOMES.get(kind) or (
-        _home(_REGISTERED[kind]) if kind in _REGISTERED else None
-    )
+    other = _HOMES.get(kind)
+    if kind in _REGISTERED:
+        other = _home(_REGISTERED[kind])
     if other not in (None, _home(controller)):
         raise InputError(
-            f"{where}: kind '{kind}' is that of {other} already, expected another one"
+            f"{where}: {name}.kind: expected one that is free, got '{kind}', which is"
+            f" that of {other}"
         )
     if kind not in _HOMES:
         _REGISTERED[kind] = controller
@@ -72,10 +88,10 @@ def registered_modules() -> tuple[str, ...]:
 
 
 def controller_class(kind: str, where: str = "controller") -> type[Controller]:
-    """The class of a kind of controller; InputError if there is none, with the nearest known one."""
+    """Class of a kind of controller; InputError if there is none, with the nearest known one."""
     check_choice(kind, controller_kinds(), where)
     if kind in _REGISTERED:
         return _REGISTERED[kind]
     module, _, name = _HOMES[kind].partition(":")
-    found: type[Controller] = getattr(import_module(module), name)
-    return found
+    controller: type[Controller] = getattr(import_module(module), name)
+    return controller

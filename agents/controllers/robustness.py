@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller
-from agents.controllers.linear_loop import Margins
+from agents.controllers.margins import Margins
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 
@@ -35,38 +35,36 @@ class MarginUncertainty:
     def quantiles(
         self, share: Sequence[float] = (0.05, 0.5, 0.95)
     ) -> dict[str, Floats]:
-        """Quantiles of each figure over ships with a stable loop, by name; InputError if none is stable."""
+        """Quantiles of each figure over ships with a stable loop; InputError if none is stable."""
         if not self.stable.any():
             raise InputError(
-                "margins: the loop is stable on none of the ships, so there are no"
-                " quantiles"
+                "margins: expected a stable loop on at least one ship, got none"
             )
-        return {
-            name: np.quantile(
-                values[self.stable], share, method="lower"
-            )  # finite and infinite ones mixed
-            for name, values in self.by_name.items()
-        }
+        quantiles = {}
+        for name, values in self.by_name.items():
+            # the lower one: finite and infinite values are mixed
+            stable = values[self.stable]
+            quantiles[name] = np.quantile(stable, share, method="lower")
+        return quantiles
 
 
 def margin_uncertainty(
     controller: Controller, models: Sequence[ShipModel]
 ) -> MarginUncertainty:
-    """Margins of a linear controller on each of many ships.
+    """Margins of a controller on each of many ships.
 
     Raises InputError if there are no models.
 
     Parameters
     ----------
     controller : Controller
-        A linear one; of a scheduled or adaptive one the design at service speed, of MPC
-        without limits.
+        Its law is taken as linear about straight running.
     models : sequence of ShipModel
         For example `model.sample(100, seed)`, drawn from the estimated covariance.
     """
     if not models:
-        raise InputError("models: none found, expected at least one")
-    names = [item.name for item in fields(Margins)]
+        raise InputError("models: expected at least one, got none")
+    names = [figure.name for figure in fields(Margins)]
     table = np.full((len(models), len(names)), np.nan)
     for row, model in zip(table, models, strict=True):
         with suppress(InputError):

@@ -9,35 +9,69 @@ Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 
 a function of the rate of turn).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from functools import cached_property
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import NUMBERS, Controller, Range
-from agents.controllers.linear_loop import Compensator, sample_ship
-from agents.controllers.memory import Flags, Floats, heading_error, records
-from agents.controllers.scheduled_lq import rising
+from agents.controllers.controller import ANY_NUMBER, Bounds, Controller
+from agents.controllers.law import Law, Number, Signals
+from agents.controllers.linear_loop import checked_interval, sample_ship
 from shipgym import InputError, ShipModel
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
-from shipgym.ships.linear import linearise, nomoto_of, steady_turn_rudder
-from shipgym.tasks.task import control_interval
+from shipgym.engine.records import Record
+from shipgym.ships.linear import Nomoto, linearise, nomoto_of, steady_turn_rudder
 
-GRID = np.arange(
-    0.02, 0.81, 0.02
-)  # rates of the feed-forward, prime: times speed over length
-LARGEST_RUDDER = (
-    0.6  # share of the rudder limit beyond which no steady turn is tabulated
-)
-# the same of the rate at which courses are changed, as `wheel_over.TURN_RUDDER`
+GRID = np.arange(0.02, 0.81, 0.02)  # rates of the feed-forward, times length over speed
+# share of the rudder limit beyond which no steady turn is tabulated
+LARGEST_RUDDER = 0.6
+# share of it that the steady turn has at whose rate courses are changed
 COURSE_RUDDER = 0.3
-DAMPING, PER_LAG, PER_LENGTH = (
-    0.9,
-    0.3,
-    2.0,
-)  # of the pair of poles; its frequency times lag, length time
+# of the pair of poles: damping ratio, frequency times lag, and times length over speed
+DAMPING, PER_LAG, PER_LENGTH = 0.9, 0.3, 2.0
 SLOWER = 4.0  # time of the heading over that of the rate
+
+
+class TurnRateGains(NamedTuple):
+    """Parameters of `turn_rate_law`."""
+
+    rates: Floats  # rad/s, of steady turns, rising
+    rudders: Floats  # rad, which keep them
+    proportional: float  # rad per rad/s
+    integral: float  # rad per rad
+    heading_time: float  # s
+    rate: float  # rad/s, at which courses are changed
+    smoothing: float  # share of the way to the wanted rate that is taken in an interval
+    dt: float  # s
+    rudder_limit: float  # rad
+
+
+class TurnRateMemory(NamedTuple):
+    """Memory of `turn_rate_law`."""
+
+    integral: Number  # rad, part of the rudder
+    followed: Number  # rad/s, the rate that follows the wanted one smoothly
+    started: Number  # 0 where an episode begins, else 1
+
+
+def turn_rate_law(
+    seen: Signals, memory: TurnRateMemory, p: TurnRateGains
+) -> tuple[Number, TurnRateMemory]:
+    """Steer the ordered rate of turn, or, where it is 0, the rate that the heading error asks for."""
+    to_heading = np.clip(seen.heading_error / p.heading_time, -p.rate, p.rate)
+    wanted = np.where(seen.rate_of_turn == 0.0, to_heading, seen.rate_of_turn)
+    before = np.where(memory.started > 0.0, memory.followed, seen.yaw_rate)
+    followed = before + p.smoothing * (wanted - before)
+
+    off = followed - seen.yaw_rate
+    steady = np.interp(followed, p.rates, p.rudders)
+    order = steady + p.proportional * off + memory.integral
+
+    more = np.where(np.abs(order) < p.rudder_limit, p.integral * p.dt * off, 0.0)
+    return order, TurnRateMemory(memory.integral + more, followed, 1.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -61,27 +95,25 @@ class TurnRate(Controller):
         "heading_time",
         "rate",
     )
-    ranges: ClassVar[Mapping[str, Range]] = {
-        **Controller.ranges,
-        **dict.fromkeys(
-            ("heading_time", "rate", "frequency"), Range(1e-9, NUMBERS.largest)
-        ),
-    }
+    law: ClassVar[Law] = staticmethod(turn_rate_law)
+    memory_record: ClassVar[Record] = TurnRateMemory
     reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "rate_of_turn")
+    bounds: ClassVar[Mapping[str, Bounds]] = {
+        **Controller.bounds,
+        "heading_time": Bounds(1e-9, ANY_NUMBER.largest),
+        "rate": Bounds(1e-9, ANY_NUMBER.largest),
+        "frequency": Bounds(1e-9, ANY_NUMBER.largest),
+    }
     arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {
         "rates": ("rates",),
         "rudders": ("rates",),
     }
 
-    #: Integral part of the rudder, rad, and the rate that follows the wanted one
-    #: smoothly, rad/s.
-    record: ClassVar[np.dtype[Any]] = np.dtype([("gathered", "f8"), ("followed", "f8")])
-
     rates: Floats
     rudders: Floats
 
     def __post_init__(self) -> None:
-        rising(self.rates.tolist(), "rates", above=None)
+        check_rising(self.rates.tolist(), "rates")
 
     @classmethod
     def from_model(
@@ -108,94 +140,111 @@ class TurnRate(Controller):
             Rate at which courses are changed, degrees per minute; by default that of a
             steady turn with three tenths of the rudder's limit.
         """
-        interval = (
-            control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
-        )
-        ship, time = sample_ship(model, interval), model.travel_time
+        interval = checked_interval(model, dt)
+        ship = sample_ship(model, interval)
         form = nomoto_of(*linearise(model, ship.about))
-        lag = model.steering.time_constant + 0.5 * interval
-        wanted = min(PER_LAG / lag, PER_LENGTH / time)
-        if frequency is not None:
-            wanted = check_number(frequency, "frequency", above=0.0)
-        rates, rudders = steady_turns(model, ship.about.rudder)
-        reached = (
-            np.abs(rudders - ship.about.rudder) <= COURSE_RUDDER * model.steering.limit
-        )
-        rate = float(
-            max(min(rates[reached].max(), -rates[reached].min()), GRID[0] / time)
-        )
-        if rate_deg_min is not None:
-            most = float(np.degrees(min(rates.max(), -rates.min()))) * 60.0
-            rate = (
-                np.radians(
-                    check_number(rate_deg_min, "rate_deg_min", above=0.0, at_most=most)
-                )
-                / 60.0
-            )
+        if frequency is None:
+            lag = model.steering.time_constant + 0.5 * interval
+            frequency = min(PER_LAG / lag, PER_LENGTH / model.travel_time)
+        check_number(frequency, "frequency", above=0.0)
+
+        turns = steady_turns(model, ship.about.rudder)
+        if rate_deg_min is None:
+            rate = course_rate(model, turns, ship.about.rudder)
+        else:
+            most = 60.0 * float(np.degrees(turns.largest_rate))
+            check_number(rate_deg_min, "rate_deg_min", above=0.0, at_most=most)
+            rate = float(np.radians(rate_deg_min)) / 60.0
+
         gains = {
-            "proportional": (
-                max(2.0 * DAMPING * wanted - 1.0 / form.T, wanted) / form.rudder_effect
-            ),
-            "integral": wanted**2 / form.rudder_effect,
-            "heading_time": SLOWER / wanted,
-            "rate": float(rate),
+            **rate_gains(form, frequency),
+            "heading_time": SLOWER / frequency,
+            "rate": rate,
         }
-        design = {"frequency": wanted, "nomoto_K": form.K, "nomoto_T": form.T}
-        return cls.designed(model, ship, gains, design, rates=rates, rudders=rudders)
+        design = {"frequency": frequency, "nomoto_K": form.K, "nomoto_T": form.T}
+        return cls.designed(
+            model, ship, gains, design, rates=turns.rates, rudders=turns.rudders
+        )
+
+    @cached_property
+    def parameters(self) -> TurnRateGains:
+        """Parameters of its law."""
+        step = self.design["dt"] * self.design["frequency"]
+        return TurnRateGains(
+            rates=self.rates,
+            rudders=self.rudders,
+            proportional=self.gains["proportional"],
+            integral=self.gains["integral"],
+            heading_time=self.gains["heading_time"],
+            rate=self.gains["rate"],
+            smoothing=step / (1.0 + step),
+            dt=self.design["dt"],
+            rudder_limit=self.rudder_limit,
+        )
+
+
+def rate_gains(form: Nomoto, frequency: float) -> dict[str, float]:
+    """Proportional and integral gain that place the poles of the yaw rate on Nomoto's first-order form.
+
+    s^2 + (1 / T + K / T Kp) s + K / T Ki = s^2 + 2 damping frequency s + frequency^2;
+    a ship that is damped by herself keeps some proportional gain.
+    """
+    damping = max(2.0 * DAMPING * frequency - 1.0 / form.T, frequency)
+    return {
+        "proportional": damping / form.rudder_effect,
+        "integral": frequency**2 / form.rudder_effect,
+    }
+
+
+class SteadyTurns(NamedTuple):
+    """Steady turns to both sides, by rising rates."""
+
+    rates: Floats  # rad/s, shape (n,)
+    rudders: Floats  # rad, shape (n,)
 
     @property
-    def smoothing(self) -> float:
-        """Share of the way to the wanted rate that is taken in an interval."""
-        step = self.design["dt"] * self.design["frequency"]
-        return step / (1.0 + step)
-
-    def steer(
-        self, seen: dict[str, Floats], memory: Floats, begins: Flags
-    ) -> tuple[Floats, Floats]:
-        """Rudder for the ordered rate of turn, `rate_of_turn` in rad/s, or, where it is 0, the heading."""
-        gains, rate, kept = self.gains, seen["yaw_rate"], records(memory, self.record)
-        to_heading = np.clip(
-            heading_error(seen) / gains["heading_time"], -gains["rate"], gains["rate"]
-        )
-        ordered = seen.get("rate_of_turn", np.zeros_like(to_heading))
-        wanted = np.where(ordered == 0.0, to_heading, ordered)
-        before = np.where(begins, rate, kept["followed"])
-        followed = before + self.smoothing * (wanted - before)
-        off = followed - rate
-        order = (
-            np.interp(followed, self.rates, self.rudders)
-            + gains["proportional"] * off
-            + kept["gathered"]
-        )
-        more = gains["integral"] * self.design["dt"] * off
-        gathered = np.where(np.abs(order) < self.rudder_limit, more, 0.0)
-        return order, np.column_stack([kept["gathered"] + gathered, followed])
-
-    def loop(self) -> Compensator:
-        """Small changes of a heading."""
-        return self.linearised()
+    def largest_rate(self) -> float:
+        """Largest rate that is reached to either side, rad/s."""
+        return float(min(self.rates.max(), -self.rates.min()))
 
 
-def steady_turns(model: ShipModel, neutral: float) -> tuple[Floats, Floats]:
-    """Yaw rates of steady turns to both sides, rad/s, and their rudder angles, rad; `neutral`: without turn.
+def steady_turns(model: ShipModel, neutral: float) -> SteadyTurns:
+    """Tabulate the steady turns of a model; `neutral` is the rudder without a turn, rad.
 
     Raises InputError if the model has none to one of the sides.
     """
     for slowed in (True, False):  # some models know no loss of speed
-        found = {0.0: neutral}
+        rudder_of = {0.0: neutral}
         for side in (-1.0, 1.0):
-            for rate in side * GRID / model.travel_time:
-                rudder = steady_turn_rudder(model, float(rate), slowed)
-                if (
-                    rudder is None
-                    or abs(rudder) > LARGEST_RUDDER * model.steering.limit
-                ):
+            for rate in (side * GRID / model.travel_time).tolist():
+                rudder = steady_turn_rudder(model, rate, slowed)
+                if rudder is None:
                     break
-                found[float(rate)] = rudder
-        if min(found) < 0.0 < max(found):
-            return np.array(sorted(found)), np.array(
-                [found[rate] for rate in sorted(found)]
-            )
+                if abs(rudder) > LARGEST_RUDDER * model.steering.limit:
+                    break
+                rudder_of[rate] = rudder
+        if min(rudder_of) < 0.0 < max(rudder_of):
+            rates = sorted(rudder_of)
+            rudders = [rudder_of[rate] for rate in rates]
+            return SteadyTurns(np.array(rates), np.array(rudders))
     raise InputError(
-        f"model {model.name!r}: no steady turn found, expected one to either side"
+        f"model {model.name!r}: expected steady turns to either side, got none"
     )
+
+
+def course_rate(model: ShipModel, turns: SteadyTurns, neutral: float) -> float:
+    """Rate at which courses are changed, rad/s: that of a steady turn with `COURSE_RUDDER`."""
+    reached = np.abs(turns.rudders - neutral) <= COURSE_RUDDER * model.steering.limit
+    some = SteadyTurns(turns.rates[reached], turns.rudders[reached])
+    return max(some.largest_rate, float(GRID[0]) / model.travel_time)
+
+
+def check_rising(values: Sequence[float], name: str) -> None:
+    """Refuse numbers that are not in rising order; InputError names them."""
+    for i, value in enumerate(values):
+        check_number(value, f"{name}[{i}]")
+    if len(values) < 2 or np.any(np.diff(values) <= 0.0):
+        raise InputError(
+            f"{name}: expected at least two numbers in rising order, SI units, got"
+            f" {list(values)}"
+        )

@@ -13,7 +13,7 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 from agents.deployment.c99 import Source, render
 from shipgym import InputError
 from shipgym.checks import check_choice
-from shipgym.files import atomic_path
+from shipgym.drafts import atomic_path
 
 VERSIONS = ("2.0", "3.0")
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")

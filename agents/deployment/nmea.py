@@ -12,28 +12,24 @@ from typing import Any, NamedTuple
 from shipgym import InputError, extras
 from shipgym.trials.nmea import checksum, parse_sentence, steering_numbers
 
-LONGEST_LINE = 512  # bytes; 82 are the standard's
-BAUD = 4800  # of the standard
-EXPECTED = "expected tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD"
 
-
-class Reading(NamedTuple):
+class NmeaReading(NamedTuple):
     """One number that an instrument sent."""
 
-    quantity: str
+    quantity: str  # a key of `NMEA_QUANTITIES`
     value: float  # SI units and radians
     talker: str  # who sent it: HE, GP, ...
 
 
 @cache
 def library(name: str) -> ModuleType:
-    """pyserial; InputError where it is not installed."""
-    found: ModuleType = extras.library(name, "nmea")
-    return found
+    """Import pyserial; InputError if it is not installed."""
+    module: ModuleType = extras.library(name, "nmea")
+    return module
 
 
-def readings(line: str) -> list[Reading] | None:
-    """What a sentence tells; None for one that is damaged, nothing for one of another kind or not valid.
+def readings(line: str) -> list[NmeaReading] | None:
+    """Numbers of a sentence: none of one of another kind or that is not valid, None if it is damaged.
 
     A sentence without a checksum counts as damaged, as one with a wrong one.
     """
@@ -42,47 +38,58 @@ def readings(line: str) -> list[Reading] | None:
         numbers = steering_numbers(sentence)
     except (ValueError, IndexError, KeyError):
         return None
-    return [
-        Reading(quantity, value, sentence.talker) for quantity, value in numbers.items()
-    ]
+    found = []
+    for quantity, value in numbers.items():
+        found.append(NmeaReading(quantity, value, sentence.talker))
+    return found
 
 
 def sentences(text: str) -> str:
     """Lines such as HEHDT,90,T as sentences, with their checksums."""
-    return "".join(f"${line}*{checksum(line)}\r\n" for line in text.splitlines())
+    lines = [f"${line}*{checksum(line)}\r\n" for line in text.splitlines()]
+    return "".join(lines)
 
 
 class Line(asyncio.Protocol, asyncio.DatagramProtocol):
-    """One end of a connection: `received` is told each line; it stands among `ends` while it is open."""
+    """One end of a connection; it is a member of `ends` while it is open.
+
+    `received` is called with each line.
+    """
+
+    longest = 512  # bytes of a line; the standard allows 82
 
     def __init__(self, received: Callable[[str], None], ends: set[Line]) -> None:
-        self.received, self.ends, self.rest = received, ends, b""
+        self.received = received
+        self.ends = ends
+        self.rest = b""  # of a line that has not ended
         self.transport: Any = None
-        self.peer: Any = None  # who was heard last, over UDP
+        self.peer: Any = None  # from whom the last datagram came
 
     def connection_made(self, transport: Any) -> None:
-        """A stream, or a socket of datagrams, is open."""
+        """Register an open stream or socket of datagrams."""
         self.transport = self.transport or transport
         self.ends.add(self)
 
     def connection_lost(self, error: Exception | None) -> None:
-        """It is closed."""
+        """Forget a closed connection."""
         self.ends.discard(self)
 
     def data_received(self, data: bytes) -> None:
-        """Bytes of a stream, in any portions."""
+        """Take bytes of a stream, in any portions."""
         *lines, self.rest = (self.rest + data).split(b"\n")
-        self.rest = self.rest if len(self.rest) <= LONGEST_LINE else b""
-        for line in filter(bytes.strip, lines):
-            self.received(line[:LONGEST_LINE].decode("ascii", "replace").strip())
+        if len(self.rest) > self.longest:
+            self.rest = b""
+        for line in lines:
+            if line.strip():
+                self.received(line[: self.longest].decode("ascii", "replace").strip())
 
     def datagram_received(self, data: bytes, address: Any) -> None:
-        """One datagram, of whole lines."""
+        """Take one datagram, of whole lines."""
         self.peer = address
         self.data_received(data + b"\n")
 
     def send(self, data: bytes) -> None:
-        """Send bytes; a datagram to whoever was heard last, or to where the socket is connected."""
+        """Send bytes; a datagram to the last peer, or to where the socket is connected."""
         if not hasattr(self.transport, "sendto"):
             self.transport.write(data)
         elif self.peer or self.transport.get_extra_info("peername"):
@@ -93,47 +100,69 @@ class Link:
     """A connection by its address: tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD."""
 
     def __init__(self, received: Callable[[str], None]) -> None:
+        self.received = received
         self.ends: set[Line] = set()  # what is connected
-        self.others: list[Any] = []  # a server, what reads a serial line
-        self.line: Callable[[], Line] = lambda: Line(received, self.ends)
+        self.others: list[Any] = []  # a server, a reader of a serial line
+
+    def line(self) -> Line:
+        """A new end of the connection."""
+        return Line(self.received, self.ends)
 
     async def open(self, address: str, serve: bool = False) -> None:
-        """Connect, or, as instruments do, wait to be connected to over TCP, and send first over UDP.
+        """Connect; or with `serve` wait for connections over TCP, and send first over UDP.
 
         Raises InputError for an address of another form, or one that cannot be opened.
         """
         kind, _, rest = address.partition(":")
-        (host, _, port), loop = rest.rpartition(":"), asyncio.get_running_loop()
+        kinds = {"tcp": self._open_tcp, "udp": self._open_udp}
         try:
             if kind == "serial" and rest:
-                await self._open_serial(*rest.partition("@")[::2])
-            elif kind == "udp":
-                where = "remote_addr" if serve else "local_addr"
-                await loop.create_datagram_endpoint(
-                    self.line, **{where: (host, int(port))}
-                )  # type: ignore[arg-type]
-            elif kind == "tcp" and serve:
-                self.others.append(await loop.create_server(self.line, host, int(port)))
-            elif kind == "tcp":
-                await loop.create_connection(self.line, host, int(port))
+                await self._open_serial(rest)
             else:
-                raise ValueError
-        except (ValueError, OverflowError):
-            raise InputError(f"address: '{address[:80]}' found, {EXPECTED}") from None
-        except OSError as error:
+                host, _, port = rest.rpartition(":")
+                await kinds[kind](host, int(port), serve)
+        except InputError:
+            raise
+        except (KeyError, ValueError, OverflowError):
             raise InputError(
-                f"{address}: cannot be opened ({error.strerror or error})"
-            ) from error
+                "address: expected tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or"
+                f" serial:DEVICE@BAUD, got '{address[:80]}'"
+            ) from None
+        except OSError as error:
+            reason = error.strerror or error
+            raise InputError(f"{address}: cannot be opened ({reason})") from error
 
-    async def _open_serial(self, device: str, baud: str) -> None:
-        serial, line = library("serial"), self.line()
-        port = serial.Serial(
-            device, int(baud or BAUD), timeout=0, write_timeout=0, exclusive=True
+    async def _open_tcp(self, host: str, port: int, serve: bool) -> None:
+        loop = asyncio.get_running_loop()
+        if serve:
+            self.others.append(await loop.create_server(self.line, host, port))
+        else:
+            await loop.create_connection(self.line, host, port)
+
+    async def _open_udp(self, host: str, port: int, serve: bool) -> None:
+        loop = asyncio.get_running_loop()
+        place = (host, port)
+        if serve:
+            await loop.create_datagram_endpoint(self.line, remote_addr=place)
+        else:
+            await loop.create_datagram_endpoint(self.line, local_addr=place)
+
+    async def _open_serial(self, rest: str) -> None:
+        """Open a serial line, which is written to at once, and read when there is something."""
+        device, _, baud = rest.partition("@")
+        standard_baud = 4800
+        port = library("serial").Serial(
+            device,
+            int(baud or standard_baud),
+            timeout=0,
+            write_timeout=0,
+            exclusive=True,
         )
-        line.transport = port  # written to at once, read when there is something
-        self.others.append(
-            (await asyncio.get_running_loop().connect_read_pipe(lambda: line, port))[0]
-        )
+        line = self.line()
+        line.transport = port
+        loop = asyncio.get_running_loop()
+        reader, _ = await loop.connect_read_pipe(lambda: line, port)
+        self.others.append(reader)
 
     def send(self, text: str) -> None:
         """Send sentences to all that are connected."""

@@ -1,4 +1,4 @@
-"""A route of waypoints for track control: where a ship stands on it, and which turns lie ahead."""
+"""A route of waypoints for track control: where a ship is along it, and which turns lie ahead."""
 
 from math import copysign, degrees, fabs
 from pathlib import Path as File
@@ -10,12 +10,9 @@ from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, placed
 from shipgym.tasks.guidance import Path
-from shipgym.tasks.path_following import fix, leg_from, next_turn, turned_off
+from shipgym.tasks.path_following import Fix, fix, leg_from, next_turn, turned_off
 from shipgym.trials.navigation import local_metres
 from shipgym.trials.readers.csv_file import read_csv
-
-COLUMNS = ("latitude", "longitude")
-FURTHEST_M = 100e3  # of a waypoint from the first one: the route is laid on a plane
 
 
 class _Scale(NamedTuple):
@@ -27,14 +24,21 @@ class _Scale(NamedTuple):
 
 
 class Route:
-    """Legs joined by arcs of one radius, m, as the path-following environment has them.
+    """Legs joined by arcs of one radius, as the path-following environment has them.
 
-    `waypoints`: latitude and longitude, degrees, shape (n, 2). Raises InputError for a
-    path that cannot be sailed, or that reaches too far for a plane.
+    Raises InputError for a path that cannot be sailed, or that reaches too far for a
+    plane.
+
+    Parameters
+    ----------
+    waypoints : array of shape (n, 2)
+        Latitude and longitude, degrees.
+    radius : float
+        Radius of the arcs, m.
     """
 
-    #: What it gives to an autopilot (`variables.toml`), beside the direction of the
-    #: path as set-point.
+    #: Inputs of an autopilot (`variables.toml`) that a route provides, beside the
+    #: direction of the path as set-point.
     GIVES = (
         "cross_track",
         "next_turn_distance",
@@ -45,58 +49,70 @@ class Route:
 
     def __init__(self, waypoints: Floats, radius: float) -> None:
         self.origin = float(waypoints[0, 0]), float(waypoints[0, 1])
-        path = Path(
-            np.column_stack(local_metres(waypoints[:, 0], waypoints[:, 1], self.origin))
-        )
-        if (far := float(np.abs(path.waypoints).max())) > FURTHEST_M:
-            expected = f"expected at most {FURTHEST_M / 1e3:.0f} km; divide the route"
+        north, east = local_metres(waypoints[:, 0], waypoints[:, 1], self.origin)
+        path = Path(np.column_stack([north, east]))
+        farthest_km = float(np.abs(path.waypoints).max()) / 1e3
+        if farthest_km > 100.0:  # too far for a plane
             raise InputError(
-                f"waypoints: {far / 1e3:.0f} km from the first found, {expected}"
+                "waypoints: expected at most 100 km from the first, got"
+                f" {farthest_km:.1f} km; divide the route"
             )
         path.check_turns(radius)
-        self.plan, self.ended = path.waypoints.ravel(), False
-        self.ship: Any = _Scale(
-            1.0, radius, 1.0
-        )  # stands for the records of the environment
+        self.plan = path.waypoints.ravel()
+        self.ended = False
+        self.scale: Any = _Scale(length=1.0, turn_radius=radius, lookahead=1.0)
         self.leg = leg_from(0, 0.0, radius, self.plan)
 
     @classmethod
     def from_csv(cls, path: str | File, radius: float) -> Self:
         """Read waypoints in degrees from the columns `latitude` and `longitude`; InputError names the row."""
-        table, limits = read_csv(path), (89.0, 180.0)
-        columns = [table.numbers(name) for name in COLUMNS]
-        for name, values, most in zip(COLUMNS, columns, limits, strict=True):
+        table = read_csv(path)
+        columns = []
+        for name, largest in {"latitude": 89.0, "longitude": 180.0}.items():
+            values = table.numbers(name)
             for row, value in enumerate(values.tolist()):
-                where = f"{path}: {table.place(row)}, column '{name}'"
-                check_number(value, where, at_least=-most, at_most=most, hint="degrees")
+                check_number(
+                    value,
+                    f"{path}: {table.place(row)}, column '{name}'",
+                    at_least=-largest,
+                    at_most=largest,
+                    hint="degrees",
+                )
+            columns.append(values)
         if len(table.rows) < 2:
             raise InputError(
-                f"{path}: {len(table.rows)} waypoints found, expected at least 2"
+                f"{path}: expected at least 2 waypoints, got {len(table.rows)}"
             )
         with placed(str(path)):
             return cls(np.column_stack(columns), radius)
 
     def given(self, latitude: float, longitude: float) -> dict[str, float]:
         """Direction of the path beside the ship, distance from it and turns ahead; position in rad."""
-        ship, radius = self.ship, self.ship.turn_radius
-        x, y = local_metres(
+        here = self._fix(latitude, longitude)
+        leg = self.leg
+        self.ended = leg.turn == 0.0 and here.way >= leg.turn_at
+        turn_to_go = max(fabs(leg.turn) - here.turned, 0.0)
+        return {
+            "set_point": leg.course + copysign(here.turned, leg.turn),
+            "cross_track": here.cross,
+            "next_turn_distance": leg.turn_at - here.way,
+            "next_turn_angle": copysign(turn_to_go, leg.turn),
+            "second_turn_distance": leg.second_at - here.way,
+            "second_turn_angle": leg.second_turn,
+        }
+
+    def _fix(self, latitude: float, longitude: float) -> Fix:
+        """Position on the leg or arc that the ship is on, after any turns that are over."""
+        scale = self.scale
+        north, east = local_metres(
             np.array(degrees(latitude)), np.array(degrees(longitude)), self.origin
         )
-        at = fix(float(x), float(y), self.leg, ship, ship)
-        while turned_off(self.leg, at.way, ship, ship):
-            end = self.leg.turn_at + radius * fabs(self.leg.turn)
-            self.leg = leg_from(
-                next_turn(int(self.leg.number), self.plan), end, radius, self.plan
-            )
-            at = fix(float(x), float(y), self.leg, ship, ship)
-        leg = self.leg
-        self.ended = leg.turn == 0.0 and at.way >= leg.turn_at
-        values = (
-            at.cross,
-            leg.turn_at - at.way,
-            copysign(max(fabs(leg.turn) - at.turned, 0.0), leg.turn),
-            leg.second_at - at.way,
-            leg.second_turn,
-        )
-        direction = leg.course + copysign(at.turned, leg.turn)
-        return {"set_point": direction, **dict(zip(self.GIVES, values, strict=True))}
+        position = float(north), float(east)
+        here = fix(*position, self.leg, scale, scale)
+        while turned_off(self.leg, here.way, scale, scale):
+            arc = scale.turn_radius * fabs(self.leg.turn)
+            end_of_turn = self.leg.turn_at + arc
+            waypoint = next_turn(int(self.leg.number), self.plan)
+            self.leg = leg_from(waypoint, end_of_turn, scale.turn_radius, self.plan)
+            here = fix(*position, self.leg, scale, scale)
+        return here

@@ -16,18 +16,28 @@ from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.ships.simulate import Conditions, Passage
 
 STEP = 0.1  # s, between two sentences of a compass
-SLOW = 10  # steps between two of the log and the GNSS receiver
-WAYPOINT = 10.0 * 1852.0  # m, of her plotter along the leg
 START = 54.0, 7.5  # degrees north and east, where the ship is at the beginning
 MINUTE = 1852.0  # m, of latitude
 
 
 class SimulatedShip:
-    """A ship model that sails on, step by step, and tells what her instruments show.
+    """A ship model that sails on, step by step, and the readings of her instruments.
 
-    She begins to the north at service speed in a weather (calm by default) that follows
-    from the seed. Her plotter tells of a leg through where she began, to the direction
-    `leg`, rad.
+    She begins to the north at service speed. Her plotter shows a leg through where she
+    began, and a waypoint ten miles along it.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship.
+    leg : float
+        Direction of the leg, rad.
+    weather : Weather or str, optional
+        By default calm.
+    seed : int
+        Seed of the weather.
+    step : float
+        Time step, s.
     """
 
     def __init__(
@@ -38,94 +48,101 @@ class SimulatedShip:
         seed: int = 0,
         step: float = STEP,
     ) -> None:
-        self.model, self.leg, self.order, self.steps = (
-            model,
-            check_number(leg, "leg"),
-            0.0,
-            0,
-        )
-        self.step = step  # s
+        self.model = model
+        self.leg = check_number(leg, "leg")
+        self.order = 0.0  # rudder, rad
+        self.steps = 0
+        self.step = step
         self.passage = Passage(model, Conditions(weather=weather, seed=seed), step)
         self.states = self.passage.states(model.service_state, 1)
 
     def hear(self, line: str) -> None:
-        """Take a rudder order; one whose status is invalid lets the rudder go amidships."""
+        """Take a rudder order; an invalid one lets the rudder go amidships."""
         for reading in readings(line) or ():
-            if reading.quantity in ("order", "released"):
-                self.order = reading.value if reading.quantity == "order" else 0.0
+            if reading.quantity == "order":
+                self.order = reading.value
+            elif reading.quantity == "released":
+                self.order = 0.0
 
     def advance(self) -> None:
-        """One step; InputError where the ship has run away."""
+        """Simulate one step; InputError if the ship runs away."""
         order = np.array([[self.order, self.model.service_shaft_speed]])
-        sail = self.passage.loop("simulate")
-        if not sail(
+        simulate = self.passage.loop("simulate")
+        is_sound = simulate(
             self.states, order, self.step, *self.passage.sea, self.passage.numbers
-        ):
+        )
+        if not is_sound:
+            seconds = self.steps * self.step
             raise InputError(
-                f"model '{self.model.name}' ran away after"
-                f" {self.steps * self.step:.1f} s"
+                f"model '{self.model.name}' ran away after {seconds:.1f} s"
             )
-        self.states[0], self.steps = self.states[1], self.steps + 1
+        self.states[0] = self.states[1]
+        self.steps += 1
 
     @property
     def now(self) -> dict[str, Any]:
-        """Her state by name."""
+        """State by name."""
         return dict(zip(self.model.state_names, self.states[0].tolist(), strict=False))
 
     def measured(self) -> dict[str, float]:
-        """What her instruments and plotter know, SI units and radians, by quantity of `shipgym/trials/nmea.toml`."""
-        s, sea = self.now, np.zeros(len(SEA_CHANNELS))
-        if (
-            self.passage.windy
-        ):  # its current, and the first-order motion that a compass and a gyro feel
+        """Readings of instruments and plotter by quantity of `shipgym/trials/nmea.toml`, SI units and radians."""
+        state = self.now
+        psi = state["psi"]
+        sway = state["v"] * cos(state.get("phi", 0.0))  # in the horizontal plane
+
+        sea = np.zeros(len(SEA_CHANNELS))
+        if self.passage.windy:
             sea = self.states[0, -len(SEA_CHANNELS) :]
-        psi_wave, r_wave, _, _, north, east = sea[:6].tolist()
-        ahead, aside, sine, cosine = (
-            s["u"],
-            s["v"] * cos(s.get("phi", 0.0)),
-            sin(s["psi"]),
-            cos(s["psi"]),
-        )
-        north, east = (
-            north + ahead * cosine - aside * sine,
-            east + ahead * sine + aside * cosine,
-        )
-        latitude = START[0] + s["x"] / MINUTE / 60.0
-        longitude = START[1] + s["y"] / MINUTE / 60.0 / cos(radians(latitude))
-        left = WAYPOINT * cos(self.leg) - s["x"], WAYPOINT * sin(self.leg) - s["y"]
+        # the first-order motion that compass and gyro feel, and the current
+        psi_wave, r_wave, _, _, current_north, current_east = sea[:6].tolist()
+
+        north = current_north + state["u"] * cos(psi) - sway * sin(psi)
+        east = current_east + state["u"] * sin(psi) + sway * cos(psi)
+        latitude = START[0] + state["x"] / MINUTE / 60.0
+        longitude = START[1] + state["y"] / MINUTE / 60.0 / cos(radians(latitude))
+        waypoint_m = 10.0 * MINUTE  # along the leg
+        north_to_go = waypoint_m * cos(self.leg) - state["x"]
+        east_to_go = waypoint_m * sin(self.leg) - state["y"]
         return {
-            "heading": s["psi"] + psi_wave,
-            "yaw_rate": s["r"] + r_wave,
-            "rudder": s["delta"],
-            "surge": s["u"],
-            "sway": s["v"],
+            "heading": psi + psi_wave,
+            "yaw_rate": state["r"] + r_wave,
+            "rudder": state["delta"],
+            "surge": state["u"],
+            "sway": state["v"],
             "course": atan2(east, north),
             "speed": hypot(north, east),
             "latitude": radians(latitude),
             "longitude": radians(longitude),
-            "cross_track": s["y"] * cos(self.leg) - s["x"] * sin(self.leg),
+            "cross_track": state["y"] * cos(self.leg) - state["x"] * sin(self.leg),
             "leg": self.leg,
-            "waypoint_bearing": atan2(left[1], left[0]),
-            "waypoint_distance": hypot(*left),
+            "waypoint_bearing": atan2(east_to_go, north_to_go),
+            "waypoint_distance": hypot(north_to_go, east_to_go),
         }
 
     def sentences(self) -> str:
-        """What her instruments send now."""
+        """Sentences that her instruments send now."""
+        steps_of_slow = 10  # between two of the log, the GNSS receiver and the plotter
         known: dict[str, Any] = self.measured()
-        north, east = (degrees(known[name]) for name in ("latitude", "longitude"))
         minutes, seconds = divmod(self.steps * self.step, 60.0)
+        hours, minutes = divmod(int(minutes), 60)
         text = render(
             "instruments.nmea.j2",
             **known,
-            slow=self.steps % SLOW == 0,
+            slow=self.steps % steps_of_slow == 0,
             off=f"{abs(known['cross_track']) / MINUTE:.5f}",
             side="L" if known["cross_track"] >= 0.0 else "R",
             miles=f"{known['waypoint_distance'] / MINUTE:.4f}",
-            north=f"{int(north):02d}{north % 1 * 60:07.4f}",
-            east=f"{int(east):03d}{east % 1 * 60:07.4f}",
-            time=f"{int(minutes) // 60 % 24:02d}{int(minutes) % 60:02d}{seconds:05.2f}",
+            north=_degrees_and_minutes(known["latitude"], 2),
+            east=_degrees_and_minutes(known["longitude"], 3),
+            time=f"{hours % 24:02d}{minutes:02d}{seconds:05.2f}",
         )
         return sentences(text)
+
+
+def _degrees_and_minutes(angle: float, digits: int) -> str:
+    """A latitude or longitude, rad, as 5430.5000 with so many digits of degrees."""
+    value = degrees(angle)
+    return f"{int(value):0{digits}d}{value % 1 * 60:07.4f}"
 
 
 async def simulate_ship(
@@ -136,25 +153,42 @@ async def simulate_ship(
     speed_up: float = 1.0,
     drop: Mapping[str, float] | None = None,
 ) -> None:
-    """Sail a ship over NMEA 0183, in real time or `speed_up` times as fast, for a duration in s.
+    """Simulate a ship over NMEA 0183.
 
-    Over TCP others connect to the `address` (`Link`), over UDP it sends there. `drop`
-    names types of sentence that fall silent, and when, s. Raises InputError for a type
-    that she does not send, or an address that cannot be opened.
+    Over TCP others connect to the address, over UDP she sends there. Raises InputError
+    for an address that cannot be opened, or a type of sentence that she does not send.
+
+    Parameters
+    ----------
+    ship : SimulatedShip
+    address : str
+        Address of a `Link`.
+    duration : float
+        How long, s of the ship.
+    speed_up : float
+        Seconds of the ship that pass in one.
+    drop : mapping of str to float, optional
+        Types of sentence that fall silent, such as HDT, and when, s.
     """
-    loop, link = asyncio.get_running_loop(), Link(ship.hear)
     check_number(speed_up, "speed_up", above=0.0)
     dropped = dict(drop or {})
-    check_keys(
-        dropped, sorted({line[3:6] for line in ship.sentences().splitlines()}), "drop"
-    )
+    types = sorted({_type(line) for line in ship.sentences().splitlines()})
+    check_keys(dropped, types, "drop")
+
+    loop = asyncio.get_running_loop()
+    link = Link(ship.hear)
     await link.open(address, serve=True)
     begin = loop.time()
-    with closing(link), suppress(asyncio.CancelledError):
-        while (now := ship.steps * ship.step) < duration:
+    with closing(link), suppress(asyncio.CancelledError):  # an interruption ends it
+        while ship.steps * ship.step < duration:
+            now = ship.steps * ship.step
             await asyncio.sleep(max(0.0, begin + now / speed_up - loop.time()))
             lines = ship.sentences().splitlines(keepends=True)
-            link.send(
-                "".join(line for line in lines if now < dropped.get(line[3:6], inf))
-            )
+            sent = [line for line in lines if now < dropped.get(_type(line), inf)]
+            link.send("".join(sent))
             ship.advance()
+
+
+def _type(line: str) -> str:
+    """Type of a sentence: HDT of $HEHDT,180.0,T."""
+    return line[3:6]

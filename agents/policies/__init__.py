@@ -1,1 +1,1 @@
-"""Learned policies and the shield around them, without torch."""
+"""Learned policies, which steer without torch."""

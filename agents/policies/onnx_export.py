@@ -34,9 +34,7 @@ def onnx_model(policy: Any) -> Any:
     if not isinstance(policy, LearnedPolicy):
         raise InputError(
             f"policy: {type(policy).__name__} found, expected a learned policy: a"
-            " shield or a classical controller has a memory and rules that are not a"
-            " network; of a shielded one export its policy, and keep the shield"
-            " around it"
+            " classical controller is not a network; export it with --c or --fmu"
         )
     onnx = library("onnx", "onnx", "the export needs it")
     helper, real = onnx.helper, onnx.TensorProto.FLOAT
@@ -117,9 +115,8 @@ def _nodes(policy: LearnedPolicy, helper: Any) -> tuple[list[Any], dict[str, Any
 
 
 def _metadata(policy: LearnedPolicy) -> dict[str, str]:
-    """What its file says of it, and two names that older readers know."""
+    """What its file says of it."""
     content, _ = policy.file_fields()
     left_out = ("format", "kind", "network", "training")
     values = {name: one for name, one in content.items() if name not in left_out}
-    values |= {"history": policy.frame_stack, "hold": policy.action_repeat}
     return {name: json.dumps(value) for name, value in values.items()}

@@ -233,7 +233,7 @@ class LearnedPolicy:
         limited = np.clip(output, -1.0, 1.0)
         if proposed is None:
             return limited
-        return np.clip(proposed + np.float32(self.authority) * limited, -1.0, 1.0)
+        return combined(proposed, limited, float(self.authority))
 
     def _recalled(
         self, state: Any, starts: Any, rows: Numbers, ndim: int
@@ -267,16 +267,24 @@ class LearnedPolicy:
 
         Arguments and errors as in `Controller.check_fits`.
         """
-        meant = (
-            f"policy '{self.name}' learned with {{}} (model '{self.model_name}',"
-            f" {self.env_id}): another ship or task; train one in this environment"
-        )
         named = f"{where}: not those that the agent learned with in {self.env_id}"
         check_names(names[: len(self.observation_names)], self.observation_names, named)
-        check_scales(names, scales, self.observation_scales, where, meant)
+        check_scales(
+            names,
+            scales,
+            self.observation_scales,
+            where,
+            f"policy '{self.name}' learned on another ship or task (model"
+            f" '{self.model_name}', {self.env_id}); train one in this environment",
+        )
 
     def check_fits_model(self, model: ShipModel) -> None:
-        """Refuse a ship with other observation scales in the environment that it learned in."""
+        """Refuse a ship with other observation scales in the environment that it learned in.
+
+        One that learned a task of a user's own is checked where it meets the task.
+        """
+        if "task" in self.env_options:
+            return
         definition = read_definition(task_showing(self.observation_names))
         known = {
             "action": self.action,
@@ -333,10 +341,15 @@ def check_part(agent: Any) -> None:
         )
 
 
-def toward(outputs: Numbers, before: Numbers, rate_limit: float) -> Numbers:
+def toward(outputs: Any, before: Any, rate_limit: float) -> Any:
     """Outputs limited to [-1, 1], and to what can be reached in one control interval from those before."""
-    step = np.float32(rate_limit)
-    return np.clip(np.clip(outputs, -1.0, 1.0), before - step, before + step)
+    within = np.clip(outputs, -1.0, 1.0)
+    return np.clip(within, before - rate_limit, before + rate_limit)
+
+
+def combined(proposed: Any, part: Any, authority: float) -> Any:
+    """Action of a base and what a policy adds to it."""
+    return np.clip(proposed + authority * part, -1.0, 1.0)
 
 
 def network_fields(network: Network) -> tuple[dict[str, Any], Tensors]:

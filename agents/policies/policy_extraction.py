@@ -19,6 +19,7 @@ from agents.policies.weights_file import as_json
 from shipgym import InputError
 from shipgym.checks import quoted
 from shipgym.envs.registration import env_id
+from shipgym.tasks.definition import TASKS
 
 #: What acts in a policy: its hidden layers, the last one where it stands apart, what
 #: follows that, and the usual activation; PPO and A2C, SAC and TQC, TD3 and DDPG.
@@ -40,7 +41,6 @@ SDE = "state-dependent exploration (use_sde) found, expected an agent without"
 ACTIVATION_OF = {"ReLU": "relu", "Tanh": "tanh"}
 #: Keywords of a vector environment that say how it runs, not what is asked.
 RUNNING = (
-    "task",
     "model",
     "num_envs",
     "threads",
@@ -149,7 +149,7 @@ def _environment(ships: Any) -> dict[str, Any]:
         "env_options": {
             name: as_json(value)
             for name, value in kwargs.items()
-            if name not in RUNNING
+            if name not in RUNNING and not (name == "task" and value in TASKS)
         },
         "model_name": model.name,
         "model_sha256": model_hash(model),
@@ -158,8 +158,7 @@ def _environment(ships: Any) -> dict[str, Any]:
 
 def task_showing(names: Sequence[str]) -> str:
     """The task of the package that shows these quantities."""
-    path = "PathFollowing-v1" if "next_turn_angle" in names else "PathFollowing"
-    return path if "cross_track" in names else "CourseKeeping"
+    return "PathFollowing" if "cross_track" in names else "CourseKeeping"
 
 
 def _network(agent: Any) -> Network:

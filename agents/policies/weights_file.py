@@ -20,15 +20,6 @@ from shipgym.files import LARGEST_TENSORS, read_bytes, write_bytes, write_json
 Tensors = dict[str, NDArray[Any]]
 
 REMEDY = "take another copy of both files"
-RENAMED = {
-    "history": "frame_stack",
-    "hold": "action_repeat",
-}  # fields and settings of older files
-
-
-def present_names(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields or settings by their present names, where some have older ones."""
-    return {RENAMED.get(name, name): value for name, value in content.items()}
 
 
 def write_policy(content: Mapping[str, Any], tensors: Tensors, path: Path) -> None:

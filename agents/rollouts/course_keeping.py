@@ -1,6 +1,6 @@
 """Episodes of course keeping and step responses of one controller on many ships at once."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -8,14 +8,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import Policy
-from agents.controllers.memory import gathered, on_course
+from agents.controllers.law import gathered
+from agents.controllers.memory import on_course
 from agents.rollouts.metrics import costs, mean, steering
 from agents.rollouts.rollout import Rollout, check_fits, rollout
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats, Integers
 from shipgym.checks import check_number
 from shipgym.envs.engine import Engine
-from shipgym.tasks.task import Task, course_keeping_task, observation_scales
+from shipgym.tasks.scales import observation_scales
+from shipgym.tasks.task import Task, course_keeping_task
 
 RECORDED = ("psi", "delta", "set_point", *course_keeping_task().info_names)
 AT_ONCE = 1024  # ships, of a structure and its recordings, that fit into little memory
@@ -204,7 +206,7 @@ def step_response(
     straight = asked.changed(course_change_deg=0.0, episode_steps=steps)
     engine = Engine(fleet, len(fleet), straight, allow_unstable=allow_unstable)
     seeds = np.zeros(len(fleet), dtype=np.int64)
-    course = _other_course(engine, np.radians(step_deg))
+    course = _OtherCourse(engine, float(np.radians(step_deg)))
     states = rollout(controller, engine, seeds, record=RECORDED, show=course).states
     left = (
         (0, steps + 1 - len(states["psi"])),
@@ -216,24 +218,24 @@ def step_response(
     return StepResponses(t, heading, rudder)
 
 
-def _other_course(
-    engine: Engine, step: float
-) -> Callable[[NDArray[np.float32]], NDArray[np.float32]]:
-    """What ships that keep their course in the engine observe of another one, a step away, rad."""
-    reach, integral, begins = (
-        observation_scales(engine.model)[-1],
-        np.zeros(engine.num_envs),
-        True,
-    )
+class _OtherCourse:
+    """Observations of another course, a step away, rad, of ships that keep theirs in an engine."""
 
-    def shown(observations: NDArray[np.float32]) -> NDArray[np.float32]:
-        nonlocal integral, begins
-        state = engine.physical_state()
-        error = step - (state["psi"] - state["set_point"])
-        integral, begins = gathered(integral, error, begins, engine.dt, reach), False
-        return on_course(observations, error, integral, reach)
+    def __init__(self, engine: Engine, step: float) -> None:
+        self.engine = engine
+        self.step = step
+        self.reach = observation_scales(engine.model)[-1]
+        self.integral = np.zeros(engine.num_envs)
+        self.started = 0.0
 
-    return shown
+    def __call__(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        state = self.engine.physical_state()
+        error = self.step - (state["psi"] - state["set_point"])
+        self.integral = gathered(
+            self.integral, error, self.started, self.engine.dt, self.reach
+        )
+        self.started = 1.0
+        return on_course(observations, error, self.integral, self.reach)
 
 
 def _fleet(models: ShipModel | Sequence[ShipModel]) -> list[ShipModel]:

@@ -82,7 +82,7 @@ def _episode(
         waypoints=engine.waypoints(lane),
         corridor=engine.path_metres("corridor"),
         turn_radius=engine.path_metres("turn_radius"),
-        arguments=plain({"model": task.model, **task.options}),
+        arguments=plain({"model": task.model, **task.arguments}),
         seed=int(run.seeds[lane]),
         terminated=not failed and bool(run.terminated[lane]),
         truncated=not failed and bool(run.truncated[lane]),

@@ -10,7 +10,7 @@ speed lost by steering); Carlton 2012, Marine Propellers and Propulsion, chapter
 """
 
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,8 +20,8 @@ from agents.rollouts.rollout import Rollout, rollout
 from agents.suites.suite import BenchmarkTask
 from shipgym import ShipModel
 from shipgym.arrays import Flags, Floats
+from shipgym.python_files import asked
 from shipgym.tasks.guidance import wrapped
-from shipgym.tasks.steering import HEADING_SCALE
 from shipgym.tasks.task import Task
 
 #: Physical states that `metrics` needs, beside all of `info`.
@@ -31,7 +31,14 @@ SMALLEST_CHANGE = np.radians(5.0)  # of course, whose overshoot and settling cou
 SETTLED_SHARE, SETTLED_LEAST = 0.05, np.radians(1.0)  # of the change of course, and rad
 OF_COURSES = ("overshoot_percent", "settling_s", "unsettled")
 OF_PATHS = ("cross_track_rmse_m", "outside_corridor", "left_corridor", "grounded")
-WORST_PROGRESS = 2.0  # cost of a step against the path
+#: Entries of `info` from which the figures of paths are computed.
+PATH_INFO = (
+    "cross_track",
+    "in_corridor",
+    "distance_made_good",
+    "grounded",
+    "success",
+)
 
 
 def recorded_for_metrics(task: Task) -> tuple[str, ...]:
@@ -41,14 +48,15 @@ def recorded_for_metrics(task: Task) -> tuple[str, ...]:
 
 def worst_step_cost(task: Task) -> float:
     """Cost of each step that is left of an episode in which control is lost, as the tasks have it."""
-    asked: Any = task
-    if _on_path(task):
-        return float((asked.ground / asked.corridor) ** 2 + WORST_PROGRESS)
-    return float((np.radians(asked.max_heading_error_deg) / HEADING_SCALE) ** 2)
+    return float(asked(task.definition.worst_cost, task.settings))
 
 
 def _on_path(task: Task) -> bool:
-    return "cross_track" in task.info_names
+    return set(PATH_INFO) <= set(task.info_names)
+
+
+def _keeps_course(task: Task) -> bool:
+    return "heading_error" in task.info_names
 
 
 def metrics(run: Rollout) -> dict[str, Floats]:
@@ -66,13 +74,7 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         charged as if it had lost control then; success is on a path whether its end was
         reached, else whether control was kept.
     """
-    shielded = run.shielded & run.sailing
-    kept = (~(run.terminated | run.failed)).astype(np.float64)
-    own = (
-        path_following(run)
-        if _on_path(run.task)
-        else {**course_changes(run), "success": kept}
-    )
+    own = task_figures(run)
     lost = run.terminated & ~(own["success"] > 0.0)
     return {
         **costs(run),
@@ -81,12 +83,24 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         **own,
         "fuel": fuel_per_distance(run),
         "extrapolating": mean(run, run.infos["extrapolating"]),
-        "shielded": ratio(total(shielded), run.steps),
-        "interventions": total(shielded[1:] & ~shielded[:-1]) + total(shielded[:1]),
         "terminated": lost.astype(np.float64),
         "failed": run.failed.astype(np.float64),
         "duration_s": run.steps * run.dt,
     }
+
+
+def task_figures(run: Rollout) -> dict[str, Floats]:
+    """Figures that depend on the task, `success` among them."""
+    if _on_path(run.task):
+        return path_following(run)
+    if "success" in run.infos:
+        return {"success": _ever(run, "success")}
+    if _keeps_course(run.task):
+        kept = ~(run.terminated | run.failed)
+        return {**course_changes(run), "success": kept.astype(np.float64)}
+    # a task of a user's own, which charges ships that are lost
+    charged = total(run.infos["reward_end"][1:] * run.sailing) < 0.0
+    return {"success": (~(charged | run.failed)).astype(np.float64)}
 
 
 def costs(run: Rollout) -> dict[str, Floats]:
@@ -108,10 +122,11 @@ def steering(run: Rollout) -> dict[str, Floats]:
     """Heading error and rudder activity of each episode, see `metrics`."""
     minutes, rudder = run.steps * run.dt / 60.0, run.states["delta"]
     turned = np.abs(np.diff(rudder, axis=0)) * run.sailing
+    heading_rmse = np.full(len(run.seeds), np.nan)
+    if _keeps_course(run.task):
+        heading_rmse = np.sqrt(mean(run, run.infos["heading_error"] ** 2))
     return {
-        "heading_rmse_deg": np.degrees(
-            np.sqrt(mean(run, run.infos["heading_error"] ** 2))
-        ),
+        "heading_rmse_deg": np.degrees(heading_rmse),
         "rudder_travel_deg_min": ratio(np.degrees(total(turned)), minutes),
         "rudder_reversals_min": ratio(reversals(rudder, run.sailing), minutes),
     }
@@ -187,8 +202,11 @@ def fuel_per_distance(run: Rollout) -> Floats:
     good is along the path, over ground, or in course keeping along the ordered course,
     through the water. So it counts the speed lost to rudder and drift, the way
     lengthened by yawing, and the weather. It is no consumption: how the engine answers
-    to load is not modelled. NaN where no way was made good, shape (n,).
+    to load is not modelled. NaN where no way was made good, or the task has neither
+    path nor course, shape (n,).
     """
+    if not (_on_path(run.task) or _keeps_course(run.task)):
+        return np.full(len(run.seeds), np.nan)
     service = run.model.service_shaft_speed if "n" in run.model.state_names else 0.0
     shaft = run.states["n"][1:] / service if service > 0.0 else 1.0
     spent = total(np.where(run.sailing, shaft, 0.0) ** 3) * run.dt
@@ -207,16 +225,18 @@ def path_following(run: Rollout) -> dict[str, Floats]:
     """How each episode followed its path, see `metrics`."""
     outside = (run.infos["in_corridor"][1:] == 0.0) & run.sailing
 
-    def ever(name: str) -> Floats:
-        return np.minimum(total((run.infos[name][1:] > 0.0) & run.sailing), 1.0)
-
     return {
         "cross_track_rmse_m": np.sqrt(mean(run, run.infos["cross_track"] ** 2)),
         "outside_corridor": ratio(total(outside), run.steps),
         "left_corridor": outside.any(axis=0).astype(np.float64),
-        "grounded": ever("grounded"),
-        "success": ever("success"),
+        "grounded": _ever(run, "grounded"),
+        "success": _ever(run, "success"),
     }
+
+
+def _ever(run: Rollout, name: str) -> Floats:
+    """Tell whether a flag was set in an episode, shape (n,)."""
+    return np.minimum(total((run.infos[name][1:] > 0.0) & run.sailing), 1.0)
 
 
 def mean(run: Rollout, values: Floats) -> Floats:

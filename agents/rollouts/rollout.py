@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import Policy
-from agents.policies.shield import ShieldState, interventions
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats
 from shipgym.envs.engine import Engine
@@ -40,9 +39,8 @@ class Rollout:
         How the policy failed first; empty if it did not.
     seconds_per_action : float
         Process time of `predict` over the number of commands it gave, in a batch.
-    actions, rewards, shielded : array of shape (n_steps, n, n_commands), and twice (n_steps, n)
-        Of each interval, the last whether a safety shield steered; without steps if
-        nothing was recorded.
+    actions, rewards : array of shape (n_steps, n, n_commands), and (n_steps, n)
+        Of each interval; without steps if nothing was recorded.
     states, infos : dict of str to array of shape (n_steps + 1, n)
         Physical states and entries of `info` that were recorded, from the beginning on.
     """
@@ -60,7 +58,6 @@ class Rollout:
     seconds_per_action: float
     actions: NDArray[np.float32]
     rewards: Floats
-    shielded: Flags
     states: dict[str, Floats]
     infos: dict[str, Floats]
 
@@ -112,7 +109,7 @@ def rollout(
         if not log.sailing.any():  # the policy has failed in all episodes
             break
         seen, rewards, terminated, truncated = engine.step(command)
-        log.note(command, memory, rewards, terminated, truncated)
+        log.note(command, rewards, terminated, truncated)
         starts = np.zeros(engine.num_envs, dtype=np.bool_)
     return log.rollout(np.asarray(seeds))
 
@@ -147,9 +144,7 @@ class _Log:
         self.costs = np.zeros(engine.num_envs)
         self.failure, self.seconds, self.asked = "", 0.0, 0
         self.sailed: list[Flags] = []
-        self.intervals: list[
-            tuple[NDArray[np.float32], Floats, Flags]
-        ] = []  # actions, rewards, shielded
+        self.intervals: list[tuple[NDArray[np.float32], Floats]] = []
         self.states: list[dict[str, Floats]] = []
         self.infos: list[list[Floats]] = []
 
@@ -228,7 +223,6 @@ class _Log:
     def note(
         self,
         command: NDArray[np.float32],
-        memory: Any,
         rewards: Floats,
         terminated: Flags,
         truncated: Flags,
@@ -239,19 +233,15 @@ class _Log:
         self.terminated = self.terminated | self.sailing & terminated
         self.truncated = self.truncated | self.sailing & truncated
         if self.record:
-            shield = isinstance(memory, ShieldState)
-            shielded = (
-                interventions(memory).steering if shield else np.zeros_like(terminated)
-            )
-            self.intervals.append((command, rewards, shielded))
+            self.intervals.append((command, rewards))
         self.look()
         self.sailing = self.sailing & ~(terminated | truncated)
 
     def rollout(self, seeds: NDArray[np.int64]) -> Rollout:
         """All that was noted."""
         engine, n = self.engine, self.engine.num_envs
-        actions, rewards, shielded = (
-            zip(*self.intervals, strict=True) if self.intervals else ((), (), ())
+        actions, rewards = (
+            zip(*self.intervals, strict=True) if self.intervals else ((), ())
         )
         return Rollout(
             task=engine.task,
@@ -269,7 +259,6 @@ class _Log:
                 -1, n, len(engine.command)
             ),
             rewards=np.array(rewards).reshape(-1, n),
-            shielded=np.array(shielded, dtype=np.bool_).reshape(-1, n),
             states={
                 name: np.array([one[name] for one in self.states])
                 for name in (self.states or [{}])[0]

@@ -1,21 +1,20 @@
-"""What is kept with a suite: the best known costs, and settings found for its classical controllers.
-
-Files of `agents/suites`:
+"""Files kept beside a suite: its best known costs, and settings of its controllers.
 
     SUITE-best.json     by task: `zero`, mean cost of wheel-over designed on the model;
-    of each scored
-                        episode the lowest cost that anything reached, `costs`, and by
-                        what, `by` (`scripts/best_known.py`)
-    SUITE-tuned.json    tasks: by task and controller `settings`, `cost`, `start_cost`,
-    `evaluations`
-                        (`scripts/tune_controllers.py`)
+                        of each scored episode the lowest known cost, `costs`, and what
+                        reached it, `by` (scripts/best_known.py)
+    SUITE-tuned.json    `tasks`: by task and controller `settings`, `cost`,
+                        `start_cost`, `evaluations` (scripts/tune_controllers.py)
+
+`suite` is a `Suite.source` in all of these functions.
 """
 
 from typing import Any
 
 import numpy as np
 
-from agents.suites.suite import N_EPISODES, BenchmarkTask, suite_file
+from agents.suites.benchmark_task import N_EPISODES, BenchmarkTask
+from agents.suites.suite import suite_file
 from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import ANY_KEY, Shape, check_shape, check_table
@@ -25,53 +24,57 @@ BEST: Shape = {ANY_KEY: {"zero": (int, float), "costs": [(int, float)], "by": [(
 
 
 def best_known(suite: str) -> dict[str, dict[str, Any]]:
-    """The best known costs by task, as in the file; empty where the suite has no such file.
+    """Return the best known costs by task, as in the file; empty if there is none.
 
     Raises InputError naming the field of the file at fault.
     """
     path = suite_file(suite, "best")
     if not path.exists():
         return {}
-    found = read_json(path, "file of best known costs", "take another copy")
-    check_shape(found, BEST, str(path))
-    for task, one in found.items():
-        if not len(one["costs"]) == len(one["by"]) == N_EPISODES:
+    content = read_json(path, "file of best known costs", "take another copy")
+    check_shape(content, BEST, str(path))
+    for task, known in content.items():
+        if not len(known["costs"]) == len(known["by"]) == N_EPISODES:
             raise InputError(
-                f"{path}: {task}: expected costs of {N_EPISODES} episodes, and by what"
+                f"{path}: {task}: expected costs of {N_EPISODES} episodes and what"
+                f" reached them, got {len(known['costs'])} and {len(known['by'])}"
             )
-    return dict(found)
+    return dict(content)
 
 
 def reference_costs(suite: str) -> dict[str, tuple[float, float]]:
-    """Mean costs with scores 0 and 1, by task: wheel-over designed on the model, and the best known."""
-    known = best_known(suite)
+    """Return the mean costs whose scores are 0 and 1, by task.
+
+    The first is that of wheel-over designed on the model, the second the best known.
+    """
     return {
-        task: (float(one["zero"]), float(np.mean(one["costs"])))
-        for task, one in known.items()
+        task: (float(known["zero"]), float(np.mean(known["costs"])))
+        for task, known in best_known(suite).items()
     }
 
 
-def best_costs(task: BenchmarkTask, suite: str) -> Floats:
-    """The best known cost of each scored episode, shape (100,); an InputError if there is none."""
-    known = best_known(suite)
+def best_costs(task: BenchmarkTask) -> Floats:
+    """Return the best known cost of each scored episode of a task, shape (100,).
+
+    Raises InputError if none are kept.
+    """
+    known = best_known(task.suite)
     if task.name not in known:
-        raise InputError(
-            f"no best known costs are kept for task '{task.name}' of suite '{suite}'"
-        )
+        raise InputError(f"no best known costs are kept for task '{task.name}'")
     return np.array(known[task.name]["costs"], dtype=np.float64)
 
 
 def load_tuned(suite: str) -> dict[str, dict[str, dict[str, Any]]]:
-    """Settings of the classical controllers found for each task by direct search, by task and controller.
+    """Return the settings of classical controllers found by direct search.
 
-    Raises InputError if the suite has none, or the file is broken.
+    By task and controller. Raises InputError if the suite has none, or the file is
+    broken.
     """
     path = suite_file(suite, "tuned")
-    content = read_json(
-        path, "file of tuned settings", "make it again with scripts/tune_controllers.py"
-    )
+    remedy = "make it again with scripts/tune_controllers.py"
+    content = read_json(path, "file of tuned settings", remedy)
     tasks = check_table(content.get("tasks"), f"{path}: tasks")
     return {
-        name: dict(check_table(found, f"{path}: tasks.{name}"))
-        for name, found in tasks.items()
+        name: dict(check_table(controllers, f"{path}: tasks.{name}"))
+        for name, controllers in tasks.items()
     }

@@ -1,21 +1,26 @@
-"""Suites: named tasks with their ship, their sea and the seeds of their episodes, fixed once and for all.
+"""Suites: named tasks with their ship, their sea and the seeds of their episodes.
 
-A suite is a TOML file of `agents/suites`, as docs/benchmark.md describes it. A task
-with a ship is three (`SETS`): contestants are made for the model and evaluated on the
-ship, on the model, and on the ship far from what they were made for.
+A suite is a TOML file, as docs/benchmark.md describes it: a shipped one in this folder,
+or a user's own. A task with a true ship has three sets of episodes (`SETS`):
+controllers are made for its model and evaluated on the ship, on the model, and on the
+ship far from what they were made for.
 """
 
 import hashlib
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
-from functools import cache, cached_property
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
-import numpy as np
-
-from shipgym import InputError, ShipModel, SteeringGear, Weather
-from shipgym.arrays import Integers
+from agents.suites.benchmark_task import (
+    FIRST_SEED,
+    N_EPISODES,
+    SETS,
+    BenchmarkTask,
+)
+from agents.suites.environments import read_environment
+from shipgym import InputError, Weather
 from shipgym.checks import (
     check_choice,
     check_keys,
@@ -24,122 +29,26 @@ from shipgym.checks import (
     data_only,
     placed,
 )
-from shipgym.envs.engine import Engine
-from shipgym.envs.environment import read_options
-from shipgym.envs.randomisation import Randomisation
-from shipgym.files import parse_toml
-from shipgym.tasks.task import Task
+from shipgym.files import parse_toml, read_bytes
 
-#: Environments by their names in suites and on the command line: id, and task.
-ENVIRONMENTS: Mapping[str, tuple[str, str]] = {
-    "course-keeping": ("shipgym/CourseKeeping-v0", "CourseKeeping"),
-    "path-following": ("shipgym/PathFollowing-v0", "PathFollowing"),
-    "path-following-v1": ("shipgym/PathFollowing-v1", "PathFollowing-v1"),
-}
-#: Seeds of the episodes that are scored; training and tuning use smaller ones.
-FIRST_SEED = 1_000_000
-N_EPISODES = 100
+__all__ = [
+    "DEFAULT_SUITE",
+    "FIRST_SEED",
+    "N_EPISODES",
+    "SETS",
+    "BenchmarkTask",
+    "Suite",
+    "find_task",
+    "list_suites",
+    "load_suite",
+    "parse_suite",
+    "suite_file",
+]
+
 DEFAULT_SUITE = "shipgym-v1"
 FOLDER = Path(__file__).parent
 FIELDS = ("environment", "model", "why", "sea", "options", "ship", "far")
-#: Sets of episodes of a task with a ship, and what their names end in.
-SETS: Mapping[str, str] = {"ship": "", "model": "-on-model", "far": "-far"}
-
-
-@dataclass(frozen=True)
-class BenchmarkTask:
-    """One task of a suite."""
-
-    name: str  # unique in its suite
-    environment: str  # one of `ENVIRONMENTS`
-    model: str  # shipped model that is steered
-    why: str = ""  # what the task is there for
-    options: Mapping[str, Any] = field(
-        default_factory=dict
-    )  # keywords of the environment, `sea` among them
-    # shipped model of the ship that is steered, if not `model`; contestants are not
-    # told
-    behind: str = ""
-    far: Mapping[str, Any] = field(
-        default_factory=dict
-    )  # keywords that differ in the episodes, and `gear`
-    on: str = "ship"  # which of `SETS`
-    base: str = ""  # name of the task that contestants are made for, if another
-
-    def __post_init__(self) -> None:
-        check_choice(self.environment, ENVIRONMENTS, f"task '{self.name}': environment")
-        shown, steered = (
-            task.observed(ship) for ship, task, _ in (self.parts, self.sailed)
-        )
-        for one, other in zip(shown, steered, strict=True):
-            if (one.name, one.scale) != (other.name, other.scale):
-                raise InputError(
-                    f"task '{self.name}': ship: '{one.name}' of '{self.behind}' is"
-                    f" shown in units of {other.scale:g}, of '{self.model}' in"
-                    f" {one.scale:g}; expected a ship of the same particulars"
-                )
-
-    @property
-    def env_id(self) -> str:
-        """Id for `gymnasium.make`; its keywords are `model` and `options`."""
-        return ENVIRONMENTS[self.environment][0]
-
-    @cached_property
-    def parts(self) -> tuple[ShipModel, Task, Randomisation]:
-        """Ship, task and domain randomisation of the environment."""
-        return read_options(ENVIRONMENTS[self.environment][1], self.model, self.options)
-
-    @cached_property
-    def sailed(self) -> tuple[ShipModel, Task, Randomisation]:
-        """The same of its episodes, which contestants are evaluated in."""
-        if not (self.behind or self.far):
-            return self.parts
-        options = {
-            name: value
-            for name, value in {**self.options, **self.far}.items()
-            if name != "gear"
-        }
-        given = ENVIRONMENTS[self.environment][1], self.behind or self.model, options
-        ship, task, randomisation = read_options(*given)
-        gear = SteeringGear.from_mapping(
-            {**asdict(ship.steering), **self.far.get("gear", {})}, "far.gear"
-        )
-        return replace(ship, steering=gear), task, randomisation
-
-    @property
-    def handed_out(self) -> Self:
-        """What contestants are made for: the design model, without the ship."""
-        return replace(
-            self, name=self.base or self.name, behind="", far={}, on="ship", base=""
-        )
-
-    @property
-    def ship(self) -> ShipModel:
-        """The model that contestants are made for, steered itself if there is no ship behind it."""
-        return self.parts[0]
-
-    @property
-    def task(self) -> Task:
-        """What is asked of the autopilot."""
-        return self.parts[1]
-
-    @property
-    def seeds(self) -> Integers:
-        """Of the episodes that are scored, shape (100,)."""
-        return FIRST_SEED + np.arange(N_EPISODES)
-
-    def engine(
-        self, num_envs: int, model: ShipModel | None = None, threads: int = 1
-    ) -> Engine:
-        """Many ships at once in its episodes, by default its own ship."""
-        ship, task, randomisation = self.sailed
-        return Engine(
-            ship if model is None else model,
-            num_envs,
-            task,
-            randomisation,
-            threads=threads,
-        )
+LARGEST_SUITE = 1_000_000  # bytes
 
 
 @dataclass(frozen=True)
@@ -148,126 +57,219 @@ class Suite:
 
     name: str  # with its version: a task never changes under the same name
     tasks: tuple[BenchmarkTask, ...]  # in the order of the file
+    source: str = ""  # name of a shipped suite, or the absolute path of a user's own
+    sha256: str = ""  # of the file
 
     def task(self, name: str) -> BenchmarkTask:
-        """The task by its name; raises InputError for an unknown name, with the nearest known one."""
+        """Return a task by name; raises InputError for an unknown one."""
         known = {task.name: task for task in self.tasks}
         return known[check_choice(name, known, f"suite '{self.name}': task")]
 
+    def select(self, names: str | Sequence[str] | None) -> tuple[BenchmarkTask, ...]:
+        """Return tasks by name, each once; None for all of them.
+
+        The name of a task with a true ship stands for all its sets of episodes.
+        """
+        if names is None:
+            return self.tasks
+        if isinstance(names, str):
+            names = [name.strip() for name in names.split(",")]
+        if not names:
+            raise InputError("tasks: expected at least one, got none")
+        selected: dict[str, BenchmarkTask] = {}
+        for name in names:
+            sets = [task for task in self.tasks if task.design_name == name]
+            for task in sets or [self.task(name)]:
+                selected[task.name] = task
+        return tuple(selected.values())
+
 
 def list_suites() -> list[str]:
-    """Names of the shipped suites."""
+    """Return the names of the shipped suites."""
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
-@cache
-def load_suite(name: str = DEFAULT_SUITE) -> Suite:
-    """Read a shipped suite; raises InputError for an unknown name, or naming the field at fault."""
-    return parse_suite(_suite_text(name), f"suite '{name}'")
+def load_suite(
+    suite: str | Path = DEFAULT_SUITE, allow_code: Collection[str] = ()
+) -> Suite:
+    """Read a shipped suite by name, or a suite of the user's own.
 
+    Raises InputError for an unknown name, with the nearest, or naming the field at
+    fault.
 
-def suite_of(task: str) -> str | None:
-    """Name of the shipped suite that has a task of this name to design for; None if there is none."""
-    return next((name for name in list_suites() if task in _designed_for(name)), None)
-
-
-def find_task(name: str) -> BenchmarkTask:
-    """What contestants of a shipped suite are made for: its task, without the ship behind the model.
-
-    Raises InputError for an unknown name, with the nearest known one of any suite.
+    Parameters
+    ----------
+    suite : str or Path
+        A name, or the path of a TOML file; relative paths in it begin at its folder.
+    allow_code : collection of str
+        Python files and modules that the suite may name, as it writes them, or their
+        paths. A suite is data: it runs no code that its user has not named too.
     """
-    known = {
-        one: task
-        for suite in list_suites()
-        for one, task in _designed_for(suite).items()
-    }
-    return known[check_choice(name, known, "task")]
+    text = str(suite)
+    if not text.endswith(".toml"):
+        return _shipped(text)
+    path = Path(text).resolve()
+    content = read_bytes(path, "TOML file of a suite", LARGEST_SUITE)
+    read = parse_suite(_decoded(content, text), text, path.parent, allow_code)
+    tasks = tuple(replace(task, suite=str(path)) for task in read.tasks)
+    return Suite(read.name, tasks, str(path), hashlib.sha256(content).hexdigest())
 
 
 @cache
-def _designed_for(suite: str) -> dict[str, BenchmarkTask]:
-    """Tasks of a suite by name, as they are handed out."""
-    return {
-        task.name: task.handed_out
-        for task in load_suite(suite).tasks
-        if task.on == "ship"
-    }
+def _shipped(name: str) -> Suite:
+    content = _shipped_file(name).read_bytes()
+    read = parse_suite(content.decode(), f"suite '{name}'")
+    tasks = tuple(replace(task, suite=name) for task in read.tasks)
+    return Suite(read.name, tasks, name, hashlib.sha256(content).hexdigest())
 
 
-def suite_hash(name: str = DEFAULT_SUITE) -> str:
-    """SHA-256 of the file of a shipped suite; an InputError for an unknown name."""
-    return hashlib.sha256(_suite_text(name).encode()).hexdigest()
+def _shipped_file(name: str) -> Path:
+    known = list_suites()
+    check_choice(name, known, "suite", " or the path of a TOML file")
+    return FOLDER / f"{name}.toml"
 
 
-def suite_file(name: str, what: str) -> Path:
-    """A file that is kept with a shipped suite, `NAME-WHAT.json`; it need not exist."""
-    return FOLDER / f"{name}-{what}.json"
+def _decoded(content: bytes, where: str) -> str:
+    try:
+        return content.decode()
+    except UnicodeDecodeError:
+        raise InputError(f"{where}: expected UTF-8, got other bytes") from None
 
 
-def _suite_text(name: str) -> str:
-    check_choice(name, list_suites(), "suite")
-    return (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+def find_task(
+    name: str, suite: str | Path = DEFAULT_SUITE, allow_code: Collection[str] = ()
+) -> BenchmarkTask:
+    """Return the task that controllers are made for: without the ship behind the model.
+
+    Raises InputError for an unknown name, with the nearest, or as `load_suite`.
+    """
+    tasks = load_suite(suite, allow_code).tasks
+    known = {task.name: task for task in tasks if task.on == "ship"}
+    return known[check_choice(name, known, "task")].design_task
 
 
-def parse_suite(text: str, where: str) -> Suite:
-    """A suite from its TOML text; raises InputError naming the field at fault."""
+def suite_file(suite: str, what: str) -> Path:
+    """Return the path of a file that is kept beside a suite; it need not exist.
+
+    `suite` is a `Suite.source`, the file's name is NAME-`what`.json.
+    """
+    if suite.endswith(".toml"):
+        path = Path(suite)
+        return path.with_name(f"{path.stem}-{what}.json")
+    return FOLDER / f"{suite}-{what}.json"
+
+
+def parse_suite(
+    text: str,
+    where: str,
+    folder: Path = Path(),
+    allow_code: Collection[str] = (),
+) -> Suite:
+    """Read a suite from its TOML text; raises InputError naming the field at fault.
+
+    `where` begins the messages, `folder` is where relative paths begin; for
+    `allow_code` see `load_suite`.
+    """
     content = parse_toml(text, f"{where}:")
     check_keys(content, ("name", "tasks"), where)
-    tasks = check_table(content.get("tasks"), f"{where}: tasks")
-    return Suite(
-        check_text(content.get("name"), f"{where}: name"),
-        tuple(
-            task
-            for name, table in tasks.items()
-            for task in _sets(name, table, f"{where}: tasks.{name}")
-        ),
-    )
+    name = check_text(content.get("name"), f"{where}: name")
+    reader = _Reader(folder, allow_code)
+    tasks: list[BenchmarkTask] = []
+    for task, table in check_table(content.get("tasks"), f"{where}: tasks").items():
+        tasks += reader.read(task, table, f"{where}: tasks.{task}")
+    return Suite(name, tuple(tasks))
 
 
-def _sets(name: str, value: Any, where: str) -> list[BenchmarkTask]:
-    """A task, and if it has a ship behind its model that on the model and that far from the design."""
-    task = _task(name, value, where)
-    if not task.behind:
+@dataclass(frozen=True)
+class _Reader:
+    """Reads the tasks of a suite."""
+
+    folder: Path
+    allow_code: Collection[str]
+
+    def read(self, name: str, value: Any, where: str) -> list[BenchmarkTask]:
+        """Return a task, once for each of its sets of episodes."""
+        table = check_table(value, where, FIELDS)
+        if table.get("far") and "ship" not in table:
+            raise InputError(
+                f"{where}.far: expected `ship` too, the one behind the model, got none"
+            )
+        text = check_text(table.get("environment"), f"{where}.environment")
+        if ":" in text or text.endswith(".py"):
+            self.check_allowed(text, f"{where}.environment")
+        data_only(self.without_allowed(table), where)
+
+        environment = read_environment(text, self.folder, f"{where}.environment")
+        options = {
+            **environment.options,
+            **self.options(table.get("options", {}), f"{where}.options"),
+            **self.options({"sea": table["sea"]} if "sea" in table else {}, where),
+        }
+        default = options.pop("model", None)
+        model = check_text(table.get("model", default), f"{where}.model")
+        ship = check_text(table["ship"], f"{where}.ship") if "ship" in table else ""
+        far = self.options(table.get("far", {}), f"{where}.far")
+        with placed(where):
+            task = BenchmarkTask(
+                name=name,
+                environment=environment.name,
+                model=self.absolute(model),
+                why=table.get("why", ""),
+                options=options,
+                true_ship=self.absolute(ship),
+                design_name=name,
+            )
+            return _with_sets(task, far)
+
+    def check_allowed(self, text: str, where: str) -> None:
+        """Refuse code that the user has not named too."""
+        if not self.allowed(text):
+            raise InputError(
+                f"{where}: expected no code that you have not named yourself, got"
+                f" '{text}'; if you trust it: --allow-code {text}"
+            )
+
+    def allowed(self, text: str) -> bool:
+        """Say whether the user has named this code too."""
+        paths = [Path(code).resolve() for code in self.allow_code]
+        return text in self.allow_code or (self.folder / text).resolve() in paths
+
+    def without_allowed(self, value: Any) -> Any:
+        """Copy a value of TOML without the code that is allowed."""
+        if isinstance(value, Mapping):
+            return {key: self.without_allowed(one) for key, one in value.items()}
+        if isinstance(value, list):
+            return [self.without_allowed(one) for one in value]
+        return None if isinstance(value, str) and self.allowed(value) else value
+
+    def options(self, value: Any, where: str) -> dict[str, Any]:
+        """Keywords of an environment: a sea may be a table, paths become absolute."""
+        options = {
+            name: self.absolute(one) for name, one in check_table(value, where).items()
+        }
+        if isinstance(options.get("sea"), Mapping):
+            with placed(f"{where}.sea"):
+                options["sea"] = Weather.from_dict(options["sea"], f"{where}.sea")
+        return options
+
+    def absolute(self, value: Any) -> Any:
+        """Absolute path of a Python or JSON file; anything else as it is."""
+        if isinstance(value, list):
+            return [self.absolute(one) for one in value]
+        if isinstance(value, str) and value.endswith((".py", ".json")):
+            return str((self.folder / value).resolve())
+        return value
+
+
+def _with_sets(task: BenchmarkTask, far: Mapping[str, Any]) -> list[BenchmarkTask]:
+    """Return a task once for each set of episodes that it has."""
+    if not task.true_ship:
         return [task]
-    far = _options(check_table(value.get("far", {}), f"{where}.far"), f"{where}.far")
-    changes: dict[str, dict[str, Any]] = {
-        "ship": {},
-        "model": {"behind": ""},
-        "far": {"far": far},
-    }
-    with placed(where):
-        sets = [on for on in SETS if on != "far" or far]
-        return [
-            replace(task, name=name + SETS[on], on=on, base=name, **changes[on])
-            for on in sets
-        ]
-
-
-def _options(table: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """Keywords of an environment; a sea may be a table."""
-    options = dict(table)
-    if isinstance(options.get("sea"), Mapping):
-        options["sea"] = Weather.from_dict(options["sea"], f"{where}.sea")
-    return options
-
-
-def _task(name: str, value: Any, where: str) -> BenchmarkTask:
-    table = check_table(value, where, FIELDS)
-    environment, model = (
-        check_text(table.get(one), f"{where}.{one}") for one in ("environment", "model")
-    )
-    data_only(table, where)
-    sea = {"sea": table["sea"]} if "sea" in table else {}
-    options = _options(
-        {**check_table(table.get("options", {}), f"{where}.options"), **sea}, where
-    )
-    behind = check_text(table["ship"], f"{where}.ship") if "ship" in table else ""
-    if table.get("far") and not behind:
-        raise InputError(
-            f"{where}.far: found without a ship, expected `ship`, the one behind the"
-            " model"
-        )
-    with placed(where):
-        return BenchmarkTask(
-            name, environment, model, table.get("why", ""), options, behind
-        )
+    on_model = replace(task, name=task.name + SETS["model"], on="model", true_ship="")
+    if not far:
+        return [task, on_model]
+    return [
+        task,
+        on_model,
+        replace(task, name=task.name + SETS["far"], on="far", far=far),
+    ]

@@ -16,8 +16,6 @@ from agents.policies.policy import NO_LIMIT
 from agents.training.plan import Plan, training_options
 from agents.training.residual import ResidualVecEnv
 from agents.training.settings import (
-    LEARNED,
-    RUNNING,
     OffPolicySettings,
     PPOSettings,
     Settings,
@@ -83,7 +81,7 @@ def make_ships(plan: Plan, base: Controller | None) -> VecEnv:
 def scaled_rewards(ships: VecEnv, settings: Settings) -> VecEnv:
     """Ships whose rewards are scaled as the settings say; observations are scaled as they are."""
     scaled = VecNormalize(ships, norm_obs=False, gamma=settings.gamma)
-    if settings.reward_scale != RUNNING:
+    if settings.reward_scale != "running":
         scaled.training = False
         scaled.ret_rms.var, scaled.epsilon = np.float64(settings.reward_scale) ** 2, 0.0
     return scaled
@@ -175,7 +173,7 @@ def _rate(settings: Settings) -> float | Callable[[float], float]:
 
 def set_deviation(agent: Any, settings: Settings) -> None:
     """Set PPO's exploration for this stage of the training, unless it is learned."""
-    if not isinstance(settings, PPOSettings) or settings.log_std_end == LEARNED:
+    if not isinstance(settings, PPOSettings) or settings.log_std_end == "learned":
         return
     if hasattr(agent.policy, "log_std"):  # discrete orders have none
         done = min(agent.num_timesteps / settings.total_steps, 1.0)

@@ -1,6 +1,6 @@
 """What a run of training is: algorithm, task, settings and seed; how it is read from what a user gives."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -8,7 +8,8 @@ from typing import Any, Self
 
 from agents.controllers.controller import model_hash
 from agents.policies.weights_file import as_json
-from agents.suites.suite import ENVIRONMENTS, BenchmarkTask, find_task
+from agents.suites.environments import read_environment
+from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, find_task
 from agents.training.settings import (
     Settings,
     changed,
@@ -17,8 +18,7 @@ from agents.training.settings import (
     read_settings_file,
     settings_of,
 )
-from shipgym.checks import check_choice, check_keys, check_whole
-from shipgym.envs.registration import environments
+from shipgym.checks import check_keys, check_whole
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather, as_weather
 from shipgym.sea.weather_column import weather_column
@@ -92,6 +92,7 @@ class Plan:
         return {
             "algorithm": self.algorithm,
             "task": self.task.name,
+            "suite": self.task.suite,
             "environment": self.task.environment,
             "model": self.task.model,
             "model_sha256": model_hash(self.task.ship),
@@ -108,7 +109,11 @@ class Plan:
             name: _read(value, name) for name, value in content["options"].items()
         }
         task = BenchmarkTask(
-            content["task"], content["environment"], content["model"], "", options
+            content["task"],
+            content["environment"],
+            content["model"],
+            options=options,
+            suite=content["suite"],
         )
         settings = make_settings(content["algorithm"], content["settings"])
         return cls(
@@ -126,15 +131,13 @@ class Given:
     """What a user gives; None or empty for what is left to the defaults, or to the run that is resumed."""
 
     algorithm: str
-    environment: str | None = (
-        None  # "course-keeping", "path-following", "path-following-v1", or an id
-    )
+    #: as `read_environment` takes it
+    environment: str | None = None
     #: name or file of a model, and a sea state
     model: str | None = None
     sea: str | None = None
-    task: str | None = (
-        None  # task of the suite, which says environment, model, sea and options
-    )
+    #: task of a suite, which says environment, model, sea and options
+    task: str | None = None
     options: Mapping[str, Any] = field(
         default_factory=dict
     )  # further keywords of the environment
@@ -146,6 +149,10 @@ class Given:
     seed: int | None = None
     randomise: bool | None = None
     threads: int | None = None
+    #: name of a shipped suite, or the path of one of the user's own; and code that it
+    #: may name
+    suite: str = DEFAULT_SUITE
+    allow_code: Sequence[str] = ()
 
 
 def make_plan(given: Given, stored: Plan | None = None) -> Plan:
@@ -170,7 +177,12 @@ def make_plan(given: Given, stored: Plan | None = None) -> Plan:
     own |= given.settings
     if stored is None or stored.algorithm != given.algorithm:
         settings = load_settings(
-            given.algorithm, task.environment, task.name, own, task.task.action
+            given.algorithm,
+            task.environment,
+            task.name,
+            own,
+            task.task.action,
+            task.suite,
         )
     else:
         settings = changed(stored.settings, own)
@@ -193,7 +205,7 @@ def _task(given: Given, stored: Plan | None) -> BenchmarkTask:
                 f"--task: found together with {beside[0]}, which the task sets; leave"
                 " one of them out"
             )
-        return find_task(given.task)
+        return find_task(given.task, given.suite, given.allow_code)
     if stored is not None and not beside:
         return stored.task
     before = (
@@ -201,22 +213,34 @@ def _task(given: Given, stored: Plan | None) -> BenchmarkTask:
         if stored is None
         else stored.task
     )
-    environment, variant = read_environment(given.environment or before.environment)
+    environment = read_environment(given.environment or before.environment)
     sea = {} if given.sea is None else {"sea": given.sea}
-    options = {**before.options, **variant, **sea, **given.options}
+    options = {**before.options, **environment.options, **sea, **given.options}
     model = options.pop("model", before.model)
-    return BenchmarkTask(before.name, environment, given.model or model, "", options)
+    return BenchmarkTask(
+        before.name,
+        environment.name,
+        given.model or model,
+        options=options,
+        suite=before.suite,
+    )
 
 
-def read_environment(name: str) -> tuple[str, dict[str, Any]]:
-    """Short name and variant's options of an environment, by name or id; InputError names the nearest one."""
-    short_names = {task: short for short, (_, task) in ENVIRONMENTS.items()}
-    ids = {
-        name: (short_names[options.pop("task")], options)
-        for name, options in environments().items()
-    }
-    known = {short: (short, dict[str, Any]()) for short in ENVIRONMENTS} | ids
-    return known[check_choice(name, known, "env")]
+def code_given(given: Given) -> dict[str, Any]:
+    """What a user names of a run that may be code: environment, model and options."""
+    if given.task is not None:
+        task = find_task(given.task, given.suite, given.allow_code)
+        options = as_json(task.options)
+        return {
+            "environment": task.environment,
+            "model": task.model,
+            "options": options,
+        }
+    name, options = None, {}
+    if given.environment is not None:
+        name, options = read_environment(given.environment)
+    options = {**options, **given.options}
+    return {"environment": name, "model": given.model, "options": options}
 
 
 def training_options(plan: Plan) -> dict[str, Any]:
@@ -228,7 +252,7 @@ def training_options(plan: Plan) -> dict[str, Any]:
     ship's particulars allow weather to be worked out, the task's own among them and its
     current in all of them.
     """
-    options = dict(plan.task.options)
+    options = plan.task.arguments
     ship, task = plan.task.ship, plan.task.task
     drawn = plan.randomise or plan.settings.model_uncertainty == "covariance"
     if drawn and ship.covariance is not None:

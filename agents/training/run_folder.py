@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.output import check_writable, present
-from agents.policies.weights_file import present_names
-from agents.training.plan import Given, Plan, check_same
-from agents.training.settings import LATER
+from agents.training.plan import Given, Plan, check_same, code_given
 from shipgym.checks import (
     Shape,
     check_fields,
@@ -29,6 +27,7 @@ FIELDS = ("format", "configuration", "threads", "command", "versions")
 CONFIGURATION: Shape = {
     "algorithm": (str,),
     "task": (str,),
+    "suite": (str,),
     "environment": (str,),
     "model": (str,),
     "options": {},
@@ -97,12 +96,10 @@ def read_plan(folder: Path, given: Given | None = None) -> Plan:
     """
     content = _content(folder)
     where, configuration = f"{folder / RUN}", content["configuration"]
-    named = {name: configuration.get(name) for name in ("model", "options")}
-    data_only(
-        named,
-        f"{where}: configuration",
-        given and {"model": given.model, "options": given.options},
-    )
+    named = {
+        name: configuration.get(name) for name in ("environment", "model", "options")
+    }
+    data_only(named, f"{where}: configuration", given and code_given(given))
     with placed(where):
         check_shape(configuration, CONFIGURATION, "configuration")
         plan = Plan.from_configuration(configuration, content["threads"])
@@ -139,9 +136,5 @@ def _content(folder: Path) -> Mapping[str, Any]:
     content = read_json(path, "run file", REMEDY)
     check_fields(content, FIELDS, str(path), REMEDY)
     check_format(content, FORMAT, str(path))
-    configuration = dict(
-        check_table(content["configuration"], f"{path}: configuration")
-    )
-    if isinstance(settings := configuration.get("settings"), Mapping):
-        configuration["settings"] = {**LATER, **present_names(settings)}
-    return {**content, "configuration": configuration}
+    check_table(content["configuration"], f"{path}: configuration")
+    return content

@@ -60,9 +60,7 @@ def read_values(path: Path, what: str) -> Any:
                     )
                 arrays[name] = file.get_tensor(name)
             about = file.metadata()
-        if (
-            about.get(SHA256, sha256 := _hash(about[CONTENT], arrays)) != sha256
-        ):  # older files have none
+        if about[SHA256] != _hash(about[CONTENT], arrays):
             raise ValueError("its SHA-256 is not that of its content")
         return _unpacked(json.loads(about[CONTENT]), arrays)
     except (SafetensorError, *MALFORMED) as error:

@@ -13,7 +13,7 @@ from typing import Any
 
 from agents.controllers.registry import controller_kinds
 from agents.policies.weights_file import as_json
-from agents.suites.suite import ENVIRONMENTS, suite_of
+from agents.suites.environments import SHORT_NAMES
 from shipgym.checks import (
     check_choice,
     check_keys,
@@ -313,6 +313,7 @@ def load_settings(
     task: str = "",
     given: Mapping[str, Any] | None = None,
     action: str = "rudder",
+    suite: str = "",
 ) -> Settings:
     """Return the tuned settings of an algorithm, with those given by name replaced.
 
@@ -323,10 +324,13 @@ def load_settings(
     Parameters
     ----------
     algorithm : {"ppo", "sac", "td3", "tqc"}
-    environment : {"course-keeping", "path-following", "path-following-v1"}
+    environment : str
+        "course-keeping", "path-following", or the path of a task's file.
     task : str
         Name of a suite's task; one without settings of its own has those of its
         environment.
+    suite : str
+        Its suite (`BenchmarkTask.suite`).
     given : mapping of str to Any, optional
         Settings by name that go before the tuned ones.
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
@@ -334,19 +338,17 @@ def load_settings(
         policy learns from scratch.
     """
     check_choice(algorithm, ALGORITHMS, "algorithm")
-    check_choice(environment, ENVIRONMENTS, "environment")
+    if not environment.endswith(".py"):
+        check_choice(environment, SHORT_NAMES, "environment")
     check_choice(action, ACTIONS, "action")
     content = shipped_toml("agents.training", f"hyperparameters/{algorithm}.toml")
     given = given or {}
     chosen = dict(content["defaults"])
     if action == "rudder" and given.get("base") != "none":
-        followed = environment.removesuffix("-v1")
-        for table, name in (
-            ("residual", followed),
-            ("suites", suite_of(task)),
-            ("tasks", task),
-        ):
-            chosen |= content.get(table, {}).get(name, {})
+        chosen |= content["residual"].get(environment, {})
+        if suite in content["suites"]:
+            chosen |= content["suites"][suite]
+            chosen |= content.get("tasks", {}).get(task, {})
     return make_settings(algorithm, {**chosen, **given})
 
 

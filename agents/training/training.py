@@ -19,7 +19,7 @@ from agents.controllers.controller import Policy
 from agents.controllers.designs import design, design_base
 from agents.output import in_use
 from agents.policies.policy import LearnedPolicy
-from agents.rollouts.rollout import episode_costs
+from agents.rollouts.rollout import check_fits, episode_costs
 from agents.suites.suite import BenchmarkTask
 from agents.training import run_folder
 from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, Plan
@@ -61,7 +61,9 @@ class HeldOut:
         lq = None
         if task.task.action == "rudder":
             with suppress(InputError):
-                lq = design("lq", task)
+                designed = design("lq", task)
+                check_fits(designed, task.task, task.ship, "lq")
+                lq = designed
         #: Mean cost of LQ designed on the task's ship; None where there is none for
         #: her.
         self.lq_cost = None if lq is None else self.cost(lq)

@@ -16,19 +16,24 @@ from typing import Any
 
 import numpy as np
 
-from agents.engines.jobs import HERE, JobEngine
+from agents.jobs import HERE, JobEngine, run_jobs
 from agents.output import in_use, present
 from agents.training.plan import Plan, check_same
 from agents.training.settings import (
     OffPolicySettings,
     Settings,
     changed,
-    hyperparameters,
     settings_of,
 )
 from shipgym.checks import Shape, check_shape, check_whole
 from shipgym.errors import InputError
-from shipgym.files import make_folder, read_json, write_json, write_text
+from shipgym.files import (
+    make_folder,
+    read_json,
+    shipped_toml,
+    write_json,
+    write_text,
+)
 
 try:
     import optuna
@@ -131,9 +136,8 @@ def tune(
                 {"configuration": run | {"settings": one}, "limits": bounds}
                 for _, one in proposed
             ]
-            results = replace(where, keep=folder / KEPT).run(
-                training or train_trial, jobs, tell
-            )
+            kept = replace(where, keep=folder / KEPT)
+            results = run_jobs(training or train_trial, jobs, kept, tell)
             for (parameters, settings), result in zip(proposed, results, strict=True):
                 found.append(_trial(len(found), parameters, settings, result))
             _record(study, found, plan, fixed)
@@ -319,7 +323,7 @@ def _write_best(folder: Path, plan: Plan, found: Sequence[Trial]) -> None:
 
 def search_space(algorithm: str, fixed: Sequence[str] = ()) -> dict[str, Any]:
     """The parameters that are varied, without those whose setting is fixed."""
-    tables = hyperparameters("search")
+    tables = shipped_toml("agents.training", "hyperparameters/search.toml")
     shared = (
         tables["off-policy"]
         if issubclass(settings_of(algorithm), OffPolicySettings)

@@ -9,14 +9,20 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller
 from agents.controllers.controller_file import read_controller
-from agents.engines.jobs import HERE, JobEngine
+from agents.jobs import HERE, JobEngine, run_jobs
 from agents.rollouts.course_keeping import Episodes, sail
-from agents.verification import index_uncertainty
-from agents.verification.index_uncertainty import ManoeuvreUncertainty
+from agents.verification.index_uncertainty import (
+    ManoeuvreUncertainty,
+    SailedDraws,
+    joined,
+    nominal_runs,
+    sail_draws,
+    uncertainty_of,
+)
+from shipgym.arrays import Flags
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
@@ -30,11 +36,10 @@ class MonteCarlo:
     """What became of the models drawn."""
 
     draws: tuple[ShipModel, ...]  # the models drawn
-    manoeuvres: (
-        ManoeuvreUncertainty  # standard manoeuvres and IMO criteria over the draws
-    )
+    #: standard manoeuvres and IMO criteria over the draws
+    manoeuvres: ManoeuvreUncertainty
     #: draws that do not keep a straight course with the rudder fixed, shape (n_draws,)
-    course_unstable: NDArray[np.bool_]
+    course_unstable: Flags
     episodes: tuple[Episodes, ...]  # of each controller, one episode on each draw
 
 
@@ -52,35 +57,39 @@ def monte_carlo(
     `controllers`: each steers every draw, draw i with seed + i, the same episodes for
     all; `model`: with a covariance; `draws`: models drawn, at least 2; `seed`: of the
     draws and of the episodes; `where`: in this process, in several, or on a ray
-    cluster: the results are the same, bit for bit; `progress`: told the number of draws
-    done. Raises InputError if the model has no covariance, or a controller is for
-    another ship; UnstableModelError if the model itself runs away.
+    cluster: the results are the same, bit for bit; `progress`: called with the number
+    of draws done. Raises InputError if the model has no covariance, or a controller is
+    for another ship; UnstableModelError if the model itself runs away.
     """
     check_whole(draws, "draws", at_least=2)
     check_whole(seed, "seed", at_least=0)
     for controller in controllers:
         controller.check_fits_model(model)
-    nominal = index_uncertainty.nominal_runs(model)
+    nominal = nominal_runs(model)
     drawn = model.sample(draws, seed)
-    tell = progress or (lambda done: None)
+
+    def on_progress(done: int, _: int) -> None:
+        if progress is not None:
+            progress(min(done * DRAWS_A_JOB, draws))
+
     jobs = draw_jobs(controllers, model, drawn, seed)
-    found = where.run(
-        do_draws, jobs, lambda done, _: tell(min(done * DRAWS_A_JOB, draws))
+    parts = run_jobs(do_draws, jobs, where, on_progress)
+    sailed = joined(SailedDraws(**part["sailed"]) for part in parts)
+    by_controller = zip(*(part["episodes"] for part in parts), strict=True)
+    return MonteCarlo(
+        draws=tuple(drawn),
+        manoeuvres=uncertainty_of(model, nominal, sailed),
+        course_unstable=np.concatenate([part["course_unstable"] for part in parts]),
+        episodes=tuple(_joined_episodes(episodes) for episodes in by_controller),
     )
-    sailed = index_uncertainty.uncertainty_of(
-        model, nominal, [part["sailed"] for part in found]
-    )
-    unstable = np.concatenate([part["course_unstable"] for part in found])
-    episodes = tuple(
-        Episodes(
-            **{
-                name: np.concatenate([part[name] for part in parts])
-                for name in parts[0]
-            }
-        )
-        for parts in zip(*(part["episodes"] for part in found), strict=True)
-    )
-    return MonteCarlo(tuple(drawn), sailed, unstable, episodes)
+
+
+def _joined_episodes(parts: Sequence[dict[str, Any]]) -> Episodes:
+    """Episodes of one controller from parts in their order."""
+    columns = {}
+    for name in parts[0]:
+        columns[name] = np.concatenate([part[name] for part in parts])
+    return Episodes(**columns)
 
 
 def draw_jobs(
@@ -90,47 +99,39 @@ def draw_jobs(
     seed: int,
 ) -> list[dict[str, Any]]:
     """The jobs: coefficients as drawn here, since another computer may draw others in the last digit."""
-    own, pilots = (
-        replace(model, covariance=None).to_dict(),
-        [one.to_dict() for one in controllers],
-    )
-    parts = [
-        (first, drawn[first : first + DRAWS_A_JOB])
-        for first in range(0, len(drawn), DRAWS_A_JOB)
-    ]
-    return [
-        {
+    own = replace(model, covariance=None).to_dict()
+    pilots = [controller.to_dict() for controller in controllers]
+    jobs = []
+    for first in range(0, len(drawn), DRAWS_A_JOB):
+        draws = drawn[first : first + DRAWS_A_JOB]
+        job = {
             "model": own,
             "controllers": pilots,
-            "names": [draw.name for draw in some],
-            "coefficients": [[*draw.coefficients.values()] for draw in some],
+            "names": [draw.name for draw in draws],
+            "coefficients": [list(draw.coefficients.values()) for draw in draws],
             "first_seed": seed + first,
         }
-        for first, some in parts
-    ]
+        jobs.append(job)
+    return jobs
 
 
 def do_draws(job: dict[str, Any]) -> dict[str, Any]:
     """Manoeuvres, course stability and episodes of some draws."""
     model = ShipModel.from_dict(job["model"])
-    draws = [
-        replace(
-            model,
-            name=name,
-            coefficients=dict(zip(model.coefficients, values, strict=True)),
-        )
-        for name, values in zip(job["names"], job["coefficients"], strict=True)
-    ]
+    draws = []
+    for name, values in zip(job["names"], job["coefficients"], strict=True):
+        coefficients = dict(zip(model.coefficients, values, strict=True))
+        draws.append(replace(model, name=name, coefficients=coefficients))
+
     seeds = job["first_seed"] + np.arange(len(draws))
-    controllers = [
-        read_controller(content, "controller") for content in job["controllers"]
-    ]
+    episodes = []
+    for content in job["controllers"]:
+        controller = read_controller(content, "controller")
+        episodes.append(asdict(sail(controller, draws, seeds=seeds)))
     return {
-        "sailed": index_uncertainty.sail_draws(model, draws),
+        "sailed": sail_draws(model, draws)._asdict(),
         "course_unstable": np.array([not keeps_course(draw) for draw in draws]),
-        "episodes": [
-            asdict(sail(controller, draws, seeds=seeds)) for controller in controllers
-        ],
+        "episodes": episodes,
     }
 
 

@@ -6,14 +6,14 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller
 from agents.rollouts.course_keeping import Episodes, StepResponses
 from agents.verification.index_uncertainty import ManoeuvreUncertainty
 from agents.verification.tracks import Track
 from identification import IdentificationResult
-from shipgym.arrays import finite
+from shipgym.arrays import Flags, finite
+from shipgym.manoeuvres.quantiles import upper_95
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import Nomoto
 from shipgym.trials.ship_file import ShipFile
@@ -21,7 +21,7 @@ from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from agents.agent_file import Agent
-    from agents.verification.standards import Row
+    from agents.verification.standards import Requirement
 
 
 STEP_DEG = 20.0
@@ -36,9 +36,8 @@ class Pilot:
     key: str
     controller: Agent  # with gains and margins if it is a Controller
     episodes: Episodes  # one episode on each model drawn
-    step: (
-        StepResponses  # of the identified model, first, and of the stable models drawn
-    )
+    # of the identified model, first, and of the stable models drawn
+    step: StepResponses
 
     @property
     def name(self) -> str:
@@ -57,20 +56,17 @@ class Verification:
 
     draws: int  # number of models drawn from the coefficient covariance
     seed: int  # of the draw and of the episodes
-    manoeuvres: (
-        ManoeuvreUncertainty  # indices and IMO criteria of the model and its draws
-    )
+    #: indices and IMO criteria of the model and its draws
+    manoeuvres: ManoeuvreUncertainty
     #: draws that do not hold a straight course with the rudder held, shape (n_draws,)
-    course_unstable: NDArray[np.bool_]
+    course_unstable: Flags
     nomoto: Nomoto  # of the identified model
     pilots: tuple[Pilot, ...]  # ranked, the lowest mean cost first
-    refused: dict[
-        str, str
-    ]  # autopilots that could not be designed on the model, and why
+    #: autopilots that could not be designed on the model, and why
+    refused: dict[str, str]
     tracks: tuple[Track, ...] = ()  # of autopilots that keep to a track
-    standards: tuple[
-        Row, ...
-    ] = ()  # what the standards of heading and track control ask for
+    #: what the standards of heading and track control ask for
+    standards: tuple[Requirement, ...] = ()
 
     @property
     def by_name(self) -> list[Pilot]:
@@ -87,10 +83,8 @@ class AutopilotResult:
     identification: IdentificationResult  # the model and its predictions
     instability: str | None  # why the model must not be used; None where it is stable
     verification: Verification | None  # none where the model is unstable or refused
-    refusal: str | None = (
-        # why no autopilot is given although the model is stable, and what would help
-        None
-    )
+    # why no autopilot is given although the model is stable, and what would help
+    refusal: str | None = None
 
     @property
     def model(self) -> ShipModel:
@@ -105,15 +99,13 @@ class AutopilotResult:
     @property
     def metrics(self) -> dict[str, Any]:
         """The contents of metrics.json."""
-        result = self.identification
+        fit = self.identification
         metrics: dict[str, Any] = {
-            **result.metrics,
+            **fit.metrics,
             "stable": self.stable,
             "instability": self.instability,
             "refusal": self.refusal,
-            "diagnostics": {
-                name: found.to_dict() for name, found in result.diagnostics.items()
-            },
+            "diagnostics": {q: found.to_dict() for q, found in fit.diagnostics.items()},
         }
         if self.verification is not None:
             metrics |= verification_metrics(self.verification)
@@ -122,6 +114,11 @@ class AutopilotResult:
 
 def verification_metrics(found: Verification) -> dict[str, Any]:
     """What metrics.json says of a verification."""
+    criteria = found.manoeuvres.criteria
+    standards = {}
+    for requirement in found.standards:
+        fields = {**asdict(requirement), "passed": requirement.passed}
+        standards[requirement.name] = fields
     return {
         "draws": {
             "count": found.draws,
@@ -129,29 +126,26 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
             "unstable": int(found.manoeuvres.unstable.sum()),
             "course_unstable": int(found.course_unstable.sum()),
         },
-        "nomoto": {name: finite(value) for name, value in asdict(found.nomoto).items()},
-        "imo": {
-            name: criterion.to_dict()
-            for name, criterion in found.manoeuvres.criteria.items()
-        },
+        "nomoto": _finite(asdict(found.nomoto)),
+        "imo": {name: criterion.to_dict() for name, criterion in criteria.items()},
         "controllers": {pilot.key: pilot_metrics(pilot) for pilot in found.pilots},
         "ranking": [pilot.key for pilot in found.pilots],
         "refused": found.refused,
         "tracks": {track.key: track_metrics(track) for track in found.tracks},
-        "standards": {
-            row.name: {**asdict(row), "passed": row.passed} for row in found.standards
-        },
+        "standards": standards,
     }
 
 
 def track_metrics(track: Track) -> dict[str, Any]:
     """Cross-track errors of one path autopilot: on the identified model, and on the models drawn."""
-    drawn = track.largest[1:] if len(track.largest) > 1 else track.largest
+    own, drawn = track.largest[0], track.largest[1:]
+    if not len(drawn):
+        drawn = track.largest
     return {
-        "gains": {name: float(value) for name, value in track.controller.gains.items()},
-        "cross_track_largest_m": float(track.largest[0]),
+        "gains": _floats(track.controller.gains),
+        "cross_track_largest_m": float(own),
         "cross_track_rmse_m": float(track.rms[0]),
-        "cross_track_largest_m_quantile_95": float(np.quantile(drawn, 0.95)),
+        "cross_track_largest_m_quantile_95": upper_95(drawn),
         "arrived": bool(track.arrived[0]),
         "not_arrived": int(np.sum(~track.arrived[1:])),
     }
@@ -160,21 +154,27 @@ def track_metrics(track: Track) -> dict[str, Any]:
 def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
     """Gains and margins of one autopilot, null if it is learned, and its episodes over the models drawn."""
     episodes, design = pilot.episodes, pilot.design
+    gains = margins = None
+    if design is not None:
+        gains = _floats(design.gains)
+        margins = _finite(asdict(design.margins))
     return {
-        "gains": (
-            design and {name: float(value) for name, value in design.gains.items()}
-        ),
-        "margins": (
-            design
-            and {name: finite(value) for name, value in asdict(design.margins).items()}
-        ),
+        "gains": gains,
+        "margins": margins,
         "cost_mean": float(np.mean(episodes.cost)),
-        "cost_quantile_95": float(np.quantile(episodes.cost, 0.95)),
+        "cost_quantile_95": upper_95(episodes.cost),
         "heading_rmse_deg_mean": float(np.mean(episodes.heading_rmse_deg)),
-        "heading_rmse_deg_quantile_95": float(
-            np.quantile(episodes.heading_rmse_deg, 0.95)
-        ),
+        "heading_rmse_deg_quantile_95": upper_95(episodes.heading_rmse_deg),
         "rudder_travel_deg_min_mean": float(np.mean(episodes.rudder_travel_deg_min)),
         "extrapolating_mean": float(np.mean(episodes.extrapolating)),
         "lost_control": int(np.sum(episodes.terminated)),
     }
+
+
+def _floats(values: dict[str, Any]) -> dict[str, float]:
+    return {name: float(value) for name, value in values.items()}
+
+
+def _finite(values: dict[str, float]) -> dict[str, float | None]:
+    """Values as JSON knows them."""
+    return {name: finite(value) for name, value in values.items()}

@@ -8,12 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller
 from agents.rollouts.metrics import path_following
 from agents.rollouts.rollout import rollout
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.envs.engine import Engine
 from shipgym.sea.conditions import Weather
 from shipgym.sea.current_wind_waves import Current
@@ -21,12 +20,17 @@ from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 
 TURNS_DEG = (30.0, -60.0, 90.0, -90.0, 45.0)  # changes of course, to starboard positive
-LEG_LENGTHS, SETTLED_LENGTHS = (
-    12.0,
-    6.0,
-)  # of each leg; way after the start that does not count
-CURRENT = 0.1  # speed over service speed, to the east: across the first leg
-STEPS = 3000  # control intervals, about twice what it takes
+LEG_LENGTHS = 12.0  # of each leg
+SETTLED_LENGTHS = 6.0  # way after the start that does not count
+RECORDED = (
+    "x",
+    "y",
+    "cross_track",
+    "distance_made_good",
+    "success",
+    "in_corridor",
+    "grounded",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,33 +40,28 @@ class Track:
     key: str  # its kind
     controller: Controller
     waypoints: Floats  # north and east, m, shape (n_waypoints, 2)
-    positions: (
-        Floats  # north and east of the identified model, m, shape (n_steps + 1, 2)
-    )
-    # its distance from the track, to starboard positive, m, shape (n_steps + 1,)
+    #: north and east of the identified model, m, shape (n_steps + 1, 2)
+    positions: Floats
+    #: its distance from the track, to starboard positive, m, shape (n_steps + 1,)
     cross_track: Floats
-    largest: (
-        Floats  # cross-track error once the start is behind, m, shape (1 + n_draws,)
-    )
+    #: cross-track error once the start is behind, m, shape (1 + n_draws,)
+    largest: Floats
     rms: Floats  # m, shape (1 + n_draws,)
-    arrived: NDArray[np.bool_]  # shape (1 + n_draws,)
+    arrived: Flags  # shape (1 + n_draws,)
 
 
 def track_task(model: ShipModel) -> Task:
-    """The track for a ship, with the current."""
+    """The track for a ship, with a current of a tenth of her speed across the first leg."""
     courses = np.radians(np.cumsum([0.0, *TURNS_DEG]))
-    legs = (
-        LEG_LENGTHS
-        * model.particulars["length"]
-        * np.column_stack([np.cos(courses), np.sin(courses)])
-    )
+    directions = np.column_stack([np.cos(courses), np.sin(courses)])
+    legs = LEG_LENGTHS * model.particulars["length"] * directions
     waypoints = np.vstack([np.zeros(2), np.cumsum(legs, axis=0)])
-    current = Current(CURRENT * model.particulars["speed"], towards_deg=90.0)
+    current = Current(0.1 * model.particulars["speed"], towards_deg=90.0)
     return Task.of(
-        "PathFollowing-v1",
+        "PathFollowing",
         waypoints=waypoints,
         sea=Weather(current=current),
-        episode_steps=STEPS,
+        episode_steps=3000,  # about twice what it takes
     )
 
 
@@ -70,31 +69,22 @@ def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:
     """Lead ships of one structure along the track, the identified one first."""
     task = track_task(models[0])
     engine = Engine(models, len(models), task, allow_unstable=True)
-    names = (
-        "x",
-        "y",
-        "cross_track",
-        "distance_made_good",
-        "success",
-        "in_corridor",
-        "grounded",
-    )
-    run = rollout(guide, engine, np.zeros(len(models), dtype=np.int64), record=names)
-    figures, last = path_following(run), int(run.steps[0]) + 1
-    way = (
-        run.infos["distance_made_good"][1:]
-        > SETTLED_LENGTHS * models[0].particulars["length"]
-    )
-    off = np.where(run.sailing & way, np.abs(run.infos["cross_track"][1:]), 0.0)
+    seeds = np.zeros(len(models), dtype=np.int64)
+    run = rollout(guide, engine, seeds, record=RECORDED)
+    figures = path_following(run)
+
+    settled = SETTLED_LENGTHS * models[0].particulars["length"]
+    counts = run.sailing & (run.infos["distance_made_good"][1:] > settled)
+    off = np.abs(run.infos["cross_track"][1:])
+    samples = int(run.steps[0]) + 1  # of the identified model
+    x, y = run.states["x"][:samples, 0], run.states["y"][:samples, 0]
     return Track(
         key=guide.kind,
         controller=guide,
         waypoints=np.reshape(task.settings.waypoints[1:], (-1, 2)),
-        positions=np.column_stack(
-            [run.states["x"][:last, 0], run.states["y"][:last, 0]]
-        ),
-        cross_track=run.infos["cross_track"][:last, 0],
-        largest=off.max(axis=0),
+        positions=np.column_stack([x, y]),
+        cross_track=run.infos["cross_track"][:samples, 0],
+        largest=np.where(counts, off, 0.0).max(axis=0),
         rms=figures["cross_track_rmse_m"],
         arrived=figures["success"] > 0.0,
     )

@@ -1,22 +1,22 @@
 """Identify with the terms that are needed: reduce the full structure, then identify what is left."""
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from functools import partial
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from identification.design.reduction import (
     Reduction,
-    reduce,
-    reduced_structure,
-    sensitivity,
+    backward_elimination,
+    forward_selection,
 )
+from identification.design.sensitivity import zigzag_sensitivity
 from identification.pipeline import identify
+from identification.regression.samples import Samples
 from identification.result import IdentificationResult
-from shipgym import InputError, ShipModel, Trial, UnstableModelError, register_structure
+from shipgym import InputError, Trial, register_structure
 from shipgym.arrays import finite
-from shipgym.manoeuvres import zigzag
+from shipgym.checks import check_choice
 from shipgym.ships import GreyBox, Structure
 
 
@@ -43,14 +43,10 @@ class ReducedIdentification:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
-        equations = {}
-        for q, found in self.reductions.items():
-            path = [asdict(step) for step in found.path]
-            for step in path:
-                step["relative_errors"] = {
-                    k: finite(e) for k, e in step["relative_errors"].items()
-                }
-            equations[q] = {"chosen": found.chosen, "path": path}
+        equations = {
+            q: {"chosen": reduction.chosen, "path": _plain_path(reduction)}
+            for q, reduction in self.reductions.items()
+        }
         return {
             "structure": self.structure.name,
             "equations": equations,
@@ -64,6 +60,15 @@ class ReducedIdentification:
             },
             "sensitivity": zigzag_sensitivity(self.reduced.model),
         }
+
+
+def _plain_path(reduction: Reduction) -> list[dict[str, Any]]:
+    """The steps of a reduction, infinite errors as null."""
+    path = []
+    for step in reduction.path:
+        errors = {name: finite(error) for name, error in step.relative_errors.items()}
+        path.append({**asdict(step), "relative_errors": errors})
+    return path
 
 
 def identify_reduced(
@@ -90,35 +95,82 @@ def identify_reduced(
     """
     full = identify(trials, **arguments)
     table = full.model.table
+    _check_reducible(table)
+    reductions = reduce(full.samples, table, direction, tolerance)
+    smaller = reduced_structure(table, reductions, table.name)
+    registered = register_structure(
+        _name_by_terms(smaller),
+        smaller.equations,
+        smaller.source,
+        smaller.normalisation,
+        smaller.quantity,
+    )
+    reduced = identify(trials, **{**arguments, "structure": registered.name})
+    return ReducedIdentification(full, reductions, registered, reduced)
+
+
+def _check_reducible(table: Structure) -> None:
+    """Refuse a structure whose equations are not those of its regression."""
     if isinstance(table, GreyBox):
         raise InputError(
-            f"structure: {table.name!r} found, whose table adds to a reference ship,"
-            " expected one of its own to reduce, such as 'abkowitz'"
+            "structure: expected one of its own to reduce, such as 'abkowitz', got"
+            f" {table.name!r}, whose table adds to a reference ship"
         )
     if tuple(table.regressed) != tuple(table.equations):
         raise InputError(
-            f"structure: {table.name!r} found, whose memory of yaw has no regression of"
-            " its own, expected one without memory to reduce, such as 'abkowitz'"
+            "structure: expected one without memory to reduce, such as 'abkowitz', got"
+            f" {table.name!r}, whose memory of yaw has no regression of its own"
         )
-    reductions = reduce(full.samples, table, direction, tolerance)
-    small = reduced_structure(table, reductions, table.name)
-    terms = repr([(q, [term.name for term in small.terms(q)]) for q in small.equations])
-    # among all reductions
-    own = f"{table.name}-{hashlib.sha256(terms.encode()).hexdigest()[:6]}"
-    small = register_structure(
-        own, small.equations, small.source, small.normalisation, small.quantity
-    )
-    reduced = identify(trials, **{**arguments, "structure": small.name})
-    return ReducedIdentification(full, reductions, small, reduced)
 
 
-def zigzag_sensitivity(model: ShipModel) -> dict[str, float | None]:
-    """`sensitivity` of the 20/20 zigzag; None where the changed ship runs away; empty where the ship does."""
-    try:
-        effects = sensitivity(
-            model,
-            partial(zigzag, rudder_deg=20.0, heading_deg=20.0, must_reverse=False),
-        )
-    except UnstableModelError:
-        return {}
-    return {name: finite(effect) for name, effect in effects.items()}
+def _name_by_terms(structure: Structure) -> str:
+    """The name of a reduced structure, its own among all reductions."""
+    terms = [
+        (q, [term.name for term in structure.terms(q)]) for q in structure.equations
+    ]
+    digest = hashlib.sha256(repr(terms).encode()).hexdigest()
+    return f"{structure.name}-{digest[:6]}"
+
+
+def reduce(
+    samples: Samples,
+    structure: Structure,
+    direction: str = "backward",
+    tolerance: float = 1e-3,
+) -> dict[str, Reduction]:
+    """Reduce each equation of a structure by elimination ("backward") or selection ("forward").
+
+    Returns the reductions by equation, with the coefficients of the features in SI
+    units; the tolerance is that of the held-out R2.
+    """
+    check_choice(direction, ("backward", "forward"), "direction")
+    run = backward_elimination if direction == "backward" else forward_selection
+    reductions = {}
+    for q in structure.equations:
+        X, y = samples.features[q], samples.targets[q]
+        reductions[q] = run(X, y, structure.names(q), tolerance=tolerance)
+    return reductions
+
+
+def reduced_structure(
+    structure: Structure, reductions: Mapping[str, Reduction], name: str
+) -> Structure:
+    """The structure, by a name of its own, with the terms that were chosen; register it to identify it.
+
+    Of forces, sway and yaw, which inertia couples, keep the terms that either needs.
+    """
+    kept = dict[str, set[str]]()
+    for q in structure.equations:
+        chosen = reductions[q].terms
+        labels = zip(structure.terms(q), structure.names(q), strict=True)
+        kept[q] = {term.name for term, label in labels if label in chosen}
+    if structure.quantity == "force" and {"v", "r"} <= kept.keys():
+        either = kept["v"] | kept["r"]
+        kept["v"] = kept["r"] = either
+
+    equations = {
+        q: tuple(term for term in structure.terms(q) if term.name in kept[q])
+        for q in structure.equations
+    }
+    source = f"{structure.source}; reduced"
+    return replace(structure, name=name, source=source, equations=equations)

@@ -1,4 +1,4 @@
-"""Which terms a model needs: backward elimination, forward selection, and sensitivity of a manoeuvre.
+"""Which terms a regression needs: backward elimination and forward selection.
 
 Backward (Xu 2020, section 5; leave-one-out): among the terms that are uncertain or
 belong to a collinear group drop the one of largest relative standard error, unless what
@@ -7,24 +7,27 @@ is held out is then explained worse. Forward (Chen, Billings & Luo 1989, Int. J.
 Held out are five stretches of the samples, each predicted from the others.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from rich.table import Table
 
+from identification.arrays import by_name, column_rms
 from identification.estimators.lssvm import TruncatedLSSVM
-from identification.regression.samples import Samples
 from identification.text import as_text
-from identification.validation.diagnostics import COLLINEAR, JITTER, variance_inflation
-from shipgym import InputError, ShipModel, Trial, UnstableModelError
+from identification.validation.diagnostics import (
+    COLLINEAR,
+    JITTER,
+    correlation_matrix,
+    variance_inflation,
+)
+from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_number
-from shipgym.ships import Structure
+from shipgym.checks import check_number
 
 FOLDS = 5
-SENSED = ("u", "v", "r", "psi")
 
 
 @dataclass(frozen=True)
@@ -71,22 +74,65 @@ class Reduction:
         return self.path[self.chosen].coefficients
 
     def __str__(self) -> str:
-        table = Table(
-            "terms", "changed", "worst relative error", "R2", "held-out R2", ""
-        )
+        headings = ("terms", "changed", "worst relative error", "R2", "held-out R2", "")
+        table = Table(*headings)
         for k, step in enumerate(self.path):
-            worst = max(
-                step.relative_errors, key=lambda name: step.relative_errors[name]
-            )
+            errors = step.relative_errors
+            worst = max(errors, key=lambda name: errors[name])
             table.add_row(
                 str(len(step.terms)),
                 step.changed,
-                f"{step.relative_errors[worst]:.3g} ({worst})",
+                f"{errors[worst]:.3g} ({worst})",
                 f"{step.r_squared:.6f}",
                 f"{step.held_out:.6f}",
                 "chosen" if k == self.chosen else "",
             )
         return as_text(table)
+
+
+@dataclass(frozen=True, eq=False)
+class _Regression:
+    """Features and targets of an equation, in time order."""
+
+    features: Floats  # shape (n_samples, n_terms)
+    targets: Floats  # shape (n_samples,)
+    names: list[str]  # of the terms
+
+    def fitted(self, kept: Sequence[int], changed: str, before: float) -> ReductionStep:
+        """The model of some terms; `before`: the share explained before the change."""
+        # scikit-learn takes a second to import
+        from sklearn.model_selection import KFold, cross_val_predict
+
+        X, y = self.features[:, kept], self.targets
+        names = tuple(self.names[term] for term in kept)
+        estimator = TruncatedLSSVM(selection="full", fit_intercept=False).fit(X, y)
+        predicted = cross_val_predict(estimator, X, y, cv=KFold(FOLDS))
+
+        r_squared = self._explained(X @ estimator.coef_)
+        return ReductionStep(
+            terms=names,
+            changed=changed,
+            coefficients=by_name(names, estimator.coef_),
+            relative_errors=by_name(names, _relative_errors(estimator)),
+            r_squared=r_squared,
+            held_out=self._explained(predicted),
+            error_reduction=r_squared - before if changed else r_squared,
+        )
+
+    def _explained(self, predicted: Floats) -> float:
+        """Share of the targets that a prediction explains."""
+        left = self.targets - predicted
+        power = float(self.targets @ self.targets)
+        return 1.0 - float(left @ left) / power
+
+
+def _relative_errors(estimator: TruncatedLSSVM) -> Floats:
+    """Standard errors of the coefficients by their sizes, infinite for one of 0."""
+    deviation = np.sqrt(np.diag(estimator.covariance_))
+    size = np.abs(estimator.coef_)
+    errors = np.full(len(size), np.inf)
+    np.divide(deviation, size, out=errors, where=size > 0.0)
+    return errors
 
 
 def backward_elimination(
@@ -119,33 +165,62 @@ def backward_elimination(
         Terms that are dropped only where no other candidate can be: where two say the
         same, it decides.
     """
-    features, targets, labels = _checked(X, y, names)
+    regression = _checked(X, y, names)
     check_number(tolerance, "tolerance", at_least=0.0)
     check_number(threshold, "threshold", at_least=0.0)
-    kept = list(range(len(labels)))
-    path = [_step(features, targets, labels, kept, "", 0.0)]
+    kept = list(range(len(regression.names)))
+    path = [regression.fitted(kept, "", 0.0)]
     best = path[0].held_out
     while len(kept) > 1:
-        errors = path[-1].relative_errors
-        uncertain = {i for i in kept if errors[labels[i]] > threshold} | _collinear(
-            features, kept
+        step = _without_one(
+            regression, kept, path[-1], threshold, prefer, best - tolerance
         )
-        # rounded, so that of two terms that say the same every computer drops the first
-        error = {i: float(f"{errors[labels[i]]:.6g}") for i in uncertain}
-        for term in sorted(
-            uncertain, key=lambda i: (labels[i] in prefer, -error[i], i)
-        ):
-            fewer = [i for i in kept if i != term]
-            step = _step(
-                features, targets, labels, fewer, labels[term], path[-1].r_squared
-            )
-            if step.held_out >= best - tolerance:
-                path.append(step)
-                kept, best = fewer, max(best, step.held_out)
-                break
-        else:
+        if step is None:
             break
+        path.append(step)
+        kept.remove(regression.names.index(step.changed))
+        best = max(best, step.held_out)
     return Reduction(tuple(path), len(path) - 1)
+
+
+def _without_one(
+    regression: _Regression,
+    kept: Sequence[int],
+    last: ReductionStep,
+    threshold: float,
+    prefer: Sequence[str],
+    least: float,
+) -> ReductionStep | None:
+    """The first model without one term that explains at least as much of what is held out; None without one."""
+    names, errors = regression.names, last.relative_errors
+    uncertain = {term for term in kept if errors[names[term]] > threshold}
+    candidates = uncertain | collinear_terms(regression.features, kept)
+
+    def order(term: int) -> tuple[bool, float, int]:
+        # rounded, so that of two terms that say the same every computer drops the first
+        error = float(f"{errors[names[term]]:.6g}")
+        return names[term] in prefer, -error, term
+
+    for term in sorted(candidates, key=order):
+        fewer = [other for other in kept if other != term]
+        step = regression.fitted(fewer, names[term], last.r_squared)
+        if step.held_out >= least:
+            return step
+    return None
+
+
+def collinear_terms(features: Floats, kept: Sequence[int]) -> set[int]:
+    """Terms that others nearly make up, by pair or by variance inflation."""
+    own = features[:, kept]
+    scaled = own / column_rms(own)
+    correlation = correlation_matrix(scaled)
+    np.fill_diagonal(correlation, 0.0)
+    in_pair = (np.abs(correlation) > COLLINEAR).any(axis=0)
+
+    largest_inflation = 1.0 / (1.0 - COLLINEAR**2)
+    by_all = variance_inflation(scaled) > largest_inflation
+    places = np.flatnonzero(in_pair | by_all).tolist()
+    return {kept[place] for place in places}
 
 
 def forward_selection(
@@ -170,220 +245,69 @@ def forward_selection(
     most : int, optional
         Terms at which to stop.
     """
-    features, targets, labels = _checked(X, y, names)
+    regression = _checked(X, y, names)
     check_number(tolerance, "tolerance", at_least=0.0)
-    rest = features / np.sqrt(np.mean(features**2, axis=0))
-    left = targets.copy()
-    chosen, path = list[int](), list[ReductionStep]()
-    while len(chosen) < min(most or len(labels), len(labels)):
-        size = np.einsum("ij,ij->j", rest, rest)
-        usable = (
-            size > len(targets) * JITTER
-        )  # what the terms before do not say already
-        if not usable.any():
+    order = _by_error_reduction(regression)
+    path = list[ReductionStep]()
+    explained = 0.0
+    for count, term in enumerate(order[: most or None], start=1):
+        name = regression.names[term]
+        path.append(regression.fitted(order[:count], name, explained))
+        explained = path[-1].r_squared
+
+    best = max(step.held_out for step in path)
+    near_best = [k for k, step in enumerate(path) if step.held_out >= best - tolerance]
+    return Reduction(tuple(path), near_best[0])
+
+
+def _by_error_reduction(regression: _Regression) -> list[int]:
+    """Terms in the order of what each explains of what those before it leave.
+
+    By orthogonal least squares; without terms that those before make up already.
+    """
+    rest = regression.features / column_rms(regression.features)
+    left = regression.targets.copy()
+    n_samples, n_terms = rest.shape
+    order = list[int]()
+    while len(order) < n_terms:
+        powers = np.sum(rest**2, axis=0)
+        independent = powers > n_samples * JITTER
+        if not independent.any():
             break
-        ratio = np.where(
-            usable, (rest.T @ left) ** 2 / np.where(usable, size, 1.0), -1.0
-        )
-        term = int(np.argmax(ratio))
-        direction = rest[:, term] / np.sqrt(size[term])
+
+        projections = rest.T @ left
+        ratios = np.full(n_terms, -1.0)
+        np.divide(projections**2, powers, out=ratios, where=independent)
+        term = int(np.argmax(ratios))
+        order.append(term)
+
+        direction = rest[:, term] / np.sqrt(powers[term])
         left = left - direction * (direction @ left)
         rest = rest - np.outer(direction, direction @ rest)
-        chosen.append(term)
-        before = path[-1].r_squared if path else 0.0
-        path.append(_step(features, targets, labels, chosen, labels[term], before))
-    best = max(step.held_out for step in path)
-    first = next(k for k, step in enumerate(path) if step.held_out >= best - tolerance)
-    return Reduction(tuple(path), first)
+    return order
 
 
-def reduce(
-    samples: Samples,
-    structure: Structure,
-    direction: str = "backward",
-    tolerance: float = 1e-3,
-) -> dict[str, Reduction]:
-    """Reduce each equation of a structure by elimination ("backward") or selection ("forward").
-
-    Returns the reductions by equation, with the coefficients of the features in SI
-    units; the tolerance is that of the held-out R2.
-    """
-    check_choice(direction, ("backward", "forward"), "direction")
-    run = backward_elimination if direction == "backward" else forward_selection
-    return {
-        q: run(
-            samples.features[q],
-            samples.targets[q],
-            structure.names(q),
-            tolerance=tolerance,
-        )
-        for q in structure.equations
-    }
-
-
-def reduced_structure(
-    structure: Structure, reductions: dict[str, Reduction], name: str
-) -> Structure:
-    """The structure, by a name of its own, with the terms that were chosen; register it to identify it.
-
-    Of forces, sway and yaw, which inertia couples, keep the terms that either needs.
-    """
-    kept = {
-        q: {
-            t.name
-            for t, label in zip(structure.terms(q), structure.names(q), strict=True)
-            if label in reductions[q].terms
-        }
-        for q in structure.equations
-    }
-    if structure.quantity == "force" and {"v", "r"} <= kept.keys():
-        kept["v"] = kept["r"] = kept["v"] | kept["r"]
-    equations = {
-        q: tuple(t for t in structure.terms(q) if t.name in kept[q])
-        for q in structure.equations
-    }
-    return replace(
-        structure, name=name, source=f"{structure.source}; reduced", equations=equations
-    )
-
-
-def table_of(model: ShipModel) -> Structure:
-    """The table of terms of a model; InputError for a ship with equations written by hand."""
-    if not isinstance(model.dynamics, Structure):
+def _checked(X: ArrayLike, y: ArrayLike, names: Sequence[str]) -> _Regression:
+    """The regression; InputError for shapes that do not fit and samples that say nothing."""
+    features, targets = np.asarray(X, dtype=float), np.asarray(y, dtype=float)
+    labels = list(names)
+    if features.ndim != 2 or (len(targets), len(labels)) != features.shape:
         raise InputError(
-            f"structure: {model.structure!r} found, expected a table of terms, as"
-            " 'abkowitz'"
+            "X, y, names: expected the shapes (n_samples, n_terms) and (n_samples,)"
+            f" and one name a term, got {features.shape}, {targets.shape} and"
+            f" {len(labels)} names"
         )
-    return model.table
-
-
-def sensitivity(
-    model: ShipModel, manoeuvre: Callable[[ShipModel], Trial], change: float = 0.01
-) -> dict[str, float]:
-    """Change of a simulated manoeuvre per per cent of each coefficient (Cao 2015).
-
-    Raises InputError for a ship with equations written by hand.
-
-    Parameters
-    ----------
-    model : ShipModel
-        With a table of terms.
-    manoeuvre : callable
-        Simulates it with a model, such as ``zigzag``.
-    change : float
-        Relative step to either side.
-
-    Returns
-    -------
-    dict of str to float
-        By coefficient, the largest first: root mean square change of u, v, r and psi,
-        each by its span, in per cent per per cent. Infinite where the changed ship runs
-        away.
-    """
-    check_number(change, "change", above=0.0, below=1.0)
-    table_of(model)
-    base = manoeuvre(model)
-    spans, found = (
-        {c: float(np.ptp(base[c])) for c in SENSED if np.ptp(base[c]) > 0.0},
-        {},
-    )
-    for name, value in model.coefficients.items():
-        try:
-            up, down = (
-                manoeuvre(
-                    replace(
-                        model, coefficients={**model.coefficients, name: value * factor}
-                    )
-                )
-                for factor in (1.0 + change, 1.0 - change)
-            )
-        except UnstableModelError:
-            found[name] = np.inf
-            continue
-        rows = min(len(up), len(down))
-        squares = [
-            np.mean((up[c][:rows] - down[c][:rows]) ** 2) / spans[c] ** 2 for c in spans
-        ]
-        found[name] = float(np.sqrt(np.mean(squares)) / (2.0 * change))
-    return dict(sorted(found.items(), key=lambda item: item[1], reverse=True))
-
-
-def _step(
-    features: Floats,
-    targets: Floats,
-    labels: Sequence[str],
-    kept: Sequence[int],
-    changed: str,
-    before: float,
-) -> ReductionStep:
-    from sklearn.model_selection import KFold, cross_val_predict
-
-    X, names = features[:, kept], tuple(labels[i] for i in kept)
-    estimator = TruncatedLSSVM(selection="full", fit_intercept=False).fit(X, targets)
-    left_out = targets - cross_val_predict(estimator, X, targets, cv=KFold(FOLDS))
-    deviation, size = np.sqrt(np.diag(estimator.covariance_)), np.abs(estimator.coef_)
-    relative = np.divide(
-        deviation, size, out=np.full(len(names), np.inf), where=size > 0.0
-    )
-    residual, power = targets - X @ estimator.coef_, float(targets @ targets)
-    r_squared, held_out = (1.0 - float(e @ e) / power for e in (residual, left_out))
-    coefficients, relative_errors = (
-        dict(zip(names, values.tolist(), strict=True))
-        for values in (estimator.coef_, relative)
-    )
-    explained = r_squared - before if changed else r_squared
-    return ReductionStep(
-        names, changed, coefficients, relative_errors, r_squared, held_out, explained
-    )
-
-
-def _collinear(features: Floats, kept: Sequence[int]) -> set[int]:
-    """Terms that others nearly make up, by pair or by variance inflation."""
-    scaled = features[:, kept] / np.sqrt(np.mean(features[:, kept] ** 2, axis=0))
-    correlation = scaled.T @ scaled / len(scaled)
-    pairs = np.abs(correlation - np.diag(np.diag(correlation))) > COLLINEAR
-    member = pairs.any(axis=0) | (
-        variance_inflation(scaled) > 1.0 / (1.0 - COLLINEAR**2)
-    )
-    return {i for i, yes in zip(kept, member.tolist(), strict=True) if yes}
-
-
-def _checked(
-    X: ArrayLike, y: ArrayLike, names: Sequence[str]
-) -> tuple[Floats, Floats, list[str]]:
-    features, targets, labels = (
-        np.asarray(X, dtype=float),
-        np.asarray(y, dtype=float),
-        list(names),
-    )
-    if (
-        features.ndim != 2
-        or targets.shape != features.shape[:1]
-        or len(labels) != features.shape[1]
-    ):
+    if not (np.isfinite(features).all() and np.isfinite(targets).all()):
         raise InputError(
-            f"X, y, names: shapes {features.shape}, {targets.shape} and {len(labels)}"
-            " names found, expected (n_samples, n_terms), (n_samples,) and one name a"
-            " term"
-        )
-    if not (np.all(np.isfinite(features)) and np.all(np.isfinite(targets))):
-        raise InputError(
-            "X, y: a value that is not finite found, expected numbers; repair the"
-            " samples first"
+            "X, y: expected numbers, got a value that is not finite; repair the samples"
+            " first"
         )
     if len(targets) < FOLDS * max(len(labels), 2):
         raise InputError(
-            f"X: {len(targets)} samples found for {len(labels)} terms, expected at"
-            f" least {FOLDS} times as many"
+            f"X: expected at least {FOLDS} times as many samples as terms, got"
+            f" {len(targets)} samples for {len(labels)} terms"
         )
-    silent = [
-        name
-        for name, column in zip(labels, features.T, strict=True)
-        if not column.any()
-    ]
-    if silent or not targets.any():
-        raise InputError(
-            f"X, y: {silent[0] if silent else 'y'} is 0 throughout, expected it to be"
-            " excited"
-        )
-    return features, targets, labels
+    for name, values in (*zip(labels, features.T, strict=True), ("y", targets)):
+        if not values.any():
+            raise InputError(f"X, y: expected {name} to be excited, got 0 throughout")
+    return _Regression(features, targets, labels)

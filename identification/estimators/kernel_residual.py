@@ -256,7 +256,7 @@ class _Search:
         blank = replace(
             self.blank,
             structure=table.name,
-            own_table=table,
+            dynamics=table,
             covariance=None,
             provenance=None,
             coefficients=dict.fromkeys(table.coefficient_names, 0.0),

@@ -147,7 +147,7 @@ def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Est
     """Estimators whose terms are held back by what they do in a hard turn.
 
     Ridge regression in which each feature is scaled by its size in a hard turn
-    (`guard.hard_turn_features`) over a window: the penalty falls on what is invisible
+    (`hard_turn.hard_turn_features`) over a window: the penalty falls on what is invisible
     in the data and large in the turn. Its strength is relative to the terms'
     contribution there.
     """

@@ -13,13 +13,13 @@ from identification.regression.rudder import estimated_gear
 from identification.regression.samples import Samples, build_samples
 from identification.regression.still_water import in_still_water
 from identification.regression.wind import constant_wind, with_constant_wind
-from identification.validation.diagnostics import check_samples, check_trials
+from identification.validation.checks import check_samples, check_trials
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.checks import check_choice, check_number
 from shipgym.ships import Envelope, Structure, Term, get_structure
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.mmg import MMG
-from shipgym.ships.structures import STRUCTURES, get_dynamics
+from shipgym.ships.structures import get_dynamics
 from shipgym.trials.identify_table import Options
 from shipgym.trials.scale import check_scale
 
@@ -131,15 +131,15 @@ def _blank(
     used: Sequence[Trial],
 ) -> ShipModel:
     """The model but for its coefficients, with the envelope of the trials behind it."""
-    names = (get_dynamics(MMG) if table is MMG_CHANNELS else table).coefficient_names
+    dynamics = get_dynamics(MMG) if table is MMG_CHANNELS else table
     return ShipModel(
         name=name,
         structure=table.name,
         particulars=ship,
         steering=gear,
         service_shaft_speed=shaft,
-        coefficients=dict.fromkeys(names, 0.0),
-        own_table=None if table.name in STRUCTURES or table is MMG_CHANNELS else table,
+        coefficients=dict.fromkeys(dynamics.coefficient_names, 0.0),
+        dynamics=dynamics,
         envelope=Envelope.from_samples(
             *(np.concatenate([t[c] for t in used]) for c in ENVELOPE_CHANNELS)
         ),

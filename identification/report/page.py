@@ -1,16 +1,14 @@
 """The report of an identification: one self-contained HTML page."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from identification.fit import Fit
-from identification.report.figures import coefficients_figure, regression_figures
+from identification.report.coefficient_figure import coefficients_figure
+from identification.report.figures import regression_figures
 from identification.report.view import fit_view, trial_figures
-from identification.validation.warnings import (
-    held_out_error,
-    undetermined,
-    why_unstable,
-)
-from shipgym.pages import render
+from identification.validation.warnings import why_unstable
+from shipgym.pages import NONE, render
 
 
 def report_page(fit: Fit) -> str:
@@ -22,14 +20,33 @@ def report_page(fit: Fit) -> str:
     instability = why_unstable(fit)
     figures: dict[str, Any] = {"regression": regression_figures(fit)}
     if instability is None:
-        figures |= {"coefficients": coefficients_figure(fit), **trial_figures(fit)}
+        figures["coefficients"] = coefficients_figure(fit)
+        figures |= trial_figures(fit)
     return render(
         "identification.report/report.html",
         name=fit.model.particulars.name or fit.model.name,
         fit=fit_view(fit),
         figures=figures,
         instability=instability,
-        held_out=held_out_error(fit),
-        undetermined=undetermined(fit),
-        settings=fit.settings,
+        settings=settings_rows(fit.settings),
+        trials=fit.settings["trials"],
     )
+
+
+def settings_rows(settings: Mapping[str, Any]) -> dict[str, str]:
+    """Arguments of `identify` in words, without those that have tables of their own."""
+    shown_elsewhere = ("trials", "particulars", "steering")
+    rows = {}
+    for name, value in settings.items():
+        if value is not None and name not in shown_elsewhere:
+            rows[name.replace("_", " ")] = setting_text(value)
+    return rows
+
+
+def setting_text(value: Any) -> str:
+    """A setting in words."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list | tuple):
+        return ", ".join(str(item) for item in value) or NONE
+    return str(value)

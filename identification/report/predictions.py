@@ -23,70 +23,72 @@ def overview_figure(
     """
     if not all("psi" in trial and "delta" in trial for trial in trials):
         return None
-    shown = []
-    for trial in trials:
-        start, found = trial["psi"][0], predictions.get(trial.name)
-        lines = [
-            line(trial.t, np.degrees(trial["delta"]), "rudder", RUDDER, 1.2),
-            line(
-                trial.t,
-                np.degrees(trial["psi"] - start),
-                "heading change, measured",
-                MEASURED,
-                1.5,
-            ),
-        ]
-        if found is not None:
-            lines.append(
-                line(
-                    found.t,
-                    np.degrees(found["psi"] - start),
-                    "heading change, model",
-                    MODEL,
-                )
-            )
-        shown.append(Panel(lines, "time, s", "deg", PurePath(trial.name).name))
-    return panels(shown, 230 * -(-len(shown) // 2) + 80, 2, outer=True)
+    shown = [_overview_panel(trial, predictions.get(trial.name)) for trial in trials]
+    rows = -(-len(shown) // 2)  # rounded up
+    return panels(shown, 230 * rows + 80, 2, outer=True)
+
+
+def _overview_panel(trial: Trial, predicted: Trial | None) -> Panel:
+    first = trial["psi"][0]
+    rudder = np.degrees(trial["delta"])
+    measured = np.degrees(trial["psi"] - first)
+    lines = [
+        line(trial.t, rudder, "rudder", RUDDER, 1.2),
+        line(trial.t, measured, "heading change, measured", MEASURED, 1.5),
+    ]
+    if predicted is not None:
+        change = np.degrees(predicted["psi"] - first)
+        lines.append(line(predicted.t, change, "heading change, model", MODEL))
+    return Panel(lines, "time, s", "deg", PurePath(trial.name).name)
 
 
 def prediction_figure(measured: Trial, predicted: Trial | None) -> Figure:
     """A recorded trial and its open-loop prediction: five channels and the path."""
     shown = []
-    for k, channel in enumerate(("psi", "r", "u", "v", "delta")):
+    for channel in ("psi", "r", "u", "v"):
         title, factor = CHANNEL_AXES[channel]
-        given = channel == "delta"
-        lines = [
-            line(run.t, factor * run[channel], *style)
-            for run, *style in _runs(measured, None if given else predicted)
-            if channel in measured.channels
-        ]
-        shown.append(
-            Panel(
-                lines,
-                "time, s" if k > 2 else "",
-                "rudder (given), deg" if given else title,
-            )
-        )
+        lines = _channel_lines(measured, predicted, channel, factor)
+        shown.append(Panel(lines, "", title))
+    _, degrees = CHANNEL_AXES["delta"]
+    rudder = _channel_lines(measured, None, "delta", degrees)
+    shown.append(Panel(rudder, "time, s", "rudder (given), deg"))
+    shown[3] = shown[3]._replace(x="time, s")  # of what stands in the last rows
     if {"x", "y"} <= measured.channels.keys():
-        shown.append(_paths(measured, predicted))
+        shown.append(_path_panel(measured, predicted))
     return panels(shown, 600, 2, grid={"vertical_spacing": 0.1}, hovermode="closest")
 
 
-def _runs(measured: Trial, predicted: Trial | None) -> list[tuple[Any, ...]]:
-    """Each with its name, colour and width of line."""
-    ours = [] if predicted is None else [(predicted, "predicted", MODEL, 2.0)]
-    return [(measured, "measured", MEASURED, 1.3), *ours]
+def _channel_lines(
+    measured: Trial, predicted: Trial | None, channel: str, factor: float
+) -> list[Any]:
+    """A channel over time, in the unit of its axis; none where it was not measured."""
+    if channel not in measured.channels:
+        return []
+    lines = [
+        line(measured.t, factor * measured[channel], "measured", MEASURED, 1.3),
+    ]
+    if predicted is not None:
+        values = factor * predicted[channel]
+        lines.append(line(predicted.t, values, "predicted", MODEL, 2.0))
+    return lines
 
 
-def _paths(measured: Trial, predicted: Trial | None) -> Panel:
+def _path_panel(measured: Trial, predicted: Trial | None) -> Panel:
     """The paths along and across the first course; a turning circle to one scale."""
-    start, turning, lines = measured["psi"][:1], measured.kind == "turning-circle", []
-    for run, *style in _runs(measured, predicted):
-        way = rotate_to_body(
-            run["x"] - measured["x"][0], run["y"] - measured["y"][0], start
-        )
-        lines.append(line(*(way[::-1] if turning else way), *style))
-    ahead, aside = "along the first course, m", "to starboard, m"
+    turning = measured.kind == "turning-circle"
+    runs = [(measured, "measured", MEASURED, 1.3)]
+    if predicted is not None:
+        runs.append((predicted, "predicted", MODEL, 2.0))
+
+    lines = []
+    for run, name, colour, width in runs:
+        north = run["x"] - measured["x"][0]
+        east = run["y"] - measured["y"][0]
+        ahead, aside = rotate_to_body(north, east, measured["psi"][:1])
+        x, y = (aside, ahead) if turning else (ahead, aside)
+        lines.append(line(x, y, name, colour, width))
+
+    along, across = "along the first course, m", "to starboard, m"
     if turning:
-        return Panel(lines, aside, axis(ahead, scaleanchor="x6", scaleratio=1))
-    return Panel(lines, ahead, axis(aside, autorange="reversed"))
+        return Panel(lines, across, axis(along, scaleanchor="x6", scaleratio=1))
+    return Panel(lines, along, axis(across, autorange="reversed"))

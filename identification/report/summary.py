@@ -1,5 +1,6 @@
 """The table of coefficients that `IdentificationResult.summary` prints."""
 
+from collections.abc import Mapping
 from math import degrees
 from typing import Any
 
@@ -16,91 +17,99 @@ from identification.validation.warnings import (
 from shipgym import ShipModel
 from shipgym.ships.particulars import ADDED_MASSES
 
-INERTIA = ("mass", "xg", "yaw_gyradius", "speed")
 PRIME = 1e-5
 
 
 def summary_table(fit: Fit) -> str:
     """Coefficients with standard error and t, inertia with what was estimated, and the verdict."""
-    verdict = (
-        "stable"
-        if fit.stable
-        else "NOT STABLE: its predictions run away and are not to be used"
-    )
     provenance = fit.model.provenance or {}
+    kernel = provenance.get("kernel")
     shown = [
-        (
-            f"{fit.model.name}: {provenance.get('structure')} by"
-            f" {provenance.get('method')}, {provenance.get('samples')} samples;"
-            f" {verdict} ({provenance.get('guard', {}).get('decision')})"
-        ),
-        (
-            kernel_text(provenance["kernel"])
-            if "kernel" in provenance
-            else _coefficients(fit)
-        ),
+        _headline(fit),
+        kernel_text(kernel) if kernel else coefficients_table(fit),
         _inertia(fit),
         _equations(fit),
     ]
-    if "model_error" in provenance:
-        error = provenance["model_error"]
+    error = provenance.get("model_error")
+    if error:
         shown.append(
             f"Standard errors are scaled by {error['factor']:.2g} for model error"
             f" ({error['how']})."
         )
     shown += sea_sentences(provenance) + undetermined(fit) + exactly_collinear(fit)
-    return as_text(
-        *shown, *([_against_reference(fit)] if "reference" in fit.metrics else [])
+    if "reference" in fit.metrics:
+        shown.append(_against_reference(fit))
+    return as_text(*shown)
+
+
+def _headline(fit: Fit) -> str:
+    provenance = fit.model.provenance or {}
+    verdict = "NOT STABLE: its predictions run away and are not to be used"
+    if fit.stable:
+        verdict = "stable"
+    decision = provenance.get("guard", {}).get("decision")
+    return (
+        f"{fit.model.name}: {provenance.get('structure')} by"
+        f" {provenance.get('method')}, {provenance.get('samples')} samples;"
+        f" {verdict} ({decision})"
     )
 
 
-def kernel_text(report: dict[str, Any]) -> str:
+def kernel_text(report: Mapping[str, Any]) -> str:
     """What was added to the reference ship, whose weights tell a reader nothing."""
-    errors = report["heading_errors_held_out"].items()
-    told = [
-        f"{name} " + ("ran away" if e is None else f"{degrees(e):.2g} deg")
-        for name, e in errors
-    ]
+    errors = []
+    for name, error in report["heading_errors_held_out"].items():
+        errors.append(f"{name} {_heading_error(error, '.2g', ' deg')}")
     return (
         f"Kernel: {report['centres']} radial basis functions of length"
         f" {report['length']:g} in {report['features']} features an equation, C"
-        f" {report['C']:g}; heading held out, rms: {', '.join(told)}"
+        f" {report['C']:g}; heading held out, rms: {', '.join(errors)}"
     )
+
+
+def _heading_error(error: float | None, digits: str, unit: str = "") -> str:
+    """An error of the heading, rad, in degrees."""
+    return "ran away" if error is None else f"{degrees(error):{digits}}{unit}"
 
 
 def are_derivatives(model: ShipModel) -> bool:
     """Whether coefficients are hydrodynamic derivatives in the prime system, printed times 1e-5."""
-    return (model.dynamics.normalisation, model.dynamics.quantity) == ("prime", "force")
+    dynamics = model.dynamics
+    return (dynamics.normalisation, dynamics.quantity) == ("prime", "force")
 
 
-def _coefficients(fit: Fit) -> Table:
-    structure = fit.model.dynamics
-    title, unit = (
-        f"Coefficients of {structure.quantity}s, {structure.normalisation} units",
-        1.0,
-    )
-    if are_derivatives(fit.model):
-        title, unit = "Hydrodynamic derivatives, prime system, 1e-5", PRIME
+def coefficients_table(fit: Fit) -> Table:
+    """Coefficients with standard error and t."""
+    dynamics = fit.model.dynamics
+    derivatives = are_derivatives(fit.model)
+    title = f"Coefficients of {dynamics.quantity}s, {dynamics.normalisation} units"
+    if derivatives:
+        title = "Hydrodynamic derivatives, prime system, 1e-5"
     table = lined_table(title, "name", ">value", ">standard error", ">t")
     for name, error in fit.standard_errors.items():
         value = fit.coefficients[name]
         t = f"{value / error:.1f}" if error > 0.0 else "-"
-        shown = f"{value / unit:.2f}" if unit == PRIME else f"{value:.6g}"
-        table.add_row(name, shown, f"{error / unit:.2g}", t)
+        if derivatives:
+            table.add_row(name, f"{value / PRIME:.2f}", f"{error / PRIME:.2g}", t)
+        else:
+            table.add_row(name, f"{value:.6g}", f"{error:.2g}", t)
     return table
 
 
 def _inertia(fit: Fit) -> Table:
-    ship = fit.model.particulars
+    ship, gear = fit.model.particulars, fit.model.steering
     table = lined_table("Inertia and service speed", "name", ">value", "unit", "source")
     units = {"mass": "kg", "xg": "m", "yaw_gyradius": "m", "speed": "m/s"}
-    for name in INERTIA + ADDED_MASSES:
-        if ship[name] is None:  # not needed by a structure of accelerations
+    units |= dict.fromkeys(ADDED_MASSES, "1e-5")
+    for name, unit in units.items():
+        value = ship[name]
+        if value is None:  # not needed by a structure of accelerations
             continue
-        value = ship[name] / PRIME if name in ADDED_MASSES else ship[name]
+        if name in ADDED_MASSES:
+            value = value / PRIME
         source = "estimated" if name in ship.estimated else "given"
-        table.add_row(name, f"{value:.6g}", units.get(name, "1e-5"), source)
-    gear = fit.model.steering
+        table.add_row(name, f"{value:.6g}", unit, source)
+
     source = (fit.model.provenance or {}).get("steering", "given")
     table.add_row("rudder limit", f"{gear.rudder_limit_deg:.4g}", "deg", source)
     table.add_row("rudder rate", f"{gear.rudder_rate_deg_s:.4g}", "deg/s", source)
@@ -109,18 +118,26 @@ def _inertia(fit: Fit) -> Table:
 
 
 def _equations(fit: Fit) -> Table:
-    headings = ("rows", "terms", "rank", "condition", "R2", "residual rms")
     table = lined_table(
-        "Fit of the equations", "equation", *(f">{heading}" for heading in headings)
+        "Fit of the equations",
+        "equation",
+        ">rows",
+        ">terms",
+        ">rank",
+        ">condition",
+        ">R2",
+        ">residual rms",
     )
-    for name, found in fit.diagnostics.items():
-        counts = (str(count) for count in (found.samples, found.terms, found.rank))
-        quality = (
-            f"{found.condition_number:.0f}",
-            f"{found.r_squared:.5f}",
-            f"{found.residual_rms:.2e}",
+    for name, equation in fit.diagnostics.items():
+        table.add_row(
+            EQUATIONS.get(name, name),
+            str(equation.samples),
+            str(equation.terms),
+            str(equation.rank),
+            f"{equation.condition_number:.0f}",
+            f"{equation.r_squared:.5f}",
+            f"{equation.residual_rms:.2e}",
         )
-        table.add_row(EQUATIONS.get(name, name), *counts, *quality)
     return table
 
 
@@ -133,9 +150,8 @@ def _against_reference(fit: Fit) -> Table:
     )
     table = lined_table(title, "trial", "use", ">model, deg", ">reference, deg")
     for name, metrics in fit.metrics["trials"].items():
-        errors = (
-            found["rmse"]["psi"] for found in (metrics, reference["trials"][name])
-        )
-        shown = ("ran away" if e is None else f"{degrees(e):.2f}" for e in errors)
-        table.add_row(name, metrics["use"], *shown)
+        own = metrics["rmse"]["psi"]
+        bare = reference["trials"][name]["rmse"]["psi"]
+        errors = [_heading_error(error, ".2f") for error in (own, bare)]
+        table.add_row(name, metrics["use"], *errors)
     return table

@@ -9,15 +9,45 @@ even keel, prime system by rho L^2 U^2 / 2 and rho L^3 U^2 / 2.
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from shipgym import InputError, Particulars
 from shipgym.arrays import Flags, Floats
-from shipgym.ships.term_table import Structure, inertia
+from shipgym.ships.prime_inertia import prime_inertia
+from shipgym.ships.term_table import Structure
 from shipgym.ships.terms import Term
 
-LINEAR_SYMBOLS = ("v", "r", "delta")
+#: Powers of speed U and length L in a linear acceleration of sway, rate * U^i L^j:
+#: those of a term in v (by v/U), r (by r L/U) and delta. Yaw has one length less.
+LINEAR_POWERS = {"v": (1, -1), "r": (1, 0), "delta": (2, -1)}
+
+
+class MainDimensions(NamedTuple):
+    """Main dimensions of a hull, by the symbols of the formulas."""
+
+    L: float  # length between perpendiculars, m
+    B: float  # beam, m
+    T: float  # draught, m
+    C_b: float  # block coefficient
+
+
+class FormulaCoefficients(NamedTuple):
+    """Coefficients of one equation, as far as formulas give them."""
+
+    values: Floats  # SI units, 0 where they give none, shape (n_terms,)
+    known: Flags  # those that they give, shape (n_terms,)
+
+
+def main_dimensions(ship: Particulars) -> MainDimensions:
+    """Main dimensions of a ship; InputError where one of them is not known."""
+    return MainDimensions(
+        L=ship.length,
+        B=ship.require("beam"),
+        T=ship.require("draught"),
+        C_b=ship.require("block_coefficient"),
+    )
 
 
 def clarke_derivatives(particulars: Particulars) -> dict[str, float]:
@@ -27,16 +57,18 @@ def clarke_derivatives(particulars: Particulars) -> dict[str, float]:
     N_delta of the hydrodynamic forces alone, without the ship's own inertia; rudder
     positive to starboard.
     """
-    L, B, T, full = main_dimensions(particulars)
-    slender, flat, shallow = B / L, B / T, T / L
-    scale = -math.pi * shallow**2
-    return {
-        "Y_v": scale * (1.0 + 0.40 * full * flat),
-        "Y_r": scale * (-0.5 + 2.2 * slender - 0.080 * flat),
-        "N_v": scale * (0.5 + 2.4 * shallow),
-        "N_r": scale * (0.25 + 0.039 * flat - 0.56 * slender),
-        **_rudder(particulars),
+    L, B, T, C_b = main_dimensions(particulars)
+    B_T = B / T
+    B_L = B / L
+    T_L = T / L
+    scale = -math.pi * T_L**2
+    hull = {
+        "Y_v": scale * (1.0 + 0.40 * C_b * B_T),
+        "Y_r": scale * (-0.5 + 2.2 * B_L - 0.080 * B_T),
+        "N_v": scale * (0.5 + 2.4 * T_L),
+        "N_r": scale * (0.25 + 0.039 * B_T - 0.56 * B_L),
     }
+    return hull | _rudder_derivatives(particulars)
 
 
 def kijima_derivatives(particulars: Particulars) -> dict[str, float]:
@@ -45,36 +77,24 @@ def kijima_derivatives(particulars: Particulars) -> dict[str, float]:
     Arguments and result as in `clarke_derivatives`. Kijima's beta is -v/U, and his Y_r
     comes less the mass and added mass in surge, which is added here.
     """
-    p = particulars
-    L, B, T, full = main_dimensions(p)
-    slender, by_length = (
-        B / L,
-        T / L,
-    )  # the latter from rho L T U^2 / 2 to rho L^2 U^2 / 2
-    k = 2.0 * by_length
-    return {
-        "Y_v": -by_length * (0.5 * math.pi * k + 1.4 * full * slender),
-        "Y_r": -by_length * 1.5 * full * slender + p.mass_prime - p.require("X_udot"),
-        "N_v": -by_length * k,
-        "N_r": by_length * (k**2 - 0.54 * k),
-        **_rudder(p),
+    L, B, T, C_b = main_dimensions(particulars)
+    B_L = B / L
+    T_L = T / L  # from rho L T U^2 / 2 to rho L^2 U^2 / 2
+    k = 2.0 * T_L
+    m, X_udot = particulars.mass_prime, particulars.require("X_udot")
+    hull = {
+        "Y_v": -T_L * (0.5 * math.pi * k + 1.4 * C_b * B_L),
+        "Y_r": -T_L * 1.5 * C_b * B_L + m - X_udot,
+        "N_v": -T_L * k,
+        "N_r": T_L * (k**2 - 0.54 * k),
     }
+    return hull | _rudder_derivatives(particulars)
 
 
-def main_dimensions(ship: Particulars) -> tuple[float, float, float, float]:
-    """Length, beam and draught, m, and block coefficient."""
-    return (
-        ship.length,
-        ship.require("beam"),
-        ship.require("draught"),
-        ship.require("block_coefficient"),
-    )
-
-
-def _rudder(p: Particulars) -> dict[str, float]:
+def _rudder_derivatives(p: Particulars) -> dict[str, float]:
     """Clarke et al. 1983: Y_delta of 3 A / L^2 half a length aft; starboard moves the stern to port."""
-    Y = -3.0 * p.require("rudder_area") / p.length**2
-    return {"Y_delta": Y, "N_delta": -0.5 * Y}
+    Y_delta = -3.0 * p.require("rudder_area") / p.length**2
+    return {"Y_delta": Y_delta, "N_delta": -0.5 * Y_delta}
 
 
 FORMULAS: dict[str, Callable[[Particulars], dict[str, float]]] = {
@@ -85,66 +105,90 @@ FORMULAS: dict[str, Callable[[Particulars], dict[str, float]]] = {
 
 def formula_coefficients(
     formula: str, structure: Structure, particulars: Particulars
-) -> dict[str, tuple[Floats, Flags]]:
-    """Coefficients of the SI features of a structure, as far as formulas give them.
+) -> dict[str, FormulaCoefficients]:
+    """Coefficients of the SI features of a structure by equation, as far as formulas give them.
 
     `formula`: which, one of `clarke`, `kijima`; `structure`: with sway and yaw, and
     terms in v, r and delta alone, or times powers of the speed; `particulars`: mass and
-    added mass are estimated where absent. Returns for each equation the coefficients,
-    and which of them the formulas give; the others are zero, shape (n_terms,). Raises
-    InputError for a structure that the formulas do not cover, and for particulars that
-    do not suffice.
+    added mass are estimated where absent. Raises InputError for a structure that the
+    formulas do not cover, and for particulars that do not suffice.
     """
     ship = particulars.completed()
-    found = {
+    symbols = {
         q: [_linear_symbol(term) for term in terms]
         for q, terms in structure.equations.items()
     }
-    if not all(set(LINEAR_SYMBOLS) <= set(found.get(q, ())) for q in "vr"):
-        raise InputError(
-            f"prior: {formula!r} found with structure {structure.name!r}, for which the"
-            " formulas give no coefficients: they are those of the terms v, r and"
-            " delta in sway and yaw; choose another structure, such as 'abkowitz' or"
-            " 'steering7', or a reference ship as prior"
-        )
-    rates = dict(
-        zip(
-            LINEAR_SYMBOLS, _accelerations(FORMULAS[formula](ship), ship).T, strict=True
-        )
-    )
-    speed, length = ship.require("speed"), ship.length
+    _check_covered(formula, structure, symbols)
+    accelerations = _linear_accelerations(FORMULAS[formula](ship), ship)
+
     coefficients = {}
     for q, terms in structure.equations.items():
-        values, known = np.zeros(len(terms)), np.zeros(len(terms), dtype=bool)
-        for i, (term, symbol) in enumerate(zip(terms, found[q], strict=True)):
-            if q == "u" or symbol is None:
-                continue
-            # acceleration = rate * (v/U, r L/U or delta) * U^2/L, yaw by another L;
-            # whatever power of U the feature lacks is that of service speed
-            speeds = {"v": 1, "r": 1, "delta": 2}[symbol]
-            lengths = {"v": -1, "r": 0, "delta": -1}[symbol] - (1 if q == "r" else 0)
-            carried = structure.speed_power(q, term) + sum(
-                p for s, p in term.powers if s in ("U", "u")
-            )
-            rate = rates[symbol][0 if q == "v" else 1]
-            values[i] = (
-                rate * speed ** float(speeds - carried) * length ** float(lengths)
-            )
-            known[i] = True
-        coefficients[q] = (values, known)
+        values = np.zeros(len(terms))
+        known = np.zeros(len(terms), dtype=bool)
+        for i, (term, symbol) in enumerate(zip(terms, symbols[q], strict=True)):
+            if q in accelerations and symbol is not None:
+                scale = _feature_scale(structure, q, term, symbol, ship)
+                values[i] = accelerations[q][symbol] * scale
+                known[i] = True
+        coefficients[q] = FormulaCoefficients(values, known)
     return coefficients
 
 
-def _accelerations(derivatives: dict[str, float], ship: Particulars) -> Floats:
-    """Sway and yaw acceleration by v, r and delta, prime system, shape (2, 3)."""
-    forces = np.array(
-        [[derivatives[f"{force}_{s}"] for s in LINEAR_SYMBOLS] for force in "YN"]
+def _check_covered(
+    formula: str, structure: Structure, symbols: dict[str, list[str | None]]
+) -> None:
+    """Refuse a structure whose equations of sway and yaw lack a linear term."""
+    if all(set(LINEAR_POWERS) <= set(symbols.get(q, ())) for q in "vr"):
+        return
+    raise InputError(
+        f"prior: expected a structure with the terms v, r and delta in sway and yaw,"
+        f" for which formula {formula!r} gives coefficients, got"
+        f" {structure.name!r}; choose 'abkowitz' or 'steering7', or a reference ship"
+        " as prior"
     )
-    forces[:, 1] -= [
-        ship.mass_prime,
-        ship.mass_prime * ship.xg_prime,
-    ]  # turning with the body's axes
-    return np.linalg.solve(inertia(ship)[1:, 1:], forces)
+
+
+def _linear_accelerations(
+    derivatives: dict[str, float], ship: Particulars
+) -> dict[str, dict[str, float]]:
+    """Sway and yaw acceleration by v, r and delta, prime system."""
+    m, x_G = ship.mass_prime, ship.xg_prime
+    sway_and_yaw = slice(1, 3)
+    mass = prime_inertia(ship)[sway_and_yaw, sway_and_yaw]
+
+    accelerations: dict[str, dict[str, float]] = {"v": {}, "r": {}}
+    for symbol in LINEAR_POWERS:
+        force = derivatives[f"Y_{symbol}"]
+        moment = derivatives[f"N_{symbol}"]
+        if symbol == "r":  # the axes turn with the body
+            force -= m
+            moment -= m * x_G
+        sway, yaw = np.linalg.solve(mass, [force, moment])
+        accelerations["v"][symbol] = float(sway)
+        accelerations["r"][symbol] = float(yaw)
+    return accelerations
+
+
+def _feature_scale(
+    structure: Structure, q: str, term: Term, symbol: str, ship: Particulars
+) -> float:
+    """Factor from the prime system to a coefficient of the SI feature of a linear term.
+
+    Whatever power of the speed the feature lacks is that of the service speed.
+    """
+    speeds, lengths = LINEAR_POWERS[symbol]
+    if q == "r":
+        lengths -= 1
+
+    speeds_in_feature = structure.speed_power(q, term)
+    for factor, power in term.powers:
+        if factor in ("U", "u"):
+            speeds_in_feature += power
+
+    speed = ship.require("speed")
+    return float(
+        speed ** float(speeds - speeds_in_feature) * ship.length ** float(lengths)
+    )
 
 
 def _linear_symbol(term: Term) -> str | None:
@@ -152,4 +196,7 @@ def _linear_symbol(term: Term) -> str | None:
     others = [
         (symbol, power) for symbol, power in term.powers if symbol not in ("u", "U")
     ]
-    return next((symbol for symbol in LINEAR_SYMBOLS if others == [(symbol, 1)]), None)
+    for symbol in LINEAR_POWERS:
+        if others == [(symbol, 1)]:
+            return symbol
+    return None

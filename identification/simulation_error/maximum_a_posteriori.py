@@ -1,90 +1,50 @@
-"""The coefficients of the MMG form that trials and prior make most probable, by simulation error in segments.
+"""The coefficients of the MMG form that trials and prior make most probable.
 
-The cost is that of the simulated states in segments back to back, each started from the
-smoothed measurement, by their own scatter, plus the squared distance from the prior
-(Maine & Iliff 1985, NASA RP-1138, 2.5, output error with prior). How much narrower the
-prior is made, the trials decide, each predicted from the others.
+How much narrower the prior is made, the trials decide, each predicted from the others.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 
+from identification.arrays import by_name
 from identification.options import Options, name_of
 from identification.regression.problem import Problem
-from identification.simulation_error.mmg_prior import YOSHIMURA, MMGPrior, mmg_prior
-from identification.simulation_error.segments import (
-    Segment,
-    channel_units,
-    compared_channels,
-    cut,
-    sailed,
-)
-from shipgym import InputError, ShipModel, Trial
-from shipgym.arrays import Floats, Integers
+from identification.simulation_error.hull_formulas import YOSHIMURA
+from identification.simulation_error.mmg_prior import MMGPrior, mmg_prior
+from identification.simulation_error.posterior import Estimate, HeldOutError, Posterior
+from shipgym import InputError, ShipModel
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
-from shipgym.engine.motion import Ship
-from shipgym.engine.records import LANES
 from shipgym.ships.mmg import IDENTIFIED
 
-MAP, DEFAULT_METHOD = "map", Options.method
-SEGMENT_LENGTHS, INTERVAL = (
-    1.7,
-    0.067,
-)  # of segments, and between samples, ship lengths at service speed
-CORRELATED = 1.0  # ship lengths, over which errors are one error
-FLOORS = {
-    "u": 0.0017,
-    "v": 0.0017,
-    "r": 0.0021,
-    "psi": np.radians(0.1),
-}  # by U0, U0, U0 / L, 1
-STRENGTHS = (1.0, 2.0, 3.0)  # of the prior: its deviations divided by it
-MARGIN = 0.1  # by which the error held out may exceed the least for a stronger prior
-STEPS_HELD_OUT = 2  # of Gauss-Newton, from the fit of all trials to that of some
-STEP = 1e-4  # of finite differences, standard deviations of the prior
-MOST_GROUPS, PIECES = 5, 3  # groups of trials held out; pieces of a single trial
-LARGEST = 1e3  # residual of a ship that runs away, in scales
-
-
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """What a fit found."""
-
-    # coefficients in standard deviations of the prior from its mean, shape (41,)
-    z: Floats
-    scales: Floats  # of the residuals by channel
-    strength: float  # of the prior
-    covariance: Floats  # of z, Gauss-Newton
-    evaluations: int
+MAP = "map"  # the method's name
 
 
 def checked_mmg(options: Options) -> Options:
     """The options of an identification of the MMG form; InputError for those that it does not have."""
     method = name_of(options.method)
-    if method not in (MAP, DEFAULT_METHOD):
+    if method not in (MAP, Options.method):
         raise InputError(
-            f"method: {method!r} found with structure 'mmg', which is not linear in its"
-            " coefficients: it is fitted by simulation error with a prior; leave the"
-            " method out, or choose another structure"
+            f"method: expected none with structure 'mmg', got {method!r}; it is not"
+            " linear in its coefficients and is fitted by simulation error with a"
+            " prior: leave the method out, or choose another structure"
         )
-    others = [
-        *options.settings(),
-        *(["uncertainty"] if options.uncertainty != Options.uncertainty else []),
-    ]
+    others = list(options.settings())
+    if options.uncertainty != Options.uncertainty:
+        others.append("uncertainty")
     if others:
         raise InputError(
-            f"settings: {', '.join(others)} found, which structure 'mmg' does not know;"
+            f"settings: expected those of structure 'mmg', got {', '.join(others)};"
             " leave them out, or choose another structure"
         )
     if options.prior is not None and options.reference_model is not None:
         raise InputError(
-            f"reference_model: {name_of(options.reference_model)!r} found together with"
-            f" prior {name_of(options.prior)!r}, expected one of them: the coefficients"
-            " of structure 'mmg' are pulled to one reference ship, or to formulas"
+            "reference_model: expected it without prior, got"
+            f" {name_of(options.reference_model)!r} and prior"
+            f" {name_of(options.prior)!r}; the coefficients of structure 'mmg' are"
+            " pulled to one reference ship, or to formulas"
         )
     return replace(options, method=MAP)
 
@@ -98,216 +58,77 @@ def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, An
     2, 3 whose error, each trial predicted from the others, is within a tenth of the
     least.
     """
-    prior = mmg_prior(
-        options.reference_model or options.prior or YOSHIMURA, problem.blank.particulars
-    )
-    given = options.prior_strength
-    if given is not None:
-        check_number(given, "prior_strength", above=0.0)
-    strengths = STRENGTHS if given is None else (given,)
-    cost = _Problem(replace(problem.blank, particulars=prior.ship), problem.used, prior)
-    estimates, z = list[Estimate](), np.zeros(len(IDENTIFIED))
-    for strength in strengths:
-        estimates.append(cost.solve(z, strength))
-        z = estimates[-1].z
-    errors, factors = zip(
-        *(cost.held_out(one, estimates[0].scales) for one in estimates), strict=True
-    )
-    chosen = max(
-        k for k, error in enumerate(errors) if error <= (1.0 + MARGIN) * min(errors)
-    )
-    best, factor = estimates[chosen], factors[chosen]
-    told = {
-        "similarity": dict(prior.similarity or {}),
-        "prior_remarks": list(prior.remarks),
-    }
-    report = {
-        "prior": prior.source,
-        **{name: value for name, value in told.items() if value},
+    blank = problem.blank
+    source = options.reference_model or options.prior or YOSHIMURA
+    prior = mmg_prior(source, blank.particulars)
+    posterior = Posterior(replace(blank, particulars=prior.ship), problem.used, prior)
+    estimates = list[Estimate]()
+    z = np.zeros(len(IDENTIFIED))
+    for strength in _strengths(options):
+        estimate = posterior.most_probable(z, strength)
+        estimates.append(estimate)
+        z = estimate.z
+
+    scales = estimates[0].scales
+    held_out = [posterior.held_out(estimate, scales) for estimate in estimates]
+    chosen = strongest_as_good([one.error for one in held_out])
+    best, factor = estimates[chosen], held_out[chosen].factor
+
+    covariance = _coefficient_covariance(prior, factor**2 * best.covariance)
+    model = replace(posterior.model(best.z), covariance=covariance)
+    return model, _report(posterior, estimates, held_out, chosen)
+
+
+def _strengths(options: Options) -> tuple[float, ...]:
+    """Strengths of the prior to choose from, or the one that was given."""
+    if options.prior_strength is None:
+        return 1.0, 2.0, 3.0
+    check_number(options.prior_strength, "prior_strength", above=0.0)
+    return (options.prior_strength,)
+
+
+def strongest_as_good(errors: list[float]) -> int:
+    """The last of errors in the order of the strengths that is within a tenth of the least."""
+    largest = 1.1 * min(errors)
+    as_good = [k for k, error in enumerate(errors) if error <= largest]
+    return as_good[-1]
+
+
+def _coefficient_covariance(prior: MMGPrior, covariance: Floats) -> Floats:
+    """Covariance of all coefficients from that of z; of those known beforehand it is 0."""
+    whole = np.zeros((len(prior.mean), len(prior.mean)))
+    identified = slice(len(IDENTIFIED))
+    units = np.outer(prior.deviation, prior.deviation)
+    whole[identified, identified] = covariance * units
+    return whole
+
+
+def _report(
+    posterior: Posterior,
+    estimates: list[Estimate],
+    held_out: list[HeldOutError],
+    chosen: int,
+) -> dict[str, Any]:
+    """For the provenance."""
+    prior, best = posterior.prior, estimates[chosen]
+    report: dict[str, Any] = {"prior": prior.source}
+    if prior.similarity:
+        report["similarity"] = dict(prior.similarity)
+    if prior.remarks:
+        report["prior_remarks"] = list(prior.remarks)
+
+    errors = dict[str, float]()
+    for estimate, found in zip(estimates, held_out, strict=True):
+        errors[f"{estimate.strength:g}"] = found.error
+    return report | {
         "prior_strength": best.strength,
-        "errors_held_out": {
-            f"{e.strength:g}": error for e, error in zip(estimates, errors, strict=True)
-        },
+        "errors_held_out": errors,
         "model_error": {
-            "factor": factor,
+            "factor": held_out[chosen].factor,
             "how": "simulated segments of trials left out in turn",
         },
-        "segments": len(cost.segments),
+        "segments": len(posterior.segments),
         "evaluations": sum(one.evaluations for one in estimates),
-        "residual_rms": dict(zip(cost.channels, best.scales.tolist(), strict=True)),
-        "deviations_from_prior": dict(
-            zip(IDENTIFIED, best.z.round(3).tolist(), strict=True)
-        ),
+        "residual_rms": by_name(posterior.channels, best.scales),
+        "deviations_from_prior": by_name(IDENTIFIED, best.z.round(3)),
     }
-    covariance, inner = np.zeros((len(prior.mean),) * 2), slice(len(IDENTIFIED))
-    covariance[inner, inner] = (
-        factor**2 * best.covariance * np.outer(prior.deviation, prior.deviation)
-    )
-    return replace(cost.model(best.z), covariance=covariance), report
-
-
-class _Problem:
-    """Segments, and what ships of given coefficients do in them."""
-
-    def __init__(
-        self, blank: ShipModel, trials: Sequence[Trial], prior: MMGPrior
-    ) -> None:
-        self.blank, self.prior = replace(blank, coefficients=prior.mean), prior
-        self.mean = np.array([prior.mean[name] for name in IDENTIFIED])
-        self.numbers = self.blank.ship_numbers()
-        self.channels = compared_channels(blank, trials)
-        self.columns = [blank.state_names.index(name) for name in self.channels]
-        floors = np.array([FLOORS[name] for name in self.channels])
-        self.floors = floors * channel_units(blank, self.channels)
-        self.segments = cut(
-            trials, self.blank, self.channels, SEGMENT_LENGTHS, False, interval=INTERVAL
-        )
-        self.groups = _groups(self.segments)
-        self.kept: dict[bytes, tuple[Floats, Floats]] = {}
-
-    def model(self, z: Floats) -> ShipModel:
-        """The model of some coefficients."""
-        values = dict(
-            zip(
-                IDENTIFIED, (self.mean + z * self.prior.deviation).tolist(), strict=True
-            )
-        )
-        return replace(self.blank, coefficients=self.prior.mean | values)
-
-    def at(self, z: Floats, which: Integers) -> tuple[Floats, Floats]:
-        """As `simulated`, which is not done twice in a row."""
-        key = z.tobytes() + which.tobytes()
-        if key not in self.kept:
-            self.kept = {key: self.simulated(z, which)}
-        return self.kept[key]
-
-    def rows(
-        self, z: Floats, which: Integers, scales: Floats, strength: float
-    ) -> tuple[Floats, Floats]:
-        """Errors of some segments in their scales, then those of the prior, and their slopes.
-
-        Shapes (n_rows + 41,) and (n_rows + 41, 41).
-        """
-        errors, slopes = self.at(z, which)
-        with np.errstate(invalid="ignore"):
-            scaled = np.clip(
-                np.nan_to_num(errors / scales, nan=LARGEST), -LARGEST, LARGEST
-            ).ravel()
-            steep = np.nan_to_num(slopes / scales[:, None], posinf=0.0, neginf=0.0)
-        own = strength * np.eye(len(z))
-        return np.append(scaled, strength * z), np.vstack(
-            [steep.reshape(len(scaled), -1), own]
-        )
-
-    def simulated(self, z: Floats, which: Integers) -> tuple[Floats, Floats]:
-        """Errors of the simulated channels and their slopes, of some segments.
-
-        Each times the root of the share that its step has of the time over which errors
-        are one error; shapes (n_samples, n_channels) and (n_samples, n_channels, 41).
-        """
-        first, n = len(Ship._fields), len(IDENTIFIED)
-        ships = np.repeat(self.numbers, LANES).reshape(-1, LANES)
-        ships[first : first + n] = (self.mean + z * self.prior.deviation)[:, None]
-        ships[first + np.arange(n), 1 + np.arange(n)] += STEP * self.prior.deviation
-        parts = []
-        for segment in (self.segments[k] for k in which):
-            lanes = sailed(
-                self.blank,
-                segment,
-                ships,
-                np.repeat(segment.start, LANES),
-                np.zeros(LANES),
-            )
-            off = lanes[1:, self.columns, : n + 1] - segment.measured[1:, :, None]
-            parts.append(off * np.sqrt(self._weight(segment) / len(off)))
-        found = np.concatenate(parts)
-        errors = found[:, :, 0]
-        with np.errstate(invalid="ignore", over="ignore"):  # of ships that run away
-            slopes = (found[:, :, 1:] - errors[:, :, None]) / STEP
-        return errors, slopes
-
-    def scales(self, errors: Floats, which: Integers) -> Floats:
-        """Root mean square of the errors by channel, not below the floors."""
-        shares = sum(self._weight(self.segments[k]) for k in which)
-        with np.errstate(invalid="ignore", over="ignore"):
-            rms = np.sqrt(np.sum(errors**2, axis=0) / shares)
-        return np.maximum(
-            np.where(np.isfinite(rms), rms, 1e2 * self.floors), self.floors
-        )
-
-    def _weight(self, segment: Segment) -> float:
-        return float(segment.inputs[-1, 0] - segment.times[0]) / (
-            CORRELATED * self.blank.travel_time
-        )
-
-    def solve(self, start: Floats, strength: float) -> Estimate:
-        """Fit all segments, the scales of the residuals renewed between rounds, fewer from an earlier fit."""
-        everything, z, evaluations = np.arange(len(self.segments)), start, 0
-        for last in (False, False, True) if not start.any() else (False, True):
-            scales = self.scales(self.at(z, everything)[0], everything)
-            given, tolerance = (everything, scales, strength), 1e-4 if last else 1e-2
-            found = least_squares(
-                lambda x, *a: self.rows(x, *a)[0],
-                z,
-                lambda x, *a: self.rows(x, *a)[1],
-                args=given,
-                method="trf",
-                ftol=tolerance,
-                xtol=tolerance,
-                max_nfev=30,
-            )
-            z, evaluations = found.x, evaluations + found.nfev
-        return Estimate(
-            z,
-            scales,
-            strength,
-            _covariance(self.rows(z, *given)[1][: -len(z)]),
-            evaluations,
-        )
-
-    def held_out(self, whole: Estimate, scales: Floats) -> tuple[float, float]:
-        """Error of each group of segments by a fit of the others, and the factor on the standard errors.
-
-        The fit of the others takes Gauss-Newton steps from that of all. The error is in
-        the scales given; the factor makes the errors held out, by those that the
-        covariance of the others' fit and the scatter of the residuals lead to expect,
-        one on average; at least 1.
-        """
-        errors, excess, expected = [], 0.0, 0.0
-        for group in np.unique(self.groups):
-            rest, held = (
-                np.flatnonzero(self.groups != group),
-                np.flatnonzero(self.groups == group),
-            )
-            z = whole.z
-            for _ in range(STEPS_HELD_OUT):
-                residuals, jacobian = self.rows(z, rest, whole.scales, whole.strength)
-                z = z - np.linalg.solve(jacobian.T @ jacobian, jacobian.T @ residuals)
-            covariance = _covariance(jacobian[: -len(z)])
-            error, slopes = (
-                part[: -len(z)] for part in self.rows(z, held, whole.scales, 0.0)
-            )
-            weight = sum(self._weight(self.segments[k]) for k in held) * len(scales)
-            errors.append(
-                np.sum((error.reshape(-1, len(scales)) * (whole.scales / scales)) ** 2)
-                / weight
-            )
-            excess += float(error @ error) - weight
-            expected += float(np.sum((slopes @ covariance) * slopes))
-        return float(np.sqrt(np.mean(errors))), float(
-            np.sqrt(max(excess / expected, 1.0))
-        )
-
-
-def _covariance(slopes: Floats) -> Floats:
-    """Gauss-Newton covariance with the prior as it is: a stronger one chosen for the fit is no knowledge."""
-    inverse = np.linalg.inv(slopes.T @ slopes + np.eye(slopes.shape[1]))
-    return 0.5 * (inverse + inverse.T)
-
-
-def _groups(segments: Sequence[Segment]) -> Integers:
-    """Which segments are held out together: of a trial, of every fifth one, or a third of a single one."""
-    trial = np.array([segment.trial for segment in segments])
-    if trial.max() == trial.min():
-        return np.arange(len(trial)) * PIECES // len(trial)
-    return trial % MOST_GROUPS

@@ -1,47 +1,25 @@
-"""Refinement: a model fitted to what it simulates, in segments, from where another method left off.
-
-Equation-error methods regress on noisy velocities, which biases them; here noise is
-only in what is compared. Whole trials would let a drift of heading leak into the
-coefficients, hence segments (multiple shooting, Bock 1983; the output-error method of
-Maine & Iliff 1985, NASA RP-1138).
-"""
+"""Refinement: a model fitted to what it simulates, from where another method left off."""
 
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 
-from identification.estimators.estimator import FitTask
+from identification.arrays import by_name, column_rms, root_mean_square
+from identification.estimators.estimator import Estimators, FitTask
 from identification.regression.samples import Samples
+from identification.simulation_error.output_error import OutputError, Solution
 from identification.simulation_error.prior import reference_turns
-from identification.simulation_error.segments import (
-    BLOCK,
-    Segment,
-    Shooter,
-    Shooting,
-    about_mean,
-    compared_channels,
-    cut,
-)
-from identification.uncertainty.covariance import newey_west
+from identification.simulation_error.segments import Segment, compared_channels, cut
+from identification.simulation_error.shooting import Shooter, about_mean
 from identification.validation.guard import GuardedFit, reasons_unstable
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 
 STARTS = ("free", "measured")
-# of fits, between which scales of the residuals and starts of the segments are renewed
-ROUNDS = 3
-OFFSET = np.radians(
-    1.0
-)  # standard deviation of a rudder's offset, as far as is known beforehand
-# factor on the pull from attempt to attempt, while the refined model runs away
-STRONGER = 10.0
-ATTEMPTS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +28,8 @@ class Refinement:
 
     #: length of a segment: the time to sail that many ship lengths at service speed
     segment_lengths: float = 3.4
-    staggered: bool = (
-        True  # whether a second set of segments begins half a segment later
-    )
+    #: whether a second set of segments begins half a segment later
+    staggered: bool = True
     #: whether the state at the start of each segment is fitted with it ("free"), which
     #: leaves no bias by noise, or is the smoothed measurement
     segment_start: str = "free"
@@ -64,9 +41,8 @@ class Refinement:
     rudder_offsets: bool = False
     #: further trials that the refinement alone sees, such as turns of a reference ship
     extra_trials: Sequence[Trial] = ()
-    extra_weight: float = (
-        1.0  # of their squared residuals, relative to those of the trials
-    )
+    #: of their squared residuals, relative to those of the trials
+    extra_weight: float = 1.0
     #: a reference ship whose turning circles, at the target's scale, join the extra
     #: trials: what holds the steady turn, which lies outside all zigzags. "auto" for
     #: the shipped one most like the target
@@ -74,41 +50,42 @@ class Refinement:
     anchor_weight: float = 1e-3  # of the squared residuals of those turns
 
     def __post_init__(self) -> None:
-        lengths, hint = self.segment_lengths, "in ship lengths"
-        check_number(lengths, "segment_lengths", at_least=0.1, at_most=1e6, hint=hint)
+        check_number(
+            self.segment_lengths,
+            "segment_lengths",
+            at_least=0.1,
+            at_most=1e6,
+            hint="in ship lengths",
+        )
         check_choice(self.segment_start, STARTS, "segment_start")
         check_number(self.pull, "pull", at_least=0.0)
-        for name in ("extra_weight", "anchor_weight"):
-            check_number(getattr(self, name), name, above=0.0)
+        check_number(self.extra_weight, "extra_weight", above=0.0)
+        check_number(self.anchor_weight, "anchor_weight", above=0.0)
 
     def plain(self) -> dict[str, Any]:
         """The settings for the provenance, extra trials by name and hash."""
-        extra = [
+        settings = {item.name: getattr(self, item.name) for item in fields(self)}
+        del settings["extra_trials"], settings["anchor"]
+        settings["extra_trials"] = [
             {"name": trial.name, "sha256": trial.sha256} for trial in self.extra_trials
         ]
-        names = [
-            item.name
-            for item in fields(self)
-            if item.name not in ("extra_trials", "anchor")
-        ]
-        anchor = self.anchor.name if isinstance(self.anchor, ShipModel) else self.anchor
-        return {name: getattr(self, name) for name in names} | {
-            "extra_trials": extra,
-            "anchor": anchor,
-        }
+        settings["anchor"] = self.anchor
+        if isinstance(self.anchor, ShipModel):
+            settings["anchor"] = self.anchor.name
+        return settings
 
 
 def split_settings(
-    settings: Mapping[str, Any], refined: bool
-) -> tuple[Refinement | None, dict[str, Any]]:
-    """The settings of the refinement, None for a method without one, and those left for its estimator."""
-    if not refined:
-        return None, dict(settings)
-    names = {item.name for item in fields(Refinement)}
-    own = {name: value for name, value in settings.items() if name in names}
-    return Refinement(**own), {
-        name: value for name, value in settings.items() if name not in names
+    settings: Mapping[str, Any],
+) -> tuple[Refinement, dict[str, Any]]:
+    """The refinement of a method, and the settings left for its estimator."""
+    others = dict(settings)
+    own = {
+        item.name: others.pop(item.name)
+        for item in fields(Refinement)
+        if item.name in others
     }
+    return Refinement(**own), others
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,9 +99,8 @@ class Refined:
     #: by trial: by how much stretches of time moved those coefficients, for the
     #: bootstrap, shape (n_stretches, n_coefficients)
     influences: list[Floats]
-    report: dict[
-        str, Any
-    ]  # for the provenance: settings, cost before and after, scales, offsets, decision
+    #: for the provenance: settings, cost before and after, scales, offsets, decision
+    report: dict[str, Any]
     width: float = 0.0  # of the stretches, s
 
 
@@ -135,303 +111,145 @@ def refine(
 
     `start`: the fit to start from; `task`: its regression, which shows how large the
     terms are in the trials, and the trials; `memory`: time over which residuals are
-    taken to be correlated, s. Returns the start itself where its model runs away
-    already, or the refined ones do under every prior. Raises InputError for extra
-    trials that lack channels.
+    taken to be correlated, s. A refined model that runs away is pulled ten times harder
+    to the start, up to three times. Returns the start itself where its model runs away
+    already, or the refined ones do however hard they are pulled. Raises InputError for
+    extra trials that lack channels.
     """
-    problem = _Problem(start, task, settings)
-    if not (
-        start.stable and np.isfinite(problem.scales).all()
-    ):  # it does not sail all segments
-        return Refined(
-            start,
-            None,
-            [],
-            settings.plain() | {"decision": "not refined: the start runs away"},
-        )
-    rejected, prior = list[dict[str, Any]](), settings.pull
-    for _ in range(ATTEMPTS):
-        solution = problem.solve(prior)
-        model = problem.model(solution.parameters)
-        if not (reasons := reasons_unstable(model, task.trials)):
-            fit = replace(
-                start, model=model, estimators=problem.estimators(solution.parameters)
+    _check_refinable(start.model, settings.extra_trials)
+    problem = _posed(start, task, settings)
+    scales = problem.start_scales()
+    if not (start.stable and np.isfinite(scales).all()):
+        return _kept(start, settings, {"decision": "not refined: the start runs away"})
+
+    rejected = list[dict[str, Any]]()
+    pull = settings.pull
+    for _ in range(4):
+        solution = problem.solve(scales, pull)
+        model = _model(start.model, problem, solution.parameters)
+        reasons = reasons_unstable(model, task.trials)
+        if not reasons:
+            report = {**_report(problem, solution, task.trials), "pull": pull}
+            report["decision"] = "refined"
+            if rejected:
+                report["rejected"] = rejected
+            estimators = _estimators(start, problem, solution.parameters)
+            covariance, influences = problem.covariance(solution, pull, memory)
+            return Refined(
+                replace(start, model=model, estimators=estimators),
+                covariance,
+                influences,
+                settings.plain() | report,
+                problem.bin_width,
             )
-            covariance, influences = problem.covariance(solution, prior, memory)
-            report = (
-                settings.plain()
-                | problem.report(solution)
-                | {
-                    "decision": "refined",
-                    "pull": prior,
-                }
-            )
-            report |= {"rejected": rejected} if rejected else {}
-            return Refined(fit, covariance, influences, report, problem.width)
-        rejected.append({"pull": prior, "reasons": reasons})
-        prior = max(prior * STRONGER, 1e-9)
-    report = settings.plain() | {
-        "decision": "not refined: it runs away",
-        "rejected": rejected,
-    }
-    return Refined(start, None, [], report)
+        rejected.append({"pull": pull, "reasons": reasons})
+        pull = max(10.0 * pull, 1e-9)
+
+    report = {"decision": "not refined: it runs away", "rejected": rejected}
+    return _kept(start, settings, report)
 
 
-@dataclass(frozen=True, eq=False)
-class _Solution:
-    parameters: Floats
-    scales: Floats
-    shooting: Shooting
-    costs: list[
-        float
-    ]  # mean squared residual in the last round's scales, before and after
-    evaluations: int
+def _kept(start: GuardedFit, settings: Refinement, report: dict[str, Any]) -> Refined:
+    """The start itself, with what was decided."""
+    return Refined(start, None, [], settings.plain() | report)
 
 
 def _check_refinable(blank: ShipModel, extra_trials: Sequence[Trial]) -> None:
     """Refuse a structure whose state is not recorded, and extra trials that lack channels."""
     if "q" in blank.table.equations:
         raise InputError(
-            f"method 'output-error': structure {blank.structure!r} with a memory of yaw"
-            " found, whose state no trial records, expected one without; choose method"
+            "method 'output-error': expected a structure without a memory of yaw,"
+            f" whose state no trial records, got {blank.structure!r}; choose method"
             " 'tls-svm'"
         )
+    needed = blank.table.required_channels
     for trial in extra_trials:
-        if missing := [c for c in blank.table.required_channels if c not in trial]:
+        missing = [channel for channel in needed if channel not in trial]
+        if missing:
             raise InputError(
                 f"extra trial {trial.name!r}: channel {missing[0]!r} is missing,"
-                f" expected {', '.join(blank.table.required_channels)}"
+                f" expected {', '.join(needed)}"
             )
 
 
-class _Problem:
-    """Segments, parameters and their prior of one refinement."""
+def _posed(start: GuardedFit, task: FitTask, settings: Refinement) -> OutputError:
+    """The problem: segments of the trials, of extra ones and of an anchor's turns."""
+    blank = start.model
+    channels = compared_channels(blank, [*task.trials, *settings.extra_trials])
+    equations = blank.table.equations
+    sizes = np.concatenate([term_sizes(task.samples, q) for q in equations])
+    free = settings.segment_start == "free"
+    shooter = Shooter(blank, channels, sizes, free)
 
-    def __init__(self, start: GuardedFit, task: FitTask, settings: Refinement) -> None:
-        self.start, self.settings, self.trials = start, settings, task.trials
-        blank = start.model
-        _check_refinable(blank, settings.extra_trials)
-        self.sizes = np.concatenate(
-            [_term_sizes(task.samples, q) for q in blank.table.equations]
+    def segments(trials: Sequence[Trial]) -> list[Segment]:
+        length = settings.segment_lengths
+        return cut(trials, blank, channels, length, settings.staggered)
+
+    extra = list(settings.extra_trials)
+    weights = [settings.extra_weight] * len(extra)
+    if settings.anchor is not None:
+        turns = reference_turns(settings.anchor, blank)
+        extra += turns
+        weights += [settings.anchor_weight] * len(turns)
+    further = [
+        replace(
+            segment,
+            trial=len(task.trials) + segment.trial,
+            weight=weights[segment.trial],
         )
-        channels = compared_channels(blank, [*task.trials, *settings.extra_trials])
-        self.shooter = Shooter(
-            blank, channels, self.sizes, settings.segment_start == "free"
-        )
-        self.own = self._segments(task.trials)  # of the trials to fit
-        self.rows = len(channels) * sum(
-            len(segment.blocks) for segment in self.own
-        )  # of their residuals
-        steps = [
-            float(np.median(np.diff(s.times))) for s in self.own if len(s.times) > 1
-        ]
-        # of the bins of time in which residuals are added up, s: a block, or a sampling
-        # step
-        self.width = max([float(BLOCK * blank.travel_time), *steps])
-        turns = (
-            [] if settings.anchor is None else reference_turns(settings.anchor, blank)
-        )
-        weights = [settings.extra_weight] * len(settings.extra_trials) + [
-            settings.anchor_weight
-        ] * len(turns)
-        further = [
-            replace(
-                segment,
-                trial=len(task.trials) + segment.trial,
-                weight=weights[segment.trial],
-            )
-            for segment in self._segments([*settings.extra_trials, *turns])
-        ]
-        self.segments = self.own + further
-        values = np.concatenate(
-            [start.estimators[q].coef_ for q in blank.table.equations]
-        )
-        no_offsets = np.zeros(len(task.trials) * settings.rudder_offsets)
-        self.first = np.concatenate([values / self.sizes, no_offsets])
-        units = self.shooter.units
-        self.scales = self._scales(
-            self.shooter.shoot(self.first, self.segments, units), units
-        )
+        for segment in segments(extra)
+    ]
 
-    def _segments(self, trials: Sequence[Trial]) -> list[Segment]:
-        lengths, staggered = self.settings.segment_lengths, self.settings.staggered
-        return cut(trials, self.start.model, self.shooter.channels, lengths, staggered)
-
-    def _scales(self, shooting: Shooting, scales: Floats) -> Floats:
-        """Root mean square of the residuals of each channel in the trials, per sample."""
-        errors = shooting.residuals[: self.rows].reshape(-1, len(scales)) * scales
-        rms = np.sqrt(
-            np.sum(errors**2, axis=0)
-            / sum(len(segment.measured) for segment in self.own)
-        )
-        return np.asarray(np.maximum(rms, 1e-9 * self.shooter.units))
-
-    def solve(self, prior: float) -> _Solution:
-        """Fit, renew scales and starts of the segments, and fit again."""
-        parameters, segments, scales, evaluations = (
-            self.first,
-            self.segments,
-            self.scales,
-            0,
-        )
-        for _ in range(ROUNDS):
-            before = self.shooter.shoot(self.first, segments, scales)
-            found, shooting = self._round(
-                parameters, segments, scales, self._prior_weights(prior)
-            )
-            parameters, evaluations, last = found.x, evaluations + found.nfev, scales
-            segments = self.shooter.moved(segments, shooting.moves)
-            scales = self._scales(shooting, scales)
-        costs = [
-            float(np.mean(one.residuals[: self.rows] ** 2))
-            for one in (before, shooting)
-        ]
-        return _Solution(parameters, last, shooting, costs, evaluations)
-
-    def _round(
-        self,
-        start: Floats,
-        segments: Sequence[Segment],
-        scales: Floats,
-        weights: Floats,
-    ) -> tuple[Any, Shooting]:
-        """The fit between two renewals of scales and starts, and the shooting that it ends with."""
-
-        @lru_cache(maxsize=1)
-        def shot(z: bytes) -> Shooting:
-            return self.shooter.shoot(np.frombuffer(z), segments, scales)
-
-        def residuals(z: Floats) -> Floats:
-            return np.concatenate(
-                [shot(z.tobytes()).residuals, weights * (z - self.first)]
-            )
-
-        def jacobian(z: Floats) -> Floats:
-            return np.vstack([shot(z.tobytes()).jacobian, np.diag(weights)])
-
-        found = least_squares(
-            residuals,
-            start,
-            jacobian,
-            method="trf",
-            x_scale="jac",
-            ftol=1e-6,
-            xtol=1e-6,
-            max_nfev=30,
-        )
-        return found, shot(found.x.tobytes())
-
-    def _prior_weights(self, prior: float) -> Floats:
-        compared = sum(segment.measured.size for segment in self.own)
-        weights = np.full(len(self.first), np.sqrt(prior * compared))
-        weights[len(self.sizes) :] = 1.0 / OFFSET
-        return weights
-
-    def model(self, parameters: Floats) -> ShipModel:
-        """The model of some parameters."""
-        blank, accelerations = (
-            self.start.model,
-            parameters[: len(self.sizes)] * self.sizes,
-        )
-        return blank.with_coefficients(
-            np.linalg.solve(blank.acceleration_matrix, accelerations)
-        )
-
-    def estimators(self, parameters: Floats) -> dict[str, Any]:
-        """Copies of the start's estimators with the refined coefficients, for the diagnostics."""
-        estimators = {
-            q: copy.copy(estimator) for q, estimator in self.start.estimators.items()
-        }
-        for q, rows in self.start.model.table.regression_rows.items():
-            estimators[q].coef_ = parameters[rows] * self.sizes[rows]
-        return estimators
-
-    def covariance(
-        self, solution: _Solution, prior: float, memory: float
-    ) -> tuple[Floats, list[Floats]]:
-        """Sandwich covariance of the coefficients of the accelerations, and each stretch's influence.
-
-        Scores are added up over the samples of the same time, which the staggered set
-        has twice, and over time as by Newey & West 1987. Extra trials and the prior
-        count as known.
-        """
-        shooting, n_terms = solution.shooting, len(self.sizes)
-        jacobian, precision = (
-            shooting.jacobian,
-            np.diag(self._prior_weights(prior) ** 2),
-        )
-        inverse = np.linalg.pinv(
-            jacobian.T @ jacobian + precision, rcond=1e-14, hermitian=True
-        )
-        slopes, times = (
-            jacobian * shooting.residuals[:, None],
-            2.0 if self.settings.staggered else 1.0,
-        )
-        blocks = (
-            slopes[: self.rows]
-            .reshape(-1, len(self.scales), slopes.shape[1])
-            .sum(axis=1)
-        )
-        scores = _in_bins(blocks, self.own, self.width)
-        used = float(
-            np.einsum(
-                "ij,jk,ik->", jacobian[: self.rows], inverse, jacobian[: self.rows]
-            )
-        )
-        used += sum(len(move) for move in shooting.moves[: len(self.own)]) / times
-        samples = self.rows / times
-        factor = samples / max(samples - used, 1.0)
-        total = np.zeros_like(inverse)
-        for score in scores:
-            total += newey_west(score, round(memory / self.width))
-        cov = (factor * inverse @ total @ inverse)[:n_terms, :n_terms] * np.outer(
-            self.sizes, self.sizes
-        )
-        influences = [
-            -np.sqrt(factor) * (score @ inverse)[:, :n_terms] * self.sizes
-            for score in scores
-        ]
-        return 0.5 * (cov + cov.T), influences
-
-    def report(self, solution: _Solution) -> dict[str, Any]:
-        """For the provenance."""
-        names = [trial.name for trial in self.trials]
-        offsets = np.degrees(
-            about_mean(solution.parameters[len(self.sizes) :])
-        ).tolist()
-        (before, after), channels = solution.costs, self.shooter.channels
-        return {
-            "segments": len(self.own),
-            "cost_before": before,
-            "cost_after": after,
-            "evaluations": solution.evaluations,
-            "residual_rms": dict(zip(channels, solution.scales.tolist(), strict=True)),
-            "rudder_offsets_deg": (
-                dict(zip(names, offsets, strict=True)) if offsets else {}
-            ),
-        }
+    values = np.concatenate([start.estimators[q].coef_ for q in equations])
+    n_offsets = len(task.trials) if settings.rudder_offsets else 0
+    parameters = np.concatenate([values / sizes, np.zeros(n_offsets)])
+    return OutputError(
+        shooter, segments(task.trials), further, parameters, settings.staggered
+    )
 
 
-def _term_sizes(samples: Samples, equation: str) -> Floats:
+def term_sizes(samples: Samples, equation: str) -> Floats:
     """Coefficients whose terms would make up the whole change of a velocity, shape (n_terms,)."""
-    whole = np.sqrt(np.mean(samples.targets[equation] ** 2))
-    terms = np.sqrt(np.mean(samples.features[equation] ** 2, axis=0))
-    return np.asarray(
-        whole / np.where(terms > 0.0, terms, np.inf) + np.finfo(float).tiny
-    )
+    change = root_mean_square(samples.targets[equation])
+    terms = column_rms(samples.features[equation])
+    terms[terms == 0.0] = np.inf
+    # never 0: coefficients are divided by the size of a term that is not seen, too
+    return change / terms + np.finfo(float).tiny
 
 
-def _in_bins(scores: Floats, segments: Sequence[Segment], width: float) -> list[Floats]:
-    """Scores of blocks, shape (n_blocks, n_parameters), added up by trial in bins of time of some width."""
-    trial = np.concatenate(
-        [np.full(len(segment.times), segment.trial) for segment in segments]
-    )
-    times, found = (
-        np.floor(np.concatenate([segment.times for segment in segments]) / width),
-        [],
-    )
-    for own in (trial == index for index in np.unique(trial)):
-        bins = (times[own] - times[own].min()).astype(int)
-        found.append(np.zeros((bins.max() + 1, scores.shape[1])))
-        np.add.at(found[-1], bins, scores[own])
-    return found
+def _model(blank: ShipModel, problem: OutputError, parameters: Floats) -> ShipModel:
+    sizes = problem.shooter.term_sizes
+    accelerations = parameters[: len(sizes)] * sizes
+    values = np.linalg.solve(blank.acceleration_matrix, accelerations)
+    return blank.with_coefficients(np.asarray(values, dtype=float))
+
+
+def _estimators(
+    start: GuardedFit, problem: OutputError, parameters: Floats
+) -> Estimators:
+    """Copies of the start's estimators with the refined coefficients, for the diagnostics."""
+    sizes = problem.shooter.term_sizes
+    estimators = {q: copy.copy(estimator) for q, estimator in start.estimators.items()}
+    for q, rows in start.model.table.regression_rows.items():
+        estimators[q].coef_ = parameters[rows] * sizes[rows]
+    return estimators
+
+
+def _report(
+    problem: OutputError, solution: Solution, trials: Sequence[Trial]
+) -> dict[str, Any]:
+    """For the provenance."""
+    shooter = problem.shooter
+    offsets_deg = dict[str, float]()
+    offsets = solution.parameters[len(shooter.term_sizes) :]
+    if len(offsets):
+        names = [trial.name for trial in trials]
+        offsets_deg = by_name(names, np.degrees(about_mean(offsets)))
+    return {
+        "segments": len(problem.fitted),
+        "cost_before": solution.cost_before,
+        "cost_after": solution.cost_after,
+        "evaluations": solution.evaluations,
+        "residual_rms": by_name(shooter.channels, solution.scales),
+        "rudder_offsets_deg": offsets_deg,
+    }

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,33 +12,43 @@ from shipgym.arrays import Floats
 from shipgym.checks import quoted
 from shipgym.ships.catalogue import REFERENCE_SHIPS
 
-GRAVITY = 9.81
 AUTO = "auto"
-#: Rudder area by length and draught of ships whose particulars lack it: Mei 2019, Table
-#: 4.
-RUDDER_SHARE = {"mariner": 1.0 / 83.1, "tanker": 1.0 / 61.0}
-#: Correlations so close are those of one hull: the ship nearest in length is taken.
-CORRELATION_TOLERANCE = 0.01
 # correlation below which a reference ship is unlike a ship, and not taken unnamed
 LEAST_SIMILARITY = 0.5
 
 
+class Features(NamedTuple):
+    """What ships are compared by; nan for what is not known."""
+
+    block_coefficient: float
+    length_by_beam: float
+    beam_by_draught: float
+    inverse_froude_number: float  # sqrt(g L) / V; as printed L / V, s
+    rudder_area_by_side: float  # rudder area by length and draught
+
+
 def similarity_vector(particulars: Particulars, printed: bool = False) -> Floats:
-    """Block coefficient, L/B, B/T, inverse Froude number and rudder area by L T; nan for what is not known.
+    """Features of a ship in the order of `Features`, shape (5,).
 
     With `printed` the fourth is L/V0 in seconds, as Mei 2019 prints it, in place of
     sqrt(g L)/V0: then a model of 7 m is like no ship at all.
     """
-    L, names = (
-        particulars.length,
-        ("beam", "draught", "speed", "rudder_area", "block_coefficient"),
+
+    def known(name: str) -> float:
+        value = particulars[name]
+        return np.nan if value is None else float(value)
+
+    L, B, T = particulars.length, known("beam"), known("draught")
+    V = known("speed")
+    gravity = 9.81
+    features = Features(
+        block_coefficient=known("block_coefficient"),
+        length_by_beam=L / B,
+        beam_by_draught=B / T,
+        inverse_froude_number=L / V if printed else np.sqrt(gravity * L) / V,
+        rudder_area_by_side=known("rudder_area") / (L * T),
     )
-    known = (particulars[name] for name in names)
-    B, T, V, area, block = (
-        np.nan if value is None else float(value) for value in known
-    )
-    time = L / V if printed else np.sqrt(GRAVITY * L) / V
-    return np.array([block, L / B, B / T, time, area / (L * T)])
+    return np.array(features)
 
 
 def correlations(
@@ -49,20 +60,20 @@ def correlations(
     for any ship are left out. Raises InputError if fewer than three features are known
     of all ships.
     """
-    table = np.array(
-        [np.asarray(target, dtype=float), *map(np.asarray, candidates.values())],
-        dtype=float,
-    )
+    rows = [np.asarray(row, dtype=float) for row in (target, *candidates.values())]
+    table = np.array(rows)
     known = np.all(np.isfinite(table), axis=0)
     if known.sum() < 3:
         raise InputError(
-            f"particulars: only {known.sum()} of block coefficient, L/B, B/T, L/V0 and"
-            " rudder area are known, expected at least 3 to find a reference ship;"
-            " give beam, draught, block_coefficient and rudder_area in [ship], or name"
-            " the reference_model"
+            "particulars: expected at least 3 of block coefficient, L/B, B/T, L/V0 and"
+            f" rudder area to find a reference ship, got {known.sum()}; give beam,"
+            " draught, block_coefficient and rudder_area in [ship], or name the"
+            " reference_model"
         )
-    table = table[:, known] / np.linalg.norm(table[:, known], axis=0)
-    return dict(zip(candidates, np.corrcoef(table)[0, 1:].tolist(), strict=True))
+
+    scaled = table[:, known] / np.linalg.norm(table[:, known], axis=0)
+    with_target = np.corrcoef(scaled)[0, 1:]
+    return dict(zip(candidates, with_target.tolist(), strict=True))
 
 
 def select_reference(
@@ -79,49 +90,54 @@ def select_reference(
     is known of the target.
     """
     ships = {name: load_model(name) for name in candidates}
-    rolls = channels is None or {"p", "phi"} <= set(channels)
-    usable = {
-        name: ship
-        for name, ship in ships.items()
-        if rolls or "phi" not in ship.state_names
-    }
-    if not usable:
+    if channels is not None and not {"p", "phi"} <= set(channels):
+        ships = {
+            name: ship for name, ship in ships.items() if "phi" not in ship.state_names
+        }
+    if not ships:
         raise InputError(
-            f"reference_model: none of {quoted(ships)} can be evaluated at"
-            f" {quoted(channels or ())}, because all of them roll; record p and phi, or"
-            " allow other candidates"
+            "reference_model: expected a ship that can be evaluated at"
+            f" {quoted(channels or ())}, got {quoted(candidates)}, all of which roll;"
+            " record p and phi, or allow other candidates"
         )
+
     vectors = {
-        name: similarity_vector(_known(name, ship)) for name, ship in usable.items()
+        name: similarity_vector(_with_rudder_area(name, ship))
+        for name, ship in ships.items()
     }
-    found = correlations(similarity_vector(particulars), vectors)
-    least = max(found.values()) - CORRELATION_TOLERANCE
-    apart = {
-        n: abs(np.log(ship.particulars.length / particulars.length))
-        for n, ship in usable.items()
-    }
-    return (
-        min(
-            (n for n in found if found[n] > least), key=lambda n: (apart[n], -found[n])
-        ),
-        found,
-    )
+    similarity = correlations(similarity_vector(particulars), vectors)
+
+    same_hull = 0.01  # correlations so close are those of one hull form
+    least = max(similarity.values()) - same_hull
+    alike = [name for name in similarity if similarity[name] > least]
+
+    def distance(name: str) -> tuple[float, float]:
+        """How far apart the lengths are; of ships of one length the most similar comes first."""
+        scale = ships[name].particulars.length / particulars.length
+        return abs(float(np.log(scale))), -similarity[name]
+
+    return min(alike, key=distance), similarity
 
 
 def check_alike(name: str, similarity: float, otherwise: str) -> None:
     """Refuse the most similar reference ship where she is unlike the target; `otherwise`: what else to do."""
     if similarity < LEAST_SIMILARITY:
         raise InputError(
-            "reference_model: 'auto' found, but none is like this ship; the best is"
-            f" {name!r} with a similarity of {similarity:.2f}, expected at least"
-            f" {LEAST_SIMILARITY:g}; {otherwise}, or name the ship all the same:"
+            "reference_model: 'auto' expected a ship like this one, with a similarity"
+            f" of at least {LEAST_SIMILARITY:g}, got {name!r} with {similarity:.2f} as"
+            f" the best; {otherwise}, or name the ship all the same:"
             f" reference_model = {name!r}"
         )
 
 
-def _known(name: str, ship: ShipModel) -> Particulars:
-    """Particulars of a reference ship, with block coefficient and rudder area."""
+def _with_rudder_area(name: str, ship: ShipModel) -> Particulars:
+    """Particulars of a reference ship with block coefficient and, by Mei 2019, Table 4, rudder area."""
+    by_length_and_draught = {"mariner": 1.0 / 83.1, "tanker": 1.0 / 61.0}
+
     p = ship.particulars.completed()
-    if p.rudder_area is None and name in RUDDER_SHARE and p.draught is not None:
-        p = replace(p, rudder_area=RUDDER_SHARE[name] * p.length * p.draught)
-    return p
+    if p.rudder_area is not None or p.draught is None:
+        return p
+    if name not in by_length_and_draught:
+        return p
+    area = by_length_and_draught[name] * p.length * p.draught
+    return replace(p, rudder_area=area)

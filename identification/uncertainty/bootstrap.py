@@ -28,9 +28,12 @@ def moving_blocks(
     """
     drawn = []
     for rows, length in zip(groups, lengths, strict=True):
-        block = min(length, len(rows))
-        starts = rng.integers(0, len(rows) - block + 1, -(-len(rows) // block))
-        drawn.append(rows[(starts[:, None] + np.arange(block)).ravel()[: len(rows)]])
+        n_rows = len(rows)
+        block = min(length, n_rows)
+        n_blocks = -(-n_rows // block)  # rounded up
+        starts = rng.integers(0, n_rows - block + 1, n_blocks)
+        places = starts[:, None] + np.arange(block)
+        drawn.append(rows[places.ravel()[:n_rows]])
     return np.concatenate(drawn)
 
 
@@ -51,20 +54,20 @@ def bootstrap_covariance(
     (n_coefficients, n_coefficients).
     """
     rng = np.random.default_rng(seed)
-    groups = [
-        np.flatnonzero(samples.trial == trial) for trial in np.unique(samples.trial)
-    ]
-    lengths = [_rows_in(memory, samples.start[rows]) for rows in groups]
+    trials = np.unique(samples.trial)
+    groups = [np.flatnonzero(samples.trial == trial) for trial in trials]
+    lengths = [rows_in(memory, samples.start[rows]) for rows in groups]
     errors = residuals(estimators, samples)
-    found = []
+
+    refits = []
     for _ in counted("bootstrap", range(draws)):
         rows = moving_blocks(groups, lengths, rng)
-        found.append(
-            np.concatenate(
-                [_again(estimators[q], samples, q, rows, errors[q]) for q in estimators]
-            )
-        )
-    return np.asarray(np.cov(np.array(found).T))
+        coefficients = [
+            _refitted(estimator, samples, q, rows, errors[q])
+            for q, estimator in estimators.items()
+        ]
+        refits.append(np.concatenate(coefficients))
+    return np.asarray(np.cov(np.array(refits).T))
 
 
 def influence_covariance(
@@ -78,21 +81,27 @@ def influence_covariance(
     """
     rng = np.random.default_rng(seed)
     stacked = np.concatenate(influences)
-    ends = np.cumsum([0, *(len(part) for part in influences)])
-    groups = [np.arange(a, b) for a, b in pairwise(ends.tolist())]
-    totals = [
-        stacked[moving_blocks(groups, [block] * len(groups), rng)].sum(axis=0)
-        for _ in range(draws)
-    ]
+    counts = [len(stretches) for stretches in influences]
+    edges = np.cumsum([0, *counts]).tolist()
+    groups = [np.arange(first, end) for first, end in pairwise(edges)]
+    lengths = [block] * len(groups)
+
+    totals = []
+    for _ in range(draws):
+        rows = moving_blocks(groups, lengths, rng)
+        totals.append(stacked[rows].sum(axis=0))
     return np.asarray(np.cov(np.array(totals).T))
 
 
-def _rows_in(memory: float, start: Floats) -> int:
-    spacing = float(np.median(np.diff(start))) if len(start) > 1 else memory
+def rows_in(memory: float, start: Floats) -> int:
+    """Rows of a regression that start within a time, s, at least one."""
+    if len(start) < 2:
+        return 1
+    spacing = float(np.median(np.diff(start)))
     return max(round(memory / spacing), 1) if spacing > 0.0 else 1
 
 
-def _again(
+def _refitted(
     estimator: Estimator,
     samples: Samples,
     equation: str,
@@ -100,12 +109,11 @@ def _again(
     errors: Floats,
 ) -> Floats:
     """Coefficients from the drawn rows."""
-    features, targets = samples.features[equation], samples.targets[equation]
+    X, y = samples.features[equation][rows], samples.targets[equation][rows]
     if isinstance(estimator, TruncatedLSSVM | LSSVM):
         refit = clone(estimator)
         if isinstance(estimator, TruncatedLSSVM):
             refit.set_params(rank=estimator.rank_)
-        return np.asarray(refit.fit(features[rows], targets[rows]).coef_)
-    return np.asarray(
-        estimator.coef_ + estimator.inverse_moment_ @ (features[rows].T @ errors[rows])
-    )
+        return np.asarray(refit.fit(X, y).coef_)
+    step = estimator.inverse_moment_ @ (X.T @ errors[rows])
+    return np.asarray(estimator.coef_ + step)

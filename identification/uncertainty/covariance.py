@@ -1,7 +1,5 @@
 """How certain the coefficients are, together: one covariance over all equations of motion."""
 
-from itertools import product
-
 import numpy as np
 
 from identification.estimators.estimator import Estimator, Estimators, weights
@@ -12,10 +10,10 @@ from shipgym.arrays import Floats
 
 def residuals(estimators: Estimators, samples: Samples) -> dict[str, Floats]:
     """Target less prediction of each equation, arrays of shape (n_rows,)."""
-    return {
-        q: samples.targets[q] - estimators[q].predict(samples.features[q])
-        for q in estimators
-    }
+    errors = {}
+    for q, estimator in estimators.items():
+        errors[q] = samples.targets[q] - estimator.predict(samples.features[q])
+    return errors
 
 
 @single_threaded()
@@ -35,45 +33,58 @@ def joint_covariance(
     correlated, s. Returns the covariance in the order of the equations and their
     features, shape (n_coefficients, n_coefficients).
     """
-    counts = {q: weights(estimators[q], samples.features[q]) for q in estimators}
-    errors = {
-        q: error * counts[q] for q, error in residuals(estimators, samples).items()
-    }
-    freedom = {
-        q: effective_freedom(estimators[q], samples.features[q]) for q in estimators
-    }
-    maps = {q: samples.features[q] @ estimators[q].inverse_moment_ for q in estimators}
+    maps, errors = [], []
+    unweighted = residuals(estimators, samples)
+    for q, estimator in estimators.items():
+        X = samples.features[q]
+        counts = weights(estimator, X)
+        # scaled to the variance of errors, of which fitting takes a part
+        scale = np.sqrt(len(samples) / effective_freedom(estimator, X))
+        errors.append(unweighted[q] * counts * scale)
+        maps.append(X @ estimator.inverse_moment_)
     if memory <= 0.0:
-        pairs = product(estimators, repeat=2)
-        sizes = {
-            (p, q): (errors[p] @ errors[q]) / np.sqrt(freedom[p] * freedom[q])
-            for p, q in pairs
-        }
-        return np.block(
-            [
-                [sizes[p, q] * (maps[p].T @ maps[q]) for q in estimators]
-                for p in estimators
-            ]
-        )
-    scaled = {
-        q: error * np.sqrt(len(samples) / freedom[q]) for q, error in errors.items()
-    }
-    scores = np.hstack([maps[q] * scaled[q][:, None] for q in estimators])
-    total = np.zeros((scores.shape[1],) * 2)
+        return _without_memory(maps, errors)
+    return _with_memory(maps, errors, samples, memory)
+
+
+def _without_memory(maps: list[Floats], errors: list[Floats]) -> Floats:
+    """Covariance for errors that are independent in time, and correlated between equations."""
+    rows = []
+    for own_map, own_errors in zip(maps, errors, strict=True):
+        blocks = []
+        for other_map, other_errors in zip(maps, errors, strict=True):
+            moment = (own_errors @ other_errors) / len(own_errors)
+            blocks.append(moment * (own_map.T @ other_map))
+        rows.append(blocks)
+    return np.block(rows)
+
+
+def _with_memory(
+    maps: list[Floats], errors: list[Floats], samples: Samples, memory: float
+) -> Floats:
+    """Covariance for errors that last, each trial by itself."""
+    columns = [
+        own_map * own_errors[:, None]
+        for own_map, own_errors in zip(maps, errors, strict=True)
+    ]
+    scores = np.hstack(columns)
+    n_coefficients = scores.shape[1]
+    total = np.zeros((n_coefficients, n_coefficients))
     for trial in np.unique(samples.trial):
         rows = samples.trial == trial
-        spacing = (
-            float(np.median(np.diff(samples.start[rows]))) if rows.sum() > 1 else memory
-        )
+        start = samples.start[rows]
+        spacing = float(np.median(np.diff(start))) if len(start) > 1 else memory
         total += newey_west(scores[rows], round(memory / spacing))
     return 0.5 * (total + total.T)
 
 
 def effective_freedom(estimator: Estimator, features: Floats) -> float:
     """Samples less effective number of parameters, at least 1."""
-    moment = features.T @ (features * weights(estimator, features)[:, None])
-    used = float(np.einsum("ij,ji->", estimator.inverse_moment_, moment))
-    return max(len(features) - used, 1.0)
+    counts = weights(estimator, features)
+    weighted = features * counts[:, None]
+    moment = features.T @ weighted
+    hat = estimator.inverse_moment_ @ moment
+    return max(len(features) - float(np.trace(hat)), 1.0)
 
 
 def coefficient_covariance(
@@ -90,10 +101,14 @@ def coefficient_covariance(
 
 
 def newey_west(scores: Floats, lags: int) -> Floats:
-    """Long-run second moment of the rows of scores, shape (n_columns, n_columns)."""
+    """Long-run second moment of the rows of scores, shape (n_columns, n_columns).
+
+    By Newey & West 1987, with Bartlett's weights 1 - lag / (lags + 1).
+    """
     lags = min(lags, len(scores) - 1)
     total: Floats = scores.T @ scores
     for lag in range(1, lags + 1):
         shifted = scores[lag:].T @ scores[:-lag]
-        total += (1.0 - lag / (lags + 1.0)) * (shifted + shifted.T)
+        weight = 1.0 - lag / (lags + 1.0)
+        total += weight * (shifted + shifted.T)
     return total

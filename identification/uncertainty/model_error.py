@@ -1,4 +1,4 @@
-"""What a structure misses: by how much trials left out are worse predicted than the covariance says.
+"""How much worse trials left out are predicted than the covariance says, because of the structure.
 
 The covariance of a regression says what noise does to the coefficients, not what the
 equations cannot do. So each trial is left out in turn and predicted, motion and indices
@@ -9,13 +9,14 @@ standard errors are scaled until these errors are of size one.
 import copy
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import t as student
 
-from identification.estimators.estimator import Estimators, weights
+from identification.arrays import mean_square
+from identification.estimators.estimator import Estimator, Estimators, weights
 from identification.regression.preprocess import smoothed_channels
 from identification.regression.preprocess.noise import noise_level
 from identification.regression.samples import Samples
@@ -23,28 +24,35 @@ from identification.uncertainty.covariance import residuals
 from identification.validation.closed_loop import closed_loop
 from identification.validation.prediction import COMPARED, ZIGZAG, index_reader, predict
 from shipgym import ShipModel, Trial
-
-Error = tuple[
-    float, float, float
-]  # squared error, variance over the draws, variance of the measurement
+from shipgym.arrays import Flags, Floats
 
 FEWEST_TRIALS = 3  # to leave one out and learn something from it
 # factor for fewer: found were 2.1 to 2.6 on ships of other equations than the
 # structure's
 DEFAULT = 2.5
 DRAWS = 20  # of each model that a trial was left out of
-# of which Student's t is taken as a multiple: few trials say little about their own
-# scatter
-NORMAL = 1.96
-SMALLEST = 1e-3  # factor looked for; the largest is its inverse
-START = 0.5  # of the noise, to which the smoothed state at a trial's start is known
-MEDIAN = 0.455  # median of a squared standard normal number
 INDICES = (
     "initial_turning_lengths",
     *ZIGZAG,
     "advance_lengths",
     "tactical_diameter_lengths",
 )
+
+
+class PredictionError(NamedTuple):
+    """An error of prediction, and what of it is to be expected."""
+
+    square: float  # the error squared
+    variance: float  # over models drawn from the covariance
+    noise: float  # variance of the measurement, and of the start that it gives
+
+
+class ErrorSizes(NamedTuple):
+    """Factors on the standard errors at which errors of prediction are of size one."""
+
+    factor: float  # root mean square of those by kind; 0 without any
+    by_kind: dict[str, float]  # of the motion and of indices
+    predicted: int  # number of trials that could be predicted
 
 
 def without_trial(
@@ -56,20 +64,34 @@ def without_trial(
     equations less the rows left out.
     """
     errors = residuals(estimators, samples)
-    out, kept = samples.trial == trial, samples.trial != trial
-    found: Estimators = {}
-    for q, estimator in estimators.items():
-        X, weight = samples.features[q][out], weights(estimator, samples.features[q])
-        moment = estimator.inverse_moment_
-        left = np.linalg.pinv(np.eye(len(moment)) - moment @ (X.T * weight[out]) @ X)
-        found[q] = copy.copy(estimator)
-        found[q].coef_ = estimator.coef_ - left @ moment @ (
-            X.T @ (weight[out] * errors[q][out])
-        )
-        found[q].inverse_moment_ = left @ moment
-        if hasattr(estimator, "weights_"):
-            found[q].weights_ = weight[kept]  # type: ignore[attr-defined]
-    return found, samples.select(kept)
+    out = samples.trial == trial
+    found = {
+        q: _without_rows(estimator, samples.features[q], errors[q], out)
+        for q, estimator in estimators.items()
+    }
+    return found, samples.select(~out)
+
+
+def _without_rows(
+    estimator: Estimator, features: Floats, errors: Floats, out: Flags
+) -> Estimator:
+    """An estimator less the rows of its normal equations that are `out`.
+
+    With M the inverse moment of all, that of the others is (1 - M X'W X)^-1 M, with the
+    features X and weights W of the rows left out.
+    """
+    weight = weights(estimator, features)
+    M = estimator.inverse_moment_
+    X = features[out]
+    left = X.T * weight[out]
+    change = np.linalg.pinv(np.eye(len(M)) - M @ left @ X)
+
+    found = copy.copy(estimator)
+    found.coef_ = estimator.coef_ - change @ M @ (left @ errors[out])
+    found.inverse_moment_ = change @ M
+    if hasattr(estimator, "weights_"):
+        found.weights_ = weight[~out]  # type: ignore[attr-defined]
+    return found
 
 
 def model_error(
@@ -84,11 +106,12 @@ def model_error(
     trial while the error of the equations does not. Returns `factor`, `how` it was
     found, and what it is made of, for the provenance.
     """
-    least, fitted, _ = _sizes([own] * len(trials), trials)
+    fitted = error_sizes([own] * len(trials), trials)
     error = _generalisation(left_out, trials)
-    if least > error["factor"]:
-        error |= {"factor": least, "how": "errors on the fitted trials"}
-    return {**error, "fitted": fitted}
+    if fitted.factor > error["factor"]:
+        error["factor"] = fitted.factor
+        error["how"] = "errors on the fitted trials"
+    return {**error, "fitted": fitted.by_kind}
 
 
 def _generalisation(
@@ -101,127 +124,146 @@ def _generalisation(
     """
     if len(trials) < FEWEST_TRIALS:
         return _assumed(f"too few trials to leave one out ({len(trials)})")
-    factor, sizes, predicted = _sizes(left_out, trials)
-    if predicted < FEWEST_TRIALS:
+    sizes = error_sizes(left_out, trials)
+    if sizes.predicted < FEWEST_TRIALS:
         return _assumed(
-            f"only {predicted} of {len(trials)} trials can be predicted when they are"
-            " left out"
+            f"only {sizes.predicted} of {len(trials)} trials can be predicted when they"
+            " are left out"
         )
-    few, how = float(student.ppf(0.975, predicted)) / NORMAL, "trials left out in turn"
+    of_normal = 1.96
+    for_few = float(student.ppf(0.975, sizes.predicted)) / of_normal
     return {
-        "factor": max(1.0, few * factor),
-        "how": how,
-        "trials": predicted,
-        "for_few_trials": few,
-        **sizes,
+        "factor": max(1.0, for_few * sizes.factor),
+        "how": "trials left out in turn",
+        "trials": sizes.predicted,
+        "for_few_trials": for_few,
+        **sizes.by_kind,
     }
-
-
-def _sizes(
-    models: Sequence[ShipModel], trials: Sequence[Trial]
-) -> tuple[float, dict[str, float], int]:
-    """The root mean square of the factors by motion and by indices, these, and how many are predicted."""
-    motion, indices, predicted = list[Error](), list[Error](), 0
-    for model, trial in zip(models, trials, strict=True):
-        own, drawn = replace(model, covariance=None), model.sample(DRAWS, 0)
-        names = [name for name in COMPARED if name in trial]
-        clean = trial.with_channels(
-            smoothed_channels(trial, names, "spline")
-        )  # extremes are read from it
-        if found := _motion_errors(own, drawn, trial, clean):
-            predicted += 1
-            motion += found
-            indices += _index_errors(own, drawn, trial, clean)
-    sizes = {
-        name: scale_of(of)
-        for name, of in (("motion", motion), ("indices", indices))
-        if of
-    }
-    return (
-        float(np.sqrt(np.mean(np.square([*sizes.values()] or [0.0])))),
-        sizes,
-        predicted,
-    )
 
 
 def _assumed(why: str) -> dict[str, Any]:
     return {"factor": DEFAULT, "how": f"assumed: {why}"}
 
 
-def scale_of(errors: Sequence[Error]) -> float:
-    """The factor k at which errors are of size one: the mean of error^2 / (k^2 variance + noise^2) is 1."""
+def error_sizes(models: Sequence[ShipModel], trials: Sequence[Trial]) -> ErrorSizes:
+    """How large the errors of models, with covariance, are on the trials of the same places."""
+    motion, indices = list[PredictionError](), list[PredictionError]()
+    predicted = 0
+    for model, trial in zip(models, trials, strict=True):
+        names = [name for name in COMPARED if name in trial]
+        # extremes are read from smoothed channels
+        clean = trial.with_channels(smoothed_channels(trial, names, "spline"))
+        own = replace(model, covariance=None)
+        drawn = model.sample(DRAWS, 0)
+
+        errors = motion_errors(own, drawn, trial, clean)
+        if errors:
+            predicted += 1
+            motion += errors
+            indices += index_errors(own, drawn, trial, clean)
+
+    by_kind = dict[str, float]()
+    if motion:
+        by_kind["motion"] = scale_of(motion)
+    if indices:
+        by_kind["indices"] = scale_of(indices)
+    squares = [size**2 for size in by_kind.values()]
+    return ErrorSizes(float(np.sqrt(np.mean(squares or 0.0))), by_kind, predicted)
+
+
+def scale_of(errors: Sequence[PredictionError]) -> float:
+    """The factor k at which errors are of size one: the mean of error^2 / (k^2 variance + noise^2) is 1.
+
+    Between a thousandth and a thousand.
+    """
     square, variance, noise = np.array(errors).T
 
     def excess(log_factor: float) -> float:
-        return (
-            float(np.mean(square / (np.exp(2.0 * log_factor) * variance + noise))) - 1.0
-        )
+        expected = np.exp(2.0 * log_factor) * variance + noise
+        return float(np.mean(square / expected)) - 1.0
 
-    low, high = np.log(SMALLEST), -np.log(SMALLEST)
-    if excess(low) <= 0.0 or excess(high) >= 0.0:
-        return SMALLEST if excess(low) <= 0.0 else 1.0 / SMALLEST
-    return float(np.exp(brentq(excess, low, high)))
+    smallest, largest = np.log(1e-3), -np.log(1e-3)
+    if excess(smallest) <= 0.0:
+        return 1e-3
+    if excess(largest) >= 0.0:
+        return 1e3
+    return float(np.exp(brentq(excess, smallest, largest)))
 
 
-def _motion_errors(
+def motion_errors(
     own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, clean: Trial
-) -> list[Error]:
-    """Of each channel the mean square error; none where the model or most draws run away."""
+) -> list[PredictionError]:
+    """Mean square error of each channel; none where the model or most draws run away."""
     predicted = predict(own, clean)
-    runs = [run for run in (predict(draw, clean) for draw in drawn) if run is not None]
+    runs = list[Trial]()
+    for draw in drawn:
+        run = predict(draw, clean)
+        if run is not None:
+            runs.append(run)
     if predicted is None or len(runs) < DRAWS / 2:
         return []
-    noise = {
+
+    levels = {
         name: noise_level(trial.t, trial[name]) for name in COMPARED if name in trial
     }
-    shifted = [
-        (name, clean[name] + START * level) for name, level in noise.items() if level
-    ]
-    started = [
-        predict(own, clean.with_channels({name: values})) for name, values in shifted
-    ]
+    shifted = _shifted_starts(own, clean, levels)
     found = []
-    for name, level in noise.items():
-        values = np.array([run[name] for run in runs]) - predicted[name]
-        variance = float(np.mean(np.median(values**2, axis=0))) / MEDIAN
-        square = float(np.mean((predicted[name] - trial[name]) ** 2))
-        starts = [
-            float(np.mean((run[name] - predicted[name]) ** 2))
-            for run in started
-            if run is not None
-        ]
-        if variance > 0.0:
-            timing = float(
-                np.mean((_timing(trial) * np.gradient(clean[name], trial.t)) ** 2)
-            )
-            found.append((square, variance, level**2 + timing + sum(starts)))
+    for name, level in levels.items():
+        scatter = np.array([run[name] for run in runs]) - predicted[name]
+        variance = float(np.mean(_robust_variance(scatter)))
+        if variance <= 0.0:
+            continue
+        by_start = [mean_square(run[name] - predicted[name]) for run in shifted]
+        by_timing = mean_square(_timing(trial) * np.gradient(clean[name], trial.t))
+        noise = level**2 + by_timing + sum(by_start)
+        square = mean_square(predicted[name] - trial[name])
+        found.append(PredictionError(square, variance, noise))
     return found
 
 
-def _index_errors(
+def _shifted_starts(
+    own: ShipModel, clean: Trial, levels: dict[str, float]
+) -> list[Trial]:
+    """Predictions from starts off by half the noise of a channel, to which smoothing leaves it known."""
+    runs = []
+    for name, level in levels.items():
+        if level:
+            shifted = clean.with_channels({name: clean[name] + 0.5 * level})
+            run = predict(own, shifted)
+            if run is not None:
+                runs.append(run)
+    return runs
+
+
+def _robust_variance(scatter: Floats) -> Floats:
+    """Variance along the first axis from the median of the squares, which of a normal number is 0.455."""
+    return np.asarray(np.median(scatter**2, axis=0) / 0.455)
+
+
+def index_errors(
     own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, clean: Trial
-) -> list[Error]:
-    """Of each index of a zigzag or a turning circle; a time read from samples is known to a step."""
-    if (read := index_reader(own, clean)) is None:
+) -> list[PredictionError]:
+    """Error of each index of a zigzag or a turning circle; a time read from samples is known to a step."""
+    read = index_reader(own, clean)
+    if read is None:
         return []
     sail = closed_loop if trial.kind == "zigzag" else predict
-    measured, predicted = read(clean), read(sail(own, clean))
+    measured = read(clean)
+    predicted = read(sail(own, clean))
     draws = [read(sail(draw, clean)) for draw in drawn]
+
     found = []
     for name in INDICES:
-        values = [
-            value
-            for value in (getattr(one, name, None) for one in draws)
-            if value is not None
-        ]
-        truth, mine = getattr(measured, name, None), getattr(predicted, name, None)
-        if truth is None or mine is None or len(values) < DRAWS / 2:
+        truth = getattr(measured, name, None)
+        mine = getattr(predicted, name, None)
+        values = [getattr(indices, name, None) for indices in draws]
+        known = np.array([value for value in values if value is not None])
+        if truth is None or mine is None or len(known) < DRAWS / 2:
             continue
-        variance = float(np.median((np.array(values) - mine) ** 2)) / MEDIAN
+        variance = float(_robust_variance(known - mine))
         if variance > 0.0:
-            found.append(
-                ((truth - mine) ** 2, variance, _reading_noise(trial, name, own))
-            )
+            noise = _reading_noise(trial, name, own)
+            found.append(PredictionError((truth - mine) ** 2, variance, noise))
     return found
 
 
@@ -234,19 +276,13 @@ def _reading_noise(trial: Trial, index: str, model: ShipModel) -> float:
     """Variance of an index as it is read from samples: noise, and a time that is known to a step."""
     timing = _timing(trial)
     if index.endswith("_deg"):
+        noise = noise_level(trial.t, trial["psi"])
         rate = float(np.abs(trial["r"]).max())
-        return (
-            float(
-                np.degrees(np.hypot(noise_level(trial.t, trial["psi"]), timing * rate))
-            )
-            ** 2
-        )
-    noise = (
-        noise_level(trial.t, trial["x"])
-        if "x" in trial and trial.kind != "zigzag"
-        else 0.0
-    )
-    return (
-        float(np.hypot(noise, timing * trial["u"].max()) / model.particulars["length"])
-        ** 2
-    )
+        error_deg = np.degrees(np.hypot(noise, timing * rate))
+        return float(error_deg) ** 2
+
+    noise = 0.0
+    if "x" in trial and trial.kind != "zigzag":
+        noise = noise_level(trial.t, trial["x"])
+    error = np.hypot(noise, timing * trial["u"].max())
+    return float(error / model.particulars["length"]) ** 2

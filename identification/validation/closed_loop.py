@@ -15,12 +15,30 @@ from identification.validation.start import with_start
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.manoeuvres.execution import reversals, rudder
-from shipgym.ships.manoeuvring_model import checked_orders, two_commands
+from shipgym.ships.manoeuvring_model import ManoeuvringModel
+from shipgym.ships.orders import checked_orders, two_commands
 from shipgym.ships.simulate import Conditions, Passage
 
 STEP = 0.02  # of the time to sail one ship length
 # times the measured one; a heading that is not reached by then is never reached
 LONGEST_LEG = 2.0
+
+
+class ZigzagLeg(NamedTuple):
+    """Part of a zigzag between two reversals of the rudder."""
+
+    order: float  # rudder angle, rad
+    duration: float  # s, as measured
+    # the heading at which it ends, rad; None where it ends by the clock
+    target: float | None
+    approach: bool  # whether it is the first one, which may have any helm
+
+
+class _Sailed(NamedTuple):
+    """Samples of a leg after its first one."""
+
+    t: Floats  # s, shape (n_samples,)
+    states: Floats  # shape (n_samples, n_columns)
 
 
 def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
@@ -29,29 +47,32 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
     None where the model runs away or a heading is never reached, without a reversal,
     and for a model whose state is not recorded.
     """
-    if not set(model.state_names) <= {*trial.channels, "x", "y"}:
+    recorded = {*trial.channels, "x", "y"}
+    if not set(model.state_names) <= recorded:
         return None
-    begun, passage = (
-        with_start(model, trial),
-        Passage(model, Conditions(), STEP * model.travel_time),
-    )
-    state = np.array(
-        [begun[c][0] if c in trial.channels else 0.0 for c in model.state_names]
-    )
-    t, states, orders = trial.t[:1], state[None], []
-    for leg in _legs(trial):
+
+    begun = with_start(model, trial)
+    start = [begun[name][0] if name in begun else 0.0 for name in model.state_names]
+    passage = Passage(model, Conditions(), STEP * model.travel_time)
+    times = [trial.t[:1]]
+    states = [np.array([start])]
+    orders = list[float]()
+    for leg in legs(trial):
         try:
-            times, sailed = _sail(passage, trial, states[-1], leg, t[-1])
+            sailed = _sail(passage, trial, leg, times[-1][-1], states[-1][-1])
         except UnstableModelError:
             return None
-        if not len(times):
+        if sailed is None:
             return None
-        t, states = np.append(t, times), np.vstack([states, sailed])
-        orders += [leg.order] * len(times)
-    channels = dict(zip(model.state_names, states.T, strict=True))
+        times.append(sailed.t)
+        states.append(sailed.states)
+        orders += [leg.order] * len(sailed.t)
+
+    columns = np.vstack(states).T
+    channels = dict(zip(model.state_names, columns, strict=True))
     channels["delta_command"] = np.array([*orders, orders[-1]])
     return Trial(
-        t,
+        np.concatenate(times),
         channels,
         name=trial.name,
         kind=trial.kind,
@@ -59,65 +80,77 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
     )
 
 
-class Leg(NamedTuple):
-    """What is held between two reversals of the rudder."""
-
-    order: float  # rudder angle, rad
-    duration: float  # s, as measured
-    target: (
-        float | None
-    )  # the heading at which it ends, rad; None where it ends by the clock
-
-
 @lru_cache(maxsize=16)  # every model drawn sails the same trials
-def _legs(trial: Trial) -> tuple[Leg, ...]:
+def legs(trial: Trial) -> tuple[ZigzagLeg, ...]:
+    """Legs of a measured zigzag; the approach and the last one end by the clock."""
     start, turns = reversals(trial)
-    delta, edges = rudder(trial), [float(trial.t[0]), start, *turns, float(trial.t[-1])]
-    found = []
-    for leg, (begin, end) in enumerate(pairwise(edges)):
-        held = (trial.t >= 0.25 * begin + 0.75 * end) & (trial.t <= end)
-        if end > begin and held.any():
-            target = (
-                float(np.interp(end, trial.t, trial["psi"]))
-                if 1 <= leg <= len(turns)
-                else None
-            )
-            found.append(Leg(float(np.median(delta[held])), end - begin, target))
+    t, delta = trial.t, rudder(trial)
+    edges = [float(t[0]), start, *turns, float(t[-1])]
+    found = list[ZigzagLeg]()
+    for number, (begin, end) in enumerate(pairwise(edges)):
+        last_quarter = t >= 0.25 * begin + 0.75 * end
+        held = last_quarter & (t <= end)
+        if end <= begin or not held.any():
+            continue
+        target = None
+        if 1 <= number <= len(turns):
+            target = float(np.interp(end, t, trial["psi"]))
+        order = float(np.median(delta[held]))
+        found.append(ZigzagLeg(order, end - begin, target, approach=not found))
     return tuple(found)
 
 
 def _sail(
-    passage: Passage, trial: Trial, state: Floats, leg: Leg, begin: float
-) -> tuple[Floats, Floats]:
-    """Times and states of a leg that begins at some time; none where its target is not reached."""
-    model, dt, target = passage.model, passage.dt, leg.target
-    count = max(
-        int(np.ceil(leg.duration * (1.0 if target is None else LONGEST_LEG) / dt)), 2
-    )
+    passage: Passage, trial: Trial, leg: ZigzagLeg, begin: float, state: Floats
+) -> _Sailed | None:
+    """Sail a leg from a time and a state; None where its target is not reached."""
+    model, dt = passage.model, passage.dt
+    longest = leg.duration
+    if leg.target is not None:
+        longest *= LONGEST_LEG
+    count = max(int(np.ceil(longest / dt)), 2)
     t = begin + dt * np.arange(count + 1, dtype=float)
-    commands = np.tile(model.service_command, (count, 1))
-    approach = target is None and begin == trial.t[0]  # with whatever helm there was
-    commands[:, 0] = (
-        np.interp(t[:-1], trial.t, rudder(trial)) if approach else leg.order
-    )
-    if "n" in model.command_names and "n" in trial.channels:
-        commands[:, 1] = np.interp(t[:-1], trial.t, trial["n"])
-    sailed = passage.states(state, count)
-    passage.run("simulate", sailed, two_commands(checked_orders(model, commands)), dt)
-    if target is None:
-        return t[1:], sailed[1:]
-    psi = sailed[:, model.state_names.index("psi")]
-    beyond = np.flatnonzero((psi - target) * np.sign(target - psi[0]) >= 0.0)
-    if not len(beyond) or beyond[0] == 0:
-        return np.empty(0), sailed[:0]
-    k = int(
-        beyond[0]
-        # the state between two steps is straight enough: a step is a fiftieth of a
-        # length
-    )
-    part = float((target - psi[k - 1]) / (psi[k] - psi[k - 1]))
-    t[k], sailed[k] = (
-        t[k - 1] + part * dt,
-        (1.0 - part) * sailed[k - 1] + part * sailed[k],
-    )
-    return t[1 : k + 1], sailed[1 : k + 1]
+
+    commands = _commands(model, trial, leg, t[:-1])
+    orders = two_commands(checked_orders(model, commands))
+    states = passage.states(state, count)
+    passage.run("simulate", states, orders, dt)
+    if leg.target is None:
+        return _Sailed(t[1:], states[1:])
+    psi = states[:, model.state_names.index("psi")]
+    return _until(leg.target, psi, t, states)
+
+
+def _commands(
+    model: ManoeuvringModel, trial: Trial, leg: ZigzagLeg, t: Floats
+) -> Floats:
+    """Rudder of the leg and shaft as measured, shape (n_steps, n_commands)."""
+    commands = np.tile(model.service_command, (len(t), 1))
+    ordered, shaft = 0, 1
+    commands[:, ordered] = leg.order
+    if leg.approach and leg.target is None:
+        commands[:, ordered] = np.interp(t, trial.t, rudder(trial))
+    if "n" in model.command_names and "n" in trial:
+        commands[:, shaft] = np.interp(t, trial.t, trial["n"])
+    return commands
+
+
+def _until(target: float, psi: Floats, t: Floats, states: Floats) -> _Sailed | None:
+    """Samples up to the heading of the target; None where it is not reached, or passed already.
+
+    The state between two steps is straight enough: a step is a fiftieth of a length.
+    """
+    side = np.sign(target - psi[0])
+    beyond = (psi - target) * side >= 0.0
+    last = int(np.argmax(beyond))
+    if last == 0:
+        return None
+
+    before = last - 1
+    gained = psi[last] - psi[before]
+    part = float((target - psi[before]) / gained)
+    step = t[last] - t[before]
+    t[last] = t[before] + part * step
+    states[last] = (1.0 - part) * states[before] + part * states[last]
+    sailed = slice(1, last + 1)
+    return _Sailed(t[sailed], states[sailed])

@@ -14,11 +14,11 @@ from identification.report.comparison import comparison_page
 from identification.result import IdentificationResult
 from identification.simulation_error.refine import Refinement
 from identification.validation.ranking import (
+    RankedFit,
     Ranking,
-    Standing,
+    fit_name,
     in_turn,
-    named,
-    standing,
+    ranked_fit,
 )
 from identification.validation.selection import (
     RM_SVM,
@@ -65,14 +65,20 @@ class Comparison(Ranking):
         """
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        written = comparison_page(self)
-        several = self.standings[0].method not in self.results
-        for one, name in reversed(list(zip(self.standings, self.results, strict=True))):
-            self.results[name].model.save(
-                folder / f"model-{one.structure if several else name}.json"
-            )
+        page = comparison_page(self)
+        for name, result in self._models().items():
+            result.model.save(folder / f"model-{name}.json")
         write_json(self.to_dict(), folder / "comparison.json")
-        write_text(written, folder / "comparison.html")
+        write_text(page, folder / "comparison.html")
+
+    def _models(self) -> dict[str, IdentificationResult]:
+        """Results to save by name: of each method, of several structures the best of each."""
+        if self.ranked[0].method in self.results:
+            return self.results
+        best = dict[str, IdentificationResult]()
+        for fit, result in zip(self.ranked, self.results.values(), strict=True):
+            best.setdefault(fit.structure, result)
+        return best
 
 
 def compare_methods(
@@ -103,67 +109,64 @@ def compare_methods(
         Of `identify` but for `method`. A method is not given settings that it does not
         have.
     """
-    wanted = (
-        [arguments.pop("structure", Options.structure)]
-        if structures is None
-        else [*structures]
-    )
-    several = structures is not None or AUTO in wanted
-    if not (
-        pairs := _pairs(STRUCTURES if AUTO in wanted else wanted, methods, several)
-    ):
-        raise InputError(
-            "methods: none found, expected at least one, such as ['ls', 'tls-svm']"
-        )
-    marked = held_out(trials, arguments.get("hold_out", ()))
-    fitted, held = (
-        [trial for trial in marked if trial.use == use] for use in ("fit", "validate")
-    )
-    if not held and len(fitted) < 2:
-        told = (
-            f"trials: {len(fitted)} to fit and none to validate found, expected a"
-            " held-out trial to rank"
-        )
-        raise InputError(
-            f'{told} the methods on; mark one use = "validate", or give two to fit'
-        )
+    pairs, several = _asked(structures, methods, arguments)
+    fitted, held = _by_use(held_out(trials, arguments.get("hold_out", ())))
     left_out = _left_out([get_method(method) for _, method in pairs], arguments)
-    found, refused = list[tuple[Standing, IdentificationResult]](), dict[str, str]()
+    found = list[tuple[RankedFit, IdentificationResult]]()
+    refused = dict[str, str]()
     for structure, method in counted("structures and methods", pairs):
         name = get_method(method).name
-        own = {
-            key: value
-            for key, value in arguments.items()
-            if key not in left_out.get(name, ())
-        }
+        unknown = left_out.get(name, ())
+        own = {key: arguments[key] for key in arguments if key not in unknown}
         if several:
+            name = fit_name(name_of(structure), name)
             own["reference_model"] = reference_of(structure, own.get("reference_model"))
         try:
             result = identify(trials, structure, method, **own)
-            seen = {t.name: result.metrics["trials"][t.name] for t in held}
-            if not held:
-                own |= {
-                    "structure": structure,
-                    "method": method,
-                    "uncertainty": "analytic",
-                }
-                seen = cross_validate(
-                    fitted, **{k: v for k, v in own.items() if k != "hold_out"}
-                )
+            if held:
+                of_trials = result.metrics["trials"]
+                seen = {trial.name: of_trials[trial.name] for trial in held}
+            else:
+                seen = _each_in_turn(fitted, structure, method, own)
         except InputError as error:
-            refused[named(name_of(structure), name) if several else name] = str(error)
-            continue
-        found.append((standing([result], seen, trials), result))
+            refused[name] = str(error)
+        else:
+            found.append((ranked_fit([result], seen, trials), result))
     if not found:
         raise InputError(next(iter(refused.values())))
-    found.sort(key=lambda pair: pair[0].rank)
-    results = {
-        named(one.structure, one.method) if several else one.method: result
-        for one, result in found
-    }
-    return Comparison(
-        tuple(one for one, _ in found), results, refused, left_out, not held
-    )
+
+    found.sort(key=lambda entry: entry[0].rank)
+    results = dict[str, IdentificationResult]()
+    for fit, result in found:
+        name = fit_name(fit.structure, fit.method) if several else fit.method
+        results[name] = result
+    ranked = tuple(fit for fit, _ in found)
+    return Comparison(ranked, results, refused, left_out, in_turn=not held)
+
+
+def _by_use(trials: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
+    """Trials to fit and trials held out; InputError where none can be held out."""
+    fitted = [trial for trial in trials if trial.use == "fit"]
+    held = [trial for trial in trials if trial.use == "validate"]
+    if not held and len(fitted) < 2:
+        raise InputError(
+            "trials: expected a held-out trial to rank the methods on, got"
+            f" {len(fitted)} to fit and none to validate; mark one use ="
+            ' "validate", or give two to fit'
+        )
+    return fitted, held
+
+
+def _each_in_turn(
+    trials: Sequence[Trial],
+    structure: Any,
+    method: Any,
+    arguments: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Metrics of each trial, predicted by a fit of the others."""
+    own = {"structure": structure, "method": method, "uncertainty": "analytic"}
+    others = {name: value for name, value in arguments.items() if name != "hold_out"}
+    return cross_validate(trials, **{**others, **own})
 
 
 def cross_validate(
@@ -187,55 +190,91 @@ def cross_validate(
     used = [trial for trial in trials if trial.use == "fit"]
     if len(used) < 2:
         raise InputError(
-            f"trials: {len(used)} to fit found, expected at least 2 to hold one out"
+            f"trials: expected at least 2 to fit, to hold one out, got {len(used)}"
         )
-    groups = len(used) if folds is None else folds
-    groups = int(
-        check_number(
-            groups, "folds", at_least=2, at_most=len(used), hint="at most one per trial"
-        )
+    groups = check_number(
+        len(used) if folds is None else folds,
+        "folds",
+        at_least=2,
+        at_most=len(used),
+        hint="at most one per trial",
     )
-    own = {"model_error": False, **arguments}
-    return in_turn(lambda held: identify(used, hold_out=held, **own), used, groups)[0]
+    settings = {"model_error": False, **arguments}
+
+    def without(held: list[str]) -> IdentificationResult:
+        return identify(used, hold_out=held, **settings)
+
+    metrics, _ = in_turn(without, used, int(groups))
+    return metrics
 
 
-def _pairs(
+def _asked(
+    structures: Sequence[str | Structure] | None,
+    methods: Sequence[Any] | None,
+    arguments: dict[str, Any],
+) -> tuple[list[tuple[Any, Any]], bool]:
+    """Structures and methods to fit, and whether there are several structures.
+
+    Takes the structure out of the arguments of `identify`.
+    """
+    if structures is None:
+        wanted = [arguments.pop("structure", Options.structure)]
+    else:
+        wanted = list(structures)
+    several = structures is not None or AUTO in wanted
+    if AUTO in wanted:
+        wanted = list(STRUCTURES)
+
+    pairs = fit_pairs(wanted, methods, several)
+    if not pairs:
+        raise InputError(
+            "methods: expected at least one, such as ['ls', 'tls-svm'], got none"
+        )
+    return pairs, several
+
+
+def fit_pairs(
     structures: Sequence[Any], methods: Sequence[Any] | None, several: bool
 ) -> list[tuple[Any, Any]]:
     """Structures, each with the methods that it is fitted by: those given, of the MMG form the first."""
+    by_name = {name_of(structure): structure for structure in structures}
     pairs: list[tuple[Any, Any]] = []
-    for structure in {name_of(one): one for one in structures}.values():
+    for structure in by_name.values():
         own = methods
         if own is None:
-            usual = (*USUAL, RM_SVM) if structure == GREY_BOX else USUAL
-            own = methods_of(structure, Options.method) if several else usual
+            own = _usual_methods(structure, several)
         elif several and structure == MMG:
             own = own[:1]
-        pairs += [
-            (structure, one)
-            for one in {get_method(one).name: one for one in own}.values()
-        ]
+        named = {get_method(method).name: method for method in own}
+        pairs += [(structure, method) for method in named.values()]
     return pairs
+
+
+def _usual_methods(structure: Any, several: bool) -> tuple[str, ...]:
+    """Methods where none are named."""
+    if several:
+        return methods_of(structure, Options.method)
+    return (*USUAL, RM_SVM) if structure == GREY_BOX else USUAL
 
 
 def _left_out(
     chosen: Sequence[Method], arguments: Mapping[str, Any]
 ) -> dict[str, tuple[str, ...]]:
-    """Settings that each method does not have but another one does."""
+    """Settings that each method does not have but another one does, by its name."""
     settings = [name for name in arguments if name in OPTIONS and OPTIONS[name].setting]
-    of_refinement, left = (
-        {item.name for item in fields(Refinement)},
-        dict[str, tuple[str, ...]](),
-    )
+    of_refinement = {item.name for item in fields(Refinement)}
+
+    left = dict[str, tuple[str, ...]]()
     for method in chosen:
-        further = of_refinement if method.refined else set()
-        left[method.name] = tuple(
-            one for one in settings if not (one in further or method.knows(one))
-        )
+        unknown = [name for name in settings if not method.knows(name)]
+        if method.refined:
+            unknown = [name for name in unknown if name not in of_refinement]
+        left[method.name] = tuple(unknown)
+
     for setting in settings:
         if all(setting in unknown for unknown in left.values()):
             raise InputError(
-                f"settings: {setting} found, which none of the methods"
-                f" {', '.join(left)} knows"
+                f"settings: expected those of the methods {', '.join(left)}, got"
+                f" {setting}, which none of them knows"
             )
     return {name: unknown for name, unknown in left.items() if unknown}

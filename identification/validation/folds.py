@@ -1,7 +1,8 @@
-"""Which trials a choice is validated on: each held out in turn, or those of the largest rudder."""
+"""What a choice is validated on: each trial held out in turn, or those of the largest rudder."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,12 +11,16 @@ from shipgym import InputError, Trial
 from shipgym.arrays import Flags
 from shipgym.checks import check_choice
 
-TRIALS, LARGEST_RUDDER = "trials", "largest-rudder"
+TRIALS = "trials"
+LARGEST_RUDDER = "largest-rudder"
 FOLDS = (TRIALS, LARGEST_RUDDER)
-LEAST_RUDDER_SHARE = (
-    0.9  # of the largest rudder; from there on a rudder counts as the largest
-)
-PIECES = 3  # into which a single trial is cut
+
+
+class Fold(NamedTuple):
+    """A regression divided into samples to fit and samples held out."""
+
+    fit: Samples
+    held: Samples
 
 
 def of_largest_rudder(trials: Sequence[Trial], where: str) -> Flags:
@@ -23,16 +28,16 @@ def of_largest_rudder(trials: Sequence[Trial], where: str) -> Flags:
 
     The hard turn is in no zigzag. How well small rudders predict larger ones is the
     closest substitute in the data. `where`: the argument that asks for it. Raises
-    InputError if all of them have the same rudder.
+    InputError if all of them have the same rudder, to a tenth.
     """
     rudders = np.array([np.abs(trial["delta"]).max() for trial in trials], dtype=float)
-    largest: Flags = rudders > LEAST_RUDDER_SHARE * rudders.max()
+    largest: Flags = rudders > 0.9 * rudders.max()
     if largest.all():
         raise InputError(
-            f"{where}: {LARGEST_RUDDER!r} found, but all trials to fit ({len(trials)})"
-            f" reach {np.degrees(rudders.max()):.3g} deg, expected some with less"
-            f" rudder than others; take {TRIALS!r}, or add trials of another rudder"
-            " angle"
+            f"{where}: expected some trials with less rudder than others for"
+            f" {LARGEST_RUDDER!r}, got {len(trials)} trials that all reach"
+            f" {np.degrees(rudders.max()):.3g} deg; take {TRIALS!r}, or add trials of"
+            " another rudder angle"
         )
     return largest
 
@@ -40,27 +45,50 @@ def of_largest_rudder(trials: Sequence[Trial], where: str) -> Flags:
 def held_out_rows(
     trials: Sequence[Trial], samples: Samples, folds: str
 ) -> Iterator[tuple[Flags, Trial]]:
-    """Rows to fit, and the trial or the piece of the only trial that is held out, by a choice of `FOLDS`."""
+    """Rows to fit, and the trial or the piece of the only trial that is held out.
+
+    `folds`: one of `FOLDS`.
+    """
     if check_choice(folds, FOLDS, "folds") == LARGEST_RUDDER:
         largest = of_largest_rudder(trials, "folds")
         rows = ~largest[samples.trial]
-        yield from (
-            (rows, trial) for trial, held in zip(trials, largest, strict=True) if held
-        )
+        for trial, held in zip(trials, largest, strict=True):
+            if held:
+                yield rows, trial
     elif len(trials) > 1:
-        yield from (
-            (samples.trial != index, trial) for index, trial in enumerate(trials)
-        )
+        for index, trial in enumerate(trials):
+            yield samples.trial != index, trial
     else:
-        start, end = samples.start, samples.start + samples.duration
-        yield from (
-            ((end <= one.t[0]) | (start >= one.t[-1]), one) for one in pieces(trials[0])
-        )
+        end = samples.start + samples.duration
+        for piece in pieces(trials[0]):
+            yield (end <= piece.t[0]) | (samples.start >= piece.t[-1]), piece
+
+
+def sample_folds(trials: Sequence[Trial], samples: Samples, folds: str) -> list[Fold]:
+    """Samples to fit and samples held out; of a single trial each fifth of its samples.
+
+    `folds`: one of `FOLDS`; by the largest rudder each trial that has it is held out of
+    a fit to all that have less.
+    """
+    if folds == LARGEST_RUDDER:
+        largest = of_largest_rudder(trials, "prior_folds")
+        smaller = samples.select(~largest[samples.trial])
+        return [
+            Fold(smaller, samples.select(samples.trial == index))
+            for index in np.flatnonzero(largest)
+        ]
+    groups = samples.trial
+    if groups.max() == groups.min():
+        groups = np.arange(len(samples)) * 5 // len(samples)
+    return [
+        Fold(samples.select(groups != group), samples.select(groups == group))
+        for group in np.unique(groups)
+    ]
 
 
 def pieces(trial: Trial) -> list[Trial]:
-    """A trial cut into parts, which are no manoeuvres."""
-    edges = np.linspace(0, len(trial), PIECES + 1).astype(int).tolist()
+    """Thirds of a trial, which are no manoeuvres."""
+    edges = np.linspace(0, len(trial), 4).astype(int).tolist()
     return [
         trial.part(slice(*ends), f"{trial.name}, part {n}")
         for n, ends in enumerate(pairwise(edges), 1)

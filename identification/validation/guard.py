@@ -4,82 +4,31 @@ A fit of zigzags extrapolates in hard turns, where terms that hardly mattered in
 data take over.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.methods import Method, fit_held
-from shipgym import Particulars, ShipModel, Trial, UnstableModelError
-from shipgym.arrays import Floats
+from identification.validation.hard_turn import RUDDER_DEG, hard_turn_features
+from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.manoeuvres import turning_circle
 from shipgym.manoeuvres.registry import FASTEST, QUICKEST_TURN
-from shipgym.ships import Structure
 from shipgym.ships.simulate import open_loop
 
-RUDDERS_DEG = (
-    35.0,
-    10.0,
-)  # of the trial manoeuvres; the first is cut to the rudder's limit
-REVERSALS = (
-    2.5,
-    5.0,
-    10.0,
-    20.0,
-)  # ship lengths sailed at service speed between those of the rudder
 DURATION_LENGTHS = 50.0  # of a trial manoeuvre, at service speed
 STEP = 0.02  # of the time to sail one ship length
 
-#: A full ship's steady hard turn: speed by service speed, drift angle, yaw rate r L /
-#: U, rudder. KVLCC2 of SIMMAN 2008 slows down to 0.37 at r L / U = 0.8 and a drift of
-#: 20 degrees. The shaft turns somewhat slower under its load.
-HARD_TURN = {
-    "speed": 0.47,
-    "drift": np.radians(20.5),
-    "yaw_rate": 0.8,
-    "rudder": np.radians(35.0),
-    "shaft": 0.9,
-    "heel": np.radians(5.0),
-}
 
-#: Strengths of the penalty tried in turn: rms error allowed in the regression, relative
-#: to what the terms contribute in a hard turn.
-STRENGTHS = tuple(float(strength) for strength in np.geomspace(1e-3, 1.0, 19))
+class Simulation(NamedTuple):
+    """A simulation that a model has to survive."""
 
-
-def hard_turn_features(
-    structure: Structure, particulars: Particulars, shaft_speed: float
-) -> dict[str, Floats]:
-    """Size of each term in a hard turn, by equation, arrays of shape (n_terms,), SI units."""
-    speed = HARD_TURN["speed"] * particulars["speed"]
-    state = {
-        "u": speed * np.cos(HARD_TURN["drift"]),
-        "v": -speed * np.sin(HARD_TURN["drift"]),
-        "r": HARD_TURN["yaw_rate"] * speed / particulars["length"],
-        "p": (
-            HARD_TURN["heel"]
-            * HARD_TURN["speed"]
-            * particulars["speed"]
-            / particulars["length"]
-        ),
-        "phi": HARD_TURN["heel"],
-        "delta": HARD_TURN["rudder"],
-        "n": HARD_TURN["shaft"] * shaft_speed,
-    }
-    channels = {name: np.array([state[name]]) for name in structure.required_channels}
-    sizes = {
-        q: np.abs(structure.features(q, channels, particulars, shaft_speed)[0])
-        for q in structure.equations
-    }
-    if "q" in sizes:
-        sizes["r"] = np.append(
-            sizes["r"], sizes.pop("q") * particulars["length"] / speed
-        )
-    return sizes
+    name: str
+    sail: Callable[[], Trial]
+    least_surge: float = 0.0  # ships go astern only where they were seen to, m/s
 
 
 def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
@@ -89,68 +38,78 @@ def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
     and rudder reversed at intervals, from short to long, which excites what a zigzag of
     any other angle would. Stops after the first kind in which it does.
     """
-    angles = sorted(
-        {min(angle, model.steering.rudder_limit_deg) for angle in RUDDERS_DEG},
-        reverse=True,
-    )
-    sides = [side for angle in angles for side in (angle, -angle)]
-    predictions = (
-        (
-            f"trial {trial.name!r}, open loop",
-            partial(open_loop, model, trial),
-            float(trial["u"].min()),
-        )
-        for trial in trials
-    )
-    turn = partial(
-        turning_circle,
-        duration=DURATION_LENGTHS * model.travel_time,
-        dt=STEP * model.travel_time,
-    )
-    turns = (
-        (f"turning circle, {side:+.0f} deg", partial(turn, model, side), 0.0)
-        for side in sides
-    )
-    reversals = (
-        (
-            f"rudder {side:+.0f} deg reversed every {gap:g} L/U",
-            partial(_reversed, model, side, gap),
-            0.0,
-        )
-        for side, gap in product(sides, REVERSALS)
-    )
-    for kind in (predictions, turns, reversals):
-        tried = ((name, _runs_away(model, run, least)) for name, run, least in kind)
-        if reasons := [f"{name}: {cause}" for name, cause in tried if cause]:
+    recorded = _recorded(model, trials)
+    for simulations in (recorded, _turns(model), _reversals(model)):
+        reasons = []
+        for simulation in simulations:
+            cause = why_unphysical(model, simulation)
+            if cause is not None:
+                reasons.append(f"{simulation.name}: {cause}")
+        if reasons:
             return reasons
     return []
 
 
-def _reversed(model: ShipModel, rudder_deg: float, interval: float) -> Trial:
-    """Rudder hard over from side to side, at intervals in ship lengths."""
-    steps = np.arange(round(DURATION_LENGTHS / STEP))
-    commands = np.tile(model.service_command, (len(steps), 1))
-    commands[:, 0] = np.where(
-        steps // round(interval / STEP) % 2 == 0, 1.0, -1.0
-    ) * np.radians(rudder_deg)
+def _recorded(model: ShipModel, trials: Sequence[Trial]) -> Iterator[Simulation]:
+    for trial in trials:
+        name = f"trial {trial.name!r}, open loop"
+        least = float(trial["u"].min())
+        yield Simulation(name, partial(open_loop, model, trial), least)
+
+
+def _turns(model: ShipModel) -> Iterator[Simulation]:
+    duration = DURATION_LENGTHS * model.travel_time
+    dt = STEP * model.travel_time
+    for angle in _angles_deg(model):
+        name = f"turning circle, {angle:+.0f} deg"
+        yield Simulation(name, partial(turning_circle, model, angle, duration, dt))
+
+
+def _reversals(model: ShipModel) -> Iterator[Simulation]:
+    for angle in _angles_deg(model):
+        for lengths in (2.5, 5.0, 10.0, 20.0):
+            name = f"rudder {angle:+.0f} deg reversed every {lengths:g} L/U"
+            yield Simulation(name, partial(reversed_rudder, model, angle, lengths))
+
+
+def _angles_deg(model: ShipModel) -> list[float]:
+    """Rudder angles of the manoeuvres to both sides, the hard turn within the rudder's limit."""
+    limit = model.steering.rudder_limit_deg
+    hard = min(RUDDER_DEG, limit)
+    small = min(10.0, limit)
+    angles = [hard, -hard]
+    if small < hard:
+        angles += [small, -small]
+    return angles
+
+
+def reversed_rudder(model: ShipModel, rudder_deg: float, lengths: float) -> Trial:
+    """Simulate a rudder put hard over from side to side, at intervals in ship lengths."""
+    step = np.arange(round(DURATION_LENGTHS / STEP))
+    side = step // round(lengths / STEP)
+    order = np.radians(rudder_deg) * np.where(side % 2 == 0, 1.0, -1.0)
+
+    commands = np.tile(model.service_command, (len(step), 1))
+    commands[:, 0] = order
     return model.simulate(commands, STEP * model.travel_time)
 
 
-def _runs_away(
-    model: ShipModel, run: Callable[[], Trial], least_surge: float
-) -> str | None:
-    """What is wrong with a simulation, None if nothing; ships go astern only where they were seen to."""
+def why_unphysical(model: ShipModel, simulation: Simulation) -> str | None:
+    """Why a simulation is that of no ship; None where it may be."""
     try:
-        trial = run()
+        trial = simulation.sail()
     except UnstableModelError as error:
         return f"ran away after {error.time_s:.0f} s"
+
     length, speed = model.particulars["length"], model.particulars["speed"]
-    if trial["u"].min() < min(least_surge, 0.0) or trial["u"].max() > FASTEST * speed:
-        return f"surge speed from {trial['u'].min():.3g} to {trial['u'].max():.3g} m/s"
-    if np.abs(trial["v"]).max() > speed:
-        return f"sway speed of {np.abs(trial['v']).max():.3g} m/s"
-    if np.abs(trial["r"]).max() * length > QUICKEST_TURN * speed:
-        return f"yaw rate of {np.degrees(np.abs(trial['r']).max()):.3g} deg/s"
+    slowest, fastest = trial["u"].min(), trial["u"].max()
+    sway, yaw = np.abs(trial["v"]).max(), np.abs(trial["r"]).max()
+    if slowest < min(simulation.least_surge, 0.0) or fastest > FASTEST * speed:
+        return f"surge speed from {slowest:.3g} to {fastest:.3g} m/s"
+    if sway > speed:
+        return f"sway speed of {sway:.3g} m/s"
+    if yaw * length > QUICKEST_TURN * speed:
+        return f"yaw rate of {np.degrees(yaw):.3g} deg/s"
     return None
 
 
@@ -173,35 +132,42 @@ def guarded_fit(
 
     Not stable, and without a penalty, where none helped or it is not `guarded`.
     """
-    blank, trials = task.blank, task.trials
     estimators = method.fitted(settings, task)
-    model = with_coefficients(blank, estimators)
-    if not (reasons := reasons_unstable(model, trials)):
+    model = with_coefficients(task.blank, estimators)
+    reasons = reasons_unstable(model, task.trials)
+    if not reasons:
         return GuardedFit(model, estimators, True, {"decision": "stable as fitted"})
-    rejected = {"rejected": reasons}
-    if not (guarded and method.regularised):
-        return GuardedFit(
-            model, estimators, False, {"decision": "runs away, not guarded", **rejected}
-        )
-    sizes = hard_turn_features(
-        blank.table, blank.particulars, blank.service_shaft_speed
-    )
-    for strength in STRENGTHS:
-        held = fit_held(task.samples, sizes, strength)
-        candidate = with_coefficients(blank, held)
-        if not reasons_unstable(candidate, trials):
+
+    decision = "runs away, not guarded"
+    if guarded and method.regularised:
+        penalised = penalised_fit(task, reasons)
+        if penalised is not None:
+            return penalised
+        decision = "runs away under every penalty"
+    report = {"decision": decision, "rejected": reasons}
+    return GuardedFit(model, estimators, False, report)
+
+
+def penalised_fit(task: FitTask, reasons: list[str]) -> GuardedFit | None:
+    """The fit with the weakest penalty on hard turns under which it does not run away.
+
+    `reasons`: why it did without. Strengths are rms errors allowed in the regression,
+    relative to what the terms contribute in a hard turn.
+    """
+    blank = task.blank
+    shaft_speed = blank.service_shaft_speed
+    sizes = hard_turn_features(blank.table, blank.particulars, shaft_speed)
+    for strength in np.geomspace(1e-3, 1.0, 19).tolist():
+        estimators = fit_held(task.samples, sizes, strength)
+        model = with_coefficients(blank, estimators)
+        if not reasons_unstable(model, task.trials):
             report = {
                 "decision": "penalised by hard turn",
                 "strength": strength,
-                **rejected,
+                "rejected": reasons,
             }
-            return GuardedFit(candidate, held, True, report)
-    return GuardedFit(
-        model,
-        estimators,
-        False,
-        {"decision": "runs away under every penalty", **rejected},
-    )
+            return GuardedFit(model, estimators, True, report)
+    return None
 
 
 def with_coefficients(blank: ShipModel, estimators: Estimators) -> ShipModel:

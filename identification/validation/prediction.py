@@ -1,10 +1,10 @@
 """How well a model predicts recorded trials, open loop from the measured rudder."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
-import numpy as np
-
+from identification.arrays import root_mean_square
 from identification.validation.closed_loop import closed_loop
 from identification.validation.start import with_start
 from shipgym import InputError, ShipModel, Trial, UnstableModelError
@@ -14,6 +14,9 @@ from shipgym.ships.simulate import open_loop
 COMPARED = ("u", "v", "r", "psi")
 ZIGZAG = ("overshoot_1_deg", "overshoot_2_deg")
 TURNING = ("advance_lengths", "transfer_lengths", "tactical_diameter_lengths")
+
+#: From a run of a trial's manoeuvre, None for one that ran away, to its indices or None.
+IndexReader = Callable[[Trial | None], Any]
 
 
 def predict(model: ShipModel, trial: Trial) -> Trial | None:
@@ -36,54 +39,63 @@ def trial_metrics(
     `predicted`, of overshoots also `closed_loop` (the rudder reversed at the measured
     headings), None where the manoeuvre has no such index or never got there.
     """
-    errors: dict[str, float | None] = dict.fromkeys(COMPARED)
-    if prediction is not None:
-        for channel in [name for name in COMPARED if name in trial]:
-            errors[channel] = float(
-                np.sqrt(np.mean((prediction[channel] - trial[channel]) ** 2))
-            )
     metrics: dict[str, Any] = {
         "use": trial.use,
         "diverged": prediction is None,
-        "rmse": errors,
+        "rmse": _errors(trial, prediction),
+        **dict.fromkeys((*ZIGZAG, *TURNING)),
     }
-    metrics |= dict.fromkeys((*ZIGZAG, *TURNING))
-    read, zigzag = index_reader(model, trial), trial.kind == "zigzag"
+    read = index_reader(model, trial)
     measured = None if read is None else read(trial)
     if read is None or measured is None:
         return metrics
+
     runs = {"measured": measured, "predicted": read(prediction)}
-    if zigzag:
-        runs["closed_loop"] = (
-            None if prediction is None else read(closed_loop(model, trial))
-        )
-    for name in ZIGZAG if zigzag else TURNING:
+    names: tuple[str, ...] = TURNING
+    if trial.kind == "zigzag":
+        names = ZIGZAG
+        again = None if prediction is None else closed_loop(model, trial)
+        runs["closed_loop"] = read(again)
+    for name in names:
         metrics[name] = {
-            kind: getattr(found, name, None) for kind, found in runs.items()
+            kind: getattr(indices, name, None) for kind, indices in runs.items()
         }
     return metrics
 
 
-def index_reader(
-    model: ShipModel, trial: Trial
-) -> Callable[[Trial | None], Any] | None:
+def _errors(trial: Trial, prediction: Trial | None) -> dict[str, float | None]:
+    """Root mean square errors by channel; None for one that is not known."""
+    errors: dict[str, float | None] = dict.fromkeys(COMPARED)
+    if prediction is not None:
+        for name in COMPARED:
+            if name in trial:
+                errors[name] = root_mean_square(prediction[name] - trial[name])
+    return errors
+
+
+def index_reader(model: ShipModel, trial: Trial) -> IndexReader | None:
     """From a run of the trial's manoeuvre to its indices, or None; None for other manoeuvres.
 
     Runs have none where a channel such as the position is missing.
     """
     length = model.particulars["length"]
-    heading = switch_heading_deg(trial) if trial.kind == "zigzag" else None
+    indices: Callable[[Trial], Any]
+    if trial.kind == "turning-circle":
+        indices = partial(turning_indices, length=length)
+    elif trial.kind == "zigzag":
+        heading = switch_heading_deg(trial)
+        if heading is None:
+            return None
+        indices = partial(zigzag_indices, length=length, heading_deg=heading)
+    else:
+        return None
 
     def read(run: Trial | None) -> Any:
+        if run is None:
+            return None
         try:
-            if run is None:
-                return None
-            return (
-                turning_indices(run, length)
-                if heading is None
-                else zigzag_indices(run, length, heading)
-            )
+            return indices(run)
         except InputError:
             return None
 
-    return read if heading is not None or trial.kind == "turning-circle" else None
+    return read

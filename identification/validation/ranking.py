@@ -9,9 +9,12 @@ import numpy as np
 from identification.result import IdentificationResult
 from shipgym import Trial
 
+#: Metrics of trials by their names, see `prediction.trial_metrics`.
+Metrics = Mapping[str, Mapping[str, Any]]
+
 
 @dataclass(frozen=True)
-class Standing:
+class RankedFit:
     """How well a method predicts the trials held out."""
 
     structure: str  # of its model
@@ -30,7 +33,7 @@ class Standing:
 
     @property
     def rank(self) -> tuple[Any, ...]:
-        """By which standings are sorted: first those that never run away, then by the error."""
+        """By which fits are sorted: first those that never run away, then by the error."""
         return self.ran_away, not self.stable, self.error is None, self.error or 0.0
 
 
@@ -40,30 +43,28 @@ class Ranking:
 
     #: the best first: those that run away on fewest trials, and among them the smallest
     #: error
-    standings: tuple[Standing, ...]
+    ranked: tuple[RankedFit, ...]
     #: identified from all trials to fit, in the same order, by method, of several
-    #: structures by `named`
+    #: structures by `fit_name`
     results: dict[str, IdentificationResult]
     refused: dict[str, str]  # why a method could not be fitted
-    left_out: dict[
-        str, tuple[str, ...]
-    ]  # settings that a method does not have and was not given
-    # whether no trial was marked `validate`, so that each trial to fit was held out in
-    # turn
+    #: settings that a method does not have and was not given
+    left_out: dict[str, tuple[str, ...]]
+    #: whether no trial was marked `validate`, so that each trial to fit was held out in
+    #: turn
     in_turn: bool
 
     @property
     def best(self) -> IdentificationResult:
-        """What the first of the ranking identified."""
+        """The result of the first of the ranking."""
         return next(iter(self.results.values()))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
+        in_turn = "each trial in turn"
         return {
-            "held_out": (
-                "each trial in turn" if self.in_turn else "trials marked validate"
-            ),
-            "ranking": [asdict(standing) for standing in self.standings],
+            "held_out": in_turn if self.in_turn else "trials marked validate",
+            "ranking": [asdict(fit) for fit in self.ranked],
             "refused": self.refused,
             "settings_left_out": {
                 name: list(left) for name, left in self.left_out.items()
@@ -82,37 +83,38 @@ def in_turn(
     `identify`: from the names held out; `groups`: at most one per trial, in their
     order.
     """
-    metrics, results = dict[str, Any](), []
+    metrics, results = dict[str, Any](), list[IdentificationResult]()
     groups = max(1, min(groups, len(trials)))
-    for k in range(groups):
+    group_of = np.arange(len(trials)) * groups // len(trials)
+    for group in range(groups):
         held = [
             trial.name
-            for i, trial in enumerate(trials)
-            if i * groups // len(trials) == k
+            for trial, own in zip(trials, group_of, strict=True)
+            if own == group
         ]
-        results.append(identify(held))
-        metrics |= {name: results[-1].metrics["trials"][name] for name in held}
+        result = identify(held)
+        results.append(result)
+        for name in held:
+            metrics[name] = result.metrics["trials"][name]
     return metrics, results
 
 
-def named(structure: str, method: str) -> str:
+def fit_name(structure: str, method: str) -> str:
     """A structure fitted by a method, in words."""
     return f"{structure} by {method}"
 
 
-def standing(
-    results: Sequence[IdentificationResult],
-    seen: Mapping[str, Any],
-    trials: Sequence[Trial],
-) -> Standing:
+def ranked_fit(
+    results: Sequence[IdentificationResult], seen: Metrics, trials: Sequence[Trial]
+) -> RankedFit:
     """How well a method that gave `results` predicts trials; `seen`: metrics of those held out, by name."""
     measured = {trial.name: trial for trial in trials}
     errors = {
-        trial: _error(metrics, measured[trial]) for trial, metrics in seen.items()
+        name: _relative_error(metrics, measured[name]) for name, metrics in seen.items()
     }
     known = [error for error in errors.values() if error is not None]
     provenance = results[0].model.provenance or {}
-    return Standing(
+    return RankedFit(
         structure=provenance["structure"],
         method=provenance["method"],
         coefficients=len(results[0].coefficients),
@@ -125,21 +127,20 @@ def standing(
     )
 
 
-def _error(metrics: Mapping[str, Any], trial: Trial) -> float | None:
+def _relative_error(metrics: Mapping[str, Any], trial: Trial) -> float | None:
     """Errors of the channels by their standard deviation; None where the simulation ran away."""
-    known = {
-        name: error for name, error in metrics["rmse"].items() if error is not None
-    }
-    ratios = [
-        error / float(np.std(trial[c]))
-        for c, error in known.items()
-        if np.std(trial[c]) > 0.0
-    ]
+    ratios = []
+    for name, error in metrics["rmse"].items():
+        if error is None:
+            continue
+        deviation = float(np.std(trial[name]))
+        if deviation > 0.0:
+            ratios.append(error / deviation)
     return float(np.mean(ratios)) if ratios else None
 
 
-def _mean_degrees(seen: Mapping[str, Any], channel: str) -> float | None:
-    found = [
-        m["rmse"][channel] for m in seen.values() if m["rmse"][channel] is not None
-    ]
-    return float(np.degrees(np.mean(found))) if found else None
+def _mean_degrees(seen: Metrics, channel: str) -> float | None:
+    """Mean over the trials of the error of an angle, degrees; None where none is known."""
+    errors = [metrics["rmse"][channel] for metrics in seen.values()]
+    known = [error for error in errors if error is not None]
+    return float(np.degrees(np.mean(known))) if known else None

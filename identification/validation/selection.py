@@ -1,7 +1,7 @@
 """Which structure and which method predict trials held out best, for `structure = "auto"`."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,12 @@ from identification.result import IdentificationResult
 from identification.simulation_error.maximum_a_posteriori import MAP
 from identification.simulation_error.similarity import AUTO
 from identification.validation.folds import pieces
-from identification.validation.ranking import Standing, in_turn, named, standing
+from identification.validation.ranking import (
+    RankedFit,
+    fit_name,
+    in_turn,
+    ranked_fit,
+)
 from shipgym import InputError, Trial
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.mmg import MMG
@@ -30,18 +35,18 @@ TABLES = (
 )
 STRUCTURES = (*TABLES, GREY_BOX, MMG)
 RM_SVM = "rm-svm"
-OTHERS = (
-    "ls",
-    "cv-lssvr",
-)  # methods that a table that predicts best is also fitted by; quick ones
-MOST_GROUPS = 5  # of trials that are held out together
-LEAST_DIFFERENCE = 0.02  # of errors, relative; a smaller one decides nothing
+#: Methods that a table that predicts best is also fitted by; quick ones.
+OTHERS = ("ls", "cv-lssvr")
+
+#: From trials and options to a result, as `identify` without particulars and gear.
+Identify = Callable[[Sequence[Trial], Options], IdentificationResult]
 
 
 def select(
-    identify: Callable[[Sequence[Trial], Options], IdentificationResult],
+    identify: Identify,
     trials: Sequence[Trial],
     options: Options,
+    structures: Sequence[str] | None = None,
 ) -> tuple[Options, dict[str, Any]]:
     """The options with the structure and method that predict best, and the ranking, for the provenance.
 
@@ -51,103 +56,134 @@ def select(
     whose error exceeds the least by no more than one standard error of their difference
     over the trials, or by 2 %. A method other than the default is the only one, and
     what does not know a setting is refused; InputError where nothing can be fitted,
-    with the first reason.
+    with the first reason. `structures`: to try, by default `STRUCTURES`.
     """
+    single = len(trials) == 1
+    parts = pieces(trials[0]) if single else trials
+    attempts = _Attempts(identify, [part.with_(kind=None) for part in parts], options)
     free = options.method == Options.method and not options.settings()
-    parts = [
-        trial.with_(kind=None)
-        for trial in (pieces(trials[0]) if len(trials) == 1 else trials)
-    ]
-    cheap = replace(options, hold_out=(), model_error=False, uncertainty="analytic")
-    found, refused = list[Standing](), dict[str, str]()
+    for structure in counted("structures", structures or STRUCTURES):
+        method = options.method
+        if free:
+            method = methods_of(structure, options.method)[0]
+        attempts.add(structure, method)
+    if not attempts.ranked:
+        raise InputError(next(iter(attempts.refused.values())))
 
-    def attempt(structure: str, method: str) -> None:
-        reference = reference_of(structure, options.reference_model)
+    first = attempts.by_rank()[0].structure
+    if free and first in TABLES:
+        for method in OTHERS:
+            attempts.add(first, method)
+
+    ranked = attempts.by_rank()
+    best = simplest(ranked)
+    in_order = [best, *(fit for fit in ranked if fit is not best)]
+    report = {
+        "held_out": "each third of the only trial" if single else "each trial in turn",
+        "ranking": [asdict(fit) for fit in in_order],
+        "refused": attempts.refused,
+    }
+    return _chosen(options, best), report
+
+
+@dataclass(frozen=True, eq=False)
+class _Attempts:
+    """Structures and methods that were tried on the same trials."""
+
+    identify: Identify
+    trials: Sequence[Trial]
+    options: Options
+    ranked: list[RankedFit] = field(default_factory=list)
+    refused: dict[str, str] = field(default_factory=dict)  # why, by name
+
+    def add(self, structure: str, method: Any) -> None:
+        """Try a structure and a method, or remember why it cannot be fitted."""
         own = replace(
-            cheap, structure=structure, method=method, reference_model=reference
+            self.options,
+            structure=structure,
+            method=method,
+            reference_model=reference_of(structure, self.options.reference_model),
+            hold_out=(),
+            model_error=False,
+            uncertainty="analytic",
         )
         try:
-            seen, results = in_turn(
-                lambda held: identify(parts, replace(own, hold_out=held)),
-                parts,
-                MOST_GROUPS,
-            )
-            if not all(
-                one.stable for one in results
-            ):  # what counts is the fit of all trials
-                results = [identify(parts, own)]
-            found.append(standing(results, seen, parts))
+            self.ranked.append(self._predicted(own))
         except InputError as error:
-            refused[named(structure, MAP if structure == MMG else method)] = str(error)
+            name = fit_name(structure, MAP if structure == MMG else method)
+            self.refused[name] = str(error)
 
-    for structure in counted("structures", STRUCTURES):
-        attempt(
-            structure,
-            methods_of(structure, options.method)[0] if free else options.method,
-        )
-    if not found:
-        raise InputError(next(iter(refused.values())))
-    first = min(found, key=lambda one: one.rank)
-    for method in OTHERS if free and first.structure in TABLES else ():
-        attempt(first.structure, method)
-    found.sort(key=lambda one: one.rank)
-    best = _simplest(found)
-    method = options.method if best.structure == MMG else best.method
-    reference = reference_of(best.structure, options.reference_model)
+    def _predicted(self, options: Options) -> RankedFit:
+        """The fit of some options, ranked by what it predicts of trials held out."""
+
+        def without(held: list[str]) -> IdentificationResult:
+            return self.identify(self.trials, replace(options, hold_out=held))
+
+        most_groups = 5
+        seen, results = in_turn(without, self.trials, most_groups)
+        if not all(result.stable for result in results):
+            # the fit of all trials is what would be used
+            results = [self.identify(self.trials, options)]
+        return ranked_fit(results, seen, self.trials)
+
+    def by_rank(self) -> list[RankedFit]:
+        """The fits, the best first."""
+        return sorted(self.ranked, key=lambda fit: fit.rank)
+
+
+def _chosen(options: Options, best: RankedFit) -> Options:
+    structure = best.structure
     return replace(
-        options, structure=best.structure, method=method, reference_model=reference
-    ), {
-        "held_out": (
-            "each trial in turn" if len(trials) > 1 else "each third of the only trial"
-        ),
-        "ranking": [
-            asdict(one) for one in (best, *(one for one in found if one is not best))
-        ],
-        "refused": refused,
-    }
+        options,
+        structure=structure,
+        method=options.method if structure == MMG else best.method,
+        reference_model=reference_of(structure, options.reference_model),
+    )
 
 
 def methods_of(structure: str, usual: str) -> tuple[str, ...]:
     """Methods that a structure is fitted by where none are named, the first before others are tried."""
-    return (
-        (RM_SVM,)
-        if structure == GREY_BOX
-        else (usual,)
-        if structure == MMG
-        else (usual, *OTHERS)
-    )
+    if structure == GREY_BOX:
+        return (RM_SVM,)
+    if structure == MMG:
+        return (usual,)
+    return (usual, *OTHERS)
 
 
 def reference_of(structure: str, named: Any) -> Any:
-    """The reference ship of a structure that knows one, as it was named."""
-    return (
-        (named or AUTO)
-        if structure == GREY_BOX
-        else named
-        if structure == MMG
-        else None
-    )
+    """The reference ship of a structure that knows one, as it was named; None for others."""
+    if structure == GREY_BOX:
+        return named or AUTO
+    if structure == MMG:
+        return named
+    return None
 
 
-def _simplest(ranked: Sequence[Standing]) -> Standing:
+def simplest(ranked: Sequence[RankedFit]) -> RankedFit:
     """Of those whose errors differ from the first's by chance the one with the fewest coefficients."""
     first = ranked[0]
     if first.error is None:
         return first
-    tied = [
-        one for one in ranked if one.stable and not one.ran_away and _alike(one, first)
+    as_good = [
+        fit
+        for fit in ranked
+        if fit.stable and not fit.ran_away and _differs_by_chance(fit, first)
     ]
     return min(
-        tied, key=lambda one: (one.coefficients, one.method in OTHERS), default=first
+        as_good,
+        key=lambda fit: (fit.coefficients, fit.method in OTHERS),
+        default=first,
     )
 
 
-def _alike(one: Standing, first: Standing) -> bool:
+def _differs_by_chance(fit: RankedFit, first: RankedFit) -> bool:
+    """Whether errors exceed those of the first by one standard error at most, or by 2 %."""
     excess = np.array(
         [
-            (one.errors[name] or 0.0) - (error or 0.0)
+            (fit.errors[name] or 0.0) - (error or 0.0)
             for name, error in first.errors.items()
         ]
     )
-    chance = float(np.std(excess, ddof=1)) / np.sqrt(len(excess))
-    return bool(excess.mean() <= max(chance, LEAST_DIFFERENCE * (first.error or 0.0)))
+    standard_error = float(np.std(excess, ddof=1)) / np.sqrt(len(excess))
+    nothing = 0.02 * (first.error or 0.0)
+    return bool(excess.mean() <= max(standard_error, nothing))

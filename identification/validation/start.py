@@ -1,5 +1,7 @@
 """The state at which a prediction starts, where the record has velocities only as derivatives."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from shipgym import ShipModel, Trial, UnstableModelError
@@ -7,67 +9,104 @@ from shipgym.arrays import Floats
 from shipgym.ships.simulate import open_loop
 
 WINDOW = 1.5  # time over which the start is estimated, of that to sail one ship length
-ROUNDS = 3  # of Gauss-Newton; what is simulated is nearly linear in its start
-STEP = 1e-4  # of finite differences, by U0 and U0 / L
-#: Errors that count as one at least: heading, rad, track by ship length, velocities by
-#: U0.
-FLOORS = {"psi": np.radians(0.1), "x": 0.005, "y": 0.005, "u": 0.02, "v": 0.02}
 
 
 def with_start(model: ShipModel, trial: Trial) -> Trial:
-    """The trial with the first surge speed, sway speed and yaw rate estimated, as far as they were derived.
+    """The trial with the first velocities estimated, as far as they were derived.
 
-    At the end of a record a derivative is least certain, the more so as the rudder
-    moves there. Instead the start is that from which the model comes nearest to the
-    measured heading and track (velocities where there is no track) over the first 1.5
-    ship lengths (output error with the initial state among the unknowns, Maine & Iliff
-    1985, NASA RP-1138). A trial whose velocities were measured stays as it is.
+    Surge speed, sway speed and yaw rate: at the end of a record a derivative is least
+    certain, the more so as the rudder moves there. Instead the start is that from which
+    the model comes nearest to the measured heading and track (velocities where there is
+    no track) over the first 1.5 ship lengths (output error with the initial state among
+    the unknowns, Maine & Iliff 1985, NASA RP-1138). A trial whose velocities were
+    measured stays as it is.
     """
     names = [
         name for name in "uvr" if name in trial.derived and name in model.state_names
     ]
-    length, speed = model.particulars["length"], model.particulars["speed"]
-    rows = trial.t <= trial.t[0] + WINDOW * length / speed
-    if not names or "psi" not in trial or np.sum(rows) < 3:
+    if not names or "psi" not in trial:
         return trial
-    units = np.array([speed / length if name == "r" else speed for name in names])
-    track = "xy" if {"x", "y"} <= trial.channels.keys() - trial.derived else "uv"
-    floors = np.array(
-        [[FLOORS[name] * (length if name in "xy" else 1.0)] for name in track]
-    )
-    floors = np.vstack([[[FLOORS["psi"]]], floors * (speed if track == "uv" else 1.0)])
-    channels = ["psi", *track]
-    opening = Trial(
-        trial.t[rows], {name: values[rows] for name, values in trial.channels.items()}
-    )
-    start, scales = np.array([trial[name][0] for name in names]), floors
-
-    def errors(start: Floats) -> Floats:
-        run = open_loop(model, _begun(opening, names, start))
-        return np.array([run[name] - opening[name] for name in channels])[:, 1:]
-
+    length, speed = model.particulars["length"], model.particulars["speed"]
+    window = trial.t <= trial.t[0] + WINDOW * length / speed
+    if np.sum(window) < 3:
+        return trial
     try:
-        for _ in range(ROUNDS):
-            error = errors(start)
-            moved = [errors(start + step) - error for step in np.diag(STEP * units)]
-            slopes = np.array([(move / scales).ravel() for move in moved]).T / STEP
-            start = (
-                start
-                - units
-                * np.linalg.lstsq(slopes, (error / scales).ravel(), rcond=1e-6)[0]
-            )
-            scales = np.maximum(
-                np.sqrt(np.mean(errors(start) ** 2, axis=1, keepdims=True)), floors
-            )
+        start = _estimated(model, _opening(model, trial, window), names)
     except UnstableModelError:
         return trial
     return _begun(trial, names, start)
 
 
+@dataclass(frozen=True, eq=False)
+class _Opening:
+    """The first part of a trial, and what a simulation of it is compared in."""
+
+    trial: Trial
+    channels: tuple[str, ...]
+    #: errors that count as one at least, shape (n_channels, 1)
+    floors: Floats
+
+
+def _opening(model: ShipModel, trial: Trial, window: Floats) -> _Opening:
+    """Heading, and track or velocities, in the first part of a trial."""
+    length, speed = model.particulars["length"], model.particulars["speed"]
+    measured = trial.channels.keys() - trial.derived
+    if {"x", "y"} <= measured:
+        channels = ("psi", "x", "y")
+        floor = 0.005 * length
+    else:
+        channels = ("psi", "u", "v")
+        floor = 0.02 * speed
+    floors = np.array([[np.radians(0.1)], [floor], [floor]])
+
+    samples = {name: values[window] for name, values in trial.channels.items()}
+    return _Opening(Trial(trial.t[window], samples), channels, floors)
+
+
+def _estimated(model: ShipModel, opening: _Opening, names: list[str]) -> Floats:
+    """First samples of some channels from which the model comes nearest to the opening.
+
+    Three rounds of Gauss-Newton: what is simulated is nearly linear in its start. The
+    scales are renewed between them, which `scipy.optimize.least_squares` would take for
+    fits of their own, of more simulations each and other last digits.
+    """
+    length, speed = model.particulars["length"], model.particulars["speed"]
+    units = np.array([speed / length if name == "r" else speed for name in names])
+    step = 1e-4
+    start = np.array([opening.trial[name][0] for name in names])
+    scales = opening.floors
+
+    for _ in range(3):
+        errors = _errors(model, opening, names, start)
+        slopes = []
+        for move in np.diag(step * units):
+            moved = _errors(model, opening, names, start + move)
+            change = (moved - errors) / scales
+            slopes.append(change.ravel())
+        jacobian = np.array(slopes).T / step
+        residuals = (errors / scales).ravel()
+
+        correction, *_ = np.linalg.lstsq(jacobian, residuals, rcond=1e-6)
+        start = start - units * correction
+        left = _errors(model, opening, names, start)
+        rms = np.sqrt(np.mean(left**2, axis=1, keepdims=True))
+        scales = np.maximum(rms, opening.floors)
+    return start
+
+
+def _errors(
+    model: ShipModel, opening: _Opening, names: list[str], start: Floats
+) -> Floats:
+    """Simulated less measured channels after the first sample, shape (n_channels, n_samples - 1)."""
+    trial = opening.trial
+    run = open_loop(model, _begun(trial, names, start))
+    errors = [run[name] - trial[name] for name in opening.channels]
+    return np.array(errors)[:, 1:]
+
+
 def _begun(trial: Trial, names: list[str], start: Floats) -> Trial:
     """The trial with other first samples of some channels."""
-    first = {
-        name: np.append(value, trial[name][1:])
-        for name, value in zip(names, start, strict=True)
-    }
-    return trial.with_channels(first)
+    channels = {}
+    for name, first in zip(names, start, strict=True):
+        channels[name] = np.append(first, trial[name][1:])
+    return trial.with_channels(channels)

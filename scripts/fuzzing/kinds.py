@@ -15,20 +15,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from agents.benchmarking.contestants import Contestant
 from rich.console import Console
 
 from agents import load_agent, load_results
-from agents.agent_file import read_agent
-from agents.benchmarking.contestants import Contestant
 from agents.benchmarking.results import gathered
 from agents.benchmarking.run import checked_part, job_of, run_job
 from agents.cli.benchmark_tables import costs_table, ranking_table
+from agents.deployment.helm import Helm
 from agents.deployment.nmea import Line
 from agents.deployment.route import Route
-from agents.deployment.steering import Helm, Limits
-from agents.engines.jobs import run_jobs
-from agents.engines.serialisation import KeptResults, pack, serialised, unpack
-from agents.policies.one_for_all import OneForAll
+from agents.deployment.sensors import Limits
+from agents.job_results import (
+    KeptResults,
+    job_to_json,
+    result_from_json,
+    result_to_json,
+)
+from agents.jobs import JobEngine, run_jobs
 from agents.policies.sb3_zip import read_sb3
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, parse_suite
 from agents.training.plan import Plan, training_options
@@ -38,7 +42,6 @@ from fuzzing.reading import CORPUS, Kind
 from shipgym import Episode, ShipFile, ShipModel, Trial
 from shipgym.envs.episode_file import to_file
 from shipgym.files import LARGEST_TOML, read_bytes
-from shipgym.ships import load_model
 from shipgym.trials.guesses import guess_trial
 
 SHOWN = Console(file=io.StringIO(), width=120)
@@ -136,14 +139,14 @@ def squared(job: dict[str, Any]) -> dict[str, Any]:
 
 def keep_results(folder: Path) -> None:
     """Results of jobs, as a benchmark or a study that goes on finds them."""
-    run_jobs(squared, JOBS[:1], keep=folder)
+    run_jobs(squared, JOBS[:1], JobEngine(keep=folder))
 
 
 def read_kept(path: Path) -> Any:
     """Jobs of which some are done."""
-    folder, text = path.parent, serialised(JOBS[0], "job")
+    folder, text = path.parent, job_to_json(JOBS[0], "job")
     kept = KeptResults(folder, squared).load(text)
-    return None if kept is None else run_jobs(squared, JOBS[:1], keep=folder)
+    return None if kept is None else run_jobs(squared, JOBS[:1], JobEngine(keep=folder))
 
 
 @cache
@@ -195,7 +198,7 @@ def read_study(path: Path) -> Any:
 def part_job() -> tuple[Contestant, BenchmarkTask, str]:
     """A contestant, a task, and the job of both."""
     one, task = Contestant("pid", "pid"), load_suite().task("mariner-calm")
-    return one, task, serialised(job_of(one, task, DEFAULT_SUITE, 3), "job")
+    return one, task, job_to_json(job_of(one, task, DEFAULT_SUITE, 3), "job")
 
 
 def keep_part(folder: Path) -> None:
@@ -208,7 +211,7 @@ def keep_part(folder: Path) -> None:
         "policy_sha256": None,
     }
     KeptResults(folder, run_job).save(
-        part_job()[2], {"value": pack({"refused": "", "runs": [run, run]})}
+        part_job()[2], result_to_json({"refused": "", "runs": [run, run]})
     )
 
 
@@ -218,7 +221,7 @@ def read_part(path: Path) -> Any:
     kept = KeptResults(path.parent, run_job).load(text)
     if kept is None:
         return None
-    part = checked_part(unpack(kept["value"]), json.loads(text))
+    part = checked_part(result_from_json(kept), json.loads(text))
     return gathered(DEFAULT_SUITE, [task], [one], {(one.name, task.name): part}, 3)
 
 
@@ -232,16 +235,6 @@ def read_zip(path: Path) -> Any:
     """An agent of stable-baselines3, as one that learned the first task."""
     agent, task = read_sb3(path), part_job()[1]
     return agent.policy(task.task, task.ship)
-
-
-def read_policy(path: Path) -> Any:
-    """A policy; one for all ships as it is made for one."""
-    agent = read_agent(path)
-    return (
-        agent.for_ship(load_model("container-abc-lssvr"))
-        if isinstance(agent, OneForAll)
-        else agent
-    )
 
 
 def read_bridge(path: Path) -> Helm:
@@ -283,7 +276,7 @@ KINDS = (
     Kind("log", lambda path: [guess_trial(path).trial], use_ship, slow=4),
     Kind("model", ShipModel.load, use_model, slow=2),
     Kind("controller", load_agent, use_agent),
-    Kind("policy", read_policy, use_agent, main="agent.json", slow=4),
+    Kind("policy", load_agent, use_agent, main="agent.json", slow=4),
     Kind("sb3", read_zip, use_agent, slow=10),
     Kind("episode", Episode.load, use_episode),
     Kind("results", load_results, use_results, main="results.json", slow=8),

@@ -21,15 +21,13 @@ import agents
 import shipgym
 from agents.controllers.registry import BUILT_IN, controller_class
 from agents.policies.network import Network
-from agents.policies.one_for_all import CONTEXT, OneForAll, context
 from agents.policies.policy import LearnedPolicy
-from agents.policies.shield import Shielded
 from agents.suites.suite import FOLDER
 from agents.training import training
 from agents.training.plan import Given, make_plan
 from agents.training.training import train
 from shipgym import Episode, Particulars, ShipFile, ShipModel
-from shipgym.tasks.task import OBSERVATION_NAMES, Task, observation_scales
+from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 from shipgym.trials.nmea import checksum
 
 CORPUS = Path(__file__).parents[2] / "tests" / "corpus"
@@ -152,7 +150,7 @@ def network(*sizes: int) -> Network:
 
 
 def policies(folder: Path) -> None:
-    """Learned, residual with a frame stack, and shielded."""
+    """Learned, and residual with a frame stack."""
     common: dict[str, Any] = {
         "observation_names": OBSERVATION_NAMES,
         "observation_scales": tuple(observation_scales(SHIP).tolist()),
@@ -169,13 +167,10 @@ def policies(folder: Path) -> None:
         **common,
     )
     discrete = LearnedPolicy(network(8, 4, 9), action="rudder-discrete", **common)
-    shielded = Shielded.from_model(shipgym.load_model("mariner-nomoto"), learned)
     made: dict[str, Any] = {
         "learned": learned,
         "residual": residual,
         "discrete": discrete,
-        "shielded": shielded,
-        "one-for-all": one_for_all(),
     }
     for name, policy in made.items():
         folder.joinpath("policy", name).mkdir(parents=True)
@@ -197,19 +192,6 @@ def sb3(folder: Path) -> None:
         policy_kwargs={"net_arch": [4]},
     )
     agent.learn(16).save(folder / "sb3" / "ppo.zip")
-
-
-def one_for_all() -> OneForAll:
-    """Told of ships around the container ship."""
-    task = Task.of("PathFollowing-v1")
-    told = context(shipgym.load_model("container-abc-lssvr"), task)
-    names = tuple(one.name for one in task.observed(SHIP))
-    fleet = np.stack(
-        [told, np.ones(len(CONTEXT)), told - 1.0, told + 1.0], axis=1
-    ).round(4)
-    return OneForAll(
-        network(len(names) + 1 + len(CONTEXT), 4, 1), names, fleet, 0.4, 0.5
-    )
 
 
 def episode(folder: Path) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
-from identification.design.reduction import sensitivity
+from identification.design.sensitivity import sensitivity
 from identification.estimators.lssvm import LSSVM
 from identification.pipeline import identify
 from identification.regression.samples import build_samples

@@ -7,7 +7,7 @@ from itertools import groupby
 
 from rich.table import Table
 
-from agents.cli.terminal import plain_table
+from agents.cli.tables import plain_table
 from papers import CASES, Conclusion, Paper, Requirement, Row, get_paper
 from papers.row import CONFIRMED, CONTRADICTED, NOT_TESTABLE, aims
 from shipgym.checks import check_choice

@@ -156,7 +156,7 @@ def known_forces(motion: Mapping[str, Any]) -> dict[str, Any]:
     """What equation 4-5 takes for known: centripetal forces and the righting moment, prime system."""
     U, L = np.hypot(motion["u"], motion["v"]), own.LENGTH
     u, v, r = motion["u"] / U, motion["v"] / U, motion["r"] * L / U
-    righting = own.GRAVITY * own.VOLUME / (0.5 * L * L) * own.GM / L / U**2
+    righting = own.WEIGHT / (0.5 * L * L) * own.GM / L / U**2
     return {
         "u": (own.PUBLISHED.m + own.PUBLISHED.my) * v * r,
         "v": -(own.PUBLISHED.m + own.PUBLISHED.mx) * u * r,

@@ -18,7 +18,8 @@ from identification.estimators.methods import get_method
 from identification.pipeline import identify
 from identification.regression.samples import build_samples
 from identification.result import IdentificationResult
-from identification.simulation_error.prior import Prior, Pulled, reference_prior
+from identification.simulation_error.prior import Prior, reference_prior
+from identification.simulation_error.pulled import Pulled
 from identification.validation.guard import reasons_unstable, with_coefficients
 from real_ships.data import MeasuredShip
 from real_ships.measures import zigzag_errors

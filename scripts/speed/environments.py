@@ -210,7 +210,7 @@ def kernel_ship(n_envs: int = 1024, centres: int = 64) -> Row:
 
 def learning(task: str) -> Row:
     """Frames per second of PPO with the shipped settings, on two cores, and what part of it is ours."""
-    from learning_speed import ppo_speed  # here, because torch takes seconds to import
+    from speed.learning import ppo_speed  # here, because torch takes seconds to import
 
     frames, share = ppo_speed(env_id(task))
     return Row(

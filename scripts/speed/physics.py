@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy_ships import numpy_step
 
 import shipgym
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.records import LANES
 from speed.measure import MODEL, SHORT_REPEATS, SHORT_STEPS, Row, best_time
+from speed.numpy_ships import numpy_step
 
 #: Ships whose bare physics is timed, and the aim for them.
 FLEET = {

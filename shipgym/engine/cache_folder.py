@@ -18,7 +18,7 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from shipgym.files import atomic_path
+from shipgym.drafts import atomic_path
 
 CACHE_VARIABLE = "SHIPGYM_CACHE"
 LOOP = ".loop"

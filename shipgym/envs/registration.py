@@ -7,43 +7,57 @@ import gymnasium
 
 from shipgym.checks import check_text
 from shipgym.errors import InputError
-from shipgym.files import shipped_toml
 from shipgym.tasks.source import kept_source
 
-#: Keywords of the variants by id, without the version, and models that are the defaults
-#: of ids of version 1.
-VARIANTS, IDENTIFIED = shipped_toml("shipgym.envs", "variants.toml").values()
-#: Tasks by their names, a version in them where it is not the first.
-TASKS = ("CourseKeeping", "PathFollowing", "PathFollowing-v1")
+#: Keywords of each environment by its id.
+ENVIRONMENTS: dict[str, dict[str, Any]] = {
+    "shipgym/CourseKeeping-v0": {"task": "CourseKeeping"},
+    "shipgym/CourseKeepingDiscrete-v0": {
+        "task": "CourseKeeping",
+        "action": "rudder-discrete",
+    },
+    "shipgym/CourseKeepingShaft-v0": {
+        "task": "CourseKeeping",
+        "action": "rudder-shaft",
+        "model": "kvlcc2-mmg",
+    },
+    "shipgym/CourseKeepingRoll-v0": {
+        "task": "CourseKeeping",
+        "roll": True,
+        "roll_weight": 1.0,
+        "model": "container-4dof-output-error",
+    },
+    "shipgym/PathFollowing-v0": {
+        "task": "PathFollowing",
+        "model": "container-abc-lssvr",
+    },
+    "shipgym/PathFollowingDiscrete-v0": {
+        "task": "PathFollowing",
+        "action": "rudder-discrete",
+        "model": "kvlcc2-tanker-rm-svm",
+    },
+    "shipgym/PathFollowingShaft-v0": {
+        "task": "PathFollowing",
+        "action": "rudder-shaft",
+        "model": "tanker-tls-svm",
+    },
+    "shipgym/PathFollowingRoll-v0": {
+        "task": "PathFollowing",
+        "roll": True,
+        "roll_weight": 1.0,
+        "model": "container-4dof-output-error",
+    },
+}
 
 
-def env_id(task: str, variant: str = "") -> str:
-    """Id of a task's environment, or of a variant of it."""
-    name, _, version = task.partition("-")
-    return f"shipgym/{name}{variant}-{version or 'v0'}"
-
-
-def environments() -> dict[str, dict[str, Any]]:
-    """Keywords of every environment by its id."""
-    found = {
-        env_id(task, variant): {"task": task, **options}
-        for task in TASKS
-        for variant, options in VARIANTS.items()
-    }
-    for name, model in IDENTIFIED.items():
-        # course keeping has no version 1 of its own: the same task, on another model
-        same = (
-            name.replace("-v1", "-v0")
-            if name.startswith("shipgym/CourseKeeping")
-            else name
-        )
-        found[name] = {**found[same], "model": model}
-    return found
+def env_id(task: str) -> str:
+    """Return the id of a shipped task's environment, without a variant."""
+    return f"shipgym/{task}-v0"
 
 
 def register_environments() -> None:
     """Register the environments with Gymnasium; a second call changes nothing."""
-    for name, options in environments().items():
+    for name, options in ENVIRONMENTS.items():
         _register(name, options)
 
 

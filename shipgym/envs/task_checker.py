@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.arrays import Floats
-from shipgym.checks import Findings
 from shipgym.engine.records import flat, leaves
 from shipgym.engine.specialise import Part
 from shipgym.engine.voyages import Voyages
@@ -16,6 +15,7 @@ from shipgym.envs.environment import DEFAULT_MODEL, read_options
 from shipgym.envs.plain_python import plain_loop
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
+from shipgym.findings import Findings
 from shipgym.python_files import asked
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task

@@ -3,7 +3,6 @@ from .excitation import multi_sine_rudder as multi_sine_rudder
 from .excitation import prbs_rudder as prbs_rudder
 from .excitation import random_rudder_steps as random_rudder_steps
 from .excitation import shaft_speed_steps as shaft_speed_steps
-from .imo import Criterion as Criterion
 from .imo import imo_assessment as imo_assessment
 from .intervals import IndexInterval as IndexInterval
 from .intervals import index_intervals as index_intervals
@@ -29,6 +28,7 @@ from .stopping import stopping_indices as stopping_indices
 from .turning import TurningIndices as TurningIndices
 from .turning import turning_circle as turning_circle
 from .turning import turning_indices as turning_indices
+from .verdicts import Criterion as Criterion
 from .zigzags import ZigzagIndices as ZigzagIndices
 from .zigzags import switch_heading_deg as switch_heading_deg
 from .zigzags import zigzag as zigzag

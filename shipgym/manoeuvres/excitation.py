@@ -15,15 +15,6 @@ from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.trial import Trial
 
-CLOCK = 0.5  # of the binary sequence, L / U0
-PERIODS = 20.0, 2.0  # longest and shortest of the multi-sine, L / U0
-REGISTER = (
-    10  # bits of the shift register: the sequence repeats after 1023 clock periods
-)
-TRIES = 32  # draws of phases from which the multi-sine of least crest is taken
-RUDDER_STEPS = 0.5, 4.0  # shortest and longest of random rudder steps, L / U0
-SHAFT_STEPS = 5.0, 15.0  # of shaft-speed steps, L / U0
-
 
 def prbs_rudder(
     model: ShipModel,
@@ -35,9 +26,9 @@ def prbs_rudder(
     water_depth: float = np.inf,
     weather: Weather | str | None = None,
 ) -> Trial:
-    """Simulate a pseudo-random binary rudder: from one side to the other at multiples of a clock period.
+    """Simulate a pseudo-random binary rudder.
 
-    Raises InputError for an amplitude beyond the rudder's limit, or a time that is not
+    It is put from one side to the other at multiples of a clock period. Raises InputError for an amplitude beyond the rudder's limit, or a time that is not
     above 0. Raises UnstableModelError if the ship runs away.
 
     Parameters
@@ -61,15 +52,19 @@ def prbs_rudder(
 
     amplitude = _rudder_angle(model, amplitude_deg, "amplitude_deg")
     times = _times(duration, dt)
-    (clock,) = _durations(model, (clock_s,), (CLOCK,))
+    clock = _seconds(model, clock_s, 0.5)
     if clock_s is not None:
         check_number(clock, "clock_s", at_least=dt)
-    register = np.zeros(REGISTER, dtype=np.int8)
+
+    n_bits = 10  # of the shift register
+    register = np.zeros(n_bits, dtype=np.int8)
     while not register.any():
-        register = np.random.default_rng(seed).integers(0, 2, REGISTER, dtype=np.int8)
-    bits, _ = max_len_seq(REGISTER, state=register)
+        register = np.random.default_rng(seed).integers(0, 2, n_bits, dtype=np.int8)
+    bits, _ = max_len_seq(n_bits, state=register)
+
     tick = np.floor(times / clock * (1.0 + 1e-12)).astype(int)
-    rudder = amplitude * (2.0 * bits[tick % len(bits)] - 1.0)
+    sides = 2.0 * bits - 1.0
+    rudder = amplitude * sides[tick % len(bits)]
     return simulate(
         model, orders(model, rudder), dt, None, water_depth, "random", weather, seed
     )
@@ -86,19 +81,18 @@ def multi_sine_rudder(
     water_depth: float = np.inf,
     weather: Weather | str | None = None,
 ) -> Trial:
-    """Simulate a multi-sine rudder: all harmonics of 1 / duration in a band, of equal amplitude.
+    """Simulate a multi-sine rudder, of harmonics of equal amplitude.
 
-    The phases, of the seed, are the draw with the smallest crest among 32; the
-    amplitude is the largest rudder angle, degrees. The band is from `longest_period_s`
-    to `shortest_period_s`, s, by default 20 and 2 times the time to travel one ship
-    length; InputError for one without a harmonic or beyond the samples. Otherwise as
-    `prbs_rudder`.
+    These are all multiples of 1 / duration in a band from `longest_period_s` to
+    `shortest_period_s`, s, by default 20 and 2 times the time to travel one ship
+    length; InputError for one without a harmonic or beyond the samples. The phases, of
+    the seed, are the draw with the smallest crest among 32; the amplitude is the
+    largest rudder angle, degrees. Otherwise as `prbs_rudder`.
     """
     amplitude = _rudder_angle(model, amplitude_deg, "amplitude_deg")
     times = _times(duration, dt)
-    longest, shortest = _durations(
-        model, (longest_period_s, shortest_period_s), PERIODS
-    )
+    longest = _seconds(model, longest_period_s, 20.0)
+    shortest = _seconds(model, shortest_period_s, 2.0)
     check_number(shortest, "shortest_period_s", at_least=2.0 * dt, hint="two samples")
     check_number(
         longest,
@@ -106,28 +100,35 @@ def multi_sine_rudder(
         above=shortest,
         hint="the band goes from long to short",
     )
-    period = len(times) * dt
+    whole = len(times) * dt
     slack = 1e-9
-    harmonics = np.arange(
-        np.ceil(period / longest - slack), np.floor(period / shortest + slack) + 1.0
-    )
-    harmonics = harmonics[harmonics >= 1.0]
+    lowest = max(np.ceil(whole / longest - slack), 1.0)
+    highest = np.floor(whole / shortest + slack)
+    harmonics = np.arange(lowest, highest + 1.0)
     if not len(harmonics):
         raise InputError(
-            f"duration: {duration:g} s found, expected at least one whole period in the"
-            f" band of {shortest:g} to {longest:g} s; sail longer or widen the band"
+            "duration: expected at least one whole period in the band of"
+            f" {shortest:g} to {longest:g} s, got {duration:g} s; sail longer or widen"
+            " the band"
         )
-    phases = np.random.default_rng(seed).uniform(
-        0.0, 2.0 * np.pi, (TRIES, len(harmonics))
-    )
-    angle = 2.0 * np.pi * np.outer(harmonics, times / period)
-    waves = np.cos(phases) @ np.cos(angle) - np.sin(phases) @ np.sin(angle)
-    crests = np.abs(waves).max(axis=1)
-    best = int(np.argmin(crests))
-    rudder = amplitude * waves[best] / crests[best]
+
+    rudder = amplitude * _least_crest(harmonics, times / whole, seed)
     return simulate(
         model, orders(model, rudder), dt, None, water_depth, "random", weather, seed
     )
+
+
+def _least_crest(harmonics: Floats, turns: Floats, seed: Seed) -> Floats:
+    """Sum of harmonics with its largest value 1, over parts of the longest period."""
+    rng = np.random.default_rng(seed)
+    phases = rng.uniform(0.0, 2.0 * np.pi, (32, len(harmonics)))
+    angle = 2.0 * np.pi * np.outer(harmonics, turns)
+
+    # cos(angle + phase), summed over the harmonics
+    waves = np.cos(phases) @ np.cos(angle) - np.sin(phases) @ np.sin(angle)
+    crests = np.abs(waves).max(axis=1)
+    best = int(np.argmin(crests))
+    return np.asarray(waves[best] / crests[best])
 
 
 def random_rudder_steps(
@@ -149,8 +150,9 @@ def random_rudder_steps(
     """
     largest = _rudder_angle(model, largest_deg, "largest_deg")
     times = _times(duration, dt)
-    lengths = _durations(model, (shortest_s, longest_s), RUDDER_STEPS)
-    rudder = _steps(times, (-largest, largest), lengths, seed)
+    shortest = _seconds(model, shortest_s, 0.5)
+    longest = _seconds(model, longest_s, 4.0)
+    rudder = random_levels(times, (-largest, largest), shortest, longest, seed)
     return simulate(
         model, orders(model, rudder), dt, None, water_depth, "random", weather, seed
     )
@@ -169,9 +171,9 @@ def shaft_speed_steps(
     water_depth: float = np.inf,
     weather: Weather | str | None = None,
 ) -> Trial:
-    """Simulate steps of the ordered shaft speed, of random speed and length, both evenly distributed.
+    """Simulate steps of the ordered shaft speed, of random speed and length.
 
-    Orders are `lowest_ratio` to `highest_ratio` of the shaft speed at service speed,
+    Both are evenly distributed: orders are `lowest_ratio` to `highest_ratio` of the shaft speed at service speed,
     ahead and at most 1.5, each held for `shortest_s` to `longest_s`, s, by default 5 to
     15 times the time to travel one ship length; the rudder is held at `rudder_deg`
     meanwhile, degrees. The seed is that of the steps; otherwise as `prbs_rudder`.
@@ -195,29 +197,36 @@ def shaft_speed_steps(
         hint="the rudder's limit",
     )
     times = _times(duration, dt)
-    lengths = _durations(model, (shortest_s, longest_s), SHAFT_STEPS)
-    shaft = service * _steps(times, (lowest_ratio, highest_ratio), lengths, seed)
+    shortest = _seconds(model, shortest_s, 5.0)
+    longest = _seconds(model, longest_s, 15.0)
+    ratios = random_levels(
+        times, (lowest_ratio, highest_ratio), shortest, longest, seed
+    )
+    shaft = service * ratios
     commands = orders(model, np.full(len(times), np.radians(rudder_deg)), shaft)
     return simulate(model, commands, dt, None, water_depth, "random", weather, seed)
 
 
 def shaft_of(model: ShipModel) -> float:
-    """Shaft speed at service speed, 1/s; InputError where the thrust is part of the hull's coefficients."""
+    """Shaft speed at service speed, 1/s; InputError for a ship without a shaft."""
     if "n" not in model.command_names:
         raise InputError(
-            f"model {model.name!r}: no shaft speed among its commands"
-            f" ({', '.join(model.command_names)}), its thrust is inside its surge"
-            " coefficients; use a ship with a propeller, such as 'container' or"
+            f"model {model.name!r}: expected one that is ordered a shaft speed, got"
+            f" the commands {', '.join(model.command_names)}; its thrust is inside its"
+            " surge coefficients: use a ship with a propeller, such as 'container' or"
             " 'tanker'"
         )
     return model.service_shaft_speed
 
 
-def _steps(
-    times: Floats, levels: tuple[float, float], lengths: tuple[float, ...], seed: Seed
+def random_levels(
+    times: Floats,
+    levels: tuple[float, float],
+    shortest: float,
+    longest: float,
+    seed: Seed,
 ) -> Floats:
-    """Random levels of random lengths, both from a range; of the shape of the times, which begin with 0."""
-    shortest, longest = lengths
+    """Random levels held for random lengths, at times that begin with 0."""
     check_number(shortest, "shortest_s", above=0.0)
     check_number(longest, "longest_s", at_least=shortest, hint="shortest_s or more")
     rng = np.random.default_rng(seed)
@@ -236,14 +245,9 @@ def _rudder_angle(model: ShipModel, angle_deg: float, argument: str) -> float:
     return float(np.radians(angle))
 
 
-def _durations(
-    model: ShipModel, given: tuple[float | None, ...], usual: tuple[float, ...]
-) -> tuple[float, ...]:
-    """The given durations, or the usual ones in times to travel one ship length; s."""
-    pairs = zip(given, usual, strict=True)
-    return tuple(
-        count * model.travel_time if own is None else own for own, count in pairs
-    )
+def _seconds(model: ShipModel, given: float | None, lengths: float) -> float:
+    """The duration that was given, or the time to travel some ship lengths, s."""
+    return lengths * model.travel_time if given is None else given
 
 
 def _times(duration: float, dt: float) -> Floats:

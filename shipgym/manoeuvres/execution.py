@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,13 @@ from shipgym.trials.trial import Trial
 ORDERED, MEASURED = 0.9, 0.75
 
 
+class Reversals(NamedTuple):
+    """When the rudder of a zigzag was ordered, s."""
+
+    start: float  # the first order
+    turns: list[float]  # each reversal
+
+
 def rudder(trial: Trial) -> Floats:
     """The ordered rudder where it was recorded, else the rudder itself, rad."""
     for name in ("delta_command", "delta"):
@@ -24,6 +32,16 @@ def rudder(trial: Trial) -> Floats:
         f"trial {trial.name!r}: channel 'delta' is missing, it shows when the rudder"
         " moved"
     )
+
+
+def is_ordered(trial: Trial) -> bool:
+    """Whether a trial has the ordered rudder."""
+    return "delta_command" in trial.channels
+
+
+def usual_rudder(trial: Trial) -> float:
+    """The angle that a rudder has in a manoeuvre, whatever it has on the approach, rad."""
+    return float(np.percentile(np.abs(rudder(trial)), 75))
 
 
 def require(trial: Trial, names: Sequence[str], what: str) -> None:
@@ -37,48 +55,56 @@ def require(trial: Trial, names: Sequence[str], what: str) -> None:
 
 def execute_time(trial: Trial) -> float:
     """Time at which the first rudder order of a manoeuvre was given, s."""
-    delta = rudder(trial)
-    if "delta_command" in trial.channels:
-        usual = np.percentile(
-            np.abs(delta), 75
-        )  # a little helm on the approach is no order yet
-        return float(trial.t[np.argmax(np.abs(delta) > 0.5 * usual)])
-    move, fastest = (
-        np.abs(delta - delta[0]),
-        np.abs(np.diff(delta) / np.diff(trial.t)).max(),
-    )
-    return max(
-        departure(trial.t, move, np.percentile(move, 75), fastest), float(trial.t[0])
-    )
+    t, delta = trial.t, rudder(trial)
+    if is_ordered(trial):
+        # a little helm on the approach is no order yet
+        given = np.abs(delta) > 0.5 * usual_rudder(trial)
+        return float(t[np.argmax(given)])
+
+    move = np.abs(delta - delta[0])
+    reach = float(np.percentile(move, 75))
+    left = departure(t, move, reach, _fastest_rate(t, delta))
+    return max(left, float(t[0]))
 
 
-def reversals(trial: Trial) -> tuple[float, list[float]]:
-    """Times of the first order and of each reversal of the rudder in a zigzag, s.
+def reversals(trial: Trial) -> Reversals:
+    """Times of the first order and of each reversal of the rudder in a zigzag.
 
     An ordered rudder reverses at the first sample that has the new order; a measured
     one when it left the angle at which it was held (`departure`).
     """
-    delta, t = rudder(trial), trial.t
+    t, delta = trial.t, rudder(trial)
     start = execute_time(trial)
-    usual = (
-        ORDERED if "delta_command" in trial.channels else MEASURED
-    ) * np.percentile(np.abs(delta), 75)
-    side = np.where(delta > usual, 1, np.where(delta < -usual, -1, 0))
-    arrived = np.flatnonzero((side != 0) & (t >= start))
-    holds = np.split(arrived, np.flatnonzero(np.diff(side[arrived])) + 1)
-    if "delta_command" in trial.channels:
-        return start, [float(t[hold[0]]) for hold in holds[1:]]
-    turns, fastest = [], np.abs(np.diff(delta) / np.diff(t)).max()
+    part = ORDERED if is_ordered(trial) else MEASURED
+    holds = _holds(t, delta, start, part * usual_rudder(trial))
+    if is_ordered(trial):
+        first_samples = [hold[0] for hold in holds[1:]]
+        return Reversals(start, t[first_samples].tolist())
+
+    fastest = _fastest_rate(t, delta)
+    turns = []
     for hold, after in pairwise(holds):
         moving = slice(hold[-1], after[0] + 1)
-        move = np.abs(delta[moving] - np.median(delta[hold]))
-        turns.append(departure(t[moving], move, move.max(), fastest))
-    return start, turns
+        held = np.median(delta[hold])
+        move = np.abs(delta[moving] - held)
+        turns.append(departure(t[moving], move, float(move.max()), fastest))
+    return Reversals(start, turns)
 
 
-def departure(
-    t: Floats, move: Floats, reach: np.floating, fastest: np.floating
-) -> float:
+def _holds(t: Floats, delta: Floats, start: float, least: float) -> list[Floats]:
+    """Samples from the start on at which the rudder is held beyond an angle, side after side."""
+    beyond = np.abs(delta) > least
+    held = np.flatnonzero(beyond & (t >= start))
+    turned = np.diff(np.sign(delta[held])) != 0.0
+    first_samples = np.flatnonzero(turned) + 1
+    return np.split(held, first_samples)
+
+
+def _fastest_rate(t: Floats, delta: Floats) -> float:
+    return float(np.abs(np.diff(delta) / np.diff(t)).max())
+
+
+def departure(t: Floats, move: Floats, reach: float, fastest: float) -> float:
     """Time at which a measured rudder left the angle at which it was held, s.
 
     Its `move` from there, rad, is traced back from where it last passed a tenth of its
@@ -89,12 +115,21 @@ def departure(
     if reach == 0.0:
         return float(t[0])
     upper = int(np.argmax(move >= 0.5 * reach))
-    lower = int(np.max(np.flatnonzero(move[:upper] <= 0.1 * reach) + 1, initial=0))
-    between = (
-        (move[upper] - move[lower]) / (t[upper] - t[lower]) if upper > lower else 0.0
-    )
-    slope = between if upper - lower > 2 else max(between, fastest)
-    first = lower if move[lower] > 0.15 * reach else upper
+    lower = 0
+    still = np.flatnonzero(move[:upper] <= 0.1 * reach)
+    if len(still):
+        lower = int(still[-1]) + 1
+
+    slope = 0.0
+    if upper > lower:
+        moved = move[upper] - move[lower]
+        slope = moved / (t[upper] - t[lower])
+    if upper - lower <= 2:
+        slope = max(slope, fastest)
+
+    first = lower
+    if move[lower] <= 0.15 * reach:
+        first = upper
     return float(t[first] - move[first] / slope)
 
 
@@ -108,8 +143,9 @@ def reached(values: Floats, threshold: float, other: Floats) -> float | None:
     past = np.flatnonzero(values >= threshold)
     if len(past) == 0:
         return None
-    k = max(int(past[0]), 1)
-    return float(np.interp(threshold, values[k - 1 : k + 1], other[k - 1 : k + 1]))
+    last = max(int(past[0]), 1)
+    around = slice(last - 1, last + 1)
+    return float(np.interp(threshold, values[around], other[around]))
 
 
 def turning_rudder(rudder_deg: float, limit: float, hint: str = "") -> float:
@@ -118,7 +154,7 @@ def turning_rudder(rudder_deg: float, limit: float, hint: str = "") -> float:
         rudder_deg, "rudder_deg", at_least=-limit, at_most=limit, hint=hint
     )
     if angle == 0.0:
-        raise InputError("rudder_deg: 0 found, expected an angle that turns the ship")
+        raise InputError("rudder_deg: expected an angle that turns the ship, got 0")
     return float(np.radians(angle))
 
 
@@ -129,8 +165,8 @@ def number_of_steps(duration: float, dt: float) -> int:
     steps = round(duration / dt)
     if steps < 2:
         raise InputError(
-            f"duration: {duration:g} s found, expected at least two steps of dt ="
-            f" {dt:g} s"
+            f"duration: expected at least two steps of dt = {dt:g} s, got"
+            f" {duration:g} s"
         )
     return steps
 

@@ -9,27 +9,27 @@ import numpy as np
 from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
+from shipgym.manoeuvres.quantiles import LEVELS_95, quantiles
+from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.standard import standard_manoeuvres
 from shipgym.ships.ship_model import ShipModel
-
-LEVELS = (0.025, 0.975)  # of the 95 % interval
 
 #: From a ship to the indices of one of her manoeuvres, a dataclass such as
 #: `ZigzagIndices`.
 Evaluation = Callable[[ShipModel], Any]
+#: Indices of manoeuvres by manoeuvre and name; None where one never got so far.
+Indices = Mapping[str, Mapping[str, float | None]]
 
 
 @dataclass(frozen=True, eq=False)
 class IndexInterval:
     """One index of a model and of models drawn from its covariance."""
 
-    value: (
-        float | None
-    )  # of the model itself; None where its manoeuvre never got so far
-    # shape (n_draws,); of the draws; NaN where one ran away or its manoeuvre never got
-    # so far
+    value: float | None  # of the model itself; None where it never got so far
+    #: of the draws, NaN where one ran away or its manoeuvre never got so far, shape
+    #: (n_draws,)
     values: Floats
-    ran_away: Flags  # shape (n_draws,); draws that ran away in the manoeuvre
+    ran_away: Flags  # draws that ran away in the manoeuvre, shape (n_draws,)
 
     @property
     def interval(self) -> tuple[float, float] | None:
@@ -38,7 +38,7 @@ class IndexInterval:
         It says nothing of those that ran away or never got so far: see their counts.
         None without any.
         """
-        low, high = self.quantiles(*LEVELS)
+        low, high = self.quantiles(*LEVELS_95)
         return None if low is None or high is None else (low, high)
 
     @property
@@ -49,14 +49,12 @@ class IndexInterval:
     @property
     def n_never_reached(self) -> int:
         """Draws that did not run away, but whose manoeuvre never got so far."""
-        return int((np.isnan(self.values) & ~self.ran_away).sum())
+        without = np.isnan(self.values) & ~self.ran_away
+        return int(without.sum())
 
     def quantiles(self, *levels: float) -> tuple[float | None, ...]:
         """Quantiles over the draws that have a value; None where none has."""
-        reached = self.values[np.isfinite(self.values)]
-        if not len(reached):
-            return (None,) * len(levels)
-        return tuple(float(value) for value in np.quantile(reached, levels))
+        return quantiles(self.values, *levels)
 
     def to_dict(self) -> dict[str, Any]:
         """Value, interval and counts, as JSON knows them."""
@@ -70,22 +68,24 @@ class IndexInterval:
 
     def __str__(self) -> str:
         text = "-" if self.value is None else f"{self.value:.4g}"
-        if self.interval is not None:
-            text += f" [{self.interval[0]:.4g}, {self.interval[1]:.4g}]"
-        return text + (f" ({self.lost_in_words})" if self.lost_in_words else "")
+        interval = self.interval
+        if interval is not None:
+            low, high = interval
+            text += f" [{low:.4g}, {high:.4g}]"
+        if self.lost_in_words:
+            text += f" ({self.lost_in_words})"
+        return text
 
     @property
     def lost_in_words(self) -> str:
         """How many draws have no value, which are not in the interval; empty where all have one."""
-        lost = (
-            (self.n_ran_away, "ran away"),
-            (self.n_never_reached, "never got so far"),
-        )
-        return ", ".join(
-            f"{count} of {len(self.values)} draws {what}"
-            for count, what in lost
-            if count
-        )
+        draws = len(self.values)
+        lost = []
+        if self.n_ran_away:
+            lost.append(f"{self.n_ran_away} of {draws} draws ran away")
+        if self.n_never_reached:
+            lost.append(f"{self.n_never_reached} of {draws} draws never got so far")
+        return ", ".join(lost)
 
 
 def index_intervals(
@@ -122,21 +122,32 @@ def index_intervals(
     >>> low < found["overshoot_1_deg"].value < high
     True
     """
+    evaluate: Evaluation
     if isinstance(manoeuvre, str):
         known = standard_manoeuvres(model)
-        evaluate: Evaluation = known[
-            check_choice(manoeuvre, tuple(known), "manoeuvre")
-        ].evaluate
+        name = check_choice(manoeuvre, tuple(known), "manoeuvre")
+        evaluate = known[name].evaluate
     else:
-        evaluate = manoeuvre
+        name, evaluate = "manoeuvre", manoeuvre
     check_number(n_draws, "n_draws", at_least=2)
-    return intervals_of(
-        {"": asdict(evaluate(model))}, model.sample(int(n_draws), seed), {"": evaluate}
-    )[""]
+    own = {name: asdict(evaluate(model))}
+    draws = model.sample(int(n_draws), seed)
+    return intervals_of(own, draws, {name: evaluate})[name]
+
+
+def own_indices(
+    model: ShipModel, needed: Mapping[str, Manoeuvre]
+) -> dict[str, dict[str, float | None]]:
+    """Indices of a model in some manoeuvres; all None in one that it cannot complete."""
+    own = {}
+    for name, manoeuvre in needed.items():
+        indices, _ = attempt(manoeuvre.evaluate, model)
+        own[name] = indices or manoeuvre.no_indices
+    return own
 
 
 def intervals_of(
-    own: Mapping[str, Mapping[str, float | None]],
+    own: Indices,
     draws: Sequence[ShipModel],
     evaluations: Mapping[str, Evaluation],
     progress: Callable[[int], None] | None = None,
@@ -147,25 +158,27 @@ def intervals_of(
     manoeuvre. Without draws the values stand alone. `progress` is called with the
     number of draws done.
     """
-    ran_away = {name: np.zeros(len(draws), dtype=np.bool_) for name in own}
-    values = {
-        name: {index: np.full(len(draws), np.nan) for index in own[name]}
-        for name in own
-    }
+    found = {name: _without_draws(indices, len(draws)) for name, indices in own.items()}
     for k, draw in enumerate(draws):
-        for name in own:
-            indices, ran_away[name][k] = attempt(evaluations[name], draw)
-            for index, value in indices.items():
-                if value is not None:
-                    values[name][index][k] = value
+        for name, intervals in found.items():
+            indices, ran_away = attempt(evaluations[name], draw)
+            for index, interval in intervals.items():
+                value = indices.get(index)
+                interval.values[k] = np.nan if value is None else value
+                interval.ran_away[k] = ran_away
         if progress is not None:
             progress(k + 1)
+    return found
+
+
+def _without_draws(
+    indices: Mapping[str, float | None], count: int
+) -> dict[str, IndexInterval]:
+    """Intervals of a manoeuvre whose draws are still to be filled in."""
+    ran_away = np.zeros(count, dtype=np.bool_)
     return {
-        name: {
-            index: IndexInterval(value, values[name][index], ran_away[name])
-            for index, value in own[name].items()
-        }
-        for name in own
+        index: IndexInterval(value, np.full(count, np.nan), ran_away)
+        for index, value in indices.items()
     }
 
 
@@ -192,6 +205,9 @@ def worst(runs: Sequence[IndexInterval]) -> IndexInterval:
     It has no value where one of the manoeuvres has none.
     """
     own = [run.value for run in runs if run.value is not None]
-    ran_away = np.any([run.ran_away for run in runs], axis=0)
-    values = np.max([run.values for run in runs], axis=0)
-    return IndexInterval(max(own) if len(own) == len(runs) else None, values, ran_away)
+    complete = len(own) == len(runs)
+    return IndexInterval(
+        value=max(own) if complete else None,
+        values=np.max([run.values for run in runs], axis=0),
+        ran_away=np.any([run.ran_away for run in runs], axis=0),
+    )

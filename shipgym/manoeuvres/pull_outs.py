@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import require, rudder, turning_rudder
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre
@@ -16,12 +17,6 @@ from shipgym.sea.conditions import Weather
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.trial import Trial
-
-TURN_DEG = 20.0  # of the standard pull-out, or the rudder's limit where that is less
-CAPTION = (
-    "Yaw rate, deg/s. Sides that end apart show a ship that is unstable on a straight"
-    " course."
-)
 
 
 @dataclass(frozen=True)
@@ -53,9 +48,8 @@ def pull_out(
     InputError for a rudder of 0 or beyond the rudder's limit, UnstableModelError if the
     ship runs away.
     """
-    turn = turning_rudder(
-        rudder_deg, model.steering.rudder_limit_deg, "the rudder's limit"
-    )
+    limit = model.steering.rudder_limit_deg
+    turn = turning_rudder(rudder_deg, limit, "the rudder's limit")
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
     for angle in (turn, 0.0):
         voyage.settle(voyage.hold(angle, model.service_shaft_speed))
@@ -71,33 +65,38 @@ def pull_out_indices(trial: Trial) -> PullOutIndices:
     """
     require(trial, ("r",), "a pull-out")
     delta = np.abs(rudder(trial))
-    over = np.flatnonzero(delta > 0.5 * delta.max())
-    release = int(over[-1]) + 1 if len(over) else 0
-    if release < 10 or len(trial) - release < 10:
+    held = np.flatnonzero(delta > 0.5 * delta.max())
+    release = int(held[-1]) + 1 if len(held) else 0
+    if min(release, len(trial) - release) < 10:
         raise InputError(
-            f"trial {trial.name!r}: no pull-out found, expected a turn and then the"
-            " rudder amidships, each for at least 10 samples"
+            f"trial {trial.name!r}: expected a turn and then the rudder amidships, each"
+            " for at least 10 samples, got no pull-out"
         )
-    turn, rest = (
-        np.degrees(trial["r"][int(over[0]) : release]),
-        np.degrees(trial["r"][release:]),
+    rate = np.degrees(trial["r"])
+    return PullOutIndices(
+        turning_rate_deg_s=_last_tenth(rate[held[0] : release]),
+        residual_rate_deg_s=_last_tenth(rate[release:]),
     )
-    last = [float(part[-max(len(part) // 10, 1) :].mean()) for part in (turn, rest)]
-    return PullOutIndices(*last)
+
+
+def _last_tenth(values: Floats) -> float:
+    """Mean over the last tenth of some values."""
+    count = max(len(values) // 10, 1)
+    return float(values[-count:].mean())
 
 
 def standard_pull_outs(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, Manoeuvre]:
     """Pull-outs from turns to both sides."""
-    angle = min(TURN_DEG, model.steering.rudder_limit_deg)
-    turn = partial(pull_out, water_depth=water_depth)
-    return {
-        f"pull-out from {side}": Manoeuvre(
-            partial(turn, rudder_deg=sign * angle),
-            pull_out_indices,
-            PullOutIndices,
-            CAPTION,
-        )
-        for side, sign in SIDES
-    }
+    angle = min(20.0, model.steering.rudder_limit_deg)
+    caption = (
+        "Yaw rate, deg/s. Sides that end apart show a ship that is unstable on a"
+        " straight course."
+    )
+    found = {}
+    for side, sign in SIDES:
+        sail = partial(pull_out, rudder_deg=sign * angle, water_depth=water_depth)
+        name = f"pull-out from {side}"
+        found[name] = Manoeuvre(sail, pull_out_indices, PullOutIndices, caption)
+    return found

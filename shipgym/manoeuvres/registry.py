@@ -28,9 +28,8 @@ SIDES = (("starboard", 1.0), ("port", -1.0))
 class Manoeuvre:
     """One manoeuvre with all its settings, and the indices that are read from it."""
 
-    sail: Callable[
-        [ShipModel], Any
-    ]  # from a ship to the trial (to the spiral, for spirals)
+    # from a ship to the trial (to the spiral, for spirals)
+    sail: Callable[[ShipModel], Any]
     indices: Callable[[Any], Any]  # from what was sailed to its indices
     outcome: type  # the dataclass of its indices, units in the names of its fields
     caption: str = ""  # what its figure shows
@@ -47,28 +46,30 @@ class Manoeuvre:
         """The indices of a ship in this manoeuvre; UnstableModelError where she does what no ship can."""
         sailed = self.sail(model)
         if isinstance(sailed, Trial):
-            _check_physical(model, sailed)
+            check_physical(model, sailed)
         return self.indices(sailed)
 
 
-def _check_physical(model: ShipModel, trial: Trial) -> None:
+def check_physical(model: ShipModel, trial: Trial) -> None:
     """Refuse a run beyond every speed and yaw rate of a ship at service power, short of overflow."""
     speed, length = model.particulars["speed"], model.particulars["length"]
-    for name, most in (
-        ("u", FASTEST * speed),
-        ("v", speed),
-        ("r", QUICKEST_TURN * speed / length),
-    ):
-        if name in trial and np.abs(trial[name]).max() > most:
-            k = int(np.argmax(np.abs(trial[name]) > most))
+    largest = {
+        "u": FASTEST * speed,
+        "v": speed,
+        "r": QUICKEST_TURN * speed / length,
+    }
+    for name, most in largest.items():
+        if name not in trial:
+            continue
+        beyond = np.abs(trial[name]) > most
+        if beyond.any():
+            k = int(np.argmax(beyond))
+            time, value = float(trial.t[k]), trial[name][k]
             raise UnstableModelError(
-                f"model {model.name!r} runs away after {trial.t[k]:.1f} s ({name} ="
-                f" {trial[name][k]:.3g})",
-                float(trial.t[k]),
-                {
-                    channel: float(values[k])
-                    for channel, values in trial.channels.items()
-                },
+                f"model {model.name!r} runs away after {time:.1f} s ({name} ="
+                f" {value:.3g})",
+                time,
+                {channel: float(row[k]) for channel, row in trial.channels.items()},
             )
 
 
@@ -112,7 +113,7 @@ def register_manoeuvre(
     check_text(name, "manoeuvre: name")
     if name in FAMILIES:
         raise InputError(
-            f"manoeuvre: '{name}' is registered already; choose another name"
+            f"manoeuvre: expected a new name, got '{name}', which is registered already"
         )
     FAMILIES[name] = Family(title or name.capitalize(), variants)
     if kind is not None and kind not in KINDS:
@@ -154,10 +155,10 @@ def standard_manoeuvres(
         stop where her equations hold for a shaft astern; and what was registered
         besides (`register_manoeuvre`).
     """
-    families = families_of(model, water_depth).values()
-    return {
-        name: manoeuvre for family in families for name, manoeuvre in family.items()
-    }
+    found = dict[str, Manoeuvre]()
+    for family in families_of(model, water_depth).values():
+        found |= family
+    return found
 
 
 def standard_time(model: ShipModel) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """Legs of a manoeuvre that last until the motion is steady."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,15 +15,19 @@ from shipgym.trials.trial import Trial
 STEPS_PER_LENGTH = 40  # simulation steps in the time to travel one ship length
 STRETCH = 5.0  # ship lengths at service speed over which the motion is averaged
 MOST_STRETCHES = 60  # after which a leg ends, steady or not
-HELMSMAN_BANDWIDTH = 2.0  # of the helmsman who holds a yaw rate, U0 / L
-HELMSMAN_RESET = 4.0  # time constant of his integral part, L / U0
-STEADY = (
-    2e-5  # largest change of (u, v, r L) / U0 and rudder from one stretch to the next
-)
+# largest change of (u, v, r L) / U0 and rudder from one stretch to the next
+STEADY = 2e-5
 
 #: Fills states of shape (n_steps + 1, n_columns), which begin with the start, and
 #: commands (n_steps, 2).
 Sail = Callable[[Floats, Floats], None]
+
+
+class SteadyMotion(NamedTuple):
+    """Means over the last stretch of a leg."""
+
+    rudder: float  # ordered, rad
+    yaw_rate: float  # rad/s
 
 
 class Voyage:
@@ -41,14 +45,12 @@ class Voyage:
         conditions: Conditions,
         state: Floats | None = None,
     ) -> None:
-        self.model, self.water_depth = model, conditions.water_depth
+        self.model = model
+        self.water_depth = conditions.water_depth
         self.length_time = model.travel_time
-        default = self.length_time / STEPS_PER_LENGTH
-        self.dt = (
-            default
-            if dt is None
-            else check_number(dt, "dt", above=0.0, at_most=self.length_time)
-        )
+        self.dt = self.length_time / STEPS_PER_LENGTH
+        if dt is not None:
+            self.dt = check_number(dt, "dt", above=0.0, at_most=self.length_time)
         self.passage = Passage(model, conditions, self.dt)
         start = model.service_state if state is None else state
         self._states = [self.passage.states(start, 0)]
@@ -61,19 +63,16 @@ class Voyage:
 
     def go(self, sail: Sail, n_steps: int) -> tuple[Floats, Floats]:
         """Sail some steps; states of shape (n_steps, n_columns) and commands of shape (n_steps, 2)."""
-        states, commands = (
-            self.passage.states(self.state, n_steps),
-            np.empty((n_steps, 2)),
-        )
+        states = self.passage.states(self.state, n_steps)
+        commands = np.empty((n_steps, 2))
         sail(states, commands)
         self._states.append(states[1:])
         self._commands.append(commands)
         return states[1:], commands
 
     def _run(self, loop: str, states: Floats, *arguments: Any) -> None:
-        self.passage.run(
-            loop, states, *arguments, since=self.dt * sum(map(len, self._commands))
-        )
+        steps = sum(len(commands) for commands in self._commands)
+        self.passage.run(loop, states, *arguments, since=self.dt * steps)
 
     def hold(self, rudder: float, shaft: float) -> Sail:
         """Leg with constant orders: rudder in rad, shaft speed in 1/s."""
@@ -87,81 +86,76 @@ class Voyage:
     def rate_helmsman(self) -> Callable[[float], Sail]:
         """From a yaw rate, rad/s, to the leg in which a proportional-integral helmsman holds it.
 
-        The helmsman is designed from the rudder's effect at service speed; the integral
-        part carries over from leg to leg.
+        The helmsman is designed from the rudder's effect at service speed, for a
+        bandwidth of 2 U0 / L and a reset time of 4 L / U0; the integral part carries
+        over from leg to leg.
         """
-        memory, shaft = np.zeros(1), self.model.service_shaft_speed
-        gain = (
-            HELMSMAN_BANDWIDTH
-            / self.length_time
-            / _rudder_effect(self.model, self.water_depth)
-        )
-        reset_time = HELMSMAN_RESET * self.length_time
+        bandwidth = 2.0 / self.length_time
+        gain = bandwidth / rudder_effect(self.model, self.water_depth)
+        reset_time = 4.0 * self.length_time
+        memory = np.zeros(1)
+        shaft = self.model.service_shaft_speed
 
         def at_rate(rate: float) -> Sail:
             def sail(states: Floats, commands: Floats) -> None:
-                orders = np.empty(len(commands))
-                self._run(
-                    "steer_rate",
-                    states,
-                    orders,
-                    memory,
-                    rate,
-                    shaft,
-                    self.dt,
-                    gain,
-                    reset_time,
-                )
-                commands[:, 0], commands[:, 1] = orders, shaft
+                rudder = np.empty(len(commands))
+                helmsman = memory, rate, shaft, self.dt, gain, reset_time
+                self._run("steer_rate", states, rudder, *helmsman)
+                commands[:, 0] = rudder
+                commands[:, 1] = shaft
 
             return sail
 
         return at_rate
 
-    def settle(self, sail: Sail) -> tuple[float, float]:
-        """Sail until the motion no longer changes, 300 ship lengths at most.
-
-        Returns the means over the last stretch of the rudder ordered, rad, and the yaw
-        rate, rad/s.
-        """
+    def settle(self, sail: Sail) -> SteadyMotion:
+        """Sail until the motion no longer changes, 300 ship lengths at most."""
         n_steps = round(STRETCH * self.length_time / self.dt)
-        speed, length = (
-            self.model.particulars["speed"],
-            self.model.particulars["length"],
-        )
+        speed = self.model.particulars["speed"]
+        units = np.array([speed, speed, 1.0 / self.length_time, 1.0])
         columns = [self.model.state_names.index(name) for name in "uvr"]
-        before: Floats | None = None
+
+        before = np.full(len(units), np.inf)
         for _ in range(MOST_STRETCHES):
             states, commands = self.go(sail, n_steps)
-            u, v, r = states[:, columns].mean(axis=0)
+            velocities = states[:, columns].mean(axis=0)
             rudder = commands[:, 0].mean()
-            now = np.array([u / speed, v / speed, r * length / speed, rudder])
-            if before is not None and np.abs(now - before).max() < STEADY:
+            motion = np.append(velocities, rudder)
+            change = np.abs(motion - before) / units
+            if change.max() < STEADY:
                 break
-            before = now
-        return float(rudder), float(r)
+            before = motion
+        return SteadyMotion(float(rudder), float(velocities[-1]))
 
     def trial(self, kind: str | None = None, last: int | None = None) -> Trial:
-        """What was sailed so far, up to the sample number `last`."""
+        """Recording of the legs sailed so far, up to the sample number `last`."""
         states = np.concatenate(self._states)
-        commands = np.concatenate([*self._commands, self._commands[-1][-1:]])
+        commands = np.concatenate(self._commands)
+        # the last order is held at the last sample too
+        commands = np.append(commands, commands[-1:], axis=0)
+        if last is not None:
+            states, commands = states[: last + 1], commands[: last + 1]
         orders = commands[:, : len(self.model.command_names)]
-        kept = slice(None if last is None else last + 1)
-        return as_trial(self.model, self.dt, states[kept], orders[kept], kind)
+        return as_trial(self.model, self.dt, states, orders, kind)
 
 
-def _rudder_effect(model: ShipModel, water_depth: float) -> float:
-    """Yaw acceleration per rudder angle at service speed, 1/s^2."""
+def rudder_effect(model: ShipModel, water_depth: float) -> float:
+    """Yaw acceleration per rudder angle at service speed, 1/s^2.
+
+    InputError for a rudder that turns the ship to the other side.
+    """
     angle = float(np.radians(5.0))
-    u, n = np.full(2, model.particulars["speed"]), np.full(2, model.service_shaft_speed)
-    rates = model.rates(
-        {"u": u, "delta": np.array([angle, -angle]), "n": n}, water_depth
-    )["r"]
-    effect = float(rates[0] - rates[1]) / (2.0 * angle)
+    columns = {
+        "u": np.full(2, model.particulars["speed"]),
+        "delta": np.array([angle, -angle]),
+        "n": np.full(2, model.service_shaft_speed),
+    }
+    to_starboard, to_port = model.rates(columns, water_depth)["r"]
+    effect = float(to_starboard - to_port) / (2.0 * angle)
     if not effect > 0.0:
         raise InputError(
-            f"model {model.name!r}: rdot by delta is {effect:g} 1/s^2 at service speed,"
-            " expected a rudder that turns the ship to its side; check the signs of"
-            " its coefficients"
+            f"model {model.name!r}: expected a rudder that turns the ship to its side,"
+            f" got rdot by delta of {effect:g} 1/s^2 at service speed; check the signs"
+            " of its coefficients"
         )
     return effect

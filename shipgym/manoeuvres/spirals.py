@@ -9,14 +9,14 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import require, rudder
+from shipgym.manoeuvres.execution import is_ordered, require, rudder
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
@@ -25,7 +25,7 @@ from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.trial import Trial
 
-Method = Literal["direct", "reverse"]
+SpiralMethod = Literal["direct", "reverse"]
 
 #: Rudder angles of the direct spiral, degrees, from starboard to port: in small steps
 #: where the loop is.
@@ -46,12 +46,6 @@ DIRECT_RUDDER_DEG = (
 )
 #: Yaw rates of the reverse spiral by U0 / L, from starboard to port.
 REVERSE_RATES = (0.2, 0.15, *(0.01 * k for k in range(12, -13, -1)), -0.15, -0.2)
-STEADY_PART = 1.0 / 3.0  # of a measured plateau, its last part
-DIRECT_CAPTION = "Each point a steady turn, with rudder angles there and back."
-REVERSE_CAPTION = (
-    "Each point a yaw rate held by a helmsman, with the mean rudder that it took."
-)
-SHORT_PLATEAU = 0.1  # of the longest plateau; shorter ones are the rudder on its way
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +57,8 @@ class Spiral:
     # deg and deg/s
     rudder_deg: Floats
     yaw_rate_deg_s: Floats
-    # {"direct", "reverse"}; whether the rudder was set and the yaw rate observed, or
-    # the other way round
-    method: Method
+    # whether the rudder was set and the yaw rate observed, or the other way round
+    method: SpiralMethod
 
 
 @dataclass(frozen=True)
@@ -81,6 +74,13 @@ class SpiralIndices:
     # rudder in the middle of the loop, degrees; of a stable ship that with which she
     # sails straight
     loop_middle_deg: float
+
+
+class _Curve(NamedTuple):
+    """Yaw rate over rudder angle of the way there or back, in the order of the angles."""
+
+    angles: Floats  # deg
+    rates: Floats  # deg/s
 
 
 def direct_spiral(
@@ -99,15 +99,15 @@ def direct_spiral(
     the other, UnstableModelError if the ship runs away.
     """
     limit = model.steering.rudder_limit_deg
-    angles = _one_way(rudder_deg, "rudder_deg", "deg", limit, "the rudder's limit")
+    there = one_way(rudder_deg, "rudder_deg", "deg", limit, "the rudder's limit")
+    angles = [*there, *there[-2::-1]]
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
-    angles += angles[-2::-1]
-    points = [
-        voyage.settle(voyage.hold(np.radians(angle), model.service_shaft_speed))
-        for angle in angles
-    ]
-    rates = np.degrees([rate for _, rate in points])
-    return Spiral(voyage.trial("spiral"), np.array(angles), rates, "direct")
+    rates = []
+    for angle in angles:
+        leg = voyage.hold(np.radians(angle), model.service_shaft_speed)
+        rates.append(voyage.settle(leg).yaw_rate)
+    trial = voyage.trial("spiral")
+    return Spiral(trial, np.array(angles), np.degrees(rates), "direct")
 
 
 def reverse_spiral(
@@ -129,41 +129,45 @@ def reverse_spiral(
     ordered. Otherwise as `direct_spiral`.
     """
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
-    usual = [float(np.degrees(rate / voyage.length_time)) for rate in REVERSE_RATES]
-    given = usual if yaw_rate_deg_s is None else yaw_rate_deg_s
-    most = float(np.degrees(1.0 / voyage.length_time))
-    rates = _one_way(
-        given, "yaw_rate_deg_s", "deg/s", most, "one radian per ship length sailed"
-    )
+    unit = voyage.length_time
+    if yaw_rate_deg_s is None:
+        yaw_rate_deg_s = [float(np.degrees(rate / unit)) for rate in REVERSE_RATES]
+    most = float(np.degrees(1.0 / unit))
+    what = "one radian per ship length sailed"
+    rates = one_way(yaw_rate_deg_s, "yaw_rate_deg_s", "deg/s", most, what)
+
     helmsman = voyage.rate_helmsman()
-    points = [voyage.settle(helmsman(np.radians(rate))) for rate in rates]
-    angles = np.degrees([rudder for rudder, _ in points])
-    return Spiral(voyage.trial("spiral"), angles, np.array(rates), "reverse")
+    angles = []
+    for rate in rates:
+        steady = voyage.settle(helmsman(np.radians(rate)))
+        angles.append(steady.rudder)
+    trial = voyage.trial("spiral")
+    return Spiral(trial, np.degrees(angles), np.array(rates), "reverse")
 
 
-def _one_way(
+def one_way(
     values: Sequence[float], argument: str, unit: str, limit: float, what: str
 ) -> list[float]:
-    """Values that go strictly from one side to the other, within a limit."""
-    numbers = [
-        check_number(
+    """Values that go strictly from one side to the other, within a limit, checked.
+
+    `what`: the limit in words.
+    """
+    numbers = []
+    for i, value in enumerate(values):
+        number = check_number(
             value,
             f"{argument}[{i}]",
             at_least=-limit,
             at_most=limit,
             hint=f"{what} in {unit}",
         )
-        for i, value in enumerate(values)
-    ]
-    steps = np.sign(np.diff(numbers))
-    if (
-        len(numbers) < 3
-        or abs(steps.sum()) < len(steps)
-        or numbers[0] * numbers[-1] >= 0.0
-    ):
+        numbers.append(number)
+    steps = np.diff(numbers)
+    strictly = np.all(steps > 0.0) or np.all(steps < 0.0)
+    if len(numbers) < 3 or not strictly or numbers[0] * numbers[-1] >= 0.0:
         raise InputError(
-            f"{argument}: {numbers} found, expected at least 3 values in {unit} that"
-            " rise or fall from one side to the other, such as 10, 5, 0, -5, -10"
+            f"{argument}: expected at least 3 values in {unit} that rise or fall from"
+            f" one side to the other, such as 10, 5, 0, -5, -10, got {numbers}"
         )
     return numbers
 
@@ -182,29 +186,45 @@ def spiral_from_trial(
     require(trial, ("r",), "a spiral")
     tolerance = check_number(tolerance_deg, "tolerance_deg", above=0.0)
     delta, rate = np.degrees(rudder(trial)), np.degrees(trial["r"])
-    allowed = 1e-9 if "delta_command" in trial.channels else tolerance
+    angles, rates = [], []
+    for first, last in _plateaus(trial, delta, tolerance):
+        angle = float(delta[first:last].mean())
+        if rudder_deg is not None and not _near(angle, rudder_deg, tolerance):
+            continue
+        steady = max(int((last - first) * (1.0 / 3.0)), 1)
+        angles.append(angle)
+        rates.append(float(rate[last - steady : last].mean()))
+    if len(angles) < 4:
+        raise InputError(
+            f"trial {trial.name!r}: expected at least 4 rudder angles, each held for a"
+            f" while, got {len(angles)} steady turns"
+        )
+    return Spiral(trial, np.array(angles), np.array(rates), "direct")
+
+
+def _plateaus(trial: Trial, delta: Floats, tolerance: float) -> list[tuple[int, int]]:
+    """First samples of each stretch of a held rudder, deg, and of what comes after it.
+
+    Without those shorter than a tenth of the longest, the rudder on its way.
+    """
+    allowed = 1e-9 if is_ordered(trial) else tolerance
     edges = [0]
     for i in range(1, len(delta)):
         if abs(delta[i] - delta[edges[-1]]) > allowed:
             edges.append(i)
     spans = list(pairwise([*edges, len(delta)]))
-    durations = np.array([trial.t[last - 1] - trial.t[first] for first, last in spans])
-    points = []
-    for (first, last), duration in zip(spans, durations, strict=True):
-        angle = float(delta[first:last].mean())
-        wanted = rudder_deg is None or any(
-            abs(angle - other) <= tolerance for other in rudder_deg
-        )
-        if wanted and duration >= SHORT_PLATEAU * durations.max() and duration > 0.0:
-            steady = max(int((last - first) * STEADY_PART), 1)
-            points.append((angle, float(rate[last - steady : last].mean())))
-    if len(points) < 4:
-        raise InputError(
-            f"trial {trial.name!r}: {len(points)} steady turns found, expected at least"
-            " 4 rudder angles, each held for a while"
-        )
-    angles, rates = np.array(points).T
-    return Spiral(trial, angles, rates, "direct")
+    durations = [trial.t[last - 1] - trial.t[first] for first, last in spans]
+    shortest = 0.1 * max(durations)
+
+    held = []
+    for span, duration in zip(spans, durations, strict=True):
+        if duration > 0.0 and duration >= shortest:
+            held.append(span)
+    return held
+
+
+def _near(angle: float, wanted: Sequence[float], tolerance: float) -> bool:
+    return any(abs(angle - other) <= tolerance for other in wanted)
 
 
 def spiral_indices(spiral: Spiral) -> SpiralIndices:
@@ -214,14 +234,16 @@ def spiral_indices(spiral: Spiral) -> SpiralIndices:
     not come back.
     """
     check_choice(spiral.method, ("direct", "reverse"), "spiral method")
-    if spiral.yaw_rate_deg_s.min() >= 0.0 or spiral.yaw_rate_deg_s.max() <= 0.0:
+    angles, rates = spiral.rudder_deg, spiral.yaw_rate_deg_s
+    least, largest = rates.min(), rates.max()
+    if least >= 0.0 or largest <= 0.0:
         raise InputError(
-            f"spiral: yaw rates from {spiral.yaw_rate_deg_s.min():.3g} to"
-            f" {spiral.yaw_rate_deg_s.max():.3g} deg/s found, expected turns to both"
-            " sides"
+            "spiral: expected turns to both sides, got yaw rates from"
+            f" {least:.3g} to {largest:.3g} deg/s"
         )
-    find = _direct_loop if spiral.method == "direct" else _reverse_loop
-    return SpiralIndices(*find(spiral.rudder_deg, spiral.yaw_rate_deg_s))
+    if spiral.method == "direct":
+        return _direct_loop(angles, rates)
+    return _reverse_loop(angles, rates)
 
 
 def turning_point(angles: Floats) -> int:
@@ -229,78 +251,92 @@ def turning_point(angles: Floats) -> int:
     return int(max(np.argmin(angles), np.argmax(angles)))
 
 
-def _direct_loop(angles: Floats, rates: Floats) -> tuple[float, float, float]:
-    """Width, deg, height, deg/s, and middle, deg: each way changes side at another rudder."""
+def _direct_loop(angles: Floats, rates: Floats) -> SpiralIndices:
+    """The loop of a direct spiral: each way changes side at another rudder."""
     turn = turning_point(angles)
-    there = np.array([angles[: turn + 1], rates[: turn + 1]])
-    back = np.array([angles[turn:], rates[turn:]])
-    falling, rising = (there, back) if angles[turn] < angles[0] else (back, there)
-    falling, rising = (
-        falling[:, np.argsort(falling[0])],
-        rising[:, np.argsort(rising[0])],
-    )
-    if min(falling.shape[1], rising.shape[1]) < 2:
+    there = _ordered(angles[: turn + 1], rates[: turn + 1])
+    back = _ordered(angles[turn:], rates[turn:])
+    if min(len(there.angles), len(back.angles)) < 2:
         raise InputError(
-            "spiral: rudder angles go one way only, expected a direct spiral there and"
-            " back"
+            "spiral: expected a direct spiral there and back, got rudder angles that go"
+            " one way only"
         )
-    to_port, to_starboard = (
-        _changes_side(falling, last=False),
-        _changes_side(rising, last=True),
-    )
-    width = max(to_starboard - to_port, 0.0)
+    falling, rising = there, back
+    if angles[turn] >= angles[0]:
+        falling, rising = back, there
+
+    to_port = _change_of_side(falling, last=False)
+    to_starboard = _change_of_side(rising, last=True)
     middle = 0.5 * (to_starboard + to_port)
-    height = float(np.interp(middle, *falling) - np.interp(middle, *rising))
-    return width, max(height, 0.0), middle
+    height = np.interp(middle, *falling) - np.interp(middle, *rising)
+    return SpiralIndices(
+        loop_width_deg=max(to_starboard - to_port, 0.0),
+        loop_height_deg_s=max(float(height), 0.0),
+        loop_middle_deg=middle,
+    )
 
 
-def _changes_side(way: Floats, last: bool) -> float:
-    """Rudder at which the yaw rate of one way goes through zero, deg; angles in row 0 rise."""
+def _ordered(angles: Floats, rates: Floats) -> _Curve:
+    order = np.argsort(angles)
+    return _Curve(angles[order], rates[order])
+
+
+def _change_of_side(way: _Curve, last: bool) -> float:
+    """Rudder at which the yaw rate of one way goes through zero, deg."""
     angles, rates = way
-    change = np.flatnonzero((rates[:-1] <= 0.0) & (rates[1:] > 0.0))
-    if len(change) == 0:
+    changes = np.flatnonzero((rates[:-1] <= 0.0) & (rates[1:] > 0.0))
+    if len(changes) == 0:
         raise InputError(
-            "spiral: one of its two ways stays on one side, expected turns to both"
-            " sides"
+            "spiral: expected turns to both sides, got one way that stays on one side"
         )
-    k = int(change[-1] if last else change[0])
-    return float(np.interp(0.0, rates[k : k + 2], angles[k : k + 2]))
+    k = int(changes[-1] if last else changes[0])
+    around = slice(k, k + 2)
+    return float(np.interp(0.0, rates[around], angles[around]))
 
 
-def _reverse_loop(angles: Floats, rates: Floats) -> tuple[float, float, float]:
-    """Width, deg, height, deg/s, and middle, deg, of the fold in the curve of rudder over yaw rate."""
+def _reverse_loop(angles: Floats, rates: Floats) -> SpiralIndices:
+    """The fold in the curve of rudder over yaw rate."""
     from scipy.interpolate import Akima1DInterpolator
 
     order = np.argsort(rates)
     grid = np.linspace(rates.min(), rates.max(), 4001)
-    curve = np.asarray(Akima1DInterpolator(rates[order], angles[order])(grid))
+    interpolator = Akima1DInterpolator(rates[order], angles[order])
+    curve = np.asarray(interpolator(grid))
     highest = np.maximum.accumulate(curve)
-    low = int(np.argmax(highest - curve))
-    width = float(highest[low] - curve[low])
+    lowest = int(np.argmax(highest - curve))
+    top, bottom = highest[lowest], curve[lowest]
+    width = float(top - bottom)
     if width == 0.0:
-        return 0.0, 0.0, float(np.interp(0.0, grid, curve))
-    middle = 0.5 * (highest[low] + curve[low])
-    inside = grid[np.flatnonzero(np.diff(np.sign(curve - middle)))]
-    return width, float(np.ptp(inside)), float(middle)
+        straight = float(np.interp(0.0, grid, curve))
+        return SpiralIndices(0.0, 0.0, straight)
+
+    middle = 0.5 * (top + bottom)
+    crossings = np.flatnonzero(np.diff(np.sign(curve - middle)))
+    height = float(np.ptp(grid[crossings]))
+    return SpiralIndices(width, height, float(middle))
 
 
 def standard_spirals(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, Manoeuvre]:
     """A direct spiral, and a reverse one where the ship is unstable on a straight course."""
-    angles = [a for a in DIRECT_RUDDER_DEG if abs(a) <= model.steering.rudder_limit_deg]
-    direct = partial(direct_spiral, rudder_deg=angles, water_depth=water_depth)
+    limit = model.steering.rudder_limit_deg
+    angles = [angle for angle in DIRECT_RUDDER_DEG if abs(angle) <= limit]
     spirals = {
         "direct spiral": Manoeuvre(
-            direct, spiral_indices, SpiralIndices, DIRECT_CAPTION
+            partial(direct_spiral, rudder_deg=angles, water_depth=water_depth),
+            spiral_indices,
+            SpiralIndices,
+            "Each point a steady turn, with rudder angles there and back.",
         )
     }
     with suppress(InputError):  # there may be no straight course at all
         if is_course_stable(model):
             return spirals
-    reverse = partial(reverse_spiral, water_depth=water_depth)
-    return spirals | {
-        "reverse spiral": Manoeuvre(
-            reverse, spiral_indices, SpiralIndices, REVERSE_CAPTION
-        )
-    }
+    spirals["reverse spiral"] = Manoeuvre(
+        partial(reverse_spiral, water_depth=water_depth),
+        spiral_indices,
+        SpiralIndices,
+        "Each point a yaw rate held by a helmsman, with the mean rudder that it took.",
+    )
+    return spirals

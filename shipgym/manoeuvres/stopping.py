@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres.excitation import shaft_of
@@ -17,20 +18,7 @@ from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
 
-LONGEST = 300.0  # of a stopping trial, L / U0
-ACCELERATION = 40.0  # duration of an acceleration, L / U0
-
-STOP_CAPTION = (
-    "The shaft stopped at service speed, the rudder amidships, until a tenth of it is"
-    " left."
-)
-CRASH_CAPTION = (
-    "The shaft ordered full astern at service speed, the rudder amidships, until dead"
-    " in the water."
-)
-ACCELERATION_CAPTION = (
-    "From a quarter of service speed, the shaft ordered to service speed."
-)
+LONGEST = 300  # of a stopping trial, L / U0
 
 
 @dataclass(frozen=True)
@@ -84,30 +72,28 @@ def stopping(
     ship is still faster after 300 times the time to travel one ship length;
     UnstableModelError if the ship runs away.
     """
-    order = _stopping_order(model, shaft_speed, speed_ratio)
+    order = stopping_order(model, shaft_speed, speed_ratio)
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
-    sail, n_steps = (
-        voyage.hold(0.0, order),
-        max(round(voyage.length_time / voyage.dt), 2),
-    )
+    leg = voyage.hold(0.0, order)
+    n_steps = max(round(voyage.length_time / voyage.dt), 2)  # of a ship length
+    surge = model.state_names.index("u")
     target = speed_ratio * model.particulars["speed"]
-    for stretch in range(round(LONGEST)):
-        states, _ = voyage.go(sail, n_steps)
-        slow = np.flatnonzero(states[:, 3] <= target)
+    for stretch in range(LONGEST):
+        states, _ = voyage.go(leg, n_steps)
+        slow = np.flatnonzero(states[:, surge] <= target)
         if len(slow):
-            return voyage.trial(
-                "straight", max(stretch * n_steps + int(slow[0]) + 1, 2)
-            )
+            last = stretch * n_steps + int(slow[0]) + 1
+            return voyage.trial("straight", max(last, 2))
     trial = voyage.trial("straight")
     raise ManoeuvreError(
-        f"stopping of {model.name!r}: surge speed {trial['u'][-1]:.3g} m/s after"
-        f" {trial.duration:.0f} s, expected {target:.3g} m/s; order the shaft to less,"
-        " or stop at a larger speed_ratio",
+        f"stopping of {model.name!r}: expected a surge speed of {target:.3g} m/s, got"
+        f" {trial['u'][-1]:.3g} m/s after {trial.duration:.0f} s; order the shaft to"
+        " less, or stop at a larger speed_ratio",
         trial,
     )
 
 
-def _stopping_order(model: ShipModel, shaft_speed: float, speed_ratio: float) -> float:
+def stopping_order(model: ShipModel, shaft_speed: float, speed_ratio: float) -> float:
     """The order for the shaft, 1/s, after checking it and the ratio of speeds."""
     service = shaft_of(model)
     order = check_number(
@@ -119,9 +105,9 @@ def _stopping_order(model: ShipModel, shaft_speed: float, speed_ratio: float) ->
     )
     if order < 0.0 and not goes_astern(model):
         raise InputError(
-            f"shaft_speed: {order:g} 1/s found, but the propeller of {model.name!r}"
-            " holds for a shaft turning ahead only; expected a number >= 0, or a ship"
-            " like 'tanker'"
+            f"shaft_speed: expected a number >= 0, got {order:g} 1/s; the propeller of"
+            f" {model.name!r} holds for a shaft turning ahead only: choose a ship like"
+            " 'tanker'"
         )
     check_number(
         speed_ratio,
@@ -132,8 +118,8 @@ def _stopping_order(model: ShipModel, shaft_speed: float, speed_ratio: float) ->
     )
     if speed_ratio == 0.0 and order >= 0.0:
         raise InputError(
-            "speed_ratio: 0 found, but a ship without an order astern is never dead in"
-            " the water; expected a number > 0, such as 0.1"
+            "speed_ratio: expected a number > 0, such as 0.1, got 0; a ship without an"
+            " order astern is never dead in the water"
         )
     return order
 
@@ -163,18 +149,24 @@ def stopping_indices(
     the length is missing, ManoeuvreError if the speed is never reached.
     """
     require(trial, ("u", "v", "x", "y", "psi"), "a stopping trial")
-    lpp, u = ship_length(trial, length), trial["u"]
+    lpp = ship_length(trial, length)
     end = float(trial.t[-1])
     if speed_ratio is not None:
         check_number(speed_ratio, "speed_ratio", at_least=0.0, below=1.0)
+        u = trial["u"]
         end = _when(trial, -u, -speed_ratio * u[0])
-    x, y, psi, sailed = (
-        float(np.interp(end, trial.t, values - values[0]))
-        for values in (trial["x"], trial["y"], trial["psi"], distance_sailed(trial))
-    )
-    ahead, aside = (float(way) / lpp for way in rotate_to_body(x, y, trial["psi"][0]))
+
+    def change(values: Floats) -> float:
+        return float(np.interp(end, trial.t, values - values[0]))
+
+    north, east = change(trial["x"]), change(trial["y"])
+    ahead, aside = rotate_to_body(north, east, trial["psi"][0])
     return StoppingIndices(
-        sailed / lpp, ahead, aside, float(np.degrees(psi)), end - float(trial.t[0])
+        track_reach_lengths=change(distance_sailed(trial)) / lpp,
+        head_reach_lengths=float(ahead) / lpp,
+        side_reach_lengths=float(aside) / lpp,
+        heading_change_deg=float(np.degrees(change(trial["psi"]))),
+        time_s=end - float(trial.t[0]),
     )
 
 
@@ -209,9 +201,10 @@ def acceleration(
         if name in model.state_names:
             start[model.state_names.index(name)] *= start_ratio
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed), start)
-    seconds = ACCELERATION * voyage.length_time if duration is None else duration
+    seconds = 40.0 * voyage.length_time if duration is None else duration
     check_number(seconds, "duration", at_least=2.0 * voyage.dt, hint="two samples")
-    voyage.go(voyage.rate_helmsman()(0.0), round(seconds / voyage.dt))
+    straight = voyage.rate_helmsman()(0.0)
+    voyage.go(straight, round(seconds / voyage.dt))
     return voyage.trial("straight")
 
 
@@ -230,24 +223,25 @@ def acceleration_indices(
     u = trial["u"]
     if not u[-1] > u[0]:
         raise InputError(
-            f"trial {trial.name!r}: u goes from {u[0]:.3g} to {u[-1]:.3g} m/s, expected"
-            " an acceleration"
+            f"trial {trial.name!r}: expected an acceleration, got u from {u[0]:.3g} to"
+            f" {u[-1]:.3g} m/s"
         )
     end = _when(trial, u, u[0] + part * (u[-1] - u[0]))
     sailed = float(np.interp(end, trial.t, distance_sailed(trial)))
     return AccelerationIndices(
-        end - float(trial.t[0]), sailed / ship_length(trial, length), float(u[-1])
+        time_s=end - float(trial.t[0]),
+        distance_lengths=sailed / ship_length(trial, length),
+        final_speed=float(u[-1]),
     )
 
 
-def _when(trial: Trial, values: np.ndarray, threshold: float) -> float:
+def _when(trial: Trial, values: Floats, threshold: float) -> float:
     """Time at which values first reach a threshold, between samples by straight lines, s."""
     time = reached(values, threshold, trial.t)
     if time is None:
         raise ManoeuvreError(
-            f"trial {trial.name!r}: surge speed {trial['u'][-1]:.3g} m/s at its end,"
-            f" expected it to reach {abs(threshold):.3g} m/s; give a larger"
-            " speed_ratio",
+            f"trial {trial.name!r}: expected a surge speed of {abs(threshold):.3g} m/s,"
+            f" got {trial['u'][-1]:.3g} m/s at its end; give a larger speed_ratio",
             trial,
         )
     return time
@@ -259,16 +253,27 @@ def standard_stops(
     """Inertia stop and acceleration of a ship with a shaft; a crash stop where she can go astern."""
     if "n" not in model.command_names:
         return {}
-    sails = (stopping, crash_stop, acceleration)
-    stop, crash, faster = (partial(sail, water_depth=water_depth) for sail in sails)
     found = {
-        "inertia stop": Manoeuvre(stop, stopping_indices, StoppingIndices, STOP_CAPTION)
+        "inertia stop": Manoeuvre(
+            partial(stopping, water_depth=water_depth),
+            stopping_indices,
+            StoppingIndices,
+            "The shaft stopped at service speed, the rudder amidships, until a tenth of"
+            " it is left.",
+        )
     }
     if goes_astern(model):
         found["crash stop"] = Manoeuvre(
-            crash, stopping_indices, StoppingIndices, CRASH_CAPTION
+            partial(crash_stop, water_depth=water_depth),
+            stopping_indices,
+            StoppingIndices,
+            "The shaft ordered full astern at service speed, the rudder amidships,"
+            " until dead in the water.",
         )
     found["acceleration"] = Manoeuvre(
-        faster, acceleration_indices, AccelerationIndices, ACCELERATION_CAPTION
+        partial(acceleration, water_depth=water_depth),
+        acceleration_indices,
+        AccelerationIndices,
+        "From a quarter of service speed, the shaft ordered to service speed.",
     )
     return found

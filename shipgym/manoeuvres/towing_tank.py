@@ -1,6 +1,6 @@
-"""A virtual towing tank: captive tests of any ship model, its motion prescribed and its forces measured.
+"""A virtual towing tank: captive tests of any ship model.
 
-Each test returns a Trial with the motion and the forces X, Y (N) and N (N m); a number
+The motion is prescribed and the forces are measured: each test returns a Trial with the motion and the forces X, Y (N) and N (N m); a number
 out of range is an InputError. The tests are those of the planar motion mechanism
 (Gertler 1967, The DTMB planar-motion-mechanism system; ITTC 7.5-02-06-02).
 """
@@ -36,18 +36,17 @@ class Tank:
 
     speed: float | None = None  # of the carriage, m/s; None: the ship's service speed
     rudder_deg: float = 0.0  # held, degrees
-    shaft_speed: float | None = (
-        None  # held, 1/s; None: that at service speed. For ships with a shaft
-    )
+    #: held, 1/s, for ships with a shaft; None: that at service speed
+    shaft_speed: float | None = None
     cycles: int = 3  # periods of an oscillation that are recorded
     samples: int = 200  # in each period, and at each angle of a static test
-    # standard deviation of white noise on each force, in parts of its root mean square
-    # over the test
+    #: standard deviation of white noise on each force, in parts of its root mean square
+    #: over the test
     noise: float = 0.0
     seed: int = 0  # of the noise
-    # whether the inertia of the ship herself (mass times acceleration, centripetal
-    # terms included) stays in the forces, as the balance of a planar motion mechanism
-    # feels it; else those of the water alone
+    #: whether the inertia of the ship herself (mass times acceleration, centripetal
+    #: terms included) stays in the forces, as the balance of a planar motion mechanism
+    #: feels it; else those of the water alone
     model_inertia: bool = True
     water_depth: float = np.inf  # m, for ships that know shallow water
 
@@ -57,12 +56,36 @@ class Tank:
         if self.shaft_speed is not None:
             check_number(self.shaft_speed, "tank shaft_speed", above=0.0, hint="ahead")
         check_number(self.rudder_deg, "tank rudder_deg", at_least=-90.0, at_most=90.0)
-        for name, least in (("cycles", 1), ("samples", 8), ("noise", 0.0), ("seed", 0)):
-            check_number(getattr(self, name), f"tank {name}", at_least=least)
+        check_number(self.cycles, "tank cycles", at_least=1)
+        check_number(self.samples, "tank samples", at_least=8)
+        check_number(self.noise, "tank noise", at_least=0.0)
+        check_number(self.seed, "tank seed", at_least=0)
 
     def carriage_speed(self, model: ShipModel) -> float:
         """Speed of the carriage, m/s."""
-        return float(model.particulars["speed"] if self.speed is None else self.speed)
+        if self.speed is None:
+            return float(model.particulars["speed"])
+        return float(self.speed)
+
+    def held_commands(self, model: ShipModel) -> tuple[float, float]:
+        """Rudder, rad, and shaft speed, 1/s; InputError for what the ship has not."""
+        limit = model.steering.rudder_limit_deg
+        check_number(
+            self.rudder_deg,
+            "tank rudder_deg",
+            at_least=-limit,
+            at_most=limit,
+            hint="the rudder's limit",
+        )
+        rudder = float(np.radians(self.rudder_deg))
+        if self.shaft_speed is None:
+            return rudder, model.service_shaft_speed
+        if "n" not in model.command_names:
+            raise InputError(
+                f"tank shaft_speed: expected none, as {model.name!r} has no shaft, got"
+                f" {self.shaft_speed:g}; leave it out"
+            )
+        return rudder, self.shaft_speed
 
 
 def static_drift(
@@ -71,7 +94,7 @@ def static_drift(
     hold_s: float = 1.0,
     tank: Tank | None = None,
 ) -> Trial:
-    """Tow a ship steadily at one drift angle after the other: forces X, Y (N) and N (N m).
+    """Tow a ship steadily at one drift angle after the other.
 
     Drift angles at midship are in degrees, positive with the bow to starboard of the
     course: v = -U sin(drift). Each is recorded for `hold_s` seconds, in `tank.samples`
@@ -83,12 +106,15 @@ def static_drift(
         for i, angle in enumerate(drift_deg)
     ]
     if not angles:
-        raise InputError("drift_deg: no angle found, expected at least one")
+        raise InputError("drift_deg: expected at least one angle, got none")
     check_number(hold_s, "hold_s", above=0.0)
+
     drift = np.repeat(np.radians(angles), tank.samples)
     t = hold_s / tank.samples * np.arange(len(drift), dtype=float)
-    speed, none = tank.carriage_speed(model), np.zeros(len(t))
-    velocity = np.stack([speed * np.cos(drift), -speed * np.sin(drift), none], axis=-1)
+    speed = tank.carriage_speed(model)
+    u = speed * np.cos(drift)
+    v = -speed * np.sin(drift)
+    velocity = np.column_stack([u, v, np.zeros(len(t))])
     return _tow(model, tank, t, velocity, np.zeros_like(velocity), "static drift")
 
 
@@ -123,7 +149,10 @@ def pure_sway(
     period_s: float | None = None,
     tank: Tank | None = None,
 ) -> Trial:
-    """Oscillate a ship in sway, her heading along the tank; amplitude in m/s, otherwise as `pure_surge`."""
+    """Oscillate a ship in sway, her heading along the tank.
+
+    The amplitude is that of the sway speed, m/s; otherwise as `pure_surge`.
+    """
     tank = tank or Tank()
     check_number(amplitude, "amplitude", above=0.0)
     speed = tank.carriage_speed(model)
@@ -138,7 +167,10 @@ def pure_yaw(
     period_s: float | None = None,
     tank: Tank | None = None,
 ) -> Trial:
-    """Oscillate a ship in yaw, always along her path, without sway; otherwise as `pure_surge`."""
+    """Oscillate a ship in yaw, always along her path, without sway.
+
+    Otherwise as `pure_surge`.
+    """
     return yaw_with_drift(model, amplitude_deg_s, 0.0, period_s, tank)
 
 
@@ -149,14 +181,16 @@ def yaw_with_drift(
     period_s: float | None = None,
     tank: Tank | None = None,
 ) -> Trial:
-    """Oscillate a ship in yaw at a drift angle at midship, v = -U sin(drift); otherwise as `pure_surge`."""
+    """Oscillate a ship in yaw at a drift angle at midship, v = -U sin(drift).
+
+    Otherwise as `pure_surge`.
+    """
     tank = tank or Tank()
-    rate = float(
-        np.radians(check_number(amplitude_deg_s, "amplitude_deg_s", above=0.0))
-    )
-    drift = float(
-        np.radians(check_number(drift_deg, "drift_deg", at_least=-90.0, at_most=90.0))
-    )
+    check_number(amplitude_deg_s, "amplitude_deg_s", above=0.0)
+    check_number(drift_deg, "drift_deg", at_least=-90.0, at_most=90.0)
+    rate = float(np.radians(amplitude_deg_s))
+    drift = float(np.radians(drift_deg))
+
     speed = tank.carriage_speed(model)
     mean = (speed * np.cos(drift), -speed * np.sin(drift), 0.0)
     name = "pure yaw" if drift == 0.0 else "yaw with drift"
@@ -172,11 +206,12 @@ def _oscillate(
     name: str,
 ) -> Trial:
     """Velocities (u, v, r) that swing about their mean as a cosine."""
-    usual = 10.0 * model.particulars["length"] / tank.carriage_speed(model)
-    period = check_number(
-        usual if period_s is None else period_s, "period_s", above=0.0
-    )
-    t = period / tank.samples * np.arange(tank.cycles * tank.samples + 1, dtype=float)
+    if period_s is None:
+        period_s = 10.0 * model.particulars["length"] / tank.carriage_speed(model)
+    period = check_number(period_s, "period_s", above=0.0)
+    n_steps = tank.cycles * tank.samples
+    t = period / tank.samples * np.arange(n_steps + 1, dtype=float)
+
     frequency = 2.0 * np.pi / period
     velocity = np.array(mean) + np.outer(np.cos(frequency * t), amplitude)
     acceleration = -frequency * np.outer(np.sin(frequency * t), amplitude)
@@ -191,47 +226,51 @@ def _tow(
     acceleration: Floats,
     name: str,
 ) -> Trial:
-    """The measured motion and forces: inertia times (the ship's own acceleration - the prescribed one).
+    """Tow a ship along a prescribed motion: the trial with motion and measured forces.
 
     Time, and prescribed velocities and accelerations (u, v, r) of shape (n_samples, 3).
     """
-    most = model.steering.rudder_limit_deg
-    check_number(
-        tank.rudder_deg,
-        "tank rudder_deg",
-        at_least=-most,
-        at_most=most,
-        hint="the rudder's limit",
-    )
-    if tank.shaft_speed is not None and "n" not in model.command_names:
-        raise InputError(
-            f"tank shaft_speed: {tank.shaft_speed:g} found, but {model.name!r} has no"
-            " shaft; leave it"
-        )
-    shaft = model.service_shaft_speed if tank.shaft_speed is None else tank.shaft_speed
-    psi = integral(t, velocity[:, 2])
-    columns = {"psi": psi, **dict(zip("uvr", velocity.T, strict=True))}
-    columns |= {
-        "delta": np.full(len(t), np.radians(tank.rudder_deg)),
+    rudder, shaft = tank.held_commands(model)
+    u, v, r = velocity.T
+    psi = integral(t, r)
+    columns = {
+        "psi": psi,
+        "u": u,
+        "v": v,
+        "r": r,
+        "delta": np.full(len(t), rudder),
         "n": np.full(len(t), shaft),
     }
-    rates = model.rates(columns, tank.water_depth)
-    own = np.stack([rates.get(axis, np.zeros(len(t))) for axis in "uvrp"], axis=-1)
-    own[:, :3] -= acceleration
-    forces = own @ inertia(model, tank.water_depth).T
+    forces = _measured_forces(model, tank, columns, acceleration)
     if not tank.model_inertia:
-        forces += rigid_body_forces(rigid_inertia(model), velocity.T, acceleration.T).T
+        rigid = rigid_inertia(model)
+        forces += rigid_body_forces(rigid, velocity.T, acceleration.T).T
     noise = tank.noise * np.sqrt((forces**2).mean(axis=0))
     forces += noise * np.random.default_rng(tank.seed).standard_normal(forces.shape)
-    north, east = rotate_to_body(columns["u"], columns["v"], -psi)
+
+    north, east = rotate_to_body(u, v, -psi)
     if "n" not in model.command_names:
         del columns["n"]
     channels = {"x": integral(t, north), "y": integral(t, east), **columns}
     channels |= zip("XYN", forces.T, strict=True)
     title = f"{model.name}, {name}"
-    return Trial(
-        t, channels, name=title, kind="captive", length=model.particulars["length"]
-    )
+    length = model.particulars["length"]
+    return Trial(t, channels, name=title, kind="captive", length=length)
+
+
+def _measured_forces(
+    model: ShipModel, tank: Tank, columns: dict[str, Floats], acceleration: Floats
+) -> Floats:
+    """Forces X, Y and N on a balance, shape (n_samples, 3).
+
+    These are the inertia times what the free ship would accelerate beyond what is
+    prescribed.
+    """
+    rates = model.rates(columns, tank.water_depth)
+    none = np.zeros(len(acceleration))
+    beyond = np.column_stack([rates.get(axis, none) for axis in "uvrp"])
+    beyond[:, :3] -= acceleration
+    return np.asarray(beyond @ inertia(model, tank.water_depth).T)
 
 
 def rigid_body_forces(
@@ -239,9 +278,9 @@ def rigid_body_forces(
     velocity: Sequence[Floats] | Floats,
     acceleration: Sequence[Floats] | Floats,
 ) -> Floats:
-    """Forces X, Y and moment N that accelerate a ship without water, about midship (Fossen 2011, 3.3).
+    """Forces X, Y and moment N that accelerate a ship without water, about midship.
 
-    All in SI units, or all in the prime system: `rigid` is mass, its static moment and
+    Fossen 2011, 3.3. All in SI units, or all in the prime system: `rigid` is mass, its static moment and
     the yaw inertia; forces, and velocity and acceleration in surge, sway and yaw, have
     the shape (3, n_samples).
     """

@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.manoeuvres.execution import (
     execute_time,
     number_of_steps,
@@ -20,12 +21,6 @@ from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
-
-TURN_DEG = 35.0  # of the standard circle, or the rudder's limit where that is less
-CAPTION = (
-    "Path from above, from the position and along the heading at which the rudder was"
-    " ordered."
-)
 
 
 @dataclass(frozen=True)
@@ -51,6 +46,20 @@ class TurningIndices:
     steady_drift_deg: float | None
 
 
+class TrackFromOrder(NamedTuple):
+    """A track from the position and along the heading at which the rudder was ordered."""
+
+    ahead: Floats  # ship lengths, shape (n_samples,)
+    aside: Floats  # to starboard, ship lengths
+    turned: Floats  # change of heading, rad
+
+
+class _SteadyTurn(NamedTuple):
+    diameter_lengths: float | None
+    speed_ratio: float | None
+    drift_deg: float | None
+
+
 def turning_circle(
     model: ShipModel,
     rudder_deg: float = 35.0,
@@ -68,16 +77,9 @@ def turning_circle(
     UnstableModelError if the ship runs away.
     """
     rudder = np.full(number_of_steps(duration, dt), turning_rudder(rudder_deg, 90.0))
-    return simulate(
-        model,
-        orders(model, rudder),
-        dt,
-        None,
-        water_depth,
-        "turning-circle",
-        weather,
-        seed,
-    )
+    commands = orders(model, rudder)
+    kind = "turning-circle"
+    return simulate(model, commands, dt, None, water_depth, kind, weather, seed)
 
 
 def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices:
@@ -89,36 +91,61 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
     """
     require(trial, ("x", "y", "psi"), "a turning circle")
     lpp = ship_length(trial, length)
+    track = track_from_order(trial, lpp)
     after = trial.t >= execute_time(trial)
-    ahead, aside, turned = (values[after] for values in track_from_order(trial, lpp))
-    side = 1.0 if turned[-1] >= 0.0 else -1.0
-    turned, aside = side * turned, side * aside
-    advance, transfer = (reached(turned, np.pi / 2, way) for way in (ahead, aside))
-    ways = advance, transfer, reached(turned, np.pi, aside)
-    if turned[-1] <= 1.5 * np.pi:  # no steady turn yet
-        return TurningIndices(*ways, None, None, None)
-    u, v, r = (trial[name][after] for name in ("u", "v", "r"))
-    speed, steady = np.hypot(u, v), turned >= turned[-1] - np.pi / 2
-    diameter = 2.0 * speed[steady].mean() / (side * r[steady].mean()) / lpp
-    drift = side * np.degrees(np.arctan2(-v[steady], u[steady]).mean())
+    side = 1.0 if track.turned[-1] >= 0.0 else -1.0
+    ahead = track.ahead[after]
+    aside = side * track.aside[after]
+    turned = side * track.turned[after]
+
+    steady = _SteadyTurn(None, None, None)
+    if turned[-1] > 1.5 * np.pi:
+        steady = _steady_turn(trial, after, turned, side, lpp)
     return TurningIndices(
-        *ways, float(diameter), float(speed[steady].mean() / speed[0]), float(drift)
+        advance_lengths=reached(turned, np.pi / 2, ahead),
+        transfer_lengths=reached(turned, np.pi / 2, aside),
+        tactical_diameter_lengths=reached(turned, np.pi, aside),
+        steady_diameter_lengths=steady.diameter_lengths,
+        steady_speed_ratio=steady.speed_ratio,
+        steady_drift_deg=steady.drift_deg,
     )
 
 
-def track_from_order(trial: Trial, length: float) -> tuple[Floats, Floats, Floats]:
-    """Way ahead and to starboard in ship lengths, and turn in rad, from where the rudder was ordered."""
+def track_from_order(trial: Trial, length: float) -> TrackFromOrder:
+    """Track from where the rudder was ordered, for a ship of some length, m."""
     start = execute_time(trial)
-    x0, y0, psi0 = (
-        float(np.interp(start, trial.t, trial[name])) for name in ("x", "y", "psi")
+
+    def since(channel: str) -> Floats:
+        values = trial[channel]
+        return np.asarray(values - np.interp(start, trial.t, values))
+
+    turned = since("psi")
+    heading = float(trial["psi"][0] - turned[0])
+    ahead, aside = rotate_to_body(since("x"), since("y"), heading)
+    return TrackFromOrder(ahead / length, aside / length, turned)
+
+
+def _steady_turn(
+    trial: Trial, after: Flags, turned: Floats, side: float, length: float
+) -> _SteadyTurn:
+    """The turn over its last quarter; `turned` to the `side` of the turn, from the order on."""
+    u, v, r = (trial[name][after] for name in ("u", "v", "r"))
+    speed = np.hypot(u, v)
+    drift = np.arctan2(-v, u)
+
+    steady = turned >= turned[-1] - np.pi / 2
+    mean_speed = speed[steady].mean()
+    rate = side * r[steady].mean()
+    return _SteadyTurn(
+        diameter_lengths=float(2.0 * mean_speed / rate / length),
+        speed_ratio=float(mean_speed / speed[0]),
+        drift_deg=float(side * np.degrees(drift[steady].mean())),
     )
-    ahead, aside = rotate_to_body(trial["x"] - x0, trial["y"] - y0, psi0)
-    return ahead / length, aside / length, trial["psi"] - psi0
 
 
 def full_rudder_deg(model: ShipModel) -> float:
     """Rudder of the standard circle, degrees: 35, or the rudder's limit where that is less."""
-    return min(TURN_DEG, model.steering.rudder_limit_deg)
+    return min(35.0, model.steering.rudder_limit_deg)
 
 
 def standard_circles(
@@ -127,13 +154,19 @@ def standard_circles(
     """Turning circles with full rudder to both sides."""
     duration, dt = standard_time(model)
     full = full_rudder_deg(model)
-    turn = partial(turning_circle, duration=duration, dt=dt, water_depth=water_depth)
-    return {
-        f"turning circle {full:.0f} deg to {side}": Manoeuvre(
-            partial(turn, rudder_deg=sign * full),
-            turning_indices,
-            TurningIndices,
-            CAPTION,
+    caption = (
+        "Path from above, from the position and along the heading at which the rudder"
+        " was ordered."
+    )
+    circles = {}
+    for side, sign in SIDES:
+        sail = partial(
+            turning_circle,
+            rudder_deg=sign * full,
+            duration=duration,
+            dt=dt,
+            water_depth=water_depth,
         )
-        for side, sign in SIDES
-    }
+        name = f"turning circle {full:.0f} deg to {side}"
+        circles[name] = Manoeuvre(sail, turning_indices, TurningIndices, caption)
+    return circles

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -13,6 +12,7 @@ from shipgym.checks import check_choice, check_number
 from shipgym.errors import ManoeuvreError
 from shipgym.manoeuvres.execution import (
     distance_sailed,
+    is_ordered,
     number_of_steps,
     reached,
     reversals,
@@ -25,10 +25,6 @@ from shipgym.ships.simulate import Conditions, Passage, Seed, as_trial, orders
 from shipgym.trials.trial import Trial
 
 STANDARD_DEG = (10.0, 20.0)
-CAPTION = (
-    "Heading change and rudder in degrees; dotted: the heading at which the rudder is"
-    " reversed."
-)
 
 
 @dataclass(frozen=True)
@@ -87,27 +83,38 @@ def zigzag(
     seed : int or Generator
         Of the weather.
     """
-    angle = np.radians(check_number(rudder_deg, "rudder_deg", above=0.0, at_most=90.0))
-    threshold = np.radians(
-        check_number(heading_deg, "heading_deg", above=0.0, at_most=180.0)
-    )
+    check_number(rudder_deg, "rudder_deg", above=0.0, at_most=90.0)
+    check_number(heading_deg, "heading_deg", above=0.0, at_most=180.0)
     n_steps = number_of_steps(duration, dt)
     check_choice(switch, ("inside", "step"), "switch")
+    angle, threshold = np.radians(rudder_deg), np.radians(heading_deg)
+    first_order = -angle if port_first else angle
+
     passage = Passage(model, Conditions(water_depth, weather, seed), dt)
-    states, rudder = passage.states(model.service_state, n_steps), np.empty(n_steps + 1)
-    first = -angle if port_first else angle, threshold, model.service_shaft_speed
-    _, turns = passage.run("zigzag", states, rudder, *first, dt, switch == "inside")
+    states = passage.states(model.service_state, n_steps)
+    rudder = np.empty(n_steps + 1)
+    shaft, inside = model.service_shaft_speed, switch == "inside"
+    _, n_reversals = passage.run(
+        "zigzag", states, rudder, first_order, threshold, shaft, dt, inside
+    )
     trial = as_trial(model, dt, states, orders(model, rudder), kind="zigzag")
-    if must_reverse and turns == 0:
-        gained = np.degrees(np.sign(rudder[0]) * (trial["psi"] - trial["psi"][0])).max()
-        raise ManoeuvreError(
-            f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: the heading"
-            f" changed by at most {gained:.3g} deg to the side of the rudder in"
-            f" {trial.duration:g} s, expected {heading_deg:g} deg, where the rudder is"
-            " reversed; sail longer, or order more rudder or less heading",
-            trial,
-        )
+    if must_reverse and n_reversals == 0:
+        _refuse_without_reversal(model, trial, rudder_deg, heading_deg)
     return trial
+
+
+def _refuse_without_reversal(
+    model: ShipModel, trial: Trial, rudder_deg: float, heading_deg: float
+) -> None:
+    side = np.sign(trial["delta_command"][0])
+    changes = side * (trial["psi"] - trial["psi"][0])
+    raise ManoeuvreError(
+        f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: expected the heading"
+        f" to change by {heading_deg:g} deg, where the rudder is reversed, got"
+        f" {np.degrees(changes.max()):.3g} deg to the side of the rudder in"
+        f" {trial.duration:g} s; sail longer, or order more rudder or less heading",
+        trial,
+    )
 
 
 def zigzag_indices(
@@ -123,15 +130,18 @@ def zigzag_indices(
     start, turns = reversals(trial)
     if not turns:
         return ZigzagIndices(None, None, None, None)
-    threshold = switch_heading_deg(trial) if heading_deg is None else heading_deg
-    spans = pairwise([*turns, trial.t[-1]][:3])
-    first, second, *_ = [
-        *(_overshoot_deg(trial, start, *span, threshold) for span in spans),
-        None,
-    ]
-    lengths = _initial_turning(trial, start, threshold, ship_length(trial, length))
+    switch = switch_heading_deg(trial) if heading_deg is None else heading_deg
+
+    ends = [*turns[1:], float(trial.t[-1])]
+    overshoots = []
+    for turn, end in zip(turns[:2], ends, strict=False):
+        overshoots.append(_overshoot_deg(trial, start, turn, end, switch))
+    lpp = ship_length(trial, length)
     return ZigzagIndices(
-        first, second, lengths, turns[2] - turns[0] if len(turns) > 2 else None
+        overshoot_1_deg=overshoots[0],
+        overshoot_2_deg=overshoots[1] if len(turns) > 1 else None,
+        initial_turning_lengths=_initial_turning(trial, start, switch, lpp),
+        period_s=turns[2] - turns[0] if len(turns) > 2 else None,
     )
 
 
@@ -139,16 +149,15 @@ def _initial_turning(
     trial: Trial, start: float, threshold_deg: float | None, length: float
 ) -> float | None:
     """Lengths sailed from the first order until the heading has changed by the threshold, if it has."""
-    after = trial.t >= start
-    times, change = (
-        trial.t[after],
-        np.abs(_heading_change(trial, start, trial.t[after])),
-    )
-    when = reached(change, float(np.radians(threshold_deg or np.inf)), times)
+    if not threshold_deg:
+        return None
+    times = trial.t[trial.t >= start]
+    change = np.abs(_heading_change(trial, start, times))
+    when = reached(change, float(np.radians(threshold_deg)), times)
     if when is None:
         return None
-    sailed = np.interp([start, when], trial.t, distance_sailed(trial))
-    return float(sailed[1] - sailed[0]) / length
+    before, then = np.interp([start, when], trial.t, distance_sailed(trial))
+    return float(then - before) / length
 
 
 def switch_heading_deg(trial: Trial) -> float | None:
@@ -162,20 +171,26 @@ def switch_heading_deg(trial: Trial) -> float | None:
     start, turns = reversals(trial)
     if not turns:
         return None
-    row = int(np.clip(np.searchsorted(trial.t, turns[0]), 1, len(trial) - 1))
-    step = float(
-        trial.t[row] - trial.t[row - 1]
-    )  # the sampling step that ends at or spans the reversal
-    around = [turns[0] - step, turns[0]]
-    before, at = sorted(
-        np.abs(np.degrees(_heading_change(trial, start, around))).tolist()
-    )
-    if "delta_command" in trial.channels:
-        whole = np.floor(at + 1e-6)
-        return float(whole) if whole >= before - 1e-6 else float(0.5 * (before + at))
+    turn = turns[0]
+    step = _sampling_step(trial, turn)
+    changes = np.abs(_heading_change(trial, start, [turn - step, turn]))
+    before, at = sorted(np.degrees(changes).tolist())
+    if is_ordered(trial):
+        whole = float(np.floor(at + 1e-6))
+        passed_within_step = whole >= before - 1e-6
+        return whole if passed_within_step else float(0.5 * (before + at))
+
     usual = np.array([1.0, *np.arange(5.0, 95.0, 5.0)])
-    reached = usual[0.95 * usual <= at]
-    return float(reached[-1]) if len(reached) and at - reached[-1] < 3.0 else float(at)
+    passed = usual[0.95 * usual <= at]
+    if len(passed) and at - passed[-1] < 3.0:
+        return float(passed[-1])
+    return float(at)
+
+
+def _sampling_step(trial: Trial, time: float) -> float:
+    """The sampling step that ends at or spans a time, s."""
+    row = int(np.clip(np.searchsorted(trial.t, time), 1, len(trial) - 1))
+    return float(trial.t[row] - trial.t[row - 1])
 
 
 def _heading_change(
@@ -190,11 +205,12 @@ def _overshoot_deg(
     trial: Trial, start: float, turn: float, end: float, switch: float | None
 ) -> float | None:
     """Heading beyond that of the switch after the reversal at time `turn`; None if still growing at `end`."""
-    window = (trial.t >= turn) & (trial.t <= end)
-    if switch is None or window.sum() < 3:
+    times = trial.t[(trial.t >= turn) & (trial.t <= end)]
+    if switch is None or len(times) < 3:
         return None
-    change = _heading_change(trial, start, trial.t[window])
-    beyond = np.degrees(change * np.sign(change[0])) - switch
+    change = _heading_change(trial, start, times)
+    side = np.sign(change[0])
+    beyond = np.degrees(side * change) - switch
     if np.argmax(beyond) == len(beyond) - 1:
         return None
     return float(beyond.max())
@@ -205,16 +221,23 @@ def standard_zigzags(
 ) -> dict[str, Manoeuvre]:
     """Zigzags 10/10 and 20/20 to both sides; one that never reverses has no indices."""
     duration, dt = standard_time(model)
-    sail = partial(
-        zigzag, duration=duration, dt=dt, water_depth=water_depth, must_reverse=False
+    caption = (
+        "Heading change and rudder in degrees; dotted: the heading at which the rudder"
+        " is reversed."
     )
-    return {
-        f"zigzag {angle:.0f}/{angle:.0f}, {side} first": Manoeuvre(
-            partial(sail, rudder_deg=angle, heading_deg=angle, port_first=sign < 0.0),
-            zigzag_indices,
-            ZigzagIndices,
-            CAPTION,
-        )
-        for angle in STANDARD_DEG
-        for side, sign in SIDES
-    }
+    zigzags = {}
+    for angle in STANDARD_DEG:
+        for side, sign in SIDES:
+            sail = partial(
+                zigzag,
+                rudder_deg=angle,
+                heading_deg=angle,
+                port_first=sign < 0.0,
+                duration=duration,
+                dt=dt,
+                water_depth=water_depth,
+                must_reverse=False,
+            )
+            name = f"zigzag {angle:.0f}/{angle:.0f}, {side} first"
+            zigzags[name] = Manoeuvre(sail, zigzag_indices, ZigzagIndices, caption)
+    return zigzags

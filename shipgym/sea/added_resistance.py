@@ -5,7 +5,8 @@ from numpy import cos, exp, log, pi, sin, sqrt, where
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
-from shipgym.sea.estimates import GRAVITY, Hull, hull_of
+from shipgym.constants import GRAVITY
+from shipgym.sea.estimates import Hull, hull_of
 from shipgym.ships.particulars import Particulars
 
 #: Radius of gyration in pitch by length.

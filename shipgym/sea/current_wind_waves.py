@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from shipgym.checks import check_choice, check_flag, check_number
+from shipgym.constants import GRAVITY
 from shipgym.errors import InputError
-from shipgym.sea.estimates import GRAVITY
 from shipgym.sea.wind_coefficients import WindTable, check_coefficients
 
 

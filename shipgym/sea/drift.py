@@ -7,9 +7,10 @@ from numpy import cos, pi, sin, trapezoid
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
+from shipgym.constants import GRAVITY
 from shipgym.sea.added_resistance import added_resistance
 from shipgym.sea.current_wind_waves import Waves
-from shipgym.sea.estimates import GRAVITY, hull_of, weather_particulars
+from shipgym.sea.estimates import hull_of, weather_particulars
 from shipgym.sea.harmonics import (
     Harmonics,
     circle,

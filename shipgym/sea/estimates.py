@@ -6,8 +6,6 @@ from typing import NamedTuple
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Estimates, Particulars, with_estimates
 
-GRAVITY = 9.80665
-
 
 class Hull(NamedTuple):
     """Main dimensions of a ship in the symbols of the formulas, SI units."""

@@ -3,8 +3,9 @@
 import numpy as np
 
 from shipgym.arrays import Floats
+from shipgym.constants import GRAVITY
 from shipgym.errors import InputError
-from shipgym.sea.estimates import GRAVITY, weather_particulars
+from shipgym.sea.estimates import weather_particulars
 from shipgym.ships.inertia import inertia
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.term_table import Structure

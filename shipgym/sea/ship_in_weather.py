@@ -3,9 +3,9 @@
 import numpy as np
 
 from shipgym.arrays import Floats
+from shipgym.constants import GRAVITY
 from shipgym.sea.current_wind_waves import Current, Waves, Wind
 from shipgym.sea.drift import wave_drift
-from shipgym.sea.estimates import GRAVITY
 from shipgym.sea.filters import Filter
 from shipgym.sea.gusts import GaussMarkov, gust_filter
 from shipgym.sea.harmonics import Harmonics

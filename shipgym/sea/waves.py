@@ -9,8 +9,9 @@ from numpy.fft import irfft, rfft
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
+from shipgym.constants import GRAVITY
 from shipgym.sea.current_wind_waves import Waves
-from shipgym.sea.estimates import GRAVITY, weather_particulars
+from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.gusts import GaussMarkov
 from shipgym.sea.harmonics import circle
 from shipgym.ships.particulars import Particulars

@@ -1,4 +1,4 @@
-"""Ship models, identified structures and reference ships. Each name is imported when it is first used."""
+"""Ship models, structures and reference ships, each imported when first used."""
 
 from lazy_loader import attach_stub
 

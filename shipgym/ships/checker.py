@@ -1,4 +1,4 @@
-"""What is wrong with a ship model: a battery that any model, a user's own included, can be put through."""
+"""Checks that any ship model, a user's own included, can be put through."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -7,38 +7,24 @@ from pathlib import Path
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import Findings
 from shipgym.errors import InputError, UnstableModelError
+from shipgym.findings import Findings
 from shipgym.ships.catalogue import load_model
 from shipgym.ships.equations import ShipEquations
-from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.manoeuvring_model import ship_of
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import orders
-from shipgym.ships.term_table import ANGULAR, EQUATION_NAMES, Structure
+from shipgym.ships.term_checks import EQUATION_NAMES
+from shipgym.ships.term_table import ANGULAR, Structure
 from shipgym.trials.trial import Trial
 
 SAMPLES = 512
-#: Range of the states looked at, in service speed and service speed by length.
-SURGE, SWAY, YAW_RATE = (0.2, 1.1), 0.3, 0.8
-ROLL_RATE, HEEL, MEMORY = (
-    0.5,
-    np.radians(15.0),
-    0.5,
-)  # the memory of yaw by (service speed by length)^2
-CAPSIZED = np.radians(60.0)
-STEP = 0.02  # of the time to sail a ship length
-STRAIGHT_LENGTHS, TURN_LENGTHS = 30.0, 40.0
-SMALL_RUDDER = np.radians(5.0)
-RESPONSE_LENGTHS = 3.0
-AGREEMENT = 1e-9
-ASYMMETRIC = 0.1
-SPEED_KEPT = (0.7, 1.3)  # straight ahead, of service speed
+STRAIGHT_LENGTHS = 30.0  # ship lengths of a run
 
 
 @dataclass(frozen=True)
 class ModelCheck(Findings):
-    """What a check of a model found."""
+    """Problems and remarks that a check of a model found."""
 
     # root mean square of the accelerations' port/starboard difference over twice their
     # own, over states that a manoeuvre passes: 0 for a symmetric ship; nan where it
@@ -47,7 +33,7 @@ class ModelCheck(Findings):
 
     @property
     def verdict(self) -> str:
-        """Whether it is sound, and how far port and starboard differ."""
+        """Soundness in words, and how far port and starboard differ."""
         return (
             f"{super().verdict}; port/starboard asymmetry"
             f" {100.0 * self.asymmetry:.1f} %"
@@ -84,22 +70,22 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
 
 
 def _states(model: ShipModel) -> dict[str, Floats]:
-    """States and commands over the range of hard manoeuvres, each of shape (n,), always the same."""
+    """States and commands over the range of hard manoeuvres, each of shape (n,)."""
     random = np.random.default_rng(0)
-    length, speed = model.particulars["length"], model.particulars["speed"]
+    L, U0 = model.particulars["length"], model.particulars["speed"]
 
     def drawn(low: float = -1.0, high: float = 1.0) -> Floats:
         return random.uniform(low, high, SAMPLES)
 
-    u = speed * drawn(*SURGE)
+    u = U0 * drawn(0.2, 1.1)
     return {
         "u": u,
         "delta": model.steering.limit * drawn(),
-        "v": SWAY * u * drawn(),
-        "r": YAW_RATE * u / length * drawn(),
-        "p": ROLL_RATE * u / length * drawn(),
-        "phi": HEEL * drawn(),
-        "q": MEMORY * (speed / length) ** 2 * drawn(),
+        "v": 0.3 * u * drawn(),
+        "r": 0.8 * u / L * drawn(),
+        "p": 0.5 * u / L * drawn(),
+        "phi": np.radians(15.0) * drawn(),
+        "q": 0.5 * (U0 / L) ** 2 * drawn(),
         "n": np.full(SAMPLES, model.service_shaft_speed),
     }
 
@@ -118,111 +104,93 @@ def _accelerations(model: ShipModel, channels: dict[str, Floats]) -> Floats:
 def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
     channels = _states(model)
     found = _accelerations(model, channels)
-    if not np.all(np.isfinite(found)):
-        row, axis = np.argwhere(~np.isfinite(found))[0]
-        known = [
-            name
-            for name in (*EQUATION_NAMES, "phi", "delta")
-            if name in model.state_names
-        ]
-        state = ", ".join(f"{name} = {channels[name][row]:.4g}" for name in known)
+    wrong = np.argwhere(~np.isfinite(found))
+    if len(wrong):
+        row, axis = wrong[0].tolist()
+        there = {name: float(values[row]) for name, values in channels.items()}
+        known = (*EQUATION_NAMES, "phi", "delta")
+        names = [name for name in known if name in model.state_names]
+        state = ", ".join(f"{name} = {there[name]:.4g}" for name in names)
         look = "for coefficients that are far too large"
         if isinstance(model.dynamics, ShipEquations):
-            there = {name: float(values[row]) for name, values in channels.items()}
-            look = (
-                f"at {model.dynamics.fault(there, model.coefficients, ship_of(model))}"
-            )
+            place = model.dynamics.fault(there, model.coefficients, ship_of(model))
+            look = f"at {place}"
         yield (
-            f"derivatives: {found[row, axis]} found for the acceleration of"
-            f" '{_rates(model)[axis]}' at {state} (SI units), expected a number; look"
-            f" {look}"
+            f"derivatives: expected a number for the acceleration of"
+            f" '{_rates(model)[axis]}' at {state} (SI units), got {found[row, axis]};"
+            f" look {look}"
         )
         return
     if isinstance(model.dynamics, Structure):
-        written = _from_table(model, model.dynamics, channels)
+        agreement = 1e-9
+        plain = model.accelerations(channels)
+        written = np.stack([plain[name] for name in _rates(model)], axis=-1)
         scale = np.abs(written).max(axis=0) + np.finfo(float).tiny
-        worst = float((np.abs(found - written) / scale).max())
-        if not worst < AGREEMENT:
+        differences = np.abs(found - written) / scale
+        worst = float(differences.max())
+        if not worst < agreement:
             yield (
-                f"derivatives: the compiled accelerations differ by {worst:.1e} from"
-                f" those of the table, expected less than {AGREEMENT:g}; empty the"
-                " cache of compiled ships"
+                "derivatives: expected compiled accelerations within"
+                f" {agreement:g} of those of the table, got {worst:.1e}; empty the cache"
+                " of compiled ships"
             )
-
-
-def _from_table(
-    model: ShipModel, table: Structure, channels: dict[str, Floats]
-) -> Floats:
-    """Accelerations as sums of the table's terms, shape (n, n_rates)."""
-    ship = model.particulars, model.service_shaft_speed
-    found = {name: np.zeros(SAMPLES) for name in _rates(model)}
-    found |= {name: -channels[name] / model.travel_time for name in "vr"}
-    weights = np.split(
-        table.term_numbers(model.coefficients, *ship),
-        np.cumsum([len(t) for t in table.equations.values()]),
-    )
-    for equation, theta in zip(table.equations, weights, strict=False):
-        found[equation] = table.features(equation, channels, *ship) @ theta
-    if isinstance(table, GreyBox):
-        for equation, known in table.converted_accelerations(channels, *ship).items():
-            found[equation] = known + (
-                found[equation] if equation in table.equations else 0.0
-            )
-    elif "q" in found:
-        found["r"] = found["r"] + channels["q"]
-    return np.stack([*found.values()], axis=-1)
 
 
 def _asymmetry(model: ShipModel) -> float:
-    """Difference of the accelerations from their mirror image over their size, all in the prime system."""
+    """Difference of the accelerations from their mirror image by size, prime system."""
     channels = _states(model)
     odd = ("v", "r", "p", "phi", "q", "delta")
     mirrored = channels | {name: -channels[name] for name in odd}
     rates = _rates(model)
     sign = [-1.0 if name in odd else 1.0 for name in rates]
-    ours, image = (
-        _accelerations(model, channels),
-        _accelerations(model, mirrored) * sign,
-    )
-    length, speed = model.particulars["length"], model.particulars["speed"]
-    unit = [
-        (length if q in ANGULAR else 1.0) * (length / speed if q == "q" else 1.0)
-        for q in rates
-    ]
-    difference, size = (ours - image) * unit, (ours * unit)
-    total = float(np.sqrt(np.mean(size**2)))
-    return (
-        float(np.sqrt(np.mean(difference**2))) / (2.0 * total) if total > 0.0 else 0.0
-    )
+    ours = _accelerations(model, channels)
+    image = _accelerations(model, mirrored) * sign
+
+    # units of the prime system, but for what all have
+    length = model.particulars["length"]
+    units = dict.fromkeys(rates, 1.0)
+    units |= dict.fromkeys(ANGULAR, length)
+    units["q"] = length * model.travel_time
+    unit = [units[name] for name in rates]
+    size = _root_mean_square(ours * unit)
+    difference = _root_mean_square((ours - image) * unit)
+    return difference / (2.0 * size) if size > 0.0 else 0.0
+
+
+def _root_mean_square(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:
-    """From service with the rudder held, over so many ship lengths at service speed."""
-    return model.simulate(
-        orders(model, np.full(round(lengths / STEP), rudder)), STEP * model.travel_time
-    )
+    """Run from service with the rudder held, over a number of ship lengths."""
+    step = 0.02  # ship lengths
+    held = np.full(round(lengths / step), rudder)
+    return model.simulate(orders(model, held), step * model.travel_time)
 
 
 def _wrong_courses(model: ShipModel) -> Iterator[str]:
     limit = model.steering.limit
+    turn_lengths = 40.0
+    capsized = np.radians(60.0)
     courses = {
         "straight ahead": (0.0, STRAIGHT_LENGTHS),
-        f"rudder {np.degrees(limit):.0f} deg to starboard": (limit, TURN_LENGTHS),
-        f"rudder {np.degrees(limit):.0f} deg to port": (-limit, TURN_LENGTHS),
+        f"rudder {np.degrees(limit):.0f} deg to starboard": (limit, turn_lengths),
+        f"rudder {np.degrees(limit):.0f} deg to port": (-limit, turn_lengths),
     }
     for name, (rudder, lengths) in courses.items():
+        wrong = ""
+        heel = 0.0
         try:
             trial = _run(model, rudder, lengths)
-            wrong, heel = (
-                "",
-                float(np.abs(trial["phi"]).max()) if "phi" in trial else 0.0,
-            )
+            if "phi" in trial:
+                heel = float(np.abs(trial["phi"]).max())
         except UnstableModelError as error:
-            wrong, heel = str(error), abs(error.state.get("phi", 0.0))
-        if not heel < CAPSIZED:
+            wrong = str(error)
+            heel = abs(error.state.get("phi", 0.0))
+        if not heel < capsized:
             yield (
-                f"{name}: heel of {np.degrees(heel):.3g} deg found, expected less than"
-                f" {np.degrees(CAPSIZED):.0f} deg: look at the terms of roll, whose"
+                f"{name}: expected a heel of less than {np.degrees(capsized):.0f} deg,"
+                f" got {np.degrees(heel):.3g} deg; look at the terms of roll, whose"
                 " coefficient of phi rights the ship where it is negative; identify it"
                 " from trials with more roll"
             )
@@ -236,26 +204,25 @@ def _wrong_courses(model: ShipModel) -> Iterator[str]:
 def _wrong_rudder(model: ShipModel) -> Iterator[str]:
     if not _steers(model):
         return
+    rudder = np.radians(5.0)
+    lengths = 3.0
     try:
-        turned = [
-            _run(model, side * SMALL_RUDDER, RESPONSE_LENGTHS)["r"][-1]
-            for side in (1.0, -1.0)
-        ]
+        starboard = np.degrees(_run(model, rudder, lengths)["r"][-1])
+        port = np.degrees(_run(model, -rudder, lengths)["r"][-1])
     except UnstableModelError:
         return  # the courses say so
-    if not turned[0] > turned[1]:
-        port, starboard = np.degrees(turned[1]), np.degrees(turned[0])
+    if not starboard > port:
         yield (
-            f"rudder: {np.degrees(SMALL_RUDDER):.0f} deg to starboard give a yaw rate"
-            f" of {starboard:.3g} deg/s, as much to port {port:.3g} deg/s, expected the"
-            " first to be larger: a positive rudder turns to starboard; read the"
-            " trials with rudder_positive='port', or turn the signs of the terms odd"
-            " in the rudder"
+            "rudder: expected a larger yaw rate for a rudder to starboard than to port,"
+            f" got {starboard:.3g} deg/s for {np.degrees(rudder):.0f} deg to starboard"
+            f" and {port:.3g} deg/s for as much to port; a positive rudder turns to"
+            " starboard: read the trials with rudder_positive='port', or turn the signs"
+            " of the terms odd in the rudder"
         )
 
 
 def _steers(model: ShipModel) -> bool:
-    """Whether the model has a rudder and can turn."""
+    """True where the model has a rudder and can turn."""
     table = model.dynamics
     return not isinstance(table, Structure) or (
         table.has_rudder and "r" in table.equations
@@ -263,7 +230,7 @@ def _steers(model: ShipModel) -> bool:
 
 
 def _unusual(model: ShipModel, asymmetry: float) -> Iterator[str]:
-    if asymmetry > ASYMMETRIC:
+    if asymmetry > 0.1:
         yield (
             f"port and starboard differ by {100.0 * asymmetry:.0f} % of the"
             " accelerations: more than the propeller of a single-screw ship explains;"
@@ -272,16 +239,14 @@ def _unusual(model: ShipModel, asymmetry: float) -> Iterator[str]:
     if not _steers(model):
         yield "no rudder turns this model: an autopilot has nothing to do on it"
     try:
-        final = (
-            float(_run(model, 0.0, STRAIGHT_LENGTHS)["u"][-1])
-            / model.particulars["speed"]
-        )
+        straight = _run(model, 0.0, STRAIGHT_LENGTHS)
     except UnstableModelError:
         return
-    if not SPEED_KEPT[0] < final < SPEED_KEPT[1]:
+    kept = float(straight["u"][-1]) / model.particulars["speed"]
+    if not 0.7 < kept < 1.3:
         yield (
             "straight ahead with the rudder amidships its speed becomes"
-            f" {100.0 * final:.0f} % of service speed: look at the terms of surge, the"
+            f" {100.0 * kept:.0f} % of service speed: look at the terms of surge, the"
             " service speed and the shaft speed"
         )
 
@@ -292,12 +257,13 @@ def _wrong_covariance(model: ShipModel) -> Iterator[str]:
     variances = np.diag(model.covariance)
     for name, value in zip(model.coefficients, variances, strict=True):
         if not value >= 0.0:
-            yield f"covariance: variance of '{name}' is {value:g}, expected at least 0"
+            yield f"covariance: expected a variance of '{name}' >= 0, got {value:g}"
             return
     scale = np.where(variances > 0.0, np.sqrt(variances), 1.0)
-    least = float(np.linalg.eigvalsh(model.covariance / np.outer(scale, scale)).min())
+    correlations = model.covariance / np.outer(scale, scale)
+    least = float(np.linalg.eigvalsh(correlations).min())
     if not least > -1e-6:
         yield (
-            f"covariance: least eigenvalue of the correlations {least:.2g}, expected"
-            " none below 0"
+            "covariance: expected no eigenvalue of the correlations below 0, got"
+            f" {least:.2g}"
         )

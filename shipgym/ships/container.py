@@ -1,4 +1,4 @@
-"""Container ship S175 (SR108), 4 degrees of freedom: surge, sway, yaw and roll, with rudder and propeller.
+"""Container ship S175 (SR108): surge, sway, yaw and roll, with rudder and propeller.
 
 Source: Son & Nomoto 1981, On the coupled motion of steering and rolling of a high speed
 container ship, J. Soc. Naval Architects of Japan 150; in the form of the function
@@ -7,7 +7,7 @@ instantaneous speed; u' is the total surge speed over U.
 """
 
 from math import copysign, fabs, pi, sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import small_sin_cos
 from shipgym.engine.motion import Motion, Ship
@@ -15,10 +15,12 @@ from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
-LENGTH, VOLUME, GM = 175.0, 21222.0, 0.3  # m, m^3, m
-GRAVITY = 9.81
-RUDDER_AREA, ASPECT_RATIO, DIAMETER = 33.0376, 1.8219, 6.533  # m^2, -, m
-SHAFT_LIMIT, SLOW_SHAFT = 160.0 / 60.0, 0.3  # 1/s
+LENGTH = 175.0  # m
+WEIGHT = 9.81 * 21222.0  # by density, m^4/s^2, of the displaced volume
+GM = 0.3  # m
+RUDDER_AREA = 33.0376  # m^2
+ASPECT_RATIO = 1.8219
+DIAMETER = 6.533  # of the propeller, m
 
 #: As published; without unit.
 Coefficients = record_of(
@@ -99,145 +101,168 @@ Coefficients = record_of(
 )
 
 
-def hull(
-    linear: float,
-    v: float,
-    r: float,
-    f: float,
-    vvv: float,
-    rrr: float,
-    vvr: float,
-    vrr: float,
-    vvf: float,
-    vff: float,
-    rrf: float,
-    rff: float,
-) -> float:
-    """Linear part plus the cubic polynomial in sway, yaw rate and heel."""
-    vv, rr, ff = v * v, r * r, f * f
-    return (
-        (linear + vv * (vvv * v + vvr * r + vvf * f))
-        + rr * (rrr * r + vrr * v + rrf * f)
-        + ff * (vff * v + rff * r)
-    )
+class State(NamedTuple):
+    """Motion in the prime system."""
+
+    u: float
+    v: float
+    r: float
+    p: float
+    phi: float
 
 
 def accelerations(
     motion: Motion, c: Any, ship: Ship
 ) -> tuple[float, float, float, float, float]:
     """Accelerations in surge, sway, yaw and roll, body frame, origin midship."""
-    u, v, r, p, phi = motion.u, motion.v, motion.r, motion.p, motion.phi
-    n, L = motion.n, LENGTH
-    U = sqrt(u * u + v * v)
+    L = LENGTH
+    U = sqrt(motion.u * motion.u + motion.v * motion.v)
     per_U = 1.0 / U  # divisions are what costs
-    u_, v_, r_, p_, f = u * per_U, v * per_U, r * L * per_U, p * L * per_U, phi
+    u = motion.u * per_U
+    v = motion.v * per_U
+    r = motion.r * L * per_U
+    p = motion.p * L * per_U
+    phi = motion.phi
 
-    inflow = v_ + c.xp * r_
-    u_P = u_ * ((1.0 - c.wp) + c.tau * (inflow * inflow + c.c_pv * v_ + c.c_pr * r_))
-    n_ = n * DIAMETER * per_U  # over the advance ratio: u_P / n_
-    K_T_nn = n_ * (
-        0.527 * n_ - 0.455 * u_P
-    )  # thrust coefficient times n_^2: a shaft at rest is no exception
-    thrust = (2.0 * DIAMETER**2 / (L * L)) * copysign(1.0, n) * K_T_nn
+    u_P, K_T_nn, T = propeller(motion.n * DIAMETER * per_U, u, v, r, c)
+    F_N, sin_delta, cos_delta = rudder_force(motion.delta, v, r, u_P, K_T_nn, c)
 
-    v_R = c.gamma * v_ + c.c_Rr * r_ + c.c_Rrrr * r_ * r_ * r_ + c.c_Rrrv * r_ * r_ * v_
-    u_R = copysign(c.epsilon, u_P) * sqrt(u_P * u_P + (8.0 * c.kappa / pi) * K_T_nn)
-    sine, cosine = small_sin_cos(motion.delta)
-    # (u_R^2 + v_R^2) sin(delta + atan(v_R / u_R)), without the arc
-    normal = sqrt(u_R * u_R + v_R * v_R) * (
-        sine * fabs(u_R) + cosine * v_R * copysign(1.0, u_R)
-    )
-    F_N = (
-        -6.13 * ASPECT_RATIO / (ASPECT_RATIO + 2.25) * (RUDDER_AREA / (L * L))
-    ) * normal
+    # W' GM'
+    weight = WEIGHT / (0.5 * L * L)
+    W_GM = (weight * GM / L) * per_U * per_U
 
-    righting = (GRAVITY * VOLUME / (0.5 * L * L) * GM / L) * per_U * per_U
+    at = State(u, v, r, p, phi)
     X = (
-        c.X_uu * u_ * u_
-        + (1.0 - c.t) * thrust
-        + c.X_vr * v_ * r_
-        + c.X_vv * v_ * v_
-        + c.X_rr * r_ * r_
-        + c.X_ff * f * f
-        + c.c_RX * F_N * sine
-        + (c.m + c.my) * v_ * r_
+        c.X_uu * u * u
+        + (1.0 - c.t) * T
+        + c.X_vr * v * r
+        + c.X_vv * v * v
+        + c.X_rr * r * r
+        + c.X_ff * phi * phi
+        + c.c_RX * F_N * sin_delta
+        + (c.m + c.my) * v * r
     )
-    Y = (
-        hull(
-            c.Y_v * v_ + c.Y_r * r_ + c.Y_p * p_ + c.Y_f * f,
-            v_,
-            r_,
-            f,
-            c.Y_vvv,
-            c.Y_rrr,
-            c.Y_vvr,
-            c.Y_vrr,
-            c.Y_vvf,
-            c.Y_vff,
-            c.Y_rrf,
-            c.Y_rff,
-        )
-        + (1.0 + c.a_H) * F_N * cosine
-        - (c.m + c.mx) * u_ * r_
-    )
+    Y = sway_hull(at, c) + (1.0 + c.a_H) * F_N * cos_delta - (c.m + c.mx) * u * r
     K = (
-        hull(
-            c.K_v * v_ + c.K_r * r_ + c.K_p * p_ + c.K_f * f,
-            v_,
-            r_,
-            f,
-            c.K_vvv,
-            c.K_rrr,
-            c.K_vvr,
-            c.K_vrr,
-            c.K_vvf,
-            c.K_vff,
-            c.K_rrf,
-            c.K_rff,
-        )
-        - (1.0 + c.a_H) * c.z_R * F_N * cosine
-        + c.mx * c.lx * u_ * r_
-        - righting * f
+        roll_hull(at, c)
+        - (1.0 + c.a_H) * c.z_R * F_N * cos_delta
+        + c.mx * c.lx * u * r
+        - W_GM * phi
     )
-    N = (
-        hull(
-            c.N_v * v_ + c.N_r * r_ + c.N_p * p_ + c.N_f * f,
-            v_,
-            r_,
-            f,
-            c.N_vvv,
-            c.N_rrr,
-            c.N_vvr,
-            c.N_vrr,
-            c.N_vvf,
-            c.N_vff,
-            c.N_rrf,
-            c.N_rff,
-        )
-        + (c.x_R + c.a_H * c.x_H) * F_N * cosine
-    )
+    x_HR = c.x_R + c.a_H * c.x_H
+    N = yaw_hull(at, c) + x_HR * F_N * cos_delta
 
-    # sway, roll and yaw are coupled by the symmetric [[a, b, g], [b, d, 0], [g, 0, e]]
-    a, b, g, d, e = c.m + c.my, -c.my * c.ly, c.my * c.alpha_y, c.Ix + c.Jx, c.Iz + c.Jz
-    vdot = (d * e * Y - b * e * K - g * d * N) * (
-        1.0 / (a * d * e - b * b * e - g * g * d)
-    )
+    # [m + m_y      -m_y l_y    m_y alpha_y] [vdot]   [Y]
+    # [-m_y l_y     I_x + J_x   0          ] [pdot] = [K]
+    # [m_y alpha_y  0           I_z + J_z  ] [rdot]   [N]
+    a = c.m + c.my
+    b = -c.my * c.ly
+    g = c.my * c.alpha_y
+    d = c.Ix + c.Jx
+    e = c.Iz + c.Jz
+    determinant = a * d * e - b * b * e - g * g * d
+    udot = X * (1.0 / (c.m + c.mx))
+    coupled = d * e * Y - b * e * K - g * d * N
+    vdot = coupled * (1.0 / determinant)
     pdot = (K - b * vdot) * (1.0 / d)
     rdot = (N - g * vdot) * (1.0 / e)
-    linear, angular = U * U * (1.0 / L), U * U * (1.0 / (L * L))
-    return (
-        X * (1.0 / (c.m + c.mx)) * linear,
-        vdot * linear,
-        rdot * angular,
-        pdot * angular,
-        0.0,
+
+    linear = U * U * (1.0 / L)
+    angular = U * U * (1.0 / (L * L))
+    return udot * linear, vdot * linear, rdot * angular, pdot * angular, 0.0
+
+
+def propeller(
+    nD: float, u: float, v: float, r: float, c: Any
+) -> tuple[float, float, float]:
+    """Inflow u_P of the propeller, its thrust by (n D)^2, and its thrust T."""
+    # u_P = u ((1 - w_P) + tau ((v + x_P r)^2 + c_Pv v + c_Pr r))
+    v_P = v + c.xp * r
+    straightened = v_P * v_P + c.c_pv * v + c.c_pr * r
+    u_P = u * ((1.0 - c.wp) + c.tau * straightened)
+    # K_T = 0.527 - 0.455 J, where J = u_P / nD: a shaft at rest has this product too
+    K_T_nn = nD * (0.527 * nD - 0.455 * u_P)
+    disc = 2.0 * DIAMETER**2 / (LENGTH * LENGTH)
+    T = disc * copysign(1.0, nD) * K_T_nn
+    return u_P, K_T_nn, T
+
+
+def rudder_force(
+    delta: float, v: float, r: float, u_P: float, K_T_nn: float, c: Any
+) -> tuple[float, float, float]:
+    """Normal force F_N of the rudder, negative to starboard, and its angle's sine and cosine."""
+    v_R = c.gamma * v + c.c_Rr * r + c.c_Rrrr * r * r * r + c.c_Rrrv * r * r * v
+    # u_R = epsilon u_P sqrt(1 + 8 kappa K_T / (pi J^2))
+    jet = u_P * u_P + (8.0 * c.kappa / pi) * K_T_nn
+    u_R = copysign(c.epsilon, u_P) * sqrt(jet)
+
+    # (u_R^2 + v_R^2) sin(delta + atan(v_R / u_R)), without the arc
+    sine, cosine = small_sin_cos(delta)
+    along = cosine * v_R * copysign(1.0, u_R)
+    across = sine * fabs(u_R) + along
+    U_R = sqrt(u_R * u_R + v_R * v_R)
+
+    # lift slope of a rudder of this aspect ratio
+    slope = 6.13 * ASPECT_RATIO / (ASPECT_RATIO + 2.25)
+    area = RUDDER_AREA / (LENGTH * LENGTH)
+    return -slope * area * (U_R * across), sine, cosine
+
+
+def sway_hull(at: State, c: Any) -> float:
+    """Sway force of the hull, to third order in sway, turn and heel, linear in roll."""
+    v, r, phi = at.v, at.r, at.phi
+    vv, rr, ff = v * v, r * r, phi * phi
+    force: float = (
+        c.Y_v * v
+        + c.Y_r * r
+        + c.Y_p * at.p
+        + c.Y_f * phi
+        + vv * (c.Y_vvv * v + c.Y_vvr * r + c.Y_vvf * phi)
+        + rr * (c.Y_rrr * r + c.Y_vrr * v + c.Y_rrf * phi)
+        + ff * (c.Y_vff * v + c.Y_rff * r)
     )
+    return force
+
+
+def roll_hull(at: State, c: Any) -> float:
+    """Roll moment of the hull, in the same terms."""
+    v, r, phi = at.v, at.r, at.phi
+    vv, rr, ff = v * v, r * r, phi * phi
+    moment: float = (
+        c.K_v * v
+        + c.K_r * r
+        + c.K_p * at.p
+        + c.K_f * phi
+        + vv * (c.K_vvv * v + c.K_vvr * r + c.K_vvf * phi)
+        + rr * (c.K_rrr * r + c.K_vrr * v + c.K_rrf * phi)
+        + ff * (c.K_vff * v + c.K_rff * r)
+    )
+    return moment
+
+
+def yaw_hull(at: State, c: Any) -> float:
+    """Yaw moment of the hull, in the same terms."""
+    v, r, phi = at.v, at.r, at.phi
+    vv, rr, ff = v * v, r * r, phi * phi
+    moment: float = (
+        c.N_v * v
+        + c.N_r * r
+        + c.N_p * at.p
+        + c.N_f * phi
+        + vv * (c.N_vvv * v + c.N_vvr * r + c.N_vvf * phi)
+        + rr * (c.N_rrr * r + c.N_vrr * v + c.N_rrf * phi)
+        + ff * (c.N_vff * v + c.N_rff * r)
+    )
+    return moment
 
 
 def shaft_acceleration(n: float, command: float, c: Any, ship: Ship) -> float:
     """Lag of the shaft, faster at higher speed."""
-    order = min(max(command, -SHAFT_LIMIT), SHAFT_LIMIT)
-    return (order - n) * (n * (1.0 / 5.65) if n > SLOW_SHAFT else 1.0 / 18.83)
+    limit = 160.0 / 60.0  # 1/s
+    slow = 0.3  # 1/s
+    order = min(max(command, -limit), limit)
+    per_T = n * (1.0 / 5.65) if n > slow else 1.0 / 18.83
+    return (order - n) * per_T
 
 
 PUBLISHED = Coefficients()

@@ -1,8 +1,9 @@
-"""A ship's steering from one form into another: state space, Nomoto's forms, prime system, and back.
+"""Convert steering dynamics: state space, Nomoto's forms, prime system, and back.
 
-    any ShipModel  ->  steering_state_space, state_space  ->  nomoto (second order, with
-    T of the first) (A, B)  ->  nomoto_of;  linear_steering_ship          nomoto1_ship,
-    nomoto2_ship  ->  any of the above prime  <->  SI: prime_matrices, si_matrices
+    any ShipModel  ->  steering_state_space (A, B), state_space, nomoto
+    (A, B)  ->  nomoto_of, linear_steering_ship
+    Nomoto's forms  ->  nomoto1_ship, nomoto2_ship
+    prime system  <->  SI: prime_matrices, si_matrices
     another length and speed: scale_model
 
 Of a ship with surge or roll the linear forms keep sway and yaw; from a linear form
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_number
+from shipgym.checks import check_number, unexpected
 from shipgym.errors import InputError
 from shipgym.ships.linear import (
     Nomoto,
@@ -75,18 +76,20 @@ def state_space(
 
     A, B = steering_state_space(model, speed)
     names = ["q" if "q" in model.state_names else "v", "r"]
-    if heading:
+    if heading:  # psidot = r
         A = np.block([[A, np.zeros((2, 1))], [np.array([[0.0, 1.0, 0.0]])]])
         B = np.vstack([B, [[0.0]]])
         names.append("psi")
-    if gear:
+    if gear:  # deltadot = (order - delta) / lag
         lag = model.steering.time_constant
         if not lag > 0.0:
             raise InputError(
-                f"steering of {model.name!r}: no lag found, expected a time_constant"
-                " above 0: a ramp of constant rate is not linear; leave gear=False"
+                f"steering of {model.name!r}: expected a time_constant above 0, got no"
+                " lag: a ramp of constant rate is not linear; leave gear=False"
             )
-        A = np.block([[A, B], [np.zeros((1, len(A))), np.array([[-1.0 / lag]])]])
+        gear_row = np.zeros((1, len(A) + 1))
+        gear_row[0, -1] = -1.0 / lag
+        A = np.vstack([np.hstack([A, B]), gear_row])
         B = np.vstack([np.zeros_like(B), [[1.0 / lag]]])
         names.append("delta")
     return control.ss(
@@ -113,7 +116,7 @@ def transfer_function(form: Nomoto, order: int = 2) -> "TransferFunction":
     if order == 1:
         return control.tf([form.K], [form.T, 1.0], inputs=["delta"], outputs=["r"])
     if order != 2:
-        raise InputError(f"order: {order!r} found, expected 2 or 1")
+        raise unexpected("order", "2 or 1", order)
     _need_time_constants(form)
     denominator = np.polymul([form.T1, 1.0], [form.T2, 1.0])
     return control.tf(
@@ -128,7 +131,7 @@ def nomoto1_ship(
     steering: SteeringGear | None = None,
     name: str = "nomoto",
 ) -> ShipModel:
-    """The ship of Nomoto's first-order form, T rdot + r = K delta, as a model of structure `nomoto`.
+    """Model of structure `nomoto` from Nomoto's first-order form, T rdot + r = K delta.
 
     K is in 1/s, positive to starboard, T in s; both are negative for a ship unstable on
     her course. She keeps the service speed of the particulars. Raises InputError for a
@@ -137,8 +140,8 @@ def nomoto1_ship(
     """
     if not check_number(K, "K") * check_number(T, "T") > 0.0:
         raise InputError(
-            "K and T: of different sign, or zero, expected both positive (a stable"
-            " ship) or both negative: a positive rudder turns to starboard"
+            "K and T: expected both positive (a stable ship) or both negative, because"
+            f" a positive rudder turns to starboard, got {K:g} and {T:g}"
         )
     coefficients = {"c_r": -1.0 / T, "c_d": K / T}
     return ShipModel(
@@ -152,14 +155,14 @@ def nomoto2_ship(
     steering: SteeringGear | None = None,
     name: str = "nomoto2",
 ) -> ShipModel:
-    """The ship of Nomoto's second-order form, of structure `nomoto2`: she does not drift. T is not used.
+    """Model of structure `nomoto2` from Nomoto's second-order form; T is not used.
 
     Raises InputError for time constants that are zero or a complex pair.
     """
     _need_time_constants(form)
     product = form.T1 * form.T2
     if product == 0.0 or form.K == 0.0:
-        raise InputError(f"nomoto: {form} found, expected K, T1 and T2 other than 0")
+        raise unexpected("nomoto", "K, T1 and T2 other than 0", form)
     coefficients = {
         "c_r": -(form.T1 + form.T2) / product,
         "c_d": form.K * form.T3 / product,
@@ -178,28 +181,29 @@ def linear_steering_ship(
     steering: SteeringGear | None = None,
     name: str = "linear-steering",
 ) -> ShipModel:
-    """The ship of d/dt (v, r) = A (v, r) + B delta at service speed, of structure `linear-steering`.
+    """Model of structure `linear-steering` from d/dt (v, r) = A (v, r) + B delta.
 
     A has shape (2, 2) and B (2, 1), SI units, delta positive to starboard, as
     `steering_state_space` gives them; at another speed her derivatives follow by the
     prime system. Raises InputError for other shapes or values that are not finite.
     """
     ship = _ship(particulars)
-    a, b = prime_matrices(A, B, ship.require("length"), ship.require("speed"))
-    names = get_structure("linear-steering").coefficient_names
-    coefficients = dict(zip(names, np.hstack([a, b]).ravel().tolist(), strict=True))
-    return ShipModel(
-        name, "linear-steering", ship, steering or SteeringGear(), coefficients
-    )
+    length = ship.require("length")
+    speed = ship.require("speed")
+    a, b = prime_matrices(A, B, length, speed)
+    structure = "linear-steering"
+    names = get_structure(structure).coefficient_names
+    values = np.hstack([a, b]).ravel().tolist()
+    coefficients = dict(zip(names, values, strict=True))
+    gear = steering or SteeringGear()
+    return ShipModel(name, structure, ship, gear, coefficients)
 
 
 def _ship(particulars: Known) -> Particulars:
     """Particulars, made of a mapping where they are one, as `identify` takes them."""
-    return (
-        particulars
-        if isinstance(particulars, Particulars)
-        else Particulars.from_mapping(particulars)
-    )
+    if isinstance(particulars, Particulars):
+        return particulars
+    return Particulars.from_mapping(particulars)
 
 
 def prime_matrices(
@@ -211,37 +215,44 @@ def prime_matrices(
     Raises InputError for matrices of another shape, or a length or speed that is not
     positive.
     """
-    a, b, unit_a, unit_b = _with_units(A, B, length, speed)
+    a, b = _checked(A, B)
+    unit_a, unit_b = _units(length, speed)
     return a / unit_a, b / unit_b
 
 
 def si_matrices(
     A: ArrayLike, B: ArrayLike, length: float, speed: float
 ) -> tuple[Floats, Floats]:
-    """Linear steering dynamics of the prime system in SI units, the inverse of `prime_matrices`."""
-    a, b, unit_a, unit_b = _with_units(A, B, length, speed)
+    """Steering dynamics of the prime system in SI units, inverse of `prime_matrices`."""
+    a, b = _checked(A, B)
+    unit_a, unit_b = _units(length, speed)
     return a * unit_a, b * unit_b
 
 
-def _with_units(
-    A: ArrayLike, B: ArrayLike, length: float, speed: float
-) -> tuple[Floats, ...]:
-    """The matrices, checked, and the unit of each entry."""
+def _checked(A: ArrayLike, B: ArrayLike) -> tuple[Floats, Floats]:
+    """The matrices as arrays of shape (2, 2) and (2, 1)."""
+    return _matrix("A", A, (2, 2)), _matrix("B", B, (2, 1))
+
+
+def _matrix(name: str, given: ArrayLike, shape: tuple[int, int]) -> Floats:
+    matrix = np.asarray(given, dtype=float)
+    if matrix.shape != shape or not np.all(np.isfinite(matrix)):
+        expected = f"finite numbers of shape {shape}"
+        raise unexpected(name, expected, matrix.tolist())
+    return matrix
+
+
+def _units(length: float, speed: float) -> tuple[Floats, Floats]:
+    """Units of the entries of A and B in the prime system."""
     check_number(length, "length", above=0.0, hint="in m")
     check_number(speed, "speed", above=0.0, hint="in m/s")
-    a, b = np.asarray(A, dtype=float), np.asarray(B, dtype=float)
-    for name, matrix, shape in (("A", a, (2, 2)), ("B", b, (2, 1))):
-        if matrix.shape != shape or not np.all(np.isfinite(matrix)):
-            raise InputError(
-                f"{name}: shape {matrix.shape} found, expected {shape} finite numbers"
-            )
-    state, time = np.array([speed, speed / length]), length / speed
-    return a, b, state[:, None] / state / time, state[:, None] / time
+    turn_rate = speed / length
+    state = np.array([speed, turn_rate])  # of v and r
+    per_time = turn_rate * state[:, None]
+    return per_time / state, per_time
 
 
 def _need_time_constants(form: Nomoto) -> None:
     if not np.all(np.isfinite([form.K, form.T1, form.T2, form.T3])):
-        raise InputError(
-            f"nomoto: {form} found, expected numbers: poles that are a complex pair"
-            " have no two time constants; use state_space"
-        )
+        remedy = "poles that are a complex pair have no two; use state_space"
+        raise unexpected("nomoto", "time constants", form, remedy)

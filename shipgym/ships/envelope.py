@@ -1,4 +1,4 @@
-"""The operating envelope of a model: the velocities and rudder angles of the data it was identified from.
+"""Operating envelope of a model: where the data lie that it was identified from.
 
 Outside it the model extrapolates. The summary is a box and, because v and r go together
 in every manoeuvre, the smallest ellipsoid around the data.
@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
+from shipgym.checks import check_array, check_table, unexpected
 
-CHANNELS = ("u", "v", "r", "delta")
+ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,70 +36,85 @@ class Envelope:
         A channel that hardly moves is given a thousandth of the ellipsoid's mean width,
         so that the ellipsoid has a volume.
         """
-        samples = np.stack(
-            [np.asarray(channel, dtype=float) for channel in (u, v, r, delta)], axis=-1
-        )
-        low, high = samples.min(axis=0), samples.max(axis=0)
+        samples = np.stack([u, v, r, delta], axis=-1).astype(float)
+        low = samples.min(axis=0)
+        high = samples.max(axis=0)
         width = np.maximum(high - low, 1e-6)
         centre, quadratic = smallest_ellipsoid((samples - low) / width)
+
+        middle = low + centre * width
         factor = np.linalg.cholesky(quadratic).T / width
         shape = np.linalg.qr(factor).R
-        middle = low + centre * width
-        reach = np.linalg.norm((samples - middle) @ shape.T, axis=-1).max()
+        offsets = (samples - middle) @ shape.T
+        reach = np.linalg.norm(offsets, axis=-1).max()
         return cls(low, high, middle, shape / reach)
 
     def distance(
         self, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike
     ) -> Floats:
-        """How far out states of one shape, SI units, are: 1 on the ellipsoid, 2 at twice its size."""
-        z = (
-            np.stack(np.broadcast_arrays(*map(np.asarray, (u, v, r, delta))), axis=-1)
-            - self.centre
-        )
-        distance: Floats = np.linalg.norm(z @ self.shape.T, axis=-1)
+        """Distance of states, SI units, from the centre: 1 on the ellipsoid, 2 at twice its size."""
+        states = np.stack(np.broadcast_arrays(u, v, r, delta), axis=-1)
+        offsets = states - self.centre
+        distance: Floats = np.linalg.norm(offsets @ self.shape.T, axis=-1)
         return distance
 
     def to_dict(self) -> dict[str, Any]:
-        """As it stands in a model file."""
+        """Envelope as it stands in a model file."""
         return {
-            "channels": list(CHANNELS),
+            "channels": list(ENVELOPE_CHANNELS),
             "low": self.low.tolist(),
             "high": self.high.tolist(),
             "centre": self.centre.tolist(),
             "shape": self.shape.tolist(),
         }
 
+    @classmethod
+    def from_dict(cls, content: Any, where: str) -> Self:
+        """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
+        shapes = {"low": (4,), "high": (4,), "centre": (4,), "shape": (4, 4)}
+        table = check_table(content, where, ("channels", *shapes))
+        names = table.get("channels")
+        if names != list(ENVELOPE_CHANNELS):
+            expected = str(list(ENVELOPE_CHANNELS))
+            raise unexpected(f"{where}.channels", expected, names)
+        arrays = {}
+        for name, shape in shapes.items():
+            place = f"{where}.{name}"
+            arrays[name] = check_array(table.get(name), shape, place)
+        return cls(**arrays)
+
 
 def smallest_ellipsoid(
     points: Floats, tolerance: float = 1e-3
 ) -> tuple[Floats, Floats]:
-    """Ellipsoid of least volume around points, by Khachiyan's algorithm (Todd & Yildirim 2007).
+    """Ellipsoid of least volume around points (Khachiyan; Todd & Yildirim 2007).
 
     The points, shape (n_points, n_dimensions), are scaled to ranges near 1; the
     algorithm stops at a relative excess `tolerance` of the largest distance. Returns
     the centre c, shape (n_dimensions,), and the positive definite Q of (z - c)' Q (z -
     c) <= 1.
     """
-    d = points.shape[1]
+    n, d = points.shape
     floor = 1e-6 * np.eye(d)
-    lifted = np.column_stack([points, np.ones(len(points))])
-    weights = np.full(len(points), 1.0 / len(points))
-    ridge = np.diag([*np.diag(floor), 0.0])
-    moment = lifted.T @ lifted / len(points)
+    ridge = np.zeros((d + 1, d + 1))
+    ridge[:d, :d] = floor
+    lifted = np.column_stack([points, np.ones(n)])
+    weights = np.full(n, 1.0 / n)
+    moment = lifted.T @ lifted / n
     for _ in range(1000):
-        distances = np.einsum(
-            "ij,ij->i", lifted @ np.linalg.inv(moment + ridge), lifted
-        )
+        inverse = np.linalg.inv(moment + ridge)
+        distances = np.einsum("ij,ij->i", lifted @ inverse, lifted)
         farthest = int(np.argmax(distances))
-        excess = distances[farthest] / (d + 1.0) - 1.0
-        if excess <= tolerance:
+        distance = distances[farthest]
+        if distance / (d + 1.0) - 1.0 <= tolerance:
             break
-        step = (distances[farthest] - d - 1.0) / (
-            (d + 1.0) * (distances[farthest] - 1.0)
-        )
+        step = (distance - d - 1.0) / ((d + 1.0) * (distance - 1.0))
         weights *= 1.0 - step
         weights[farthest] += step
-        moment += step * (np.outer(lifted[farthest], lifted[farthest]) - moment)
+        point = lifted[farthest]
+        moment += step * (np.outer(point, point) - moment)
+
     centre = weights @ points
-    scatter = points.T @ (weights[:, None] * points) - np.outer(centre, centre) + floor
+    second = points.T @ (weights[:, None] * points)
+    scatter = second - np.outer(centre, centre) + floor
     return centre, np.linalg.inv(scatter) / d

@@ -1,4 +1,4 @@
-"""Ships with equations of their own: a record of coefficients and functions that read like the publication.
+"""Ships with their own equations: a record of coefficients and published functions.
 
 A file with such a ship defines `Coefficients`, a `NamedTuple` of numbers with their
 published values, `accelerations(motion, c, ship)`, where the speed of the shaft is a
@@ -6,10 +6,13 @@ state `shaft_acceleration(n, command, c, ship)`, and `SHIP`, which says the rest
 functions are plain Python; `shipgym.engine` compiles them.
 """
 
+from __future__ import annotations
+
 import importlib
 import math
 from collections import namedtuple
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -17,7 +20,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_flag, check_number, check_text, placed
+from shipgym.checks import check_flag, check_number, check_text, placed, unexpected
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.records import Record, field_types, is_record
 from shipgym.engine.specialise import Part
@@ -33,13 +36,13 @@ from shipgym.python_files import (
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
-RATES = ("udot", "vdot", "rdot", "pdot", "qdot")
+ACCELERATIONS = ("udot", "vdot", "rdot", "pdot", "qdot")
 Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, float]]
 
 
 def record_of(values: Mapping[str, float], module: str) -> Any:
-    """A record of coefficients with these values as defaults, for the file of a ship."""
-    names, defaults = [*values], [*values.values()]
+    """Make a record of coefficients with these values as defaults."""
+    names, defaults = list(values), list(values.values())
     record = namedtuple("Coefficients", names, defaults=defaults, module=module)  # type: ignore[misc]
     record.__annotations__ = dict.fromkeys(values, float)
     return record
@@ -47,13 +50,12 @@ def record_of(values: Mapping[str, float], module: str) -> Any:
 
 @dataclass(frozen=True)
 class ShipEquations:
-    """The equations of motion of one ship, with her numbers."""
+    """Equations of motion of one ship, with their numbers."""
 
     name: str  # by which `load_model` and model files know the ship
     source: str  # where the equations were published
-    coefficients_record: (
-        Record  # a `NamedTuple` of floats, each with its published value as the default
-    )
+    # a `NamedTuple` of floats, each with its published value as the default
+    coefficients_record: Record
     # from (motion, coefficients, ship), see `Motion` and `Ship` of
     # `shipgym.engine.motion`, to udot, vdot in m/s^2, rdot, pdot in rad/s^2, and the
     # rate of the memory of yaw, 0 as a rule; body frame, origin midship
@@ -69,115 +71,96 @@ class ShipEquations:
     rolls: bool = False  # whether roll rate and heel are among her states
     shallow_water: bool = False  # whether the equations know the depth of the water
     astern: bool = False  # whether the propeller holds for a shaft that turns astern
-    # coefficients that choose between forms of the equations: the functions read them
-    # as constants of the same name in their file, which are compiled in
-    switches: tuple[str, ...] = ()
     path: Path | None = field(default=None, repr=False)
-    normalisation: ClassVar[str] = (
-        "own"  # as a model file has it: the publication's units
-    )
+    # as a model file has it: the publication's units
+    normalisation: ClassVar[str] = "own"
     quantity: ClassVar[str] = "force"  # what the coefficients make up
-    scales: ClassVar[bool] = (
-        False  # whether the dimensions are those of the particulars
-    )
+    # whether the dimensions are those of the particulars
+    scales: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         check_text(self.name, "ship equations: name")
         where = f"equations of {self.name!r}"
         check_text(self.source, f"{where}: source")
-        record = self.coefficients_record
-        if not is_record(record) or any(
-            kind is not float for kind in field_types(record).values()
-        ):
-            raise InputError(
-                f"{where}: coefficients_record {record!r} found, expected a NamedTuple"
-                " of floats"
-            )
-        valued = record._field_defaults  # type: ignore[attr-defined]
-        for name in self.coefficient_names:
-            if name not in valued:
-                raise InputError(
-                    f"{where}: coefficient {name!r} has no value, expected a default"
-                )
-            check_number(valued[name], f"{where}: coefficient {name!r}")
-        for name in (
-            self.switches if isinstance(self.switches, tuple) else (self.switches,)
-        ):
-            if name not in self.coefficient_names:
-                raise InputError(
-                    f"{where}: switches: {name!r} found, expected a tuple of names of"
-                    " coefficients"
-                )
+        self._check_coefficients(where)
         for name in ("rolls", "shallow_water", "astern"):
             check_flag(getattr(self, name), f"{where}: {name}")
-        check_function(
-            self.accelerations,
-            3,
-            f"{where}: accelerations",
-            "a function (motion, c, ship)",
-        )
-        if self.shaft_acceleration is not None:
-            what = "a function (n, command, c, ship)"
-            check_function(
-                self.shaft_acceleration, 4, f"{where}: shaft_acceleration", what
-            )
-        if self.shaft_acceleration is not None or self.service_shaft_speed:
-            check_number(
-                self.service_shaft_speed, f"{where}: service_shaft_speed", above=0.0
-            )
-        self.particulars.require("speed")
-        self._try(where)
 
-    def _try(self, where: str) -> None:
-        """Work out the accelerations of one state as plain Python, whose messages are the clearest."""
-        L, U = self.particulars["length"], self.particulars["speed"]
-        n, limit, rate = (
-            self.service_shaft_speed,
-            self.steering.limit,
-            self.steering.rate,
-        )
-        ship = Ship(L, U, limit, rate, 0.0, n, math.inf, U)
-        motion = Motion(
-            0.0, 0.0, 0.1, 0.9 * U, 0.1 * U, 0.1 * U / L, 0.01, 0.01, 0.0, 0.1, n
-        )
-        coefficients = self.coefficients_record()
+        place, expected = f"{where}: accelerations", "a function (motion, c, ship)"
+        check_function(self.accelerations, 3, place, expected)
+        shaft = self.shaft_acceleration
+        if shaft is not None:
+            place = f"{where}: shaft_acceleration"
+            check_function(shaft, 4, place, "a function (n, command, c, ship)")
+        if shaft is not None or self.service_shaft_speed:
+            place = f"{where}: service_shaft_speed"
+            check_number(self.service_shaft_speed, place, above=0.0)
         with placed(where):
-            found = asked(self.accelerations, motion, coefficients, ship)
-            if not isinstance(found, tuple) or len(found) != len(RATES):
+            self.particulars.require("speed")
+            self._try()
+
+    def _check_coefficients(self, where: str) -> None:
+        record = self.coefficients_record
+        if not is_record(record) or set(field_types(record).values()) != {float}:
+            expected = "a NamedTuple of floats"
+            raise unexpected(f"{where}: coefficients_record", expected, record)
+        values = record._field_defaults  # type: ignore[attr-defined]
+        for name in record._fields:  # type: ignore[attr-defined]
+            if name not in values:
                 raise InputError(
-                    f"accelerations returns {found!r}, expected five numbers, a tuple:"
-                    " udot, vdot, rdot, pdot, qdot, 0 for those that the ship does not"
-                    " have"
+                    f"{where}: coefficient {name!r}: expected a default, got no value"
                 )
-            rates = dict(zip(RATES, found, strict=True))
-            if self.shaft_acceleration is not None:
-                rates["shaft_acceleration"] = asked(
-                    self.shaft_acceleration, n, 0.9 * n, coefficients, ship
-                )
-            for name, value in rates.items():
-                if not isinstance(value, (int, float)):
-                    raise InputError(
-                        f"{name} is {value!r}, expected a number, int or float"
-                    )
+            check_number(values[name], f"{where}: coefficient {name!r}")
+
+    def _try(self) -> None:
+        """Compute the accelerations of one state in plain Python, for its clear messages."""
+        L, U = self.particulars["length"], self.particulars["speed"]
+        n = self.service_shaft_speed
+        gear = self.steering
+        ship = Ship(L, U, gear.limit, gear.rate, 0.0, n, math.inf, U)
+        motion = Motion(
+            x=0.0,
+            y=0.0,
+            psi=0.1,
+            u=0.9 * U,
+            v=0.1 * U,
+            r=0.1 * U / L,
+            p=0.01,
+            phi=0.01,
+            q=0.0,
+            delta=0.1,
+            n=n,
+        )
+        c = self.coefficients_record()
+        found = asked(self.accelerations, motion, c, ship)
+        if not isinstance(found, tuple) or len(found) != len(ACCELERATIONS):
+            expected = (
+                "five numbers, a tuple: udot, vdot, rdot, pdot, qdot, 0 for those that"
+                " the ship does not have"
+            )
+            raise unexpected("accelerations", expected, found)
+        rates = dict(zip(ACCELERATIONS, found, strict=True))
+        if self.shaft_acceleration is not None:
+            rate = asked(self.shaft_acceleration, n, 0.9 * n, c, ship)
+            rates["shaft_acceleration"] = rate
+        for name, value in rates.items():
+            if not isinstance(value, (int, float)):
+                raise unexpected(name, "a number, int or float", value)
 
     def fault(
         self, state: Mapping[str, float], coefficients: Mapping[str, float], ship: Ship
     ) -> str:
-        """Where plain Python fails at a state, and why; the place of the accelerations if it does not."""
+        """Place where plain Python fails at a state, and why; else that of the accelerations."""
         motion = Motion(*[state.get(name, 0.0) for name in Motion._fields])
+        c = self.coefficients_record(**coefficients)
         try:
-            asked(
-                self.accelerations,
-                motion,
-                self.coefficients_record(**coefficients),
-                ship,
-            )
+            asked(self.accelerations, motion, c, ship)
         except InputError as error:
             return str(error)
         return place_of(self.accelerations)
 
     def __reduce__(self) -> Any:
-        """Another process finds a ship of this package by her name, another by her file."""
+        """Find a ship of this package by name in another process, others by their file."""
         if self.path is not None:
             return read_ship_equations, (self.path,)
         return _named, (self.accelerations.__module__,)
@@ -191,10 +174,8 @@ class ShipEquations:
     @property
     def coefficients(self) -> dict[str, float]:
         """The published coefficients."""
-        return {
-            name: float(value)
-            for name, value in self.coefficients_record()._asdict().items()
-        }  # type: ignore[attr-defined]
+        published = self.coefficients_record()._asdict()  # type: ignore[attr-defined]
+        return {name: float(value) for name, value in published.items()}
 
     @property
     def command_names(self) -> tuple[str, ...]:
@@ -208,19 +189,47 @@ class ShipEquations:
         shaft = ("n",) if self.shaft_acceleration is not None else ()
         return ("x", "y", "psi", "u", "v", "r", *roll, "delta", *shaft)
 
+    def form(self, coefficients: Mapping[str, float]) -> Accelerations:
+        """Equations for given coefficients; some ships have more than one form."""
+        return self.accelerations
+
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
-        """What is compiled of the ship: the same whatever her coefficients are, but for the switches."""
-        parts: dict[str, Any] = {"accelerations": Part(self.accelerations)}
-        parts |= {name: bool(coefficients[name]) for name in self.switches}
+        """Make the functions to be compiled, the same for all coefficients of one form."""
+        functions = {"accelerations": Part(self.form(coefficients))}
         if self.shaft_acceleration is not None:
-            parts["shaft_acceleration"] = Part(self.shaft_acceleration)
-        return vessel_of(
-            self.name,
-            self.state_names,
-            self.coefficients_record,
-            tuple(parts.items()),
-            lag,
-        )
+            functions["shaft_acceleration"] = Part(self.shaft_acceleration)
+        record = self.coefficients_record
+        parts = tuple(functions.items())
+        return vessel_of(self.name, self.state_names, record, parts, lag)
+
+    def accelerations_at(
+        self,
+        channels: Mapping[str, Floats],
+        coefficients: Mapping[str, float],
+        particulars: Particulars,
+        ship: Ship,
+    ) -> dict[str, Floats]:
+        """Accelerations at samples of shape (n_samples,), in plain Python, by state.
+
+        They are nan where Python has no number; a shaft is ordered to turn as in
+        service.
+        """
+        numbers = self.numbers(coefficients, particulars, ship.shaft)
+        c = self.coefficients_record(*numbers.tolist())
+        accelerations = self.form(coefficients)
+        none = np.zeros(len(channels["u"]))
+        columns = [channels.get(name, none) for name in Motion._fields]
+        states = np.stack(columns, axis=-1)
+        found = np.full((len(states), len(ACCELERATIONS)), math.nan)
+        for row, state in zip(found, states.tolist(), strict=True):
+            with suppress(ArithmeticError, ValueError):
+                row[:] = accelerations(Motion(*state), c, ship)
+        rates = dict(zip(("u", "v", "r", "p", "q"), found.T, strict=True))
+        if self.shaft_acceleration is not None:
+            shaft = self.shaft_acceleration
+            lag = [shaft(n, ship.shaft, c, ship) for n in channels["n"].tolist()]
+            rates["n"] = np.array(lag)
+        return rates
 
     def numbers(
         self,
@@ -237,19 +246,17 @@ class ShipEquations:
 
 
 def read_ship_equations(path: str | Path) -> ShipEquations:
-    """The ship that a Python file defines as `SHIP`; the file is run.
+    """Run a Python file and return the ship that it defines as `SHIP`.
 
     Raises InputError for a file that is not there, cannot be run, or defines no `SHIP`.
     """
     path = Path(path).resolve()
-    written = "SHIP = ShipEquations(...)"
-    ship = getattr(
-        load_file(path, f"a Python file that defines {written}"), "SHIP", None
-    )
+    expected = "a Python file that defines SHIP = ShipEquations(...)"
+    ship = getattr(load_file(path, expected), "SHIP", None)
     if not isinstance(ship, ShipEquations):
-        raise InputError(f"{path}: SHIP = {ship!r} found, expected {written}")
-    for one in (ship.accelerations, ship.shaft_acceleration):
-        refuse_closure(one)
+        raise unexpected(f"{path}", "SHIP = ShipEquations(...)", ship)
+    for function in (ship.accelerations, ship.shaft_acceleration):
+        refuse_closure(function)
     object.__setattr__(ship, "path", path)
     return ship
 

@@ -1,18 +1,21 @@
-"""The grey box: the accelerations of a reference ship, converted by similarity, and a table of terms.
+"""Grey box: a reference ship's accelerations, converted by similarity, plus terms.
 
 Source: Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via
 adaptive RM-SVM with minor rudder. Their equation 11 adds accelerations of two different
 ships; here those of the reference ship are converted back to the target first.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from shipgym.arrays import Floats
+from shipgym.checks import check_flag
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.records import Record
 from shipgym.engine.specialise import Part
@@ -20,21 +23,23 @@ from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.structures import WITH_REFERENCE
 from shipgym.ships.term_functions import (
     accelerations_function,
     accelerations_source,
     coefficients_record,
 )
-from shipgym.ships.term_table import ALWAYS_MEASURED, MEASURED, Structure
-from shipgym.ships.terms import read_terms
+from shipgym.ships.term_table import (
+    ALWAYS_MEASURED,
+    MEASURED,
+    Structure,
+    structure_fields,
+)
 
-GREY_BOX = WITH_REFERENCE
+GREY_BOX = "grey-box"
 SOURCE = (
     "Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via"
     " adaptive RM-SVM with minor rudder"
 )
-LINEAR = read_terms("du, v, r, delta, 1")
 
 
 @dataclass(frozen=True)
@@ -64,24 +69,24 @@ class GreyBox(Structure):
         where = f"structure '{self.name}'"
         if self.reference is None:
             raise InputError(
-                f"{where}: no reference found, expected a ManoeuvringModel, or the name"
-                " of a shipped model"
+                f"{where}: expected a ManoeuvringModel as reference, or the name of a"
+                " shipped model, got none"
             )
         if isinstance(self.reference.dynamics, GreyBox):
             raise InputError(
-                f"{where}: reference {self.reference.name!r} is a grey box itself,"
-                " expected a reference ship or a table of terms; take that grey box's"
-                " own reference"
+                f"{where}: expected a reference ship or a table of terms, got"
+                f" {self.reference.name!r}, a grey box itself; take that grey box's own"
+                " reference"
             )
         if self.quantity != "acceleration":
             raise InputError(
-                f"{where}: quantity 'force' found, expected 'acceleration': the terms"
-                " are added to the reference ship's accelerations"
+                f"{where}: expected quantity 'acceleration', because the terms are added"
+                " to the reference ship's accelerations, got 'force'"
             )
         if self.shaft and "n" not in self.reference.command_names:
             raise InputError(
-                f"{where}: shaft true found, but reference {self.reference.name!r} has"
-                " no shaft speed; leave it out"
+                f"{where}: expected shaft false, because reference"
+                f" {self.reference.name!r} has no shaft speed, got true; leave it out"
             )
 
     @property
@@ -92,50 +97,52 @@ class GreyBox(Structure):
 
     @property
     def rolls(self) -> bool:
-        """Whether the reference ship has a rolling motion, and with it the target."""
+        """True where the reference ship, and with it the target, rolls."""
         return "phi" in self.ship.state_names
 
     @property
     def remembers(self) -> bool:
-        """Whether the reference ship has a memory of yaw, and with it the target."""
+        """True where the reference ship has a memory of yaw, and with it the target."""
         return "q" in self.ship.state_names
 
     @cached_property
     def required_channels(self) -> tuple[str, ...]:
-        """Channels a trial needs: those of the terms and those that the reference ship is evaluated at."""
-        needed = self.channels | ALWAYS_MEASURED
-        needed |= {"p", "phi"} if self.rolls else set()
-        needed |= {"n"} if self.shaft else set()
+        """Channels a trial needs: those of the terms and of the reference ship."""
+        needed = set(self.channels | ALWAYS_MEASURED)
+        if self.rolls:
+            needed |= {"p", "phi"}
+        if self.shaft:
+            needed.add("n")
         return tuple(name for name in MEASURED if name in needed)
 
     @property
     def has_rudder(self) -> bool:
-        """Whether a rudder turns it: that of the reference ship does."""
+        """True: the rudder of the reference ship turns it."""
         return True
 
     @property
     def needs_shaft_speed(self) -> bool:
-        """Whether the shaft speed at service speed has to be known."""
+        """True where the shaft speed at service speed has to be known."""
         return self.shaft or super().needs_shaft_speed
 
     @property
     def astern(self) -> bool:
-        """Whether the reference ship's shaft may turn astern."""
+        """True where the reference ship's shaft may turn astern."""
         return self.ship.turns_astern
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
-        """What is compiled of a ship with this grey box: the reference ship's functions and the terms."""
-        terms = coefficients_record(len(self._terms), "GreyBoxTerms")
-        return self._vessel(
-            terms,
-            {"term_accelerations": Part(accelerations_function(self._source))},
-            lag,
-        )
+        """Make what is compiled: the reference ship's functions and the terms."""
+        prime = self.normalisation == "prime"
+        # an equation without terms is the reference ship's alone
+        source = accelerations_source(self.equations, prime, damped=False)
+        terms = coefficients_record(self._n_terms, "GreyBoxTerms")
+        function = Part(accelerations_function(source))
+        return self.vessel_with(terms, {"term_accelerations": function}, lag)
 
-    def _vessel(
+    def vessel_with(
         self, terms: Record, functions: dict[str, Any], lag: bool, **summed: Any
     ) -> Vessel:
-        """Functions of the reference ship, of the terms with their record of coefficients, and their sum."""
+        """Make the functions to be compiled of the reference ship and a sum of terms."""
         reference = self.ship.vessel
         parts = {
             **reference.functions,
@@ -145,14 +152,14 @@ class GreyBox(Structure):
             **functions,
         }
         parts.pop("shaft_acceleration", None)  # the shaft turns as commanded
-        record = _coefficients(reference.coefficients, terms)
-        named = tuple(parts.items()), lag, tuple(summed.items())
-        return vessel_of("a grey box", self.state_names, record, *named)
-
-    @cached_property
-    def _source(self) -> str:
-        """Written once; an equation without terms is the reference ship's alone."""
-        return accelerations_source(self._sums, damped=False)
+        return vessel_of(
+            "a grey box",
+            self.state_names,
+            _coefficients(reference.coefficients, terms),
+            tuple(parts.items()),
+            lag,
+            tuple(summed.items()),
+        )
 
     def numbers(
         self,
@@ -160,7 +167,7 @@ class GreyBox(Structure):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Numbers of the vessel's coefficients: the reference ship's, then those of the terms."""
+        """Numbers of the compiled functions: those of the reference ship, then the terms'."""
         terms = self.term_numbers(coefficients, particulars, shaft_speed)
         return np.concatenate([self.ship.ship_numbers(), terms])
 
@@ -170,17 +177,44 @@ class GreyBox(Structure):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> dict[str, Floats]:
-        """Accelerations of the reference ship, evaluated at and converted back to the target.
+        """Accelerations of the reference ship, converted to the target.
 
         The channels of the target are u, v, r, delta, and n, p, phi where known, each
         of shape (n_samples,), SI units; its particulars give length and service speed,
         the shaft speed is that at service speed, 1/s. Returns arrays of shape
-        (n_samples,) by equation `u`, `v`, `r`, and `q` where the reference ship has a
-        memory of yaw.
+        (n_samples,) by equation `u`, `v`, `r`, and `p` or `q` where the reference ship
+        has a roll or a memory of yaw.
         """
-        ship = self.ship
-        fast = ship.particulars["speed"] / particulars["speed"]
-        quick = fast * particulars["length"] / ship.particulars["length"]
+        at = self._reference_channels(channels, particulars, shaft_speed)
+        return self._converted_back(self.ship.rates(at), particulars)
+
+    def accelerations_at(
+        self,
+        channels: Mapping[str, Floats],
+        coefficients: Mapping[str, float],
+        particulars: Particulars,
+        ship: Ship,
+    ) -> dict[str, Floats]:
+        """Accelerations at samples, without compiling: the converted ship's and the terms'."""
+        at = self._reference_channels(channels, particulars, ship.shaft)
+        known = self.ship.accelerations(at)
+        found = self._converted_back(known, particulars)
+        sums = self._sums_at(channels, coefficients, particulars, ship.shaft)
+        for equation, added in sums.items():
+            found[equation] = found[equation] + added
+        return found
+
+    def _scales(self, particulars: Particulars) -> tuple[float, float]:
+        """Speed and turn rate of the reference ship over those of the target."""
+        known = self.ship.particulars
+        fast = known["speed"] / particulars["speed"]
+        return fast, fast * particulars["length"] / known["length"]
+
+    def _reference_channels(
+        self, channels: Mapping[str, Any], particulars: Particulars, shaft_speed: float
+    ) -> dict[str, Floats]:
+        """Channels of the target, converted to the reference ship."""
+        fast, quick = self._scales(particulars)
         scale = {
             "u": fast,
             "v": fast,
@@ -190,24 +224,36 @@ class GreyBox(Structure):
             "q": quick**2,
             "delta": 1.0,
         }
-        values = {
-            name: scale[name] * np.asarray(channels[name])
-            for name in scale
+        at = {
+            name: factor * np.asarray(channels[name])
+            for name, factor in scale.items()
             if name in channels
         }
-        values["n"] = np.full_like(values["u"], ship.service_shaft_speed)
+        service = self.ship.service_shaft_speed
+        at["n"] = np.full_like(at["u"], service)
         if self.shaft:
-            values["n"] = np.asarray(channels["n"]) * (
-                ship.service_shaft_speed / shaft_speed
-            )
+            at["n"] = np.asarray(channels["n"]) * (service / shaft_speed)
+        return at
+
+    def _converted_back(
+        self, rates: Mapping[str, Floats], particulars: Particulars
+    ) -> dict[str, Floats]:
+        """Accelerations of the reference ship, converted to the target."""
+        fast, quick = self._scales(particulars)
+        linear = 1.0 / (fast * quick)
+        angular = 1.0 / quick**2
         back = {
-            "u": 1.0 / (fast * quick),
-            "v": 1.0 / (fast * quick),
-            "r": quick**-2,
-            "q": quick**-3,
+            "u": linear,
+            "v": linear,
+            "r": angular,
+            "p": angular,
+            "q": angular / quick,
         }
-        rates = ship.rates(values)
-        return {q: rates[q] * back[q] for q in back if q in rates}
+        found = {}
+        for name, scale in back.items():
+            if name in rates:
+                found[name] = rates[name] * scale
+        return found
 
     def to_dict(self) -> dict[str, Any]:
         """The table and the whole reference ship, as they stand in a model file."""
@@ -217,16 +263,25 @@ class GreyBox(Structure):
             "reference": self.ship.to_dict(),
         }
 
+    @classmethod
+    def read(
+        cls, table: Mapping[str, Any], where: str, reference: ManoeuvringModel
+    ) -> Self:
+        """Read what `to_dict` wrote, given the reference ship; errors begin with `where`."""
+        shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
+        fields = structure_fields(table, where)
+        return cls(**fields, reference=reference, shaft=shaft)
+
 
 KNOWS_SHAFT = False  # whether the reference ship's shaft turns with the target's
 
 
 def reference_accelerations(motion: Motion, c: Any, ship: Ship) -> Any:
-    """A part: the reference ship's."""
+    """Place of the reference ship's accelerations."""
 
 
 def term_accelerations(motion: Motion, c: Any, ship: Ship) -> Any:
-    """A part: the sum of the terms."""
+    """Place of the sum of the terms."""
 
 
 def accelerations(
@@ -235,6 +290,9 @@ def accelerations(
     """The reference ship's at the converted state, converted back, and the terms."""
     fast = c.known.speed / ship.speed
     quick = fast * ship.length / c.known.length
+    n = c.known.shaft
+    if KNOWS_SHAFT:
+        n = motion.n * (c.known.shaft / ship.shaft)
     at = Motion(
         x=0.0,
         y=0.0,
@@ -246,11 +304,12 @@ def accelerations(
         phi=motion.phi,
         q=quick * quick * motion.q,
         delta=motion.delta,
-        n=motion.n * (c.known.shaft / ship.shaft) if KNOWS_SHAFT else c.known.shaft,
+        n=n,
     )
     surge, sway, yaw, roll, memory = reference_accelerations(at, c.reference, c.known)
     udot, vdot, rdot, _, _ = term_accelerations(motion, c.terms, ship)
-    linear, angular = 1.0 / (fast * quick), 1.0 / (quick * quick)
+    linear = 1.0 / (fast * quick)
+    angular = 1.0 / (quick * quick)
     return (
         udot + linear * surge,
         vdot + linear * sway,
@@ -262,6 +321,6 @@ def accelerations(
 
 @cache
 def _coefficients(reference: Record, terms: Record) -> Record:
-    """The record of a grey box's coefficients: the known ship, hers, and those of the terms."""
+    """Record of a grey box's coefficients: the reference ship's and the terms'."""
     fields = [("known", Ship), ("reference", reference), ("terms", terms)]
     return NamedTuple("GreyBoxCoefficients", fields)  # type: ignore[return-value]

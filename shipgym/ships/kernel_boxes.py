@@ -1,4 +1,4 @@
-"""A reference ship, and radial basis functions that correct her accelerations and fade outside their data.
+"""Reference ship corrected by radial basis functions that fade outside their data.
 
 Source: Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares
 support vector machines, chapter 6 (fixed-size LS-SVM: a kernel on a few centres,
@@ -7,15 +7,18 @@ Sun & Shi 2019). With a linear reference fitted to the same trials it is a kerne
 of its own, a black box.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from math import sqrt
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from shipgym.arrays import Floats
+from shipgym.checks import check_array, check_flag, check_table, check_text, unexpected
 from shipgym.engine import stages
 from shipgym.engine.mathematics import two_to
 from shipgym.engine.motion import Motion, Ship, accelerations
@@ -26,18 +29,16 @@ from shipgym.engine.stages import Point, Sums
 from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
 from shipgym.ships.grey_boxes import GreyBox
+from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.terms import Term
 
 RBF = "rbf"
 SIZES = (32, 64, 100)  # centres of what is compiled; others have weight 0
-# numbers of a centre: coordinates, minus half their square, weights of surge, sway and
-# yaw
-ROW = 8
 SLOWEST = 0.05  # of service speed; slower, v and r are divided by it
-PER_ROOT_LN_2 = 1.0 / sqrt(
-    np.log(2.0)
-)  # of coordinates, so that the kernel is a power of 2
+# numbers of a centre in the table: 4 coordinates, minus half the square of their
+# distance from the origin, 3 weights
+ROW = 8
 
 SOURCE = (
     "Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares"
@@ -53,13 +54,13 @@ class KernelTerm(Term):
 
     @property
     def product(self) -> object:
-        """Its number: the functions are the kernel's."""
+        """Number of the feature: the functions are the kernel's."""
         return self.number
 
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """Radial basis functions exp(-|x - centre|^2 / 2), and the features that are made of them.
+    """Radial basis functions exp(-|x - centre|^2 / 2), and the features made of them.
 
     x is v / U, r L / U, the rudder angle in rad and U / U0, less an offset, by a scale.
 
@@ -72,20 +73,21 @@ class Kernel:
     basis: Floats  # of the features in the functions, shape (n_centres, n_features)
 
     def __post_init__(self) -> None:
-        shapes = [
-            np.shape(a) for a in (self.offset, self.scale, self.centres, self.basis)
-        ]
+        arrays = (self.offset, self.scale, self.centres, self.basis)
+        shapes = [np.shape(array) for array in arrays]
         n = len(self.centres)
-        whole = (
+        fits = (
             shapes[:3] == [(4,), (4,), (n, 4)]
-            and np.ndim(self.basis) == 2
-            and len(self.basis) == n
+            and len(shapes[3]) == 2
+            and shapes[3][0] == n
+            and 0 < n <= SIZES[-1]
+            and np.all(self.scale > 0.0)
         )
-        if not whole or not 0 < n <= SIZES[-1] or not np.all(self.scale > 0.0):
+        if not fits:
             raise InputError(
-                f"kernel: offset, scale, centres and basis of shapes {shapes} found,"
-                " expected (4,), (4,) above 0, (n, 4) and (n, n_features) with n at"
-                f" most {SIZES[-1]}"
+                "kernel: expected offset, scale, centres and basis of shapes (4,), (4,)"
+                f" above 0, (n, 4) and (n, n_features) with n at most {SIZES[-1]}, got"
+                f" {shapes}"
             )
 
     @property
@@ -101,32 +103,56 @@ class Kernel:
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, as a model file has them."""
         return {
-            name: getattr(self, name).tolist()
-            for name in ("offset", "scale", "centres", "basis")
+            "offset": self.offset.tolist(),
+            "scale": self.scale.tolist(),
+            "centres": self.centres.tolist(),
+            "basis": self.basis.tolist(),
         }
+
+    @classmethod
+    def from_dict(cls, content: Any, where: str) -> Self:
+        """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
+        shapes: dict[str, tuple[int | None, ...]] = {
+            "offset": (4,),
+            "scale": (4,),
+            "centres": (None, 4),
+            "basis": (None, None),
+        }
+        table = check_table(content, where, shapes)
+        arrays = {}
+        for name, shape in shapes.items():
+            place = f"{where}.{name}"
+            arrays[name] = check_array(table.get(name), shape, place)
+        return cls(**arrays)
 
 
 def kernel_inputs(channels: Mapping[str, Any], particulars: Particulars) -> Floats:
-    """Inputs v / U, r L / U, rudder angle and U / U0 of samples, shape (n_samples, 4)."""
-    u, v, r, delta = (
-        np.asarray(channels[name], dtype=float) for name in ("u", "v", "r", "delta")
-    )
-    speed = particulars["speed"]
-    U = np.maximum(np.hypot(u, v), SLOWEST * speed)
-    return np.stack([v / U, r * particulars["length"] / U, delta, U / speed], axis=-1)
+    """Inputs v / U, r L / U, rudder angle and U / U0; shape (n_samples, 4)."""
+    u = np.asarray(channels["u"], dtype=float)
+    v = np.asarray(channels["v"], dtype=float)
+    r = np.asarray(channels["r"], dtype=float)
+    delta = np.asarray(channels["delta"], dtype=float)
+    U0 = particulars["speed"]
+    slowest = SLOWEST * U0
+    U = np.maximum(np.hypot(u, v), slowest)
+    turn = r * particulars["length"] / U
+    return np.stack([v / U, turn, delta, U / U0], axis=-1)
 
 
 def gaussians(x: Floats, centres: Floats) -> Floats:
     """exp(-|x - centre|^2 / 2), shape (n_samples, n_centres)."""
-    squares = (
-        (x**2).sum(axis=1)[:, None] - 2.0 * x @ centres.T + (centres**2).sum(axis=1)
-    )
-    return np.asarray(np.exp(-0.5 * np.maximum(squares, 0.0)))
+    # |x - c|^2 = |x|^2 - 2 x c + |c|^2
+    own = (x**2).sum(axis=1)
+    theirs = (centres**2).sum(axis=1)
+    product = x @ centres.T
+    squares = own[:, None] - 2.0 * product + theirs
+    within = np.maximum(squares, 0.0)
+    return np.asarray(np.exp(-0.5 * within))
 
 
 @dataclass(frozen=True)
 class KernelBox(GreyBox):
-    """A reference ship's accelerations and, by U^2 / L (U^2 / L^2 of yaw), sums of features of a kernel.
+    """Accelerations of a reference ship plus sums of a kernel's features.
 
     Raises InputError for no kernel, and as `GreyBox`.
     """
@@ -135,8 +161,8 @@ class KernelBox(GreyBox):
 
     def __post_init__(self) -> None:
         if not isinstance(self.kernel, Kernel):
-            raise InputError(
-                f"structure '{self.name}': no kernel found, expected a Kernel"
+            raise unexpected(
+                f"structure '{self.name}': kernel", "a Kernel", self.kernel
             )
         super().__post_init__()
 
@@ -147,20 +173,22 @@ class KernelBox(GreyBox):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """As of `Structure`: the features of the kernel by U^2, shape (n_samples, n_features)."""
-        u, v = (np.asarray(channels[name], dtype=float) for name in ("u", "v"))
-        return np.asarray(
-            (u * u + v * v)[:, None] * self.kernel.features(channels, particulars)
-        )
+        """Features of the kernel by U^2, shape (n_samples, n_features)."""
+        u = np.asarray(channels["u"], dtype=float)
+        v = np.asarray(channels["v"], dtype=float)
+        UU = u * u + v * v
+        features = self.kernel.features(channels, particulars)
+        return np.asarray(UU[:, None] * features)
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
-        """What is compiled: the reference ship's functions and the sum over centres, read at run time."""
+        """Make the functions to be compiled: the reference ship's and the sum over centres."""
         size = self.kernel.size
         functions = {
             "N_CENTRES": size,
             "term_accelerations": Part(kernel_accelerations),
         }
-        return self._vessel(_kernel_record(size), functions, lag, **SUMMED, N_ROWS=size)
+        record = _kernel_record(size)
+        return self.vessel_with(record, functions, lag, **SUMMED, N_ROWS=size)
 
     def numbers(
         self,
@@ -168,43 +196,72 @@ class KernelBox(GreyBox):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Numbers of the vessel's coefficients: the reference ship's, scales, offset and table of centres."""
+        """Numbers of the functions: the reference ship's, scales, offset and centres.
+
+        Coordinates are scaled so that the kernel is a power of 2.
+        """
         kernel = self.kernel
+        per_root_ln_2 = 1.0 / np.sqrt(np.log(2.0))
+        centres = per_root_ln_2 * kernel.centres
         weights = self.term_numbers(coefficients, particulars, shaft_speed)
         table = np.zeros((kernel.size, ROW))
-        rows = table[: len(kernel.centres)]
-        rows[:, :4] = PER_ROOT_LN_2 * kernel.centres
-        rows[:, 4] = -0.5 * (rows[:, :4] ** 2).sum(axis=1)
+        rows = table[: len(centres)]
+        rows[:, :4] = centres
+        rows[:, 4] = -0.5 * (centres**2).sum(axis=1)
         rows[:, 5:] = kernel.basis @ weights.reshape(3, -1).T
-        per_scale = PER_ROOT_LN_2 / kernel.scale
         return np.concatenate(
-            [self.ship.ship_numbers(), per_scale, kernel.offset, table.ravel()]
+            [
+                self.ship.ship_numbers(),
+                per_root_ln_2 / kernel.scale,
+                kernel.offset,
+                table.ravel(),
+            ]
         )
 
     def to_dict(self) -> dict[str, Any]:
         """Reference ship and kernel, as they stand in a model file."""
-        table = {k: v for k, v in super().to_dict().items() if k != "equations"}
+        table = super().to_dict()
+        del table["equations"]
         return {**table, "kernel": self.kernel.to_dict()}
+
+    @classmethod
+    def read(
+        cls, table: Mapping[str, Any], where: str, reference: ManoeuvringModel
+    ) -> Self:
+        """Read what `to_dict` wrote, given the reference ship; errors begin with `where`."""
+        kernel = Kernel.from_dict(table["kernel"], f"{where}.kernel")
+        shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
+        name = check_text(table.get("name"), f"{where}.name")
+        check_text(table.get("source"), f"{where}.source")
+        fields = _kernel_fields(name, reference, shaft, kernel)
+        return cls(**fields)
 
 
 def kernel_box(box: GreyBox, kernel: Kernel) -> KernelBox:
-    """The reference ship of a grey box with a kernel in place of its terms."""
-    terms = tuple(KernelTerm(f"k{i + 1}", (), i) for i in range(kernel.basis.shape[1]))
-    table = dict.fromkeys("uvr", terms)
-    return KernelBox(
-        box.name,
-        SOURCE,
-        table,
-        "prime",
-        "acceleration",
-        box.reference,
-        box.shaft,
-        kernel,
-    )
+    """Take the reference ship of a grey box with a kernel in place of its terms."""
+    return KernelBox(**_kernel_fields(box.name, box.ship, box.shaft, kernel))
+
+
+def _kernel_fields(
+    name: str, reference: ManoeuvringModel, shaft: bool, kernel: Kernel
+) -> dict[str, Any]:
+    """Fields of a `KernelBox`, whose terms are the kernel's features in all equations."""
+    n_features = kernel.basis.shape[1]
+    terms = tuple(KernelTerm(f"k{i + 1}", (), i) for i in range(n_features))
+    return {
+        "name": name,
+        "source": SOURCE,
+        "equations": {"u": terms, "v": terms, "r": terms},
+        "normalisation": "prime",
+        "quantity": "acceleration",
+        "reference": reference,
+        "shaft": shaft,
+        "kernel": kernel,
+    }
 
 
 class KernelCoefficients(NamedTuple):
-    """Stands for the record of scales, offsets and centres."""
+    """Record of scales, offsets and centres, for any number of these."""
 
     per_v: float
     per_r: float
@@ -217,42 +274,60 @@ class KernelCoefficients(NamedTuple):
     table: Any
 
 
-N_CENTRES = 0  # part
+N_CENTRES = 0  # place of their number
 
 
 def coordinates(motion: Motion, c: KernelCoefficients, ship: Ship) -> Point:
-    """Where a ship is among the centres."""
-    U = max(sqrt(motion.u * motion.u + motion.v * motion.v), SLOWEST * ship.speed)
+    """Coordinates among the centres, and half the squared distance from the origin."""
+    u, v = motion.u, motion.v
+    slowest = SLOWEST * ship.speed
+    U = max(sqrt(u * u + v * v), slowest)
     per_U = 1.0 / U
-    x = c.per_v * (motion.v * per_U - c.v)
-    y = c.per_r * (motion.r * ship.length * per_U - c.r)
-    z = c.per_delta * (motion.delta - c.delta)
-    w = c.per_speed * (U / ship.speed - c.speed)
-    return Point(x, y, z, w, 0.5 * (x * x + y * y + z * z + w * w))
+    v_ = v * per_U
+    r_ = motion.r * ship.length * per_U
+    U_ = U / ship.speed
+    sway = c.per_v * (v_ - c.v)
+    turn = c.per_r * (r_ - c.r)
+    rudder = c.per_delta * (motion.delta - c.delta)
+    speed = c.per_speed * (U_ - c.speed)
+    square = sway * sway + turn * turn + rudder * rudder + speed * speed
+    return Point(sway, turn, rudder, speed, half=0.5 * square)
 
 
 def add_centre(at: Point, sums: Sums, c: KernelCoefficients, number: int) -> Sums:
-    """The sums with what one centre adds."""
-    i, t = ROW * number, c.table
-    near = row_of(t, i + 4) - at.half + row_of(t, i) * at.a + row_of(t, i + 1) * at.b
-    value = two_to(near + row_of(t, i + 2) * at.c + row_of(t, i + 3) * at.d)
-    u, v, r = row_of(t, i + 5), row_of(t, i + 6), row_of(t, i + 7)
-    return Sums(sums.u + value * u, sums.v + value * v, sums.r + value * r)
+    """Add one centre: its weights by exp(-|x - centre|^2 / 2)."""
+    row = ROW * number
+    # -|x - centre|^2 / 2 = -|centre|^2 / 2 - |x|^2 / 2 + x centre
+    exponent = (
+        row_of(c.table, row + 4)
+        - at.half
+        + row_of(c.table, row) * at.a
+        + row_of(c.table, row + 1) * at.b
+        + row_of(c.table, row + 2) * at.c
+        + row_of(c.table, row + 3) * at.d
+    )
+    value = two_to(exponent)
+    return Sums(
+        u=sums.u + value * row_of(c.table, row + 5),
+        v=sums.v + value * row_of(c.table, row + 6),
+        r=sums.r + value * row_of(c.table, row + 7),
+    )
 
 
 def sum_accelerations(
     motion: Motion, sums: Sums, ship: Ship
 ) -> tuple[float, float, float]:
-    """Surge, sway and yaw of the sums."""
-    square = motion.u * motion.u + motion.v * motion.v
-    return square * sums.u, square * sums.v, square * sums.r
+    """Surge, sway and yaw acceleration of the sums, by U^2."""
+    UU = motion.u * motion.u + motion.v * motion.v
+    return UU * sums.u, UU * sums.v, UU * sums.r
 
 
 def kernel_accelerations(
     motion: Motion, c: KernelCoefficients, ship: Ship
 ) -> tuple[float, float, float, float, float]:
-    """What the kernel adds, of one ship."""
-    at, sums = coordinates(motion, c, ship), Sums(0.0, 0.0, 0.0)
+    """Accelerations that the kernel adds to those of one ship."""
+    at = coordinates(motion, c, ship)
+    sums = Sums(0.0, 0.0, 0.0)
     for number in range(N_CENTRES):
         sums = add_centre(at, sums, c, number)
     udot, vdot, rdot = sum_accelerations(motion, sums, ship)

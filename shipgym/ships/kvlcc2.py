@@ -2,21 +2,22 @@
 
 Source: Yasukawa & Yoshimura 2015, Introduction of MMG standard method for ship
 maneuvering predictions, J. Mar. Sci. Technol. 20; the numbers are those of the 7 m
-model, and the full-scale ship replaces those of scale. `PACKAGE_FORM` chooses the
-variant of the package shipmmg 0.0.11, which takes speed and drift at another point and
-has another law for the wake.
+model, and the full-scale ship replaces those of scale. Forces are per density of water.
+
+The coefficient `PACKAGE_FORM` chooses the variant of the package shipmmg 0.0.11, which
+takes speed and drift at another point and has another law for the wake.
 """
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from math import copysign, fabs, pi, sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import arctan2, exponential, small_sin_cos
 from shipgym.engine.motion import Motion, Ship
-from shipgym.ships.equations import ShipEquations, record_of
+from shipgym.ships.equations import Accelerations, ShipEquations, record_of
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
-
-PACKAGE_FORM = False  # a switch, compiled in
 
 #: As published; without unit but for the scale.
 Coefficients = record_of(
@@ -89,104 +90,184 @@ FULL_SCALE = {
 }
 
 
-def wake(drift: float, turn: float, c: Any) -> Any:
-    """Wake fraction at the propeller."""
-    if PACKAGE_FORM:
-        angle = drift - c.x_P_package * turn
-        return c.w_P0 * exponential(-4.0 * angle * angle)
-    angle = drift - c.x_P * turn
-    side = c.C_2_starboard if angle >= 0.0 else c.C_2_port
-    return 1.0 - (1.0 - c.w_P0) * (
-        1.0 + (1.0 - exponential(-c.C_1 * fabs(angle))) * (side - 1.0)
-    )
+class Flow(NamedTuple):
+    """Water that flows at hull, propeller and rudder."""
+
+    U: float  # m/s
+    v_: float  # sway by U
+    r_: float  # yaw rate by U / L
+    beta: float  # rad, drift angle
+    one_w_P: float  # 1 - wake fraction at the propeller
 
 
 def accelerations(
     motion: Motion, c: Any, ship: Ship
 ) -> tuple[float, float, float, float, float]:
-    """Accelerations in surge, sway and yaw, body frame, origin midship, from forces per density."""
-    u, v, r, n = motion.u, motion.v, motion.r, motion.n
-    if PACKAGE_FORM:
-        at = v - r * c.xG
-        U = sqrt(u * u + at * at)
-        drift = arctan2(-at, fabs(u))  # the arc sine of -at / U
-    else:
-        U = sqrt(u * u + v * v)
-        drift = arctan2(-v, u)
+    """Accelerations in surge, sway and yaw, body frame, midship, as published."""
+    u, v, r = motion.u, motion.v, motion.r
+    U = sqrt(u * u + v * v)
     per_U = 1.0 / U
-    v_, r_ = v * per_U, r * c.L * per_U
+    beta = arctan2(-v, u)
+    r_ = r * c.L * per_U
 
-    w_P = wake(drift, r_, c)
-    inflow, tip = u * (1.0 - w_P), n * c.D_P  # advance ratio: inflow / tip
-    # thrust coefficient times tip^2
+    # wake: (1 - w_P) / (1 - w_P0) = 1 + (1 - exp(-C_1 |beta_P|)) (C_2 - 1)
+    beta_P = beta - c.x_P * r_
+    C_2 = c.C_2_starboard if beta_P >= 0.0 else c.C_2_port
+    straight = exponential(-c.C_1 * fabs(beta_P))
+    fuller = (1.0 - straight) * (C_2 - 1.0)
+    one_w_P = (1.0 - c.w_P0) * (1.0 + fuller)
+
+    flow = Flow(U, v * per_U, r_, beta, one_w_P)
+    return accelerations_in(motion, c, flow)
+
+
+def package_accelerations(
+    motion: Motion, c: Any, ship: Ship
+) -> tuple[float, float, float, float, float]:
+    """Accelerations as in shipmmg 0.0.11: flow at the centre of gravity, Gaussian wake."""
+    u, v, r = motion.u, motion.v, motion.r
+    v_G = v - r * c.xG
+    U = sqrt(u * u + v_G * v_G)
+    per_U = 1.0 / U
+    beta = arctan2(-v_G, fabs(u))  # the arc sine of -v_G / U
+    r_ = r * c.L * per_U
+
+    beta_P = beta - c.x_P_package * r_
+    w_P = c.w_P0 * exponential(-4.0 * beta_P * beta_P)
+
+    flow = Flow(U, v * per_U, r_, beta, 1.0 - w_P)
+    return accelerations_in(motion, c, flow)
+
+
+def accelerations_in(
+    motion: Motion, c: Any, flow: Flow
+) -> tuple[float, float, float, float, float]:
+    """Accelerations in a flow: the forces by mass and added mass."""
+    L = c.L
+    X_H, Y_H, N_H = hull_forces(c, flow)
+
+    # propeller: T = n^2 D^4 K_T(J), J = inflow / tip
+    inflow = motion.u * flow.one_w_P
+    tip = motion.n * c.D_P
     K_T_nn = c.k_0 * tip * tip + c.k_1 * tip * inflow + c.k_2 * inflow * inflow
-    thrust = c.D_P**2 * K_T_nn
+    T = c.D_P**2 * K_T_nn
+    X_P = (1.0 - c.t_P) * T
 
-    beta_R = drift - c.l_R * r_
-    v_R = U * (c.gamma_minus if beta_R < 0.0 else c.gamma_plus) * beta_R
-    eta = c.D_P / c.H_R
-    race = fabs(inflow) * (1.0 - c.kappa) + c.kappa * sqrt(
-        inflow * inflow + (8.0 / pi) * K_T_nn
-    )
-    u_R = copysign(c.epsilon, inflow) * sqrt(
-        eta * race * race + (1.0 - eta) * inflow * inflow
-    )
-    sine, cosine = small_sin_cos(motion.delta)
-    # (u_R^2 + v_R^2) sin(delta - atan2(v_R, u_R)), without the arc
-    F_N = (
-        0.5
-        * c.A_R
-        * c.f_alpha
-        * sqrt(u_R * u_R + v_R * v_R)
-        * (sine * u_R - cosine * v_R)
-    )
-
-    q = 0.5 * c.L * c.d * U * U
-    X_H = q * (
-        -c.R_0
-        + c.X_vv * v_ * v_
-        + c.X_vr * v_ * r_
-        + c.X_rr * r_ * r_
-        + c.X_vvvv * v_ * v_ * v_ * v_
-    )
-    Y_H = q * (
-        c.Y_v * v_
-        + c.Y_r * r_
-        + c.Y_vvv * v_ * v_ * v_
-        + c.Y_vvr * v_ * v_ * r_
-        + c.Y_vrr * v_ * r_ * r_
-        + c.Y_rrr * r_ * r_ * r_
-    )
-    N_H = (
-        q
-        * c.L
-        * (
-            c.N_v * v_
-            + c.N_r * r_
-            + c.N_vvv * v_ * v_ * v_
-            + c.N_vvr * v_ * v_ * r_
-            + c.N_vrr * v_ * r_ * r_
-            + c.N_rrr * r_ * r_ * r_
-        )
-    )
-    X = X_H - (1.0 - c.t_R) * F_N * sine + (1.0 - c.t_P) * thrust
-    Y = Y_H - (1.0 + c.a_H) * F_N * cosine
-    N = N_H - (c.x_R + c.a_H * c.x_H) * c.L * F_N * cosine
+    F_N, sin_delta, cos_delta = rudder_force(motion, c, flow, inflow, K_T_nn)
+    X_R = -(1.0 - c.t_R) * F_N * sin_delta
+    Y_R = -(1.0 + c.a_H) * F_N * cos_delta
+    x_HR = c.x_R + c.a_H * c.x_H
+    N_R = -x_HR * L * F_N * cos_delta
 
     m = c.volume
-    m_x, m_y = c.mx * 0.5 * c.L * c.L * c.d, c.my * 0.5 * c.L * c.L * c.d
-    inertia = m * (0.25 * c.L) ** 2 + c.xG * c.xG * m + c.Jz * 0.5 * c.L**4 * c.d
-    udot = (X + (m + m_y) * v * r + c.xG * m * r * r) * (1.0 / (m + m_x))
-    sway, yaw = Y - (m + m_x) * u * r, N - c.xG * m * u * r
-    vdot = (inertia * sway - c.xG * m * yaw) * (
-        1.0 / ((m + m_y) * inertia - (c.xG * m) ** 2)
-    )
-    rdot = (yaw - c.xG * m * vdot) * (1.0 / inertia)
+    m_x = c.mx * 0.5 * L * L * c.d
+    m_y = c.my * 0.5 * L * L * c.d
+    J_z = c.Jz * 0.5 * L**4 * c.d
+    I_z = m * (0.25 * L) ** 2 + c.xG * c.xG * m + J_z
+    mass = Mass(m + m_x, m + m_y, c.xG * m, I_z)
+    X = X_H + X_R + X_P
+    Y = Y_H + Y_R
+    N = N_H + N_R
+    udot, vdot, rdot = planar_accelerations(motion, X, Y, N, mass)
     return udot, vdot, rdot, 0.0, 0.0
 
 
+class Mass(NamedTuple):
+    """Mass with added mass, by density."""
+
+    surge: float  # m + m_x
+    sway: float  # m + m_y
+    static: float  # x_G m
+    yaw: float  # I_zG + x_G^2 m + J_z
+
+
+def planar_accelerations(
+    motion: Motion, X: float, Y: float, N: float, mass: Mass
+) -> tuple[float, float, float]:
+    """Accelerations in surge, sway and yaw by forces.
+
+    (m + m_x) udot - (m + m_y) v r - x_G m r^2 = X
+    (m + m_y) vdot + (m + m_x) u r + x_G m rdot = Y
+    (I_zG + x_G^2 m + J_z) rdot + x_G m (vdot + u r) = N
+    """
+    u, v, r = motion.u, motion.v, motion.r
+    surge = X + mass.sway * v * r + mass.static * r * r
+    sway = Y - mass.surge * u * r
+    yaw = N - mass.static * u * r
+
+    determinant = mass.sway * mass.yaw - mass.static**2
+    udot = surge * (1.0 / mass.surge)
+    coupled = mass.yaw * sway - mass.static * yaw
+    vdot = coupled * (1.0 / determinant)
+    rdot = (yaw - mass.static * vdot) * (1.0 / mass.yaw)
+    return udot, vdot, rdot
+
+
+def hull_forces(c: Any, flow: Flow) -> tuple[float, float, float]:
+    """Forces X_H, Y_H and moment N_H of the hull, polynomials in v' and r'."""
+    v, r = flow.v_, flow.r_
+    X = (
+        -c.R_0
+        + c.X_vv * v * v
+        + c.X_vr * v * r
+        + c.X_rr * r * r
+        + c.X_vvvv * v * v * v * v
+    )
+    Y = (
+        c.Y_v * v
+        + c.Y_r * r
+        + c.Y_vvv * v * v * v
+        + c.Y_vvr * v * v * r
+        + c.Y_vrr * v * r * r
+        + c.Y_rrr * r * r * r
+    )
+    N = (
+        c.N_v * v
+        + c.N_r * r
+        + c.N_vvv * v * v * v
+        + c.N_vvr * v * v * r
+        + c.N_vrr * v * r * r
+        + c.N_rrr * r * r * r
+    )
+    q = 0.5 * c.L * c.d * flow.U * flow.U
+    return q * X, q * Y, q * c.L * N
+
+
+def rudder_force(
+    motion: Motion, c: Any, flow: Flow, inflow: float, K_T_nn: float
+) -> tuple[float, float, float]:
+    """Normal force F_N of the rudder, and sine and cosine of its angle."""
+    # v_R = U gamma_R beta_R
+    beta_R = flow.beta - c.l_R * flow.r_
+    gamma_R = c.gamma_minus if beta_R < 0.0 else c.gamma_plus
+    v_R = flow.U * gamma_R * beta_R
+
+    # u_R = epsilon inflow sqrt(eta (1 + kappa (sqrt(1 + 8 K_T / (pi J^2)) - 1))^2 + 1 - eta)
+    eta = c.D_P / c.H_R
+    outside = inflow * inflow
+    jet = outside + (8.0 / pi) * K_T_nn
+    race = fabs(inflow) * (1.0 - c.kappa) + c.kappa * sqrt(jet)
+    mean = eta * race * race + (1.0 - eta) * outside
+    u_R = copysign(c.epsilon, inflow) * sqrt(mean)
+
+    # U_R sin(alpha_R) = U_R sin(delta - atan2(v_R, u_R)), without the arc
+    sine, cosine = small_sin_cos(motion.delta)
+    across = sine * u_R - cosine * v_R
+    U_R = sqrt(u_R * u_R + v_R * v_R)
+    return 0.5 * c.A_R * c.f_alpha * U_R * across, sine, cosine
+
+
+@dataclass(frozen=True)
+class TwoForms(ShipEquations):
+    """Published equations, or those of shipmmg where `PACKAGE_FORM` is 1."""
+
+    def form(self, coefficients: Mapping[str, float]) -> Accelerations:
+        """Accelerations of the form that the coefficients ask for."""
+        return package_accelerations if coefficients["PACKAGE_FORM"] else accelerations
+
+
 def particulars(name: str, c: Any, beam: float, speed: float) -> Particulars:
-    """Of the ship at a scale: beam in m, service speed in m/s."""
+    """Particulars of the ship at a scale: beam in m, service speed in m/s."""
     to_prime = c.d / c.L  # added masses are given by rho L^2 d / 2
     return Particulars(
         name=name,
@@ -209,7 +290,7 @@ def particulars(name: str, c: Any, beam: float, speed: float) -> Particulars:
     )
 
 
-SHIP = ShipEquations(
+SHIP = TwoForms(
     "kvlcc2",
     "Yasukawa & Yoshimura 2015, Introduction of MMG standard method for ship"
     " maneuvering predictions",
@@ -218,5 +299,4 @@ SHIP = ShipEquations(
     particulars("KVLCC2, 7 m model", Coefficients(), 1.27, 1.179),
     SteeringGear(rudder_rate_deg_s=15.8),
     service_shaft_speed=11.85159,
-    switches=("PACKAGE_FORM",),
 )

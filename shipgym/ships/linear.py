@@ -1,4 +1,4 @@
-"""Steering linearised about straight running: state space, Nomoto's forms and course stability.
+"""Linearise steering about straight running: state space, Nomoto, course stability.
 
 Sources: Nomoto, Taguchi, Honda & Hirano 1957, On the steering qualities of ships,
 International Shipbuilding Progress 4; Fossen 2011, Handbook of Marine Craft
@@ -17,18 +17,10 @@ from shipgym.errors import InputError
 from shipgym.ships.inertia import inertia
 from shipgym.ships.ship_model import ShipModel
 
-STEP = 1e-4  # of the finite differences, prime system; the error is its square
-SLOWEST, FASTEST = (
-    0.75,
-    1.25,
-)  # speed of straight running over service speed where surge is to be believed
-LARGEST_RUDDER = np.radians(
-    20.0
-)  # neutral rudder beyond which a model is not that of a ship
-LARGEST_SWAY = 0.5  # over service speed, likewise
-AT_REST = 1e-8  # prime acceleration that counts as zero
+#: Largest neutral rudder, rad: beyond, a model is not that of a ship.
+LARGEST_RUDDER = np.radians(20.0)
 SIDES = {"starboard": 1, "port": -1}
-# rate that each unknown brings to 0
+# unknowns of a balance, and the rate that each brings to 0
 BALANCED_BY = {"u": "u", "v": "v", "delta": "r", "phi": "p", "q": "q", "n": "n"}
 
 
@@ -42,9 +34,8 @@ class StraightRunning:
     rudder: float  # the neutral rudder, rad, positive to starboard
     heel: float = 0.0  # rad, starboard down; 0 where the model knows no roll
     shaft_speed: float = 0.0  # 1/s; 0 where the model's shaft has no dynamics
-    memory: float = (
-        0.0  # yaw acceleration that a table with a memory `q` keeps, rad/s^2
-    )
+    # yaw acceleration that a table with a memory `q` keeps, rad/s^2
+    memory: float = 0.0
 
     def state(self, model: ShipModel) -> Floats:
         """The state vector, in the order of `model.state_names`, shape (n_state,)."""
@@ -92,42 +83,54 @@ def straight_running(model: ShipModel, speed: float | None = None) -> StraightRu
     speed: a ship that has lost speed in a turn or in weather. Raises InputError if the
     model has no straight course within physical drift and rudder angles.
     """
+    service = model.particulars["speed"]
+    unknowns = [name for name in BALANCED_BY if name in model.state_names]
     found = None
-    if speed is None:
-        found = _balance(
-            model, [name for name in BALANCED_BY if name in model.state_names]
-        )
-    if found is None or not SLOWEST < found["u"] / model.particulars["speed"] < FASTEST:
-        others = [
-            name for name in BALANCED_BY if name in model.state_names and name != "u"
-        ]
-        found = _balance(model, others, speed)
+    if speed is None and _feels_speed(model):
+        found = _balance(model, unknowns)
+    # where surge is not to be believed, the speed is kept
+    if found is None or not 0.75 < found["u"] / service < 1.25:
+        kept = [name for name in unknowns if name != "u"]
+        found = _balance(model, kept, speed)
     if found is None:
-        held = speed or model.particulars["speed"]
         raise InputError(
-            f"model {model.name!r}: no straight course found with less than "
-            f"{np.degrees(LARGEST_RUDDER):.0f} deg of rudder at {held:g} m/s; identify "
-            "it from trials that turn to both sides, or check the sign of the rudder"
+            f"model {model.name!r}: expected a straight course with less than"
+            f" {np.degrees(LARGEST_RUDDER):.0f} deg of rudder at"
+            f" {speed or service:g} m/s, got none; identify it from trials that turn to"
+            " both sides, or check the sign of the rudder"
         )
-    rest = (found.get(name, 0.0) for name in ("phi", "n", "q"))
-    return StraightRunning(found["u"], found["v"], found["delta"], *rest)
+    return StraightRunning(
+        surge=found["u"],
+        sway=found["v"],
+        rudder=found["delta"],
+        heel=found.get("phi", 0.0),
+        shaft_speed=found.get("n", 0.0),
+        memory=found.get("q", 0.0),
+    )
 
 
 def steady_turn_rudder(
     model: ShipModel, rate: float, slowed: bool = True
 ) -> float | None:
-    """Rudder angle, rad, of the steady turn at a yaw rate, rad/s; None if none is found.
+    """Rudder angle, rad, of the steady turn at a yaw rate, rad/s; None if not found.
 
     `slowed`: whether the ship loses speed as her surge equation has it, or keeps that
     of service.
     """
-    unknowns = [
-        name
-        for name in BALANCED_BY
-        if name in model.state_names and (slowed or name != "u")
-    ]
-    found = _balance(model, unknowns, rate=rate, drift=1.0)
-    return found["delta"] if found is not None and found.get("u", 1.0) > 0.0 else None
+    unknowns = [name for name in BALANCED_BY if name in model.state_names]
+    if not slowed:
+        unknowns.remove("u")
+    found = _balance(model, unknowns, rate=rate, largest_sway=1.0)
+    if found is None or found["u"] <= 0.0:
+        return None
+    return found["delta"]
+
+
+def _feels_speed(model: ShipModel) -> bool:
+    """True where surge depends on the speed, so that there is a steady one."""
+    service = dict(zip(model.state_names, model.service_state.tolist(), strict=True))
+    slower = service | {"u": 0.9 * service["u"]}
+    return _prime_rates(model, slower)["u"] != _prime_rates(model, service)["u"]
 
 
 def _balance(
@@ -135,67 +138,63 @@ def _balance(
     unknowns: list[str],
     speed: float | None = None,
     rate: float = 0.0,
-    drift: float = LARGEST_SWAY,
+    largest_sway: float = 0.5,
 ) -> dict[str, float] | None:
-    """State without accelerations at a yaw rate, found from a speed by changing the unknowns; SI units.
+    """State without accelerations at a yaw rate, found from a speed; SI units.
 
-    `drift`: largest sway over service speed; a state in a turn may have more rudder
-    than straight running.
+    `largest_sway`: over service speed; a state in a turn may have more rudder than
+    straight running.
     """
     from scipy.optimize import root
 
-    columns = [model.state_names.index(name) for name in unknowns]
-    balances = [model.state_names.index(BALANCED_BY[name]) for name in unknowns]
-    scales = _scales(model)
+    first = dict(zip(model.state_names, model.service_state.tolist(), strict=True))
+    first["r"] = rate
+    if speed is not None:
+        first["u"] = speed
+    units = _units(model)
 
-    def state_with(deviations: Floats) -> Floats:
-        state = model.service_state.copy()
-        if speed is not None and "u" in model.state_names:
-            state[model.state_names.index("u")] = speed
-        state[model.state_names.index("r")] = rate
-        state[columns] += deviations * scales[columns]
-        return state
+    def state_with(deviations: Floats) -> dict[str, float]:
+        changes = zip(unknowns, deviations.tolist(), strict=True)
+        return first | {name: first[name] + units[name] * by for name, by in changes}
 
     def imbalance(deviations: Floats) -> Floats:
-        return _rates(model, state_with(deviations))[balances]
+        rates = _prime_rates(model, state_with(deviations))
+        return np.array([rates[BALANCED_BY[name]] for name in unknowns])
 
-    found = root(imbalance, np.zeros(len(unknowns)), tol=1e-12)
-    state = dict(zip(model.state_names, state_with(found.x).tolist(), strict=True))
-    at_rest = bool(np.all(np.abs(imbalance(found.x)) < AT_REST))
-    small = abs(state["v"]) < drift * model.particulars["speed"]
-    return (
-        state
-        if at_rest and small and (rate or abs(state["delta"]) < LARGEST_RUDDER)
-        else None
-    )
+    solution = root(imbalance, np.zeros(len(unknowns)), tol=1e-12).x
+    state = state_with(solution)
+    at_rest = np.all(np.abs(imbalance(solution)) < 1e-8)
+    drifts_little = abs(state["v"]) < largest_sway * model.particulars["speed"]
+    steers_little = rate != 0.0 or abs(state["delta"]) < LARGEST_RUDDER
+    return state if at_rest and drifts_little and steers_little else None
 
 
-def _scales(model: ShipModel) -> Floats:
-    """Unit of each state in the prime system (the shaft's: its service speed), shape (n_state,)."""
-    length, speed = model.particulars["length"], model.particulars["speed"]
-    units = {
+def _units(model: ShipModel) -> dict[str, float]:
+    """Unit of each state in the prime system; that of a shaft is its service speed."""
+    speed = model.particulars["speed"]
+    turn_rate = speed / model.particulars["length"]
+    prime = {
         "u": speed,
         "v": speed,
-        "r": speed / length,
-        "p": speed / length,
-        "q": (speed / length) ** 2,
+        "r": turn_rate,
+        "p": turn_rate,
+        "q": turn_rate**2,
         "n": model.service_shaft_speed or 1.0,
     }
-    return np.array([units.get(name, 1.0) for name in model.state_names])
+    return {name: prime.get(name, 1.0) for name in model.state_names}
 
 
-def _rates(model: ShipModel, states: Floats) -> Floats:
-    """Prime time derivatives of states (..., n_state), the rudder held and the shaft at service speed."""
-    commands = np.broadcast_to(
-        model.service_command, (*states.shape[:-1], len(model.command_names))
-    ).copy()
-    rudder = states[..., model.state_names.index("delta")]
-    commands[..., 0] = np.clip(
-        rudder, -0.5 * np.pi, 0.5 * np.pi
-    )  # a search may go beyond any rudder
-    return np.asarray(
-        model.derivatives(states, commands) * model.travel_time / _scales(model)
-    )
+def _prime_rates(model: ShipModel, state: dict[str, float]) -> dict[str, float]:
+    """Accelerations by name at a state, prime system, shaft as in service."""
+    at = {"n": model.service_shaft_speed} | state
+    channels = {name: np.array([value]) for name, value in at.items()}
+    units = _units(model)
+    accelerations = model.accelerations(channels)
+    rates = {}
+    for name, (rate,) in accelerations.items():
+        unit = units[name] / model.travel_time
+        rates[name] = float(rate) / unit
+    return rates
 
 
 def linearise(
@@ -212,26 +211,68 @@ def linearise(
     deviations in SI units, delta positive to starboard. In a table with a memory q of
     yaw, whose ship does not drift, q stands in place of v.
     """
-    first = "q" if "q" in model.state_names else "v"
-    names = (first, "r", *(name for name in ("p", "phi") if name in model.state_names))
-    varied = [model.state_names.index(name) for name in (*names, "delta")]
-    n = len(names)
-    scales = _scales(model)
-    signs = side * np.array([-1.0] + n * [1.0]) if side else np.ones(n + 1)
-    steps = np.zeros((n + 1, len(scales)))
-    steps[range(n + 1), varied] = STEP * signs * scales[varied]
-    state = at.state(model)
-    behind = np.tile(state, (n + 1, 1)) if side else state - steps
-    change = (_rates(model, state + steps) - _rates(model, behind))[:, varied[:n]]
-    jacobian = change.T / (STEP * signs * (1.0 if side else 2.0))
-    if n > 2:
-        follows = np.linalg.solve(jacobian[2:, 2:n], jacobian[2:][:, [0, 1, n]])
-        jacobian = jacobian[:2][:, [0, 1, n]] - jacobian[:2, 2:n] @ follows
-    units = scales[varied[:2]]
-    per_time = model.particulars["speed"] / model.particulars["length"]
-    A = per_time * units[:, None] * jacobian[:, :2] / units
-    B = per_time * units[:, None] * jacobian[:, 2:]
+    sway = "q" if "q" in model.state_names else "v"
+    roll: list[str] = [name for name in ("p", "phi") if name in model.state_names]
+    jacobian = _jacobian(model, at, [sway, "r", *roll], side)
+    to = [sway, "r"]
+    by = [sway, "r", "delta"]
+    steering = _block(jacobian, to, by)
+    if roll:
+        # roll is balanced, 0 = R_s s + R_p p, where s is (v, r, delta): p = -R_p^-1 R_s s
+        R_s = _block(jacobian, roll, by)
+        R_p = _block(jacobian, roll, roll)
+        by_roll = _block(jacobian, to, roll)
+        steering -= by_roll @ np.linalg.solve(R_p, R_s)
+
+    all_units = _units(model)
+    units = np.array([all_units[name] for name in to])
+    rates = steering * units[:, None] / model.travel_time
+    A = rates[:, :2] / units
+    B = rates[:, 2:]
     return A, B
+
+
+def _jacobian(
+    model: ShipModel, at: StraightRunning, rates: list[str], side: int
+) -> dict[tuple[str, str], float]:
+    """Derivatives of rates by states and rudder, prime system, by the names of both.
+
+    By central differences, or by one-sided ones to starboard (1) or port (-1).
+    """
+    size = 1e-4  # prime system; the error of central differences is its square
+    units = _units(model)
+    values = at.state(model).tolist()
+    state = dict(zip(model.state_names, values, strict=True))
+
+    def rates_off(name: str, step: float) -> dict[str, float]:
+        varied = state[name] + step * units[name]
+        off = state | {name: varied}
+        found = _prime_rates(model, off)
+        if "p" in found:
+            found["phi"] = off["p"] / units["p"]
+        return found
+
+    jacobian = {}
+    for name in (*rates, "delta"):
+        step = size
+        if side:  # a ship turns to starboard as she drifts to port
+            step = -size * side if name == rates[0] else size * side
+        ahead = rates_off(name, step)
+        behind = rates_off(name, 0.0 if side else -step)
+        width = step if side else 2.0 * step
+        for rate in rates:
+            jacobian[rate, name] = (ahead[rate] - behind[rate]) / width
+    return jacobian
+
+
+def _block(
+    jacobian: dict[tuple[str, str], float], rates: list[str], by: list[str]
+) -> Floats:
+    """Entries of a Jacobian as a matrix, a row a rate."""
+    matrix = np.empty((len(rates), len(by)))
+    for row, rate in zip(matrix, rates, strict=True):
+        row[:] = [jacobian[rate, name] for name in by]
+    return matrix
 
 
 def steering_state_space(
@@ -246,23 +287,31 @@ def steering_state_space(
 
 
 def nomoto_of(A: Floats, B: Floats) -> Nomoto:
-    """Nomoto's form of d/dt (v, r) = A (v, r) + B delta (Fossen 2011, equations 7.40 to 7.44).
+    """Nomoto's form of d/dt (v, r) = A (v, r) + B delta (Fossen 2011, 7.40 to 7.44).
 
     Raises InputError if a steady rudder does not turn the ship.
     """
-    determinant, trace = float(np.linalg.det(A)), float(np.trace(A))
+    determinant = float(np.linalg.det(A))
+    trace = float(np.trace(A))
+    # r / delta = (b_2 s + numerator) / (s^2 - trace s + determinant)
     numerator = float(A[1, 0] * B[0, 0] - A[0, 0] * B[1, 0])
     if numerator == 0.0 or determinant == 0.0:
         raise InputError(
-            "nomoto: the rudder has no steady effect on the ship, or the ship no"
-            " damping"
+            "nomoto: expected a ship with damping, whose rudder has a steady effect, got"
+            " none"
         )
+    time_constants = [np.nan, np.nan]
     poles = np.linalg.eigvals(A)
-    time_constants = -1.0 / poles if np.all(np.isreal(poles)) else np.full(2, np.nan)
-    T1, T2 = sorted(np.real(time_constants).tolist(), key=abs, reverse=True)
+    if np.all(np.isreal(poles)):
+        time_constants = (-1.0 / poles.real).tolist()
+    T1, T2 = sorted(time_constants, key=abs, reverse=True)
     T3 = float(B[1, 0]) / numerator
     return Nomoto(
-        K=numerator / determinant, T1=T1, T2=T2, T3=T3, T=-trace / determinant - T3
+        K=numerator / determinant,
+        T1=T1,
+        T2=T2,
+        T3=T3,
+        T=-trace / determinant - T3,
     )
 
 
@@ -275,7 +324,7 @@ def nomoto(model: ShipModel) -> Nomoto:
 
 
 def is_course_stable(model: ShipModel) -> bool:
-    """Whether the ship, with the rudder fixed, comes back to a straight course after a disturbance.
+    """True where the ship, rudder fixed, returns to a straight course.
 
     Raises InputError if the model has no straight course.
     """
@@ -296,17 +345,17 @@ class StraightLineStability:
 
     @property
     def index(self) -> float:
-        """Largest real part of the eigenvalues of either side, 1/s: negative for a stable ship."""
+        """Largest real part of either side's eigenvalues, 1/s: negative if stable."""
         return max(values[0].real for values in self.eigenvalues.values())
 
     @property
     def stable(self) -> bool:
-        """Whether a disturbance to either side dies out."""
+        """True where a disturbance to either side dies out."""
         return self.index < 0.0
 
     @property
     def unstable_sides(self) -> tuple[str, ...]:
-        """Sides to which the ship leaves her course by herself."""
+        """Sides to which the ship leaves its course by itself."""
         return tuple(
             side
             for side, values in self.eigenvalues.items()
@@ -315,40 +364,39 @@ class StraightLineStability:
 
 
 def straight_line_stability(model: ShipModel) -> StraightLineStability:
-    """Straight-line stability of a ship about straight running, rudder, speed and shaft fixed, roll balanced.
+    """Straight-line stability with rudder, speed and shaft fixed and roll balanced.
 
     The criterion is the determinant of the linear derivatives of force, which is that
     of the inertia times that of the linearised accelerations; the inertia is positive,
     so both tell the same. Raises InputError if the model has no straight course.
     """
     at = straight_running(model)
-    matrices = {name: linearise(model, at, side)[0] for name, side in SIDES.items()}
-    eigenvalues = {
-        name: tuple(
-            sorted(
-                np.linalg.eigvals(A).tolist(), key=lambda value: -complex(value).real
-            )
-        )
-        for name, A in matrices.items()
-    }
+    matrices = {}
+    eigenvalues = {}
+    for name, side in SIDES.items():
+        A, _ = linearise(model, at, side)
+        values: list[complex] = np.linalg.eigvals(A).tolist()
+        values.sort(key=lambda value: -complex(value).real)
+        matrices[name] = A
+        eigenvalues[name] = tuple(values)
     return StraightLineStability(eigenvalues, _criterion(model, matrices))
 
 
 def _criterion(
     model: ShipModel, matrices: dict[str, Floats]
 ) -> dict[str, float] | None:
-    """Determinant of the force derivatives of sway and yaw, prime system; None without sway or mass."""
+    """Determinant of the force derivatives, prime system; None without sway or mass."""
     if "q" in model.state_names:
         return None
     try:
         M = inertia(model)[1:, 1:3]
         p = model.particulars.completed()
-        unit = 0.5 * p.require("water_density") * p.length**3
+        mass_unit = 0.5 * p.require("water_density") * p.length**3
     except InputError:
         return None
-    length, speed = p.length, model.particulars["speed"]
-    size = unit**2 * length**2 * (speed / length) ** 2
-    return {
-        name: float(np.linalg.det(M) * np.linalg.det(A) / size)
-        for name, A in matrices.items()
-    }
+    unit = (mass_unit * model.particulars["speed"]) ** 2
+    criterion = {}
+    for name, A in matrices.items():
+        forces = np.linalg.det(M) * np.linalg.det(A)
+        criterion[name] = float(forces / unit)
+    return criterion

@@ -1,40 +1,37 @@
-"""The equations of motion of one ship with her numbers: what every simulation is made from."""
+"""Equations of motion of one ship and their numbers, as simulations need them."""
+
+from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_number
+from shipgym.checks import check_number, quoted
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.motion import Ship
 from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
-from shipgym.ships.equations import ShipEquations
+from shipgym.ships.orders import check_units, two_commands
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import (
-    PRINTED,
-    SHIPPED_EQUATIONS,
-    get_dynamics,
-    get_structure,
-)
+from shipgym.ships.structures import get_dynamics, get_structure
 from shipgym.ships.term_table import Structure
 
-FORMAT = 1  # of model files
-FASTEST_SHAFT = (
-    5.0  # times the shaft speed at service speed; beyond it stands in other units
-)
+if TYPE_CHECKING:  # most models have a table of terms
+    from shipgym.ships.equations import ShipEquations
+
+MODEL_FORMAT = 1  # of model files
 
 
 @dataclass(frozen=True, eq=False)
 class ManoeuvringModel:
-    """A ship's structure and coefficients, their uncertainty and envelope; fields as in `ShipModel`."""
+    """Structure and coefficients of a ship, with uncertainty and envelope; see `ShipModel`."""
 
     name: str
     structure: str
@@ -44,105 +41,73 @@ class ManoeuvringModel:
     covariance: Floats | None = None
     envelope: Envelope | None = None
     provenance: dict[str, Any] | None = None
-    own_table: Structure | ShipEquations | None = None
+    # by default, and for a copy with another structure, what is registered under its name
+    dynamics: Structure | ShipEquations = None  # type: ignore[assignment]
     service_shaft_speed: float = 0.0
 
     def __post_init__(self) -> None:
-        if (
-            self.own_table is None
-            and self.structure not in PRINTED | SHIPPED_EQUATIONS.keys()
-        ):
-            # another process lacks what is registered
-            object.__setattr__(self, "own_table", get_dynamics(self.structure))
         self.particulars.require("speed")
+        if self.dynamics is None or self.dynamics.name != self.structure:
+            object.__setattr__(self, "dynamics", get_dynamics(self.structure))
         names = self.dynamics.coefficient_names
-        missing = [name for name in names if name not in self.coefficients]
-        unknown = [name for name in self.coefficients if name not in names]
-        if missing or unknown:
+        if self.coefficients.keys() != set(names):
+            raise _other_coefficients(self.name, names, self.coefficients)
+        coefficients = {}
+        for name in names:
+            value = self.coefficients[name]
+            coefficients[name] = check_number(value, f"coefficients.{name}")
+        object.__setattr__(self, "coefficients", coefficients)
+        shaft = self.service_shaft_speed
+        if self.dynamics.scales and "n" in self.command_names and not shaft > 0:
             raise InputError(
-                f"coefficients of {self.name!r}: structure {self.structure!r} has"
-                f" {len(names)}; missing: {', '.join(missing) or 'none'}; unknown:"
-                f" {', '.join(unknown) or 'none'}"
+                f"service_shaft_speed of {self.name!r}: expected that at service speed"
+                f" in 1/s, because structure {self.structure!r} has a shaft speed, got"
+                f" {shaft:g}"
             )
-        ordered = {name: float(self.coefficients[name]) for name in names}
-        for name, value in ordered.items():
-            if not np.isfinite(value):
-                raise InputError(
-                    f"coefficients of {self.name!r}: {name} is {value}, expected a"
-                    " number"
-                )
-        object.__setattr__(self, "coefficients", ordered)
-        if (
-            self.dynamics.scales
-            and "n" in self.command_names
-            and not self.service_shaft_speed > 0
-        ):
+        square = (len(names), len(names))
+        if self.covariance is not None and self.covariance.shape != square:
             raise InputError(
-                f"service_shaft_speed of {self.name!r}: {self.service_shaft_speed:g}"
-                " found, expected that at service speed in 1/s: structure"
-                f" {self.structure!r} has a shaft speed"
-            )
-        if self.covariance is not None and self.covariance.shape != (
-            len(names),
-            len(names),
-        ):
-            raise InputError(
-                f"covariance of {self.name!r}: shape {self.covariance.shape}, expected"
-                f" ({len(names)}, {len(names)}), one row and column a coefficient"
+                f"covariance of {self.name!r}: expected shape {square}, one row and"
+                f" column a coefficient, got {self.covariance.shape}"
             )
 
     @property
     def table(self) -> Structure:
-        """The table of terms of its structure; InputError for a ship with equations written by hand."""
-        dynamics = self.dynamics
-        return (
-            dynamics
-            if isinstance(dynamics, Structure)
-            else get_structure(self.structure)
-        )
+        """Table of terms of the structure; InputError for equations written by hand."""
+        if isinstance(self.dynamics, Structure):
+            return self.dynamics
+        return get_structure(self.structure)  # which refuses her
 
-    @property
-    def dynamics(self) -> Structure | ShipEquations:
-        """The table of terms, or the equations of a ship that has her own."""
-        return (
-            get_dynamics(self.structure) if self.own_table is None else self.own_table
-        )
+    # ---- coefficients ----------------------------------------------------------------
 
     @property
     def acceleration_matrix(self) -> Floats:
-        """From the coefficients to those of the accelerations, as `Structure.acceleration_matrix`."""
+        """Matrix from coefficients to accelerations, as `Structure.acceleration_matrix`."""
         return self.table.acceleration_matrix(
             self.particulars, self.service_shaft_speed
         )
 
     def with_coefficients(self, values: Floats) -> Self:
-        """A copy with other coefficients, in their order, shape (n_coefficients,)."""
-        return replace(
-            self,
-            coefficients=dict(zip(self.coefficients, values.tolist(), strict=True)),
-        )
+        """Copy with other coefficients, in their order, shape (n_coefficients,)."""
+        coefficients = dict(zip(self.coefficients, values.tolist(), strict=True))
+        return replace(self, coefficients=coefficients)
 
     def with_accelerations(self, coefficients: Mapping[str, Floats]) -> Self:
-        """A copy with the coefficients that follow from those of each regression on accelerations, SI."""
+        """Copy with coefficients that follow from each regression on accelerations, SI."""
         stacked = np.concatenate([coefficients[q] for q in self.table.regressed])
-        return self.with_coefficients(
-            np.linalg.solve(self.acceleration_matrix, stacked)
-        )
+        values = np.linalg.solve(self.acceleration_matrix, stacked)
+        return self.with_coefficients(values)
 
-    @property
-    def travel_time(self) -> float:
-        """Time to travel one ship length at service speed, s."""
-        return float(self.particulars["length"] / self.particulars["speed"])
+    # ---- what simulations are made of ------------------------------------------------
 
     @property
     def vessel(self) -> Vessel:
-        """What is compiled of the ship: one for all models that differ in numbers only."""
-        return self.dynamics.vessel(
-            self.coefficients, self.steering.time_constant > 0.0
-        )
+        """Functions and records to compile, shared by models that differ in numbers only."""
+        lag = self.steering.time_constant > 0.0
+        return self.dynamics.vessel(self.coefficients, lag)
 
     def ship_numbers(self, water_depth: float = np.inf, step: float = 0.0) -> Floats:
-        """What her vessel reads of the ship, in the order of `vessel.layout`: `Ship`, then coefficients.
+        """Numbers that `vessel` reads, in the order of its layout: `Ship`, then coefficients.
 
         `step`, s, is that of her simulation, which a lag of her steering gear has to be
         long enough for.
@@ -150,19 +115,21 @@ class ManoeuvringModel:
         Raises InputError for water that is too shallow, and for particulars that the
         structure cannot use.
         """
-        self.check_depth(water_depth)
-        of, kept = tuple(self.coefficients.values()), self._numbers
-        if of not in kept:
-            own = self.dynamics.numbers(
+        if water_depth != np.inf:
+            self.check_depth(water_depth)
+        values = tuple(self.coefficients.values())
+        if values not in self._numbers:
+            self._numbers.clear()
+            self._numbers[values] = self.dynamics.numbers(
                 self.coefficients, self.particulars, self.service_shaft_speed
             )
-            kept.clear()
-            kept[of] = own
-        return np.concatenate([ship_of(self, water_depth, step), kept[of]])
+        ship = ship_of(self, water_depth, step)
+        return np.concatenate([ship, self._numbers[values]])
 
     @cached_property
     def _numbers(self) -> dict[tuple[float, ...], Floats]:
-        return {}  # by the coefficients that they were made of
+        """Last numbers of the dynamics, by the coefficients that they were made of."""
+        return {}
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -176,12 +143,17 @@ class ManoeuvringModel:
 
     @property
     def turns_astern(self) -> bool:
-        """Whether the shaft may turn astern: a table of terms is taken at its word."""
+        """True where the shaft may turn astern."""
         return self.dynamics.astern
+
+    @property
+    def travel_time(self) -> float:
+        """Time to travel one ship length at service speed, s."""
+        return float(self.particulars["length"] / self.particulars["speed"])
 
     @cached_property
     def service_state(self) -> Floats:
-        """Straight ahead north at service speed with the rudder amidships, shape (n_state,)."""
+        """State straight ahead north at service speed, rudder amidships; shape (n_state,)."""
         values = {"u": self.particulars["speed"], "n": self.service_shaft_speed}
         return np.array([values.get(name, 0.0) for name in self.state_names])
 
@@ -189,6 +161,8 @@ class ManoeuvringModel:
     def service_command(self) -> Floats:
         """Rudder amidships and shaft at service speed, shape (n_command,)."""
         return np.array([0.0, self.service_shaft_speed])[: len(self.command_names)]
+
+    # ---- rates of change -------------------------------------------------------------
 
     def derivatives(
         self, state: ArrayLike, command: ArrayLike, water_depth: float = np.inf
@@ -212,169 +186,126 @@ class ManoeuvringModel:
         self.check_depth(float(depth.min()))
         states = _with_last_axis("state", state, self.state_names)
         commands = _with_last_axis("command", command, self.command_names)
-        if not np.all(np.isfinite(states)):
-            raise InputError(
-                f"state: {states[~np.isfinite(states)][0]} found, expected finite"
-                " numbers"
-            )
-        check_units(self, commands.reshape(-1, len(self.command_names)), "command")
-        shape = np.broadcast_shapes(states.shape[:-1], commands.shape[:-1], depth.shape)
-        flat = np.array(np.broadcast_to(states, (*shape, states.shape[-1]))).reshape(
-            -1, states.shape[-1]
-        )
-        flat_commands = np.broadcast_to(commands, (*shape, commands.shape[-1])).reshape(
-            len(flat), -1
-        )
-        depths = np.array(np.broadcast_to(depth, shape)).reshape(-1)
-        out = np.empty_like(flat)
+        wrong = states[~np.isfinite(states)]
+        if wrong.size:
+            raise InputError(f"state: expected finite numbers, got {wrong[0]}")
+
+        # one row for each state
+        leading = states.shape[:-1], commands.shape[:-1], depth.shape
+        shape = np.broadcast_shapes(*leading)
+        rows = _rows(states, shape)
+        orders = _rows(commands, shape)
+        check_units(self, orders, "command")
+        depths = _rows(depth[..., None], shape)[:, 0].copy()
+
+        rates = np.empty_like(rows)
         loop = ship_loop(self.vessel, "derivatives")
-        loop(flat, two_commands(flat_commands), depths, self.ship_numbers(), out)
-        return out.reshape(*shape, len(self.state_names))
+        loop(rows, two_commands(orders), depths, self.ship_numbers(), rates)
+        return rates.reshape(*shape, len(self.state_names))
 
     def rates(
         self, channels: Mapping[str, Floats], water_depth: float = np.inf
     ) -> dict[str, Floats]:
-        """`derivatives` by name at channels of shape (n_samples,); a state that is absent is 0."""
+        """`derivatives` by name at channels of shape (n_samples,); absent states are 0."""
         none = np.zeros(len(channels["u"]))
-        states = np.stack(
-            [channels.get(name, none) for name in self.state_names], axis=-1
+        states = [channels.get(name, none) for name in self.state_names]
+        commands = [channels[name] for name in self.command_names]
+        derivatives = self.derivatives(
+            np.stack(states, axis=-1),
+            np.stack(commands, axis=-1),
+            water_depth,
         )
-        commands = np.stack([channels[name] for name in self.command_names], axis=-1)
-        return dict(
-            zip(
-                self.state_names,
-                self.derivatives(states, commands, water_depth).T,
-                strict=True,
-            )
+        return dict(zip(self.state_names, derivatives.T, strict=True))
+
+    def accelerations(
+        self, channels: Mapping[str, Floats], water_depth: float = np.inf
+    ) -> dict[str, Floats]:
+        """Accelerations at a few samples, as `derivatives` has them, without compiling.
+
+        The channels are the states by name, each of shape (n_samples,), in SI units; a
+        state that is absent is 0. Returns the accelerations of `u`, `v`, `r`, and of
+        `p`, of the memory `q` and of a shaft `n` with dynamics (ordered to turn as in
+        service) where the model has them, each of shape (n_samples,).
+        """
+        none = np.zeros(len(channels["u"]))
+        complete = dict.fromkeys((*self.state_names, *self.command_names), none)
+        complete |= channels
+        ship = ship_of(self, water_depth)
+        found = self.dynamics.accelerations_at(
+            complete, self.coefficients, self.particulars, ship
         )
+        return {q: found.get(q, none) for q in "uvrpqn" if q in self.state_names}
+
+    # ---- model file ------------------------------------------------------------------
 
     def to_dict(self) -> dict[str, Any]:
-        """What a model file holds, ready for JSON (format in `shipgym.ships.model_file`)."""
+        """Content of a model file, ready for JSON (see `shipgym.ships.model_file`)."""
+        covariance, envelope = self.covariance, self.envelope
         return {
-            "format": FORMAT,
+            "format": MODEL_FORMAT,
             "name": self.name,
             "structure": self.dynamics.to_dict(),
             "normalisation": self.dynamics.normalisation,
             "coefficients": self.coefficients,
-            "covariance": None if self.covariance is None else self.covariance.tolist(),
+            "covariance": None if covariance is None else covariance.tolist(),
             "particulars": self.particulars.to_dict(),
             "steering": self.steering.to_dict(),
             "service_shaft_speed": self.service_shaft_speed,
-            "envelope": None if self.envelope is None else self.envelope.to_dict(),
+            "envelope": None if envelope is None else envelope.to_dict(),
             "provenance": self.provenance,
         }
 
     def check_depth(self, water_depth: float) -> None:
-        """InputError for water that is too shallow, or shallow water and a ship that knows none."""
+        """Refuse water that is too shallow, or shallow water for a model that has none."""
         if water_depth == np.inf:
             return
-        check_number(
-            water_depth, "water_depth", above=0.0, hint="in m, or inf for deep water"
-        )
+        hint = "in m, or inf for deep water"
+        check_number(water_depth, "water_depth", above=0.0, hint=hint)
         if not self.dynamics.shallow_water:
             raise InputError(
-                f"water_depth: {water_depth:g} m found, but {self.name!r} is a"
-                " deep-water model; leave it out"
+                f"water_depth: expected none, because {self.name!r} is a deep-water"
+                f" model, got {water_depth:g} m; leave it out"
             )
         draught = self.particulars["draught"]
         if not water_depth > draught:
             raise InputError(
-                f"water_depth: {water_depth:g} m found, expected more than the draught"
-                f" of {draught:g} m"
+                f"water_depth: expected more than the draught of {draught:g} m, got"
+                f" {water_depth:g} m"
             )
+
+
+def _other_coefficients(
+    model: str, names: tuple[str, ...], coefficients: Mapping[str, float]
+) -> InputError:
+    missing = quoted(name for name in names if name not in coefficients)
+    unknown = quoted(name for name in coefficients if name not in names)
+    return InputError(
+        f"coefficients of {model!r}: expected the {len(names)} of its structure;"
+        f" missing: {missing}; unknown: {unknown}"
+    )
 
 
 def _with_last_axis(argument: str, given: ArrayLike, names: tuple[str, ...]) -> Floats:
     array = np.asarray(given, dtype=float)
     if array.ndim == 0 or array.shape[-1] != len(names):
         raise InputError(
-            f"{argument}: shape {array.shape} found, expected (..., {len(names)}) for"
-            f" {', '.join(names)}"
+            f"{argument}: expected shape (..., {len(names)}) for {', '.join(names)}, got"
+            f" {array.shape}"
         )
     return array
 
 
-def two_commands(commands: Floats) -> Floats:
-    """Rudder and shaft speed as loops take them, shape (n, 2); a ship without shaft has speed 0."""
-    two = np.zeros((len(commands), 2))
-    two[:, : commands.shape[1]] = commands
-    return two
-
-
-def checked_orders(model: ManoeuvringModel, commands: ArrayLike) -> Floats:
-    """Orders of shape (n_steps, n_command), within what a rudder and a shaft can be asked for.
-
-    A rudder ordered beyond its limit is brought to the limit, as its gear would do;
-    beyond a right angle it was meant in other units. InputError names the first row out
-    of range.
-    """
-    orders = np.asarray(commands, dtype=float)
-    names = model.command_names
-    if orders.ndim != 2 or orders.shape[1] != len(names) or len(orders) < 2:
-        raise InputError(
-            f"commands: shape {orders.shape} found, expected (n_steps, {len(names)})"
-            f" for {', '.join(names)}, with at least 2 steps"
-        )
-    check_units(model, orders)
-    if "n" in names and not model.turns_astern:
-        expected = (
-            f"a number >= 0: the equations of {model.name!r} hold for a shaft turning"
-            " ahead only"
-        )
-        _within(
-            orders[:, names.index("n")],
-            0.0,
-            np.inf,
-            "shaft speed",
-            expected,
-            "commands",
-        )
-    return orders
-
-
-def check_units(
-    model: ManoeuvringModel, orders: Floats, where: str = "commands"
-) -> None:
-    """InputError for orders of shape (n, n_command) that are not finite or not in rad and 1/s."""
-    names = model.command_names
-    if not np.all(np.isfinite(orders)):
-        raise InputError(
-            f"{where}: row {int(np.argwhere(~np.isfinite(orders))[0, 0])} is not finite"
-        )
-    if "delta" in names:
-        rudder = orders[:, names.index("delta")]
-        _within(
-            rudder,
-            -np.pi / 2,
-            np.pi / 2,
-            "rudder",
-            "rad (not degrees) between -pi/2 and pi/2",
-            where,
-        )
-    if "n" in names:
-        most = FASTEST_SHAFT * model.service_shaft_speed
-        expected = (
-            f"1/s (not rpm) between {-most if model.turns_astern else 0.0:.4g} and"
-            f" {most:.4g}; {model.service_shaft_speed:.4g} at service speed"
-        )
-        _within(
-            orders[:, names.index("n")], -most, most, "shaft speed", expected, where
-        )
-
-
-def _within(
-    values: Floats, low: float, high: float, what: str, expected: str, where: str
-) -> None:
-    for row in np.flatnonzero((values < low) | (values > high))[:1]:
-        raise InputError(
-            f"{where}: row {row}: {what} {values[row]:g} found, expected {expected}"
-        )
+def _rows(array: Floats, shape: tuple[int, ...]) -> Floats:
+    """Rows of an array broadcast to a shape in front of its last axis."""
+    width = array.shape[-1]
+    repeated = np.broadcast_to(array, (*shape, width))
+    return np.array(repeated).reshape(-1, width)
 
 
 def ship_of(
     model: ManoeuvringModel, water_depth: float = np.inf, step: float = 0.0
 ) -> Ship:
-    """What every ship has beside her coefficients, as a record, for simulations in steps of some seconds."""
+    """Record of the numbers that every ship has besides its coefficients."""
     gear, p = model.steering, model.particulars
     return Ship(
         length=p["length"],

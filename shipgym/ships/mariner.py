@@ -11,14 +11,16 @@ is m', and so on.
 
 from math import sqrt
 
+from shipgym.constants import SEA_WATER
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import get_structure
 
-LENGTH = 160.93
-WATER_DENSITY = 1025.0
-MASS, INERTIA, XG = 798e-5, 39.2e-5, -0.023  # prime system, inertia about midship
+LENGTH = 160.93  # m
+# prime system, about midship
+MASS = 798e-5
+INERTIA = 39.2e-5
+XG = -0.023
 
 X = {
     "u": -184,
@@ -70,21 +72,21 @@ N = {
 
 def mariner(service_speed: float = 7.7175) -> ShipModel:
     """The Mariner class reference ship, expanded about a service speed U0 in m/s."""
-    coefficients = {
-        f"{force}_{term}": value * 1e-5 * (-1.0) ** term.count("d")
-        for force, table in (("X", X), ("Y", Y), ("N", N))
-        for term, value in table.items()
-    }
+    coefficients = {}
+    for force, table in (("X", X), ("Y", Y), ("N", N)):
+        for term, value in table.items():
+            turned = (-1.0) ** term.count("d")
+            coefficients[f"{force}_{term}"] = value * 1e-5 * turned
     particulars = Particulars(
         name="Mariner class cargo ship",
         length=LENGTH,
         beam=23.17,
         draught=8.23,
-        mass=MASS * 0.5 * WATER_DENSITY * LENGTH**3,
+        mass=MASS * 0.5 * SEA_WATER * LENGTH**3,
         xg=XG * LENGTH,
         yaw_gyradius=LENGTH * sqrt(INERTIA / MASS - XG**2),
         speed=service_speed,
-        water_density=WATER_DENSITY,
+        water_density=SEA_WATER,
         X_udot=-42e-5,
         Y_vdot=-748e-5,
         Y_rdot=-9.354e-5,
@@ -98,10 +100,7 @@ def mariner(service_speed: float = 7.7175) -> ShipModel:
         steering=SteeringGear(
             rudder_limit_deg=40.0, rudder_rate_deg_s=5.0, time_constant=1.0
         ),
-        coefficients={
-            name: coefficients[name]
-            for name in get_structure("abkowitz").coefficient_names
-        },
+        coefficients=coefficients,
         provenance={
             "source": (
                 "Chislett & Strom-Tejsen 1965, in the form of the MSS toolbox (Fossen"

@@ -1,4 +1,4 @@
-"""The structure `mmg`: a ship by the MMG method in its general form, 3 degrees of freedom.
+"""Structure `mmg`: the MMG method in its general form, 3 degrees of freedom.
 
 Source: Yasukawa & Yoshimura 2015, Introduction of MMG standard method for ship
 maneuvering predictions, J. Mar. Sci. Technol. 20. Beyond it: a thrust factor, a helm
@@ -12,7 +12,7 @@ at any scale.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import copysign, fabs, pi, sqrt
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -22,15 +22,10 @@ from shipgym.engine.motion import Motion, Ship
 from shipgym.errors import InputError
 from shipgym.ships import kvlcc2
 from shipgym.ships.equations import ShipEquations, record_of
+from shipgym.ships.kvlcc2 import Mass, planar_accelerations
 from shipgym.ships.particulars import Particulars
 
 MMG = "mmg"
-KVLCC2 = kvlcc2.Coefficients()
-SLOWEST = 0.02  # of service speed, below which v' and r' lose their meaning
-LEAST_SPEED, MOST_SPEED = (
-    0.01,
-    4.0,
-)  # over service speed, for which the power law of the damping holds
 
 #: What the general form has beyond the standard method, with the values that make it
 #: the standard one.
@@ -98,7 +93,7 @@ KNOWN = ("t_P", "x_P", "x_R", "k_0", "k_1", "k_2", "nD_U0")
 def standard_form(
     model_coefficients: Mapping[str, float], speed: float, shaft: float
 ) -> dict[str, float]:
-    """Coefficients of the general form of a ship given in the standard form, as KVLCC2 is.
+    """Coefficients of the general form from those of the standard form, as KVLCC2 has.
 
     `speed`, m/s, and `shaft`, 1/s, are those at service. Raises InputError for the
     variant of shipmmg, whose wake has another law.
@@ -106,32 +101,31 @@ def standard_form(
     c = BEYOND | dict(model_coefficients)
     if c["PACKAGE_FORM"]:
         raise InputError(
-            "kvlcc2 in the form 'shipmmg' found, expected the published one: its wake"
+            "kvlcc2: expected the published form, got that of shipmmg, whose wake"
             " differs"
         )
-    for name, plus, minus in (
-        ("C_2", "C_2_starboard", "C_2_port"),
-        ("gamma_R", "gamma_plus", "gamma_minus"),
-    ):
-        c |= {
-            name: 0.5 * (c[plus] + c[minus]),
-            f"{name}_side": 0.5 * (c[plus] - c[minus]),
-        }
+    c["C_2"] = 0.5 * (c["C_2_starboard"] + c["C_2_port"])
+    c["C_2_side"] = 0.5 * (c["C_2_starboard"] - c["C_2_port"])
+    c["gamma_R"] = 0.5 * (c["gamma_plus"] + c["gamma_minus"])
+    c["gamma_R_side"] = 0.5 * (c["gamma_plus"] - c["gamma_minus"])
     c["nD_U0"] = shaft * c["D_P"] / speed
     return {name: c[name] for name in IDENTIFIED + KNOWN}
 
 
 def dimensions(p: Particulars) -> dict[str, float]:
-    """What the equations take from the particulars, SI units.
+    """Dimensions that the equations take from the particulars, SI units.
 
     Draught, volume, xG, yaw gyradius, D_P, A_R of all rudders, eta (diameter of the
     propeller by span of the rudder in its race) and number of propellers. A single
     rudder between two propellers stands in no race. Raises InputError for what is not
     known.
     """
-    rudders, propellers = p.rudders or 1.0, p.propellers or 1.0
-    D_P, A_R = p.require("propeller_diameter"), p.require("rudder_area")
+    rudders = p.rudders or 1.0
+    propellers = p.propellers or 1.0
+    D_P = p.require("propeller_diameter")
+    A_R = p.require("rudder_area")
     span = sqrt(p.require("rudder_aspect_ratio") * A_R / rudders)
+    eta = min(D_P / span, 1.0) if rudders >= propellers else 0.0
     return {
         "d": p.require("draught"),
         "volume": p.require("mass") / p.require("water_density"),
@@ -139,7 +133,7 @@ def dimensions(p: Particulars) -> dict[str, float]:
         "gyradius": p.require("yaw_gyradius"),
         "D_P": D_P,
         "A_R": A_R,
-        "eta": min(D_P / span, 1.0) if rudders >= propellers else 0.0,
+        "eta": eta,
         "propellers": propellers,
     }
 
@@ -148,121 +142,155 @@ def dimensions(p: Particulars) -> dict[str, float]:
 STANDARD = standard_form(kvlcc2.SHIP.coefficients, 1.179, 11.85159) | {
     "nD_U0": 2.171283
 }
+PUBLISHED = kvlcc2.Coefficients()
 PARTICULARS = replace(
-    kvlcc2.SHIP.particulars, rudder_aspect_ratio=KVLCC2.H_R**2 / KVLCC2.A_R
+    kvlcc2.SHIP.particulars, rudder_aspect_ratio=PUBLISHED.H_R**2 / PUBLISHED.A_R
 )
 Coefficients = record_of(STANDARD | dimensions(PARTICULARS), __name__)
 
 
+class Flow(NamedTuple):
+    """Water that flows at hull, propeller and rudder."""
+
+    U: float  # m/s, at least a little
+    v_: float  # sway by U
+    r_: float  # yaw rate by U / L
+    beta: float  # rad, drift angle
+    inflow: float  # m/s, at the propeller
+    K_T_nn: float  # thrust coefficient by (n D)^2
+
+
 def power_law(x: float, power: float) -> float:
-    """A speed by service speed to a power; its logarithm from the series of artanh at its eighth root."""
-    root = sqrt(sqrt(sqrt(min(max(x, LEAST_SPEED), MOST_SPEED))))
+    """Power of a speed by service speed, from the series of artanh at its eighth root."""
+    least, most = 0.01, 4.0  # for which the series is good enough
+    within = min(max(x, least), most)
+    root = sqrt(sqrt(sqrt(within)))
     z = (root - 1.0) / (root + 1.0)
     s = z * z
-    series = 1.0 + s * (
-        1 / 3
-        + s * (1 / 5 + s * (1 / 7 + s * (1 / 9 + s * (1 / 11 + s * (1 / 13 + s / 15)))))
-    )
+    # artanh(z) / z = 1 + s / 3 + s^2 / 5 + ... + s^7 / 15
+    series = 1.0 / 13.0 + s / 15.0
+    series = 1.0 / 11.0 + s * series
+    series = 1.0 / 9.0 + s * series
+    series = 1.0 / 7.0 + s * series
+    series = 1.0 / 5.0 + s * series
+    series = 1.0 / 3.0 + s * series
+    series = 1.0 + s * series
     return exponential(power * 16.0 * z * series)
 
 
 def accelerations(
     motion: Motion, c: Any, ship: Ship
 ) -> tuple[float, float, float, float, float]:
-    """Accelerations in surge, sway and yaw, body frame, origin midship, from forces per density."""
-    u, v, r, L = motion.u, motion.v, motion.r, ship.length
-    U = max(sqrt(u * u + v * v), SLOWEST * ship.speed)
-    drift = arctan2(-v, u)
-    per_U = 1.0 / U
-    v_, r_ = v * per_U, r * L * per_U
+    """Accelerations in surge, sway and yaw, body frame, origin midship."""
+    L = ship.length
+    flow = flow_of(motion, c, ship)
+    X_H, Y_H, N_H = hull_forces(c, flow, ship)
+    T = c.propellers * c.D_P**2 * flow.K_T_nn
+    X_P = (1.0 - c.t_P) * T
+    F_N, sin_delta, cos_delta = rudder_force(motion, c, flow)
+    X_R = -(1.0 - c.t_R) * F_N * sin_delta
+    Y_R = -(1.0 + c.a_H) * F_N * cos_delta
+    x_HR = c.x_R + c.a_H * c.x_H
+    N_R = -x_HR * L * F_N * cos_delta
 
-    angle = drift - c.x_P * r_
-    side = c.C_2 + (c.C_2_side if angle >= 0.0 else -c.C_2_side)
-    behind = (1.0 - c.w_P0) * (
-        1.0 + (1.0 - exponential(-c.C_1 * fabs(angle))) * (side - 1.0)
-    )  # 1 - w_P
-    inflow, tip = (
-        u * behind,
-        ship.speed * c.nD_U0 * (motion.n / ship.shaft),
-    )  # advance ratio: inflow / tip
+    m = c.volume
+    m_x = c.mx * 0.5 * L * L * c.d
+    m_y = c.my * 0.5 * L * L * c.d
+    J_z = c.Jz * 0.5 * L**4 * c.d
+    I_z = m * (c.gyradius * c.gyradius + c.xG * c.xG) + J_z
+    mass = Mass(m + m_x, m + m_y, c.xG * m, I_z)
+    X = X_H + X_R + X_P
+    Y = Y_H + Y_R
+    N = N_H + N_R
+    udot, vdot, rdot = planar_accelerations(motion, X, Y, N, mass)
+    return udot, vdot, rdot, 0.0, 0.0
+
+
+def flow_of(motion: Motion, c: Any, ship: Ship) -> Flow:
+    """Flow at hull, propeller and rudder."""
+    u, v = motion.u, motion.v
+    slowest = 0.02 * ship.speed  # below, v' and r' lose their meaning
+    U = max(sqrt(u * u + v * v), slowest)
+    per_U = 1.0 / U
+    beta = arctan2(-v, u)
+    r_ = motion.r * ship.length * per_U
+
+    # wake: (1 - w_P) / (1 - w_P0) = 1 + (1 - exp(-C_1 |beta_P|)) (C_2 - 1)
+    beta_P = beta - c.x_P * r_
+    side = c.C_2_side if beta_P >= 0.0 else -c.C_2_side
+    straight = exponential(-c.C_1 * fabs(beta_P))
+    fuller = (1.0 - straight) * (c.C_2 + side - 1.0)
+    inflow = u * ((1.0 - c.w_P0) * (1.0 + fuller))
+
+    # K_T(J) by tip^2, where J = inflow / tip
+    tip = ship.speed * c.nD_U0 * (motion.n / ship.shaft)
     K_T_nn = c.thrust * (
         c.k_0 * tip * tip + c.k_1 * tip * inflow + c.k_2 * inflow * inflow
     )
-    thrust = c.propellers * c.D_P**2 * K_T_nn
+    return Flow(U, v * per_U, r_, beta, inflow, K_T_nn)
 
-    beta_R = drift - c.l_R * r_
-    v_R = (
-        U
-        * (c.gamma_R + (c.gamma_R_side if beta_R >= 0.0 else -c.gamma_R_side))
-        * beta_R
-    )
-    jet = sqrt(max(inflow * inflow + (8.0 / pi) * K_T_nn, 0.0))
-    race = fabs(inflow) * (1.0 - c.kappa) + c.kappa * jet
-    u_R = copysign(c.epsilon, inflow) * sqrt(
-        c.eta * race * race + (1.0 - c.eta) * inflow * inflow
-    )
-    sine, cosine = small_sin_cos(motion.delta + c.delta_0)
-    across = sine * u_R - cosine * v_R  # U_R sin alpha_R
-    F_N = (
-        0.5
-        * c.A_R
-        * c.f_alpha
-        * across
-        * (sqrt(u_R * u_R + v_R * v_R) + c.c_R * fabs(across))
-    )
 
-    q = 0.5 * L * c.d * U * U
-    slowed = power_law(U / ship.speed, c.speed_power)
-    X_H = q * (
+def hull_forces(c: Any, flow: Flow, ship: Ship) -> tuple[float, float, float]:
+    """Forces X_H, Y_H and moment N_H of the hull, polynomials in v' and r'."""
+    v, r = flow.v_, flow.r_
+    slowed = power_law(flow.U / ship.speed, c.speed_power)
+    X = (
         -c.R_0
-        + c.X_vv * v_ * v_
-        + c.X_vr * v_ * r_
-        + c.X_rr * r_ * r_
-        + c.X_vvvv * v_ * v_ * v_ * v_
+        + c.X_vv * v * v
+        + c.X_vr * v * r
+        + c.X_rr * r * r
+        + c.X_vvvv * v * v * v * v
     )
-    Y_H = q * (
+    Y = (
         c.Y_0
-        + c.Y_v * v_
-        + c.Y_r * slowed * r_
-        + c.Y_vvv * v_ * v_ * v_
-        + c.Y_vvr * v_ * v_ * r_
-        + c.Y_vrr * v_ * r_ * r_
-        + c.Y_rrr * r_ * r_ * r_
+        + c.Y_v * v
+        + c.Y_r * slowed * r
+        + c.Y_vvv * v * v * v
+        + c.Y_vvr * v * v * r
+        + c.Y_vrr * v * r * r
+        + c.Y_rrr * r * r * r
     )
-    N_H = (
-        q
-        * L
-        * (
-            c.N_0
-            + c.N_v * v_
-            + c.N_r * slowed * r_
-            + c.N_absr * fabs(r_)
-            + c.N_rr * r_ * r_
-            + c.N_vvv * v_ * v_ * v_
-            + c.N_vvr * v_ * v_ * r_
-            + c.N_vrr * v_ * r_ * r_
-            + c.N_rrr * r_ * r_ * r_
-        )
+    N = (
+        c.N_0
+        + c.N_v * v
+        + c.N_r * slowed * r
+        + c.N_absr * fabs(r)
+        + c.N_rr * r * r
+        + c.N_vvv * v * v * v
+        + c.N_vvr * v * v * r
+        + c.N_vrr * v * r * r
+        + c.N_rrr * r * r * r
     )
-    X = X_H - (1.0 - c.t_R) * F_N * sine + (1.0 - c.t_P) * thrust
-    Y = Y_H - (1.0 + c.a_H) * F_N * cosine
-    N = N_H - (c.x_R + c.a_H * c.x_H) * L * F_N * cosine
+    q = 0.5 * ship.length * c.d * flow.U * flow.U
+    return q * X, q * Y, q * ship.length * N
 
-    m = c.volume
-    m_x, m_y = c.mx * 0.5 * L * L * c.d, c.my * 0.5 * L * L * c.d
-    inertia = m * (c.gyradius * c.gyradius + c.xG * c.xG) + c.Jz * 0.5 * L**4 * c.d
-    udot = (X + (m + m_y) * v * r + c.xG * m * r * r) * (1.0 / (m + m_x))
-    sway, yaw = Y - (m + m_x) * u * r, N - c.xG * m * u * r
-    vdot = (inertia * sway - c.xG * m * yaw) * (
-        1.0 / ((m + m_y) * inertia - (c.xG * m) ** 2)
-    )
-    rdot = (yaw - c.xG * m * vdot) * (1.0 / inertia)
-    return udot, vdot, rdot, 0.0, 0.0
+
+def rudder_force(motion: Motion, c: Any, flow: Flow) -> tuple[float, float, float]:
+    """Normal force F_N of the rudder, and sine and cosine of its angle."""
+    # v_R = U gamma_R beta_R
+    beta_R = flow.beta - c.l_R * flow.r_
+    side = c.gamma_R_side if beta_R >= 0.0 else -c.gamma_R_side
+    v_R = flow.U * (c.gamma_R + side) * beta_R
+
+    # u_R = epsilon inflow sqrt(eta (1 + kappa (sqrt(1 + 8 K_T / (pi J^2)) - 1))^2 + 1 - eta)
+    inflow = flow.inflow
+    outside = inflow * inflow
+    jet = outside + (8.0 / pi) * flow.K_T_nn
+    race = fabs(inflow) * (1.0 - c.kappa) + c.kappa * sqrt(max(jet, 0.0))
+    mean = c.eta * race * race + (1.0 - c.eta) * outside
+    u_R = copysign(c.epsilon, inflow) * sqrt(mean)
+
+    # U_R sin(alpha_R), without the arc; the force grows faster than that sine by c_R
+    sine, cosine = small_sin_cos(motion.delta + c.delta_0)
+    across = sine * u_R - cosine * v_R
+    U_R = sqrt(u_R * u_R + v_R * v_R)
+    steeper = U_R + c.c_R * fabs(across)
+    return 0.5 * c.A_R * c.f_alpha * across * steeper, sine, cosine
 
 
 @dataclass(frozen=True)
 class MMGEquations(ShipEquations):
-    """The general form: coefficients without unit, dimensions from the particulars of each ship."""
+    """General form: coefficients without unit, dimensions from each ship's particulars."""
 
     scales: ClassVar[bool] = True
 
@@ -273,7 +301,7 @@ class MMGEquations(ShipEquations):
 
     @property
     def coefficients(self) -> dict[str, float]:
-        """Those of KVLCC2."""
+        """Coefficients of KVLCC2."""
         return dict(STANDARD)
 
     def numbers(
@@ -282,7 +310,7 @@ class MMGEquations(ShipEquations):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Coefficients, then dimensions; InputError for particulars that do not suffice."""
+        """Numbers of coefficients, then dimensions; InputError if particulars do not suffice."""
         values = [coefficients[name] for name in self.coefficient_names]
         return np.array([*values, *dimensions(particulars).values()])
 

@@ -1,24 +1,23 @@
 """Particulars of a ship, and what can be estimated from them."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import Any, Self
 
-from shipgym.checks import check_number, check_table, check_text
+from shipgym.checks import check_table, check_text, placed, unexpected
+from shipgym.constants import SEA_WATER
 from shipgym.errors import InputError
-from shipgym.files import shipped_toml
-
-#: Added masses, in the prime system; in a ship file under ``[ship.added_mass]``.
-ADDED_MASSES = ("X_udot", "Y_vdot", "Y_rdot", "N_vdot", "N_rdot")
-
-#: Bounds of each value, hints of its unit, and how it grows with the length.
-BOUNDS: dict[str, dict[str, Any]] = shipped_toml("shipgym.ships", "particulars.toml")
+from shipgym.ships.particulars_limits import ADDED_MASSES as ADDED_MASSES
+from shipgym.ships.particulars_limits import check_together, check_value
 
 
 @dataclass(frozen=True)
 class Particulars(Mapping[str, Any]):
-    """Main dimensions, mass and added masses of a ship; also a mapping from name to value.
+    """Main dimensions, mass and added masses of a ship; a mapping from name to value.
 
     What is not known is None. :meth:`completed` estimates what the models need.
 
@@ -89,20 +88,32 @@ class Particulars(Mapping[str, Any]):
     estimated: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "estimated", frozenset(self.estimated))
-        for name, value in _checked(self, "particulars").items():
-            object.__setattr__(self, name, value)
+        check_text(self.name, "name")
+        numbers = {}
+        for name in NAMES:
+            value = getattr(self, name)
+            if name == "name" or (value is None and name != "length"):
+                continue
+            numbers[name] = check_value(name, value)
+            object.__setattr__(self, name, numbers[name])
+        check_together(numbers)
+
+        names = self.estimated
+        listed = isinstance(names, list | tuple | set | frozenset)
+        if not listed or not all(name in NAMES for name in names):
+            raise unexpected("estimated", "a list of names of values", names)
+        object.__setattr__(self, "estimated", frozenset(names))
 
     def __getitem__(self, name: str) -> Any:
-        if name not in FIELDS:
+        if name not in NAMES:
             raise KeyError(name)
         return getattr(self, name)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(FIELDS)
+        return iter(NAMES)
 
     def __len__(self) -> int:
-        return len(FIELDS)
+        return len(NAMES)
 
     @classmethod
     def from_mapping(
@@ -115,42 +126,37 @@ class Particulars(Mapping[str, Any]):
         InputError, beginning with `where`, for an unknown key, a missing length, a
         wrong type or a value that no ship has.
         """
-        table = dict(check_table(mapping, where, (*FIELDS, "added_mass", "estimated")))
-        added = check_table(
-            table.pop("added_mass", None) or {}, f"{where} added_mass", ADDED_MASSES
-        )
-        twice = table.keys() & added.keys()
-        if twice:
-            raise InputError(
-                f"{where} added_mass: {min(twice)} is given twice, expected it in one"
-                " place"
-            )
-        values = {**table, **added}
-        estimated = values.pop("estimated", None) or ()
-        names = isinstance(estimated, list | tuple | set | frozenset)
-        if not names or not all(name in FIELDS for name in estimated):
-            raise InputError(
-                f"{where} estimated: {estimated!r} found, expected a list of names of"
-                " values"
-            )
-        if values.get("length") is None:
+        table = dict(check_table(mapping, where, (*NAMES, "added_mass", "estimated")))
+        added = table.pop("added_mass", None) or {}
+        check_table(added, f"{where} added_mass", ADDED_MASSES)
+        for name in added:
+            if name in table:
+                raise InputError(
+                    f"{where} added_mass: expected each value in one place, got {name}"
+                    " twice"
+                )
+        if table.get("length") is None:
             raise InputError(
                 f"{where} length: missing, expected the length between perpendiculars"
                 " in m"
             )
-        return cls(**_checked(values, where), estimated=frozenset(estimated))
-
-    @classmethod
-    def from_dict(cls, mapping: Mapping[str, Any], where: str = "particulars") -> Self:
-        """Read what :meth:`to_dict` wrote; the same as :meth:`from_mapping`."""
-        return cls.from_mapping(mapping, where)
+        estimated: Any = table.pop("estimated", None) or ()
+        with placed(where, " "):
+            return cls(**table, **added, estimated=estimated)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the values by name, ready for JSON, None where not known; :meth:`from_mapping` reads it."""
+        """Return the values by name, ready for JSON; :meth:`from_mapping` reads them."""
+        # left out where not known, so that hashes of models from before them stay
+        later = {
+            "rudder_aspect_ratio",
+            "propeller_pitch_ratio",
+            "rudders",
+            "propellers",
+        }
         found = {
             name: value
             for name, value in self.items()
-            if value is not None or name not in LATER
+            if value is not None or name not in later
         }
         return {**found, "estimated": sorted(self.estimated)}
 
@@ -178,13 +184,13 @@ class Particulars(Mapping[str, Any]):
 
     @property
     def inertia_prime(self) -> float:
-        """Yaw inertia about MIDSHIP by rho L^5 / 2: that about the centre of gravity and m xg^2."""
+        """Yaw inertia about MIDSHIP by rho L^5 / 2, m xg^2 included."""
         return self.mass_prime * (
             (self.require("yaw_gyradius") / self.length) ** 2 + self.xg_prime**2
         )
 
-    def completed(self) -> "Particulars":
-        """Return particulars with mass, inertia and added masses estimated where absent, and marked so.
+    def completed(self) -> Particulars:
+        """Return particulars with absent mass, inertia and added masses estimated.
 
         Water density 1025 kg/m3, centre of gravity at midship, yaw gyradius L/4, mass
         from the block coefficient, X_udot five per cent of the mass, the other added
@@ -197,91 +203,85 @@ class Particulars(Mapping[str, Any]):
 
 
 #: Names of all values, in the order of the ship file.
-FIELDS: tuple[str, ...] = tuple(
+NAMES: tuple[str, ...] = tuple(
     item.name for item in fields(Particulars) if item.name != "estimated"
 )
-
-#: Left out of files where not known, so that hashes of models from before them stay.
-LATER = ("rudder_aspect_ratio", "propeller_pitch_ratio", "rudders", "propellers")
 
 Estimates = Mapping[str, Callable[[Particulars], float | None]]
 
 
 def with_estimates(ship: Particulars, estimates: Estimates) -> Particulars:
-    """A ship with what is absent estimated in turn, and marked so, where an estimate has an answer."""
+    """Particulars with absent values estimated in turn, and marked so, where possible."""
     for name, estimate in estimates.items():
-        if ship[name] is None and (value := estimate(ship)) is not None:
-            changes: dict[str, Any] = {
-                name: value,
-                "estimated": ship.estimated | {name},
-            }
-            ship = replace(ship, **changes)
+        value = estimate(ship) if ship[name] is None else None
+        if value is not None:
+            known: dict[str, Any] = {name: value}
+            ship = replace(ship, **known, estimated=ship.estimated | {name})
     return ship
 
 
 def clarke_added_masses(
     length: float, beam: float, draught: float, block_coefficient: float
 ) -> dict[str, float]:
-    """Added masses in sway and yaw from a hull's proportions, in the prime system, about midship.
+    """Added masses in sway and yaw from a hull's proportions, prime system, midship.
 
     Regressions of Clarke, Gedling and Hine 1983, by pi (T/L)^2. Dimensions in m; the
     block coefficient is the displaced volume by length * beam * draught.
     """
-    scale = -math.pi * (draught / length) ** 2
-    fullness = block_coefficient * beam / draught
-    slenderness, flatness = beam / length, beam / draught
+    B_L = beam / length
+    B_T = beam / draught
+    cB_B_T = block_coefficient * B_T
+    Y_vdot = 1.0 + 0.16 * cB_B_T - 5.1 * B_L**2
+    Y_rdot = 0.67 * B_L - 0.0033 * B_T**2
+    N_vdot = 1.1 * B_L - 0.041 * B_T
+    N_rdot = 1.0 / 12.0 + 0.017 * cB_B_T - 0.33 * B_L
+    unit = -math.pi * (draught / length) ** 2
     return {
-        "Y_vdot": scale * (1.0 + 0.16 * fullness - 5.1 * slenderness**2),
-        "Y_rdot": scale * (0.67 * slenderness - 0.0033 * flatness**2),
-        "N_vdot": scale * (1.1 * slenderness - 0.041 * flatness),
-        "N_rdot": scale * (1.0 / 12.0 + 0.017 * fullness - 0.33 * slenderness),
+        "Y_vdot": unit * Y_vdot,
+        "Y_rdot": unit * Y_rdot,
+        "N_vdot": unit * N_vdot,
+        "N_rdot": unit * N_rdot,
     }
+
+
+def _box_mass(ship: Particulars) -> float:
+    """Mass of water in the box around the hull, kg."""
+    box = ship.length * ship.require("beam") * ship.require("draught")
+    return ship.require("water_density") * box
 
 
 def _block_coefficient(ship: Particulars) -> float | None:
     if ship.mass is None or ship.beam is None or ship.draught is None:
         return None
-    return ship.mass / (
-        ship.require("water_density") * ship.length * ship.beam * ship.draught
-    )
+    return ship.mass / _box_mass(ship)
 
 
 def _mass(ship: Particulars) -> float:
-    _check_known(
-        ship,
-        "mass",
-        "give mass (kg), or beam, draught and block_coefficient, in [ship]",
-    )
-    volume = (
-        ship.length
-        * ship.require("beam")
-        * ship.require("draught")
-        * ship.require("block_coefficient")
-    )
-    return ship.require("water_density") * volume
+    remedy = "give mass (kg), or beam, draught and block_coefficient, in [ship]"
+    _check_known(ship, "mass", remedy)
+    return ship.require("block_coefficient") * _box_mass(ship)
 
 
-def _clarke(name: str) -> Callable[[Particulars], float]:
-    def estimate(ship: Particulars) -> float:
-        remedy = (
-            "give beam, draught and block_coefficient (or mass) in [ship], or all of "
-            f"{', '.join(ADDED_MASSES)} in [ship.added_mass]"
+def _clarke(name: str, ship: Particulars) -> float:
+    """Estimate one added mass."""
+    remedy = (
+        "give beam, draught and block_coefficient (or mass) in [ship], or all of"
+        f" {', '.join(ADDED_MASSES)} in [ship.added_mass]"
+    )
+    _check_known(ship, name, remedy)
+    beam = ship.require("beam")
+    draught = ship.require("draught")
+    fullness = ship.require("block_coefficient")
+    estimates = clarke_added_masses(ship.length, beam, draught, fullness)
+    value = estimates[name]
+    if name in ("Y_vdot", "N_rdot") and value >= 0.0:
+        raise InputError(
+            f"particulars of {ship.name}: expected a {name} < 0, got {value:.3g} by"
+            f" regression for length/beam {ship.length / beam:.2f} and beam/draught"
+            f" {beam / draught:.2f}: the proportions are outside its range; check them,"
+            " or give [ship.added_mass]"
         )
-        _check_known(ship, name, remedy)
-        beam, draught = ship.require("beam"), ship.require("draught")
-        value = clarke_added_masses(
-            ship.length, beam, draught, ship.require("block_coefficient")
-        )[name]
-        if name in ("Y_vdot", "N_rdot") and value >= 0.0:
-            raise InputError(
-                f"particulars of {ship.name}: length/beam {ship.length / beam:.2f} and"
-                f" beam/draught {beam / draught:.2f} found, for which the regression of"
-                f" {name} gives {value:.3g}, expected < 0: the proportions are outside"
-                " its range; check them, or give [ship.added_mass]"
-            )
-        return value
-
-    return estimate
+    return value
 
 
 def _check_known(ship: Particulars, name: str, remedy: str) -> None:
@@ -299,69 +299,14 @@ def _check_known(ship: Particulars, name: str, remedy: str) -> None:
 
 
 _ESTIMATES: Estimates = {  # in this order
-    "water_density": lambda ship: 1025.0,
+    "water_density": lambda ship: SEA_WATER,
     "xg": lambda ship: 0.0,
     "yaw_gyradius": lambda ship: 0.25 * ship.length,
     "block_coefficient": _block_coefficient,
     "mass": _mass,
     "X_udot": lambda ship: -0.05 * ship.mass_prime,
-    **{name: _clarke(name) for name in ("Y_vdot", "Y_rdot", "N_vdot", "N_rdot")},
+    "Y_vdot": partial(_clarke, "Y_vdot"),
+    "Y_rdot": partial(_clarke, "Y_rdot"),
+    "N_vdot": partial(_clarke, "N_vdot"),
+    "N_rdot": partial(_clarke, "N_rdot"),
 }
-
-
-def _checked(values: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """Return the values, numbers as float, after checking each and all together."""
-    checked = {name: values[name] for name in values if name in FIELDS}
-    check_text(checked.get("name", "ship"), f"{where} name")
-    for name, value in checked.items():
-        if name == "name" or (value is None and name != "length"):
-            continue
-        place = (
-            f"{where} added_mass {name}" if name in ADDED_MASSES else f"{where} {name}"
-        )
-        given = {
-            key: bound
-            for key, bound in BOUNDS[name].items()
-            if key in ("above", "below", "hint")
-        }
-        checked[name] = check_number(value, place, **given)
-    _check_together(
-        {k: v for k, v in checked.items() if k != "name" and v is not None}, where
-    )
-    return checked
-
-
-def _check_together(values: Mapping[str, float], where: str) -> None:
-    """Refuse values that do not fit each other: most often a wrong unit."""
-    length = values["length"]
-    for name, value in values.items():
-        share, power = (
-            BOUNDS[name].get(key, usual)
-            for key, usual in (("share", math.inf), ("growth", 0))
-        )
-        if abs(value) > share * length**power:
-            raise InputError(
-                f"{where} {name}: {value:g} found with length {length:g}, expected at"
-                f" most {share:g} of the length{' squared' * (power - 1)}; check the"
-                f" units (m{'2' * (power - 1)})"
-            )
-    if "mass" in values:
-        low, high, reason = _mass_range(values)
-        if not low <= values["mass"] <= high:
-            raise InputError(
-                f"{where} mass: {values['mass']:g} found, expected {low:.4g} to"
-                f" {high:.4g} kg ({reason}); check the units (kg, not tonnes)"
-            )
-
-
-def _mass_range(values: Mapping[str, float]) -> tuple[float, float, str]:
-    """Return the smallest and largest mass that fit the dimensions, kg, and how they were found."""
-    density, length = values.get("water_density", 1025.0), values["length"]
-    if not {"beam", "draught"} <= values.keys():
-        cube = density * length**3
-        return 2e-4 * cube, 0.2 * cube, "0.0002 to 0.2 times water_density * length^3"
-    box = density * length * values["beam"] * values["draught"]
-    if "block_coefficient" not in values:
-        return 0.2 * box, box, "a block coefficient of 0.2 to 1"
-    full = box * values["block_coefficient"]
-    return 0.5 * full, 2.0 * full, "half to twice what block_coefficient gives"

@@ -7,9 +7,9 @@ import numpy as np
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
-from shipgym.ships.particulars import BOUNDS, Particulars
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.particulars_limits import LIMITS
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.steering import SteeringGear
 from shipgym.ships.term_table import Structure
 
 
@@ -50,46 +50,50 @@ def scale_model(
     table = model.dynamics
     if not table.scales:
         raise InputError(
-            f"model {model.name!r}: the equations of reference ship '{table.name}'"
-            " found, which are written for one length; expected a model with a table"
-            " of terms, such as one identified from its trials"
+            f"model {model.name!r}: expected a table of terms, such as that of a model"
+            " identified from its trials, got the equations of reference ship"
+            f" '{table.name}', which are written for one length"
         )
     check_number(length, "length", above=0.0, hint="in m")
     size = length / model.particulars.length
-    speed = model.particulars["speed"] * np.sqrt(size) if speed is None else speed
+    service = model.particulars["speed"]
+    speed = service * np.sqrt(size) if speed is None else speed
     check_number(speed, "speed", above=0.0, hint="in m/s")
-    fast = float(speed) / model.particulars["speed"]
-    quick, gear = fast / size, model.steering
-    gear = SteeringGear(
-        gear.rudder_limit_deg,
-        gear.rudder_rate_deg_s * quick,
-        gear.time_constant / quick,
+    fast = float(speed) / service
+    quick = fast / size
+
+    gear = replace(
+        model.steering,
+        rudder_rate_deg_s=model.steering.rudder_rate_deg_s * quick,
+        time_constant=model.steering.time_constant / quick,
     )
     factors = dict.fromkeys(model.coefficients, 1.0)  # those without unit
     if isinstance(table, Structure) and table.normalisation == "si":
         factors = _coefficient_factors(table, size, fast)
-    scale = np.array(list(factors.values()))
-    box, unit = model.envelope, np.array([fast, fast, quick, 1.0])
-    origin = {
-        "from_length": model.particulars.length,
-        "from_speed": model.particulars["speed"],
+    coefficients = {
+        name: value * factors[name] for name, value in model.coefficients.items()
     }
+    covariance = model.covariance
+    if covariance is not None:
+        scale = np.array(list(factors.values()))
+        covariance = covariance * np.outer(scale, scale)
+    envelope = model.envelope
+    if envelope is not None:
+        unit = np.array([fast, fast, quick, 1.0])  # of u, v, r, delta
+        envelope = Envelope(
+            low=envelope.low * unit,
+            high=envelope.high * unit,
+            centre=envelope.centre * unit,
+            shape=envelope.shape / unit,
+        )
+    origin = {"from_length": model.particulars.length, "from_speed": service}
     return replace(
         model,
         steering=gear,
         particulars=_particulars(model.particulars, size, float(speed), water_density),
-        coefficients={
-            name: value * factors[name] for name, value in model.coefficients.items()
-        },
-        covariance=(
-            None
-            if model.covariance is None
-            else model.covariance * np.outer(scale, scale)
-        ),
-        envelope=box
-        and Envelope(
-            box.low * unit, box.high * unit, box.centre * unit, box.shape / unit
-        ),
+        coefficients=coefficients,
+        covariance=covariance,
+        envelope=envelope,
         provenance=(model.provenance or {}) | {"scaled": origin},
         service_shaft_speed=model.service_shaft_speed * fast / size,
     )
@@ -98,34 +102,29 @@ def scale_model(
 def _coefficient_factors(
     table: Structure, size: float, fast: float
 ) -> dict[str, float]:
-    """What each coefficient of a table in SI units is multiplied by: the change of units."""
+    """Factor of each coefficient of a table in SI units: the change of units."""
     similar = replace(table, normalisation="service")
-    return {
-        name: similar.feature_scale(equation, term, size, fast, fast / size)
-        for equation in table.equations
-        for name, term in zip(table.names(equation), table.terms(equation), strict=True)
-    }
+    quick = fast / size
+    factors = {}
+    for equation in table.equations:
+        names = table.names(equation)
+        terms = table.terms(equation)
+        for name, term in zip(names, terms, strict=True):
+            factors[name] = similar.feature_scale(equation, term, size, fast, quick)
+    return factors
 
 
 def _particulars(
     ship: Particulars, size: float, speed: float, water_density: float | None
 ) -> Particulars:
-    growth = {
-        name: given["growth"] for name, given in BOUNDS.items() if "growth" in given
-    }
-    changes = {
-        name: ship[name] * size**power
-        for name, power in growth.items()
-        if ship[name] is not None
-    }
+    changes = {}
+    for name, limits in LIMITS.items():
+        if limits.growth and ship[name] is not None:
+            changes[name] = ship[name] * size**limits.growth
     density = ship.water_density if water_density is None else water_density
     if ship.mass is not None:
-        denser = (
-            1.0
-            if water_density is None
-            else water_density / ship.require("water_density")
-        )
-        changes["mass"] = ship.mass * size**3 * denser
-    return replace(
-        ship, length=ship.length * size, speed=speed, water_density=density, **changes
-    )
+        changes["mass"] = ship.mass * size**3
+        if water_density is not None:
+            changes["mass"] *= water_density / ship.require("water_density")
+    changes["length"] = ship.length * size
+    return replace(ship, speed=speed, water_density=density, **changes)

@@ -1,4 +1,4 @@
-"""Tables for forces in which a coefficient may stand in several equations, added masses among them.
+"""Tables for forces whose coefficients and added masses may stand in several equations.
 
 The vectorial model of captive tests: Xu, Hassani & Guedes Soares 2020, Truncated least
 square support vector machine for parameter estimation of a nonlinear manoeuvring model
@@ -6,31 +6,32 @@ based on PMM tests, equations 18 to 21 and 39 to 41. Its hydrodynamic forces hol
 accelerations, so that the mass to be accelerated follows from the coefficients.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from shipgym.arrays import Floats
+from shipgym.checks import check_number, check_table, check_text, quoted, unexpected
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.term_table import Structure, total_inertia
-from shipgym.ships.terms import Term, short_terms
+from shipgym.ships.prime_inertia import total_inertia
+from shipgym.ships.term_table import Structure
+from shipgym.ships.terms import Term, list_entries, short_terms
 
 AXES = ("u", "v", "r")
 ACCELERATIONS = ("udot", "vdot", "rdot")
-VR, RR, UR = (
-    Term("vr", (("v", 1), ("r", 1))),
-    Term("rr", (("r", 2),)),
-    Term("ur", (("u", 1), ("r", 1))),
-)
+# terms of the ship's own mass
+VR = Term("vr", (("v", 1), ("r", 1)))
+RR = Term("rr", (("r", 2),))
+UR = Term("ur", (("u", 1), ("r", 1)))
 
 
 @dataclass(frozen=True)
 class Share:
-    """A coefficient's share in the force of one equation: sign times coefficient times term."""
+    """Share of a coefficient in a force: sign times coefficient times term."""
 
     coefficient: str  # its name: `Y_vdot`
     term: Term  # of velocities, or one acceleration (`udot`, `vdot`, `rdot`)
@@ -40,13 +41,10 @@ class Share:
         where = f"share '{self.coefficient}'"
         if self.acceleration is None:
             self.term.check(where)
-        elif repr(self.term.powers) != repr(
-            ((self.acceleration, 1),)
-        ):  # true is no power
-            raise InputError(
-                f"{where}: {dict(self.term.powers)} found, expected an acceleration"
-                " alone"
-            )
+            return
+        ((_, power), *others) = self.term.powers
+        if others or type(power) is not int or power != 1:
+            raise unexpected(where, "an acceleration alone", dict(self.term.powers))
 
     @property
     def acceleration(self) -> str | None:
@@ -55,17 +53,29 @@ class Share:
         return symbol if symbol in ACCELERATIONS else None
 
     def to_dict(self) -> dict[str, Any]:
-        """As it stands in a model file."""
-        term = {"name": self.term.name, "powers": dict(self.term.powers)}
+        """Share as it stands in a model file."""
+        term = self.term.to_dict()
         return {"coefficient": self.coefficient, **term, "sign": self.sign}
+
+    @classmethod
+    def from_dict(cls, content: Any, where: str) -> Self:
+        """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
+        fields = ("coefficient", "name", "powers", "sign")
+        table = check_table(content, where, fields, fields)
+        coefficient = check_text(table["coefficient"], f"{where}.coefficient")
+        name_and_powers = {"name": table["name"], "powers": table["powers"]}
+        term = Term.from_dict(name_and_powers, where)
+        place = f"{where}.sign"
+        sign = check_number(table["sign"], place, at_least=-1.0, at_most=1.0)
+        return cls(coefficient, term, sign)
 
 
 @dataclass(frozen=True)
 class SharedStructure(Structure):
-    """A table for the hydrodynamic forces X, Y, N, prime system, that is identified from captive tests.
+    """Table for hydrodynamic forces X, Y, N, prime system, identified from captive tests.
 
     Its `equations` are the terms that a simulation sums up: those of velocities of the
-    shares, alike for sway and yaw, and the centripetal ones of the ship's own mass.
+    shares, the same for sway and yaw, and the centripetal ones of the ship's own mass.
     Make one by `shared_structure`.
     """
 
@@ -80,46 +90,42 @@ class SharedStructure(Structure):
         where = f"structure '{self.name}'"
         if tuple(self.shares) != AXES:
             raise InputError(
-                f"{where}: shares of {tuple(self.shares)} found, expected of 'u',"
-                " 'v', 'r'"
+                f"{where}: expected shares of {quoted(AXES)}, got {quoted(self.shares)}"
             )
         for axis, shares in self.shares.items():
+            allowed = {"udot"} if axis == "u" else {"vdot", "rdot"}
             for share in shares:
-                if share.acceleration is not None and (axis == "u") != (
-                    share.acceleration == "udot"
-                ):
+                if share.acceleration not in (None, *allowed):
                     raise InputError(
-                        f"{where}: '{share.acceleration}' found in the equation of"
-                        f" '{axis}', expected 'udot' in that of surge, 'vdot' and"
-                        " 'rdot' in those of sway and yaw"
+                        f"{where}: expected 'udot' in the equation of surge, 'vdot' and"
+                        " 'rdot' in those of sway and yaw, got"
+                        f" '{share.acceleration}' in the equation of '{axis}'"
                     )
 
     @cached_property
     def coefficient_names(self) -> tuple[str, ...]:
         """Each coefficient once, those of X first."""
-        return tuple(
-            dict.fromkeys(
-                share.coefficient for axis in AXES for share in self.shares[axis]
-            )
-        )
+        names: dict[str, None] = {}
+        for axis in AXES:
+            names |= dict.fromkeys(self.names(axis))
+        return tuple(names)
 
     def names(self, equation: str) -> tuple[str, ...]:
         """Names of the coefficients in one equation."""
-        return tuple(
-            dict.fromkeys(share.coefficient for share in self.shares[equation])
-        )
+        shares = self.shares[equation]
+        return tuple(dict.fromkeys(share.coefficient for share in shares))
 
     def added_mass(self, coefficients: Mapping[str, float]) -> Floats:
-        """Derivatives of (X, Y, N) by (udot, vdot, rdot), prime system, shape (3, 3): negative added mass."""
+        """Derivatives of (X, Y, N) by (udot, vdot, rdot), prime system, shape (3, 3)."""
         matrix = np.zeros((3, 3))
-        for i, axis in enumerate(AXES):
+        for row, axis in zip(matrix, AXES, strict=True):
             for share in self.shares[axis]:
                 if share.acceleration is not None:
-                    j = ACCELERATIONS.index(share.acceleration)
-                    matrix[i, j] += share.sign * coefficients[share.coefficient]
+                    column = ACCELERATIONS.index(share.acceleration)
+                    row[column] += share.sign * coefficients[share.coefficient]
         return matrix
 
-    def inertia(
+    def prime_inertia(
         self, coefficients: Mapping[str, float], particulars: Particulars
     ) -> Floats:
         """Mass of the ship and identified added mass, prime system, shape (3, 3).
@@ -130,9 +136,9 @@ class SharedStructure(Structure):
         return total_inertia(
             particulars,
             self.added_mass(coefficients),
-            f"structure '{self.name}': the mass of the ship and the added mass of the"
-            " coefficients are not positive together; expected derivatives X_udot,"
-            " Y_vdot, N_rdot below 0",
+            f"structure '{self.name}': expected a positive inertia, got mass of the ship"
+            " and added mass of the coefficients that are not positive together; X_udot,"
+            " Y_vdot and N_rdot are derivatives below 0",
         )
 
     def term_numbers(
@@ -141,111 +147,119 @@ class SharedStructure(Structure):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Coefficients of the SI features: the forces by mass and added mass (see `Structure`)."""
+        """Coefficients of the SI features: forces by mass and added mass."""
         p = particulars.completed()
-        forces = np.concatenate(
-            [self._velocity_forces(axis, coefficients, p) for axis in AXES]
-        )
-        return np.asarray(
-            self.term_scales(p)
-            * (self._from_forces(self.inertia(coefficients, p)) @ forces)
-        )
+        inertia = self.prime_inertia(coefficients, p)
+        forces = [self._velocity_forces(axis, coefficients, p) for axis in AXES]
+        accelerations = self._from_forces(inertia) @ np.concatenate(forces)
+        return np.asarray(self.term_scales(p) * accelerations)
 
     def _velocity_forces(
         self, axis: str, coefficients: Mapping[str, float], p: Particulars
     ) -> Floats:
-        """Coefficient of each term of an equation in its force, that of the ship's own mass included."""
+        """Coefficient of each term in an equation's force, that of the ship's mass included."""
         terms = self.terms(axis)
-        row = {frozenset(term.powers): i for i, term in enumerate(terms)}
-        force = np.zeros(len(terms))
+        force = dict.fromkeys([term.product for term in terms], 0.0)
         for share in self.shares[axis]:
             if share.acceleration is None:
-                force[row[frozenset(share.term.powers)]] += (
-                    share.sign * coefficients[share.coefficient]
-                )
-        m, static = p.mass_prime, p.mass_prime * p.xg_prime
-        own = {"u": ((VR, m), (RR, static)), "v": ((UR, -m),), "r": ((UR, -static),)}
-        for term, value in own[axis]:
-            force[row[frozenset(term.powers)]] += value
-        return force
+                value = share.sign * coefficients[share.coefficient]
+                force[share.term.product] += value
+
+        m = p.mass_prime
+        m_xG = m * p.xg_prime
+        if axis == "u":
+            force[VR.product] += m
+            force[RR.product] += m_xG
+        elif axis == "v":
+            force[UR.product] -= m
+        else:
+            force[UR.product] -= m_xG
+        return np.array([force[term.product] for term in terms])
 
     def acceleration_matrix(
         self, particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
-        """InputError: free-running trials cannot tell the unknown added masses from the mass."""
+        """Refuse: free-running trials cannot tell unknown added masses from mass."""
         raise InputError(
-            f"structure '{self.name}': free-running trials found, expected captive"
-            " tests with the channels X, Y, N: its added masses are among the"
-            " unknowns; use identification.identify_forces"
+            f"structure '{self.name}': expected captive tests with the channels X, Y, N,"
+            " got free-running trials: its added masses are among the unknowns; use"
+            " identification.identify_forces"
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """The table as it stands in a model file."""
-        return {
-            "name": self.name,
-            "source": self.source,
-            "shares": {
-                axis: [share.to_dict() for share in shares]
-                for axis, shares in self.shares.items()
-            },
-        }
+        """Table as it stands in a model file."""
+        shares = {}
+        for axis, listed in self.shares.items():
+            shares[axis] = [share.to_dict() for share in listed]
+        return {"name": self.name, "source": self.source, "shares": shares}
 
     @classmethod
-    def from_dict(cls, table: Mapping[str, Any]) -> "SharedStructure":
-        """The table from a model file."""
-        shares = {
-            axis: tuple(
-                Share(
-                    s["coefficient"],
-                    Term(s["name"], tuple(s["powers"].items())),
-                    s["sign"],
-                )
-                for s in listed
-            )
-            for axis, listed in table["shares"].items()
-        }
-        return shared_structure(table["name"], table["source"], shares)
+    def from_dict(cls, table: Mapping[str, Any], where: str = "structure") -> Self:
+        """Read what `to_dict` wrote; errors begin with `where`."""
+        place = f"{where}.shares"
+        listed = check_table(table["shares"], place, AXES, AXES)
+        shares = {}
+        for axis in AXES:
+            entries = list_entries(listed[axis], f"{place}.{axis}")
+            read = [Share.from_dict(entry, at) for at, entry in entries.items()]
+            shares[axis] = tuple(read)
+        name = table.get("name")
+        source = table.get("source")
+        return cls(**_shared_fields(name, source, shares))
 
 
 def shared_structure(
     name: str, source: str, shares: Mapping[str, tuple[Share, ...]]
 ) -> SharedStructure:
-    """A table for forces from the shares of equations `u`, `v`, `r`; InputError if it cannot be computed."""
-    velocity = {
-        axis: [share.term for share in listed if share.acceleration is None]
-        for axis, listed in shares.items()
-    }
-    across = _distinct([*velocity.get("v", ()), *velocity.get("r", ()), UR])
-    equations = {
-        "u": _distinct([*velocity.get("u", ()), VR, RR]),
-        "v": across,
-        "r": across,
-    }
-    return SharedStructure(name, source, equations, "prime", "force", dict(shares))
+    """Make a table for forces from the shares of equations `u`, `v` and `r`."""
+    return SharedStructure(**_shared_fields(name, source, shares))
 
 
-def _distinct(terms: list[Term]) -> tuple[Term, ...]:
-    """Each product once."""
-    return tuple({frozenset(term.powers): term for term in reversed(terms)}.values())[
-        ::-1
-    ]
+def _shared_fields(
+    name: Any, source: Any, shares: Mapping[str, tuple[Share, ...]]
+) -> dict[str, Any]:
+    """Fields of a `SharedStructure`: its equations follow from the shares."""
+    on_velocities: dict[str, list[Term]] = {axis: [] for axis in AXES}
+    for axis, listed in shares.items():
+        for share in listed:
+            if share.acceleration is None and axis in AXES:
+                on_velocities[axis].append(share.term)
+    surge = _distinct([*on_velocities["u"], VR, RR])
+    across = _distinct([*on_velocities["v"], *on_velocities["r"], UR])
+    return {
+        "name": name,
+        "source": source,
+        "equations": {"u": surge, "v": across, "r": across},
+        "normalisation": "prime",
+        "quantity": "force",
+        "shares": dict(shares),
+    }
+
+
+def _distinct(terms: Iterable[Term]) -> tuple[Term, ...]:
+    """Each product once, where it stands last, by its first name."""
+    found: dict[object, Term] = {}
+    for term in terms:
+        first = found.pop(term.product, term)
+        found[term.product] = first
+    return tuple(found.values())
 
 
 def read_shares(text: str) -> tuple[Share, ...]:
-    """Shares from short names such as `X_uuu`, `Y_|r|v` or `N_vdot`, separated by spaces.
+    """Read shares from short names such as `X_uuu`, `Y_|r|v` or `N_vdot`.
 
     After a colon stands the term where it is not that of the coefficient's name, as in
     `Y_vdot:vr`; a leading minus is the sign.
     """
     shares = []
     for word in text.split():
-        sign, body = (-1.0, word[1:]) if word[0] == "-" else (1.0, word)
-        coefficient, _, name = body.partition(":")
-        name = name or coefficient.partition("_")[2]
-        (term,) = (
-            (Term(name, ((name, 1),)),)
-            if name in ACCELERATIONS
-            else short_terms(name, surge="u")
-        )
+        sign = -1.0 if word[0] == "-" else 1.0
+        coefficient, _, name = word.removeprefix("-").partition(":")
+        if not name:
+            name = coefficient.partition("_")[2]
+        if name in ACCELERATIONS:
+            term = Term(name, ((name, 1),))
+        else:
+            (term,) = short_terms(name, surge="u")
         shares.append(Share(coefficient, term, sign))
     return tuple(shares)

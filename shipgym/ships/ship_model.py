@@ -1,24 +1,28 @@
 """A ship as a manoeuvring model that is simulated, sampled from, saved and loaded."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.checks import placed
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
-from shipgym.sea.conditions import Weather
-from shipgym.ships.equations import ShipEquations
-from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.model_file import numbers_hash, read_model
-from shipgym.ships.simulate import Seed, simulate
-from shipgym.ships.term_table import Structure
-from shipgym.trials.trial import Trial
+
+if TYPE_CHECKING:  # for annotations, and where a ship is simulated
+    from shipgym.sea.conditions import Weather
+    from shipgym.ships.equations import ShipEquations
+    from shipgym.ships.simulate import Seed
+    from shipgym.ships.term_table import Structure
+    from shipgym.trials.trial import Trial
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +48,9 @@ class ShipModel(ManoeuvringModel):
     provenance : dict or None
         Method, settings, software version and trials it came from, or the source of a
         reference ship.
-    own_table : Structure, ShipEquations or None
-        The table of terms a model file came with, or a registered table or ship; by
-        default what is shipped under the structure's name.
+    dynamics : Structure or ShipEquations
+        The table of terms, or the equations of a ship that has her own; by default what
+        is shipped or registered under the structure's name.
     service_shaft_speed : float
         Shaft speed at service speed, 1/s; 0 where the model knows no shaft.
     """
@@ -90,46 +94,46 @@ class ShipModel(ManoeuvringModel):
             `wind_speed` and `wind_from` tell the weather. What instruments show of it
             all: `shipgym.trials.sensors.Sensors`.
         """
+        from shipgym.ships.simulate import simulate  # an environment does without
+
         return simulate(
             self, commands, dt, state, water_depth, weather=weather, seed=seed
         )
 
     def sample(self, n: int, seed: int | np.random.Generator) -> list[Self]:
-        """N models whose coefficients are drawn from the identified covariance; the same for the same seed.
+        """Draw n models whose coefficients follow the identified covariance.
 
         Raises InputError if the model has no covariance.
         """
         if self.covariance is None:
             raise InputError(
-                f"model {self.name!r} has no covariance: only identified models can be"
-                " sampled from"
+                f"model {self.name!r}: expected a covariance, which only identified"
+                " models have, to sample from, got none"
             )
-        mean = np.array(list(self.coefficients.values()))
-        deviation = np.sqrt(np.diag(self.covariance))
-        scale = np.where(deviation > 0.0, deviation, 1.0)
-        # of the correlations: coefficients of 1e-5 and of 1 have to be drawn equally
-        # well
-        values, vectors = np.linalg.eigh(self.covariance / np.outer(scale, scale))
-        root = scale[:, None] * vectors * np.sqrt(np.clip(values, 0.0, None))
         rng = np.random.default_rng(seed)
-        draws = mean + rng.standard_normal((n, len(mean))) @ root.T
-        tables, drawn = self._drawn_tables(n, rng), map(self.with_coefficients, draws)
-        return [
-            replace(
-                model, name=f"{self.name}-draw-{i}", covariance=None, own_table=table
-            )
-            for i, (model, table) in enumerate(zip(drawn, tables, strict=True))
-        ]
+        mean = np.array(list(self.coefficients.values()))
+        normal = rng.standard_normal((n, len(mean)))
+        draws = mean + normal @ _root(self.covariance).T
+        tables = self._drawn_tables(n, rng)
+        models = []
+        for i, (values, dynamics) in enumerate(zip(draws, tables, strict=True)):
+            name = f"{self.name}-draw-{i}"
+            drawn = replace(self, name=name, covariance=None, dynamics=dynamics)
+            models.append(drawn.with_coefficients(values))
+        return models
 
     def _drawn_tables(
         self, n: int, rng: np.random.Generator
-    ) -> list[Structure | ShipEquations | None]:
-        """Its table n times, with a fitted reference ship drawn anew each time."""
-        box = self.own_table
+    ) -> list[Structure | ShipEquations]:
+        """Its table n times, with a fitted reference ship drawn each time."""
+        from shipgym.ships.grey_boxes import GreyBox
+
+        box = self.dynamics
         if not isinstance(box, GreyBox) or box.ship.covariance is None:
             return [box] * n
         assert isinstance(box.reference, ShipModel)
-        return [replace(box, reference=drawn) for drawn in box.reference.sample(n, rng)]
+        references = box.reference.sample(n, rng)
+        return [replace(box, reference=drawn) for drawn in references]
 
     def save(self, path: str | Path) -> None:
         """Write the model as a JSON file (format in `shipgym.ships.model_file`)."""
@@ -142,13 +146,24 @@ class ShipModel(ManoeuvringModel):
         fields = read_json(
             file, "model file", "identify the model again or take another copy"
         )
-        with placed(str(file)):
-            return read_model(fields, str(file), cls)
+        return cls.from_dict(fields, str(file))
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any], where: str = "model") -> Self:
-        """The model of what `to_dict` gave, or a model file holds.
+        """Read what `to_dict` gave, or a model file holds.
 
         Raises InputError, naming the field at fault, after `where`.
         """
-        return read_model(fields, where, cls)
+        with placed(where):
+            return read_model(fields, where, cls)
+
+
+def _root(covariance: Floats) -> Floats:
+    """Square root of a covariance by its correlations: 1e-5 and 1 are drawn equally well."""
+    deviation = np.sqrt(np.diag(covariance))
+    scale = np.where(deviation > 0.0, deviation, 1.0)
+    correlations = covariance / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(correlations)
+    lengths = np.sqrt(np.clip(values, 0.0, None))
+    root: Floats = scale[:, None] * vectors * lengths
+    return root

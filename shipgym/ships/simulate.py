@@ -1,4 +1,4 @@
-"""Ships through time as Trials: with given commands, or open loop with the rudder of a measured trial."""
+"""Simulate ships as Trials, with given commands or those of a measured trial."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_whole
+from shipgym.checks import check_number, check_whole, unexpected
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.records import leaves
 from shipgym.engine.trajectories import SEA_CHANNELS
@@ -15,11 +15,8 @@ from shipgym.errors import InputError, UnstableModelError
 from shipgym.sea.conditions import Weather, as_weather
 from shipgym.sea.open_sea import Sea
 from shipgym.sea.weather_column import weather_column
-from shipgym.ships.manoeuvring_model import (
-    ManoeuvringModel,
-    checked_orders,
-    two_commands,
-)
+from shipgym.ships.manoeuvring_model import ManoeuvringModel
+from shipgym.ships.orders import checked_orders, two_commands
 from shipgym.ships.term_table import Structure
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
@@ -34,14 +31,13 @@ class Conditions:
     """Depth of the water and weather of a simulation."""
 
     water_depth: float = np.inf  # m
-    weather: Weather | str | None = (
-        None  # A weather, the name of a sea state, or None for calm
-    )
+    # a weather, the name of a sea state, or None for calm
+    weather: Weather | str | None = None
     seed: Seed = 0  # of the random part of the weather
 
 
 class Passage:
-    """One ship on her way through given conditions: the loops for them and the arrays they work on.
+    """One ship in given conditions: the loops for them and the arrays they work on.
 
     `numbers` are the ship's, `sea` is its state, that of its random numbers and its
     parameters, as loops take them, `windy` whether there is any weather; its filters
@@ -51,49 +47,49 @@ class Passage:
     def __init__(
         self, model: ManoeuvringModel, conditions: Conditions, dt: float
     ) -> None:
-        self.model, self.vessel, self.dt = model, model.vessel, dt
+        self.model = model
+        self.vessel = model.vessel
+        self.dt = dt
         self.numbers = model.ship_numbers(conditions.water_depth, dt)
         weather = as_weather(conditions.weather, "weather")
         self.windy = not weather.calm
         self.sea = np.zeros(0), np.zeros(0, dtype=np.uint64), np.zeros(0)
         if self.windy:
-            seed, parameters = (
-                conditions.seed,
-                weather_column(model, weather, dt, conditions.water_depth),
-            )
+            depth = conditions.water_depth
+            parameters = weather_column(model, weather, dt, depth)
+            seed = conditions.seed
             if not isinstance(seed, np.random.Generator):
                 check_whole(seed, "seed", at_least=0)
             word = np.random.default_rng(seed).integers(2**63)
-            self.sea = (
-                np.zeros(len(leaves(Sea))),
-                np.array([word], dtype=np.uint64),
-                parameters,
-            )
+            random = np.array([word], dtype=np.uint64)
+            self.sea = np.zeros(len(leaves(Sea))), random, parameters
 
     def loop(self, name: str) -> Any:
-        """A loop of `shipgym.engine.loops`, compiled for the ship and for calm water or weather."""
+        """Loop of `shipgym.engine.loops`, compiled for the ship in calm water or weather."""
         return ship_loop(self.vessel, name, self.windy)
 
     def run(
         self, name: str, states: Floats, *arguments: Any, since: float = 0.0
     ) -> Any:
-        """Fill the states after the first by a loop, from its arguments but for the sea and the ship.
+        """Fill the states after the first by a loop, from its arguments but sea and ship.
 
         Returns what the loop returns: the last row, or that and more. Raises
         UnstableModelError where the ship leaves every physical range, `since` s after
         the manoeuvre began.
         """
-        found = self.loop(name)(states, *arguments, *self.sea, self.numbers)
+        loop = self.loop(name)
+        found = loop(states, *arguments, *self.sea, self.numbers)
         reached = found[0] if isinstance(found, tuple) else found
         if reached < len(states) - 1:
-            raise unstable(
-                self.model, since + self.dt * reached, states[reached], self.dt
-            )
+            time_s = since + self.dt * reached
+            raise unstable(self.model, time_s, states[reached], self.dt)
         return found
 
     def states(self, first: Floats, n_steps: int) -> Floats:
-        """Rows for `n_steps` + 1 states, shape (n_columns,) each, and their weather; `first` filled in."""
-        width = len(self.vessel.state_names) + (len(SEA_CHANNELS) if self.windy else 0)
+        """Rows for `n_steps` + 1 states and their weather, with `first` filled in."""
+        width = len(self.vessel.state_names)
+        if self.windy:
+            width += len(SEA_CHANNELS)
         states = np.empty((n_steps + 1, width))
         states[0, : len(first)] = first
         if len(first) < width:
@@ -113,18 +109,20 @@ def simulate(
 ) -> Trial:
     """Simulate a ship with commands held over each step (see `ShipModel.simulate`)."""
     held = checked_orders(model, commands)
-    if not (np.isfinite(dt) and dt > 0.0):
-        raise InputError(f"dt: {dt} found, expected a step in s above 0")
-    passage = Passage(model, Conditions(water_depth, weather, seed), dt)
-    states = passage.states(initial_state(model, state), len(held))
+    check_number(dt, "dt", above=0.0, hint="in s")
+    conditions = Conditions(water_depth, weather, seed)
+    passage = Passage(model, conditions, dt)
+    first = initial_state(model, state)
+    states = passage.states(first, len(held))
     passage.run("simulate", states, two_commands(held), dt)
-    return as_trial(model, dt, states, np.vstack([held, held[-1:]]), kind)
+    commands = np.vstack([held, held[-1:]])
+    return as_trial(model, dt, states, commands, kind)
 
 
 def orders(
     model: ManoeuvringModel, rudder: Floats, shaft: Floats | None = None
 ) -> Floats:
-    """Commands of shape (n_steps, n_command): a rudder, rad, and a shaft, 1/s, by default as in service."""
+    """Commands of shape (n_steps, n_command): rudder, rad, and shaft, 1/s."""
     commands = np.repeat(model.service_command[None], len(rudder), axis=0)
     commands[:, 0] = rudder
     if shaft is not None:
@@ -133,7 +131,7 @@ def orders(
 
 
 def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
-    """Predict a trial from its initial state and its measured rudder (and shaft speed) alone.
+    """Predict a trial from its initial state and measured commands alone.
 
     The rudder is taken straight between the samples, as measured: no steering gear
     stands between. The trial has u, v, r, psi, delta (x and y where recorded; n where
@@ -142,56 +140,66 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     UnstableModelError where the simulated ship leaves every physical range.
     """
     needed = ["psi", "u", "v", "r", "delta", *model.command_names[1:]]
-    missing = [name for name in needed if name not in trial.channels]
-    if missing:
-        raise InputError(
-            f"trial {trial.name!r}: channel {missing[0]!r} is missing, it is needed to"
-            " predict the trial"
-        )
+    for name in needed:
+        if name not in trial.channels:
+            raise InputError(
+                f"trial {trial.name!r}: channel {name!r} is missing, it is needed to"
+                " predict the trial"
+            )
     t = np.array(trial.t)
-    states = np.empty((len(t), len(model.state_names)))
-    states[0] = [
-        trial[name][0] if name in trial.channels else 0.0 for name in model.state_names
-    ]
-    if "q" in model.state_names:  # which no trial records: that of a steady yaw rate
-        rates = model.rates({name: trial[name][:1] for name in needed})
-        states[0, model.state_names.index("q")] = -rates["r"][0]
-    n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
-    longest_step = LONGEST_STEP * model.travel_time
+    states = np.zeros((len(t), len(model.state_names)))
+    for i, name in enumerate(model.state_names):
+        if name in trial.channels:
+            states[0, i] = trial[name][0]
+        elif name == "q":  # which no trial records: that of a steady yaw rate
+            first = {known: trial[known][:1] for known in needed}
+            states[0, i] = -model.rates(first)["r"][0]
+
+    delta = np.array(trial["delta"])
+    n = np.zeros(len(t))
+    if "n" in trial.channels:
+        n = np.array(trial["n"])
     wind = wind_accelerations(trial, model.dynamics)
     wind = 0.5 * (wind[1:] + wind[:-1])
+    longest_step = LONGEST_STEP * model.travel_time
     loop = ship_loop(model.vessel, "open_loop", bool(wind.any()))
-    reached = loop(
-        states, t, np.array(trial["delta"]), n, wind, longest_step, model.ship_numbers()
-    )
+    reached = loop(states, t, delta, n, wind, longest_step, model.ship_numbers())
     if reached < len(t) - 1:
         raise unstable(model, t[reached], states[reached])
-    channels, length = _channels(model, states), model.particulars["length"]
     return Trial(
-        t, channels, name=trial.name, kind=trial.kind, use=trial.use, length=length
+        t,
+        _channels(model, states),
+        name=trial.name,
+        kind=trial.kind,
+        use=trial.use,
+        length=model.particulars["length"],
     )
 
 
 def wind_accelerations(trial: Trial, dynamics: Any = None) -> Floats:
-    """Those in surge, sway and yaw that a trial has, of a structure's equations; shape (n_samples, 3)."""
-    own = dynamics.equations if isinstance(dynamics, Structure) else "uvr"
-    rows = [
-        trial[name] if axis in own and name in trial else 0.0 * trial.t
-        for axis, name in WIND.items()
-    ]
-    return np.column_stack(rows)
+    """Accelerations by wind in a trial: surge, sway, yaw; shape (n_samples, 3).
+
+    Those of equations that a structure does not have are 0.
+    """
+    own = dynamics.equations if isinstance(dynamics, Structure) else WIND
+    columns = []
+    for axis, name in WIND.items():
+        column = np.zeros(len(trial))
+        if axis in own and name in trial:
+            column = trial[name]
+        columns.append(column)
+    return np.column_stack(columns)
 
 
 def initial_state(model: ManoeuvringModel, state: ArrayLike | None) -> Floats:
-    """A given state, checked, or straight ahead at service speed."""
+    """State to start from: a given one, checked, or straight ahead at service speed."""
     if state is None:
         return model.service_state
     start = np.asarray(state, dtype=float)
-    if start.shape != (len(model.state_names),) or not np.all(np.isfinite(start)):
-        raise InputError(
-            f"state: shape {start.shape} found, expected {len(model.state_names)}"
-            f" finite numbers for {', '.join(model.state_names)}"
-        )
+    names = model.state_names
+    if start.shape != (len(names),) or not np.all(np.isfinite(start)):
+        expected = f"{len(names)} finite numbers for {', '.join(names)}"
+        raise unexpected("state", expected, start.tolist())
     return start
 
 
@@ -202,27 +210,25 @@ def as_trial(
     commands: Floats,
     kind: str | None = None,
 ) -> Trial:
-    """States dt apart, the weather behind them and the commands held from each sample on as a Trial."""
+    """Trial of states dt apart, their weather, and the commands held from each sample on."""
     channels = _channels(model, states)
-    for name, values in zip(
-        SEA_CHANNELS, states[:, len(model.state_names) :].T, strict=False
-    ):
-        if name not in ("phi_wave", "p_wave") or "phi" in model.state_names:
+    rolls = "phi" in model.state_names
+    weather = states[:, len(model.state_names) :]
+    for name, values in zip(SEA_CHANNELS, weather.T, strict=False):
+        if rolls or name not in ("phi_wave", "p_wave"):
             channels[name] = values
     for name, command in zip(model.command_names, commands.T, strict=True):
         channels[f"{name}_command"] = command
-        if (
-            name == "n"
-        ):  # a shaft without lag turns as ordered, and is part of the record
+        if name == "n":
+            # a shaft without lag turns as ordered, and is part of the record
             channels.setdefault("n", command)
     t = dt * np.arange(len(states), dtype=float)
-    return Trial(
-        t, channels, name=model.name, kind=kind, length=model.particulars["length"]
-    )
+    length = model.particulars["length"]
+    return Trial(t, channels, name=model.name, kind=kind, length=length)
 
 
 def _channels(model: ManoeuvringModel, states: Floats) -> dict[str, Floats]:
-    """What can be recorded of states; a memory of yaw cannot."""
+    """Channels of states that can be recorded; a memory of yaw cannot."""
     columns = zip(model.state_names, states.T, strict=False)
     return {name: column for name, column in columns if name in CHANNELS}
 
@@ -230,20 +236,22 @@ def _channels(model: ManoeuvringModel, states: Floats) -> dict[str, Floats]:
 def unstable(
     model: ManoeuvringModel, time_s: float, state: Floats, step: float = 0.0
 ) -> UnstableModelError:
-    """The error for a ship that ran away after a given time and physical state, in steps of so many s."""
+    """Make the error for a ship whose state grew beyond bounds at a given time."""
     last = dict(zip(model.state_names, state.tolist(), strict=False))
-    heel = f", phi = {np.degrees(last['phi']):.3g} deg" if "phi" in last else ""
-    longest = LONGEST_STEP * model.travel_time
-    long = (
-        f", or steps of {step:g} s are too long: try {longest:.1g} s"
-        if step > longest
-        else ""
+    there = (
+        f"u = {last['u']:.3g} m/s, v = {last['v']:.3g} m/s,"
+        f" r = {np.degrees(last['r']):.3g} deg/s"
     )
-    own = ", or her equations give no number (check_ship_model says where)"
+    if "phi" in last:
+        there += f", phi = {np.degrees(last['phi']):.3g} deg"
+    reason = "it is unstable there"
+    longest = LONGEST_STEP * model.travel_time
+    if step > longest:
+        reason += f", or steps of {step:g} s are too long: try {longest:.1g} s"
+    if getattr(model.dynamics, "path", None):  # a user's own
+        reason += ", or her equations give no number (check_ship_model says where)"
     return UnstableModelError(
-        f"model {model.name!r} runs away after {time_s:.1f} s (u = {last['u']:.3g} m/s,"
-        f" v = {last['v']:.3g} m/s, r = {np.degrees(last['r']):.3g} deg/s{heel}): it is"
-        f" unstable there{long}{own if getattr(model.dynamics, 'path', None) else ''}",
+        f"model {model.name!r} runs away after {time_s:.1f} s ({there}): {reason}",
         time_s,
         last,
     )

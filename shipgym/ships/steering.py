@@ -2,18 +2,10 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
 
-from shipgym.checks import check_number, check_table
-
-_BOUNDS: dict[str, dict[str, Any]] = {
-    "rudder_limit_deg": {"above": 0.0, "at_most": 90.0},
-    "rudder_rate_deg_s": {"above": 0.0},
-    "time_constant": {"at_least": 0.0},
-}
-
-SHORTEST_LAG = 0.45  # of a step of simulations
+from shipgym.checks import check_number, check_table, placed
 
 
 @dataclass(frozen=True)
@@ -46,23 +38,28 @@ class SteeringGear:
     time_constant: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, bounds in _BOUNDS.items():
-            value = check_number(getattr(self, name), f"steering gear {name}", **bounds)
+        bounds: dict[str, dict[str, Any]] = {
+            "rudder_limit_deg": {"above": 0.0, "at_most": 90.0},
+            "rudder_rate_deg_s": {"above": 0.0},
+            "time_constant": {"at_least": 0.0},
+        }
+        for name, allowed in bounds.items():
+            value = check_number(getattr(self, name), name, **allowed)
             object.__setattr__(self, name, value)
 
     @classmethod
     def from_mapping(
         cls, mapping: Mapping[str, Any], where: str = "steering gear"
     ) -> Self:
-        """A steering gear from keys of the ship file's ``[steering]``, which are this class's fields.
+        """Make a steering gear from the keys of the ship file's ``[steering]``.
 
         Raises InputError, beginning with `where`, for an unknown key or a value out of
         bounds.
         """
-        table = check_table(mapping, where, _BOUNDS)
-        for name, value in table.items():
-            check_number(value, f"{where} {name}", **_BOUNDS[name])
-        return cls(**table)
+        names = [one.name for one in fields(cls)]
+        table = check_table(mapping, where, names)
+        with placed(where, " "):
+            return cls(**table)
 
     def to_dict(self) -> dict[str, float]:
         """Return the three values by name, as :meth:`from_mapping` takes them."""
@@ -79,14 +76,13 @@ class SteeringGear:
         return math.radians(self.rudder_rate_deg_s)
 
     def frequency(self, step: float = 0.0) -> float:
-        """Inverse of the time constant in steps of some seconds, 1/s; 0 for a gear without lag.
+        """Inverse of the time constant, 1/s, in steps of some seconds; 0 without lag.
 
         A lag shorter than 0.45 of a step is taken as that: the Runge-Kutta method does
         not follow it, and is unstable where it is shorter than 0.36 of a step (Hairer &
         Wanner 1996, IV.2).
         """
-        return (
-            1.0 / max(self.time_constant, SHORTEST_LAG * step)
-            if self.time_constant
-            else 0.0
-        )
+        if self.time_constant == 0.0:
+            return 0.0
+        shortest = 0.45 * step
+        return 1.0 / max(self.time_constant, shortest)

@@ -1,88 +1,123 @@
-"""The printed structures by name (`structures.toml`), and those that users register."""
+"""Structures by name: printed ones, ships with equations, and those users register."""
+
+from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from functools import cache
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from shipgym.checks import check_choice, check_keys, check_table, placed
+from shipgym.checks import check_choice, check_keys, check_table, placed, unexpected
 from shipgym.errors import InputError
 from shipgym.files import shipped_toml
-from shipgym.ships import container, kvlcc2, mmg, tanker
-from shipgym.ships.equations import ShipEquations
-from shipgym.ships.shared_structure import read_shares, shared_structure
 from shipgym.ships.term_table import Structure
 from shipgym.ships.terms import Term, read_terms, short_terms
 
-# a table that stands on a reference ship, which only a user can name
-WITH_REFERENCE = "grey-box"
+if TYPE_CHECKING:  # few models have equations
+    from shipgym.ships.equations import ShipEquations
+
+#: Files of this package that define a ship with equations of her own, by her name.
+SHIPPED_EQUATIONS = ("container", "tanker", "kvlcc2", "mmg")
+#: The grey box stands on a reference ship, which only a user can name; the MMG form is
+#: no table.
+NO_TABLES = {
+    "grey-box": (
+        "a table of terms, got 'grey-box', which is a reference ship and a table; give"
+        " the reference ship: identify(..., structure='grey-box',"
+        " reference_model='tanker'), or shipgym.ships.grey_box"
+    ),
+    "mmg": (
+        "a table of terms, got 'mmg', which is none; choose one, such as 'abkowitz' or"
+        " 'cubic'"
+    ),
+}
+# where a table does not say
+USUAL = {"source": "own", "normalisation": "si", "quantity": "acceleration"}
+
+#: What users registered, by name.
+REGISTERED_STRUCTURES: dict[str, Structure] = {}
+REGISTERED_EQUATIONS: dict[str, ShipEquations] = {}
+
 Read = TypeVar("Read")
-USUAL = {
-    "source": "own",
-    "normalisation": "si",
-    "quantity": "acceleration",
-}  # where a table does not say
 
 
-def _read_printed(
-    name: str, table: dict[str, Any], papers: Mapping[str, str]
-) -> Structure:
-    """A structure of `structures.toml`, whose terms are formulas, letters or shares of coefficients."""
-    source = table.pop("source").format(**papers)
+# ---- what is shipped -------------------------------------------------------------------
+
+
+@cache
+def printed_tables() -> dict[str, dict[str, Any]]:
+    """Tables of `structures.toml` by name, with the papers in their sources."""
+    tables = shipped_toml("shipgym.ships", "structures.toml")
+    papers = tables.pop("papers")
+    for table in tables.values():
+        table["source"] = table["source"].format(**papers)
+    return tables
+
+
+@cache
+def printed_structure(name: str) -> Structure:
+    """Structure of `structures.toml`, given by formulas, letters or shares."""
+    table = dict(printed_tables()[name])
     if "shares" in table:
-        return shared_structure(name, source, _by_axis(table["shares"], read_shares))
+        from shipgym.ships.shared_structure import read_shares, shared_structure
+
+        shares = _by_axis(table["shares"], read_shares)
+        return shared_structure(name, table["source"], shares)
     if "letters" in table:
-        terms = _by_axis(table.pop("letters"), short_terms)
+        table["equations"] = _by_axis(table.pop("letters"), short_terms)
     else:
-        terms = _by_axis(table.pop("equations"), read_terms)
-    return Structure(name, source, terms, **table)
+        table["equations"] = _by_axis(table["equations"], read_terms)
+    return Structure(**USUAL | table, name=name)
 
 
 def _by_axis(texts: Mapping[str, str], read: Callable[[str], Read]) -> dict[str, Read]:
-    """What is read of each text, for each of the axes in its key, such as "v r"."""
+    """Read each text for each of the axes in its key, such as "v r"."""
     return {axis: read(text) for axes, text in texts.items() for axis in axes.split()}
 
 
-_TABLES = shipped_toml("shipgym.ships", "structures.toml")
-_PAPERS = _TABLES.pop("papers")
-STRUCTURES = {
-    name: _read_printed(name, USUAL | table, _PAPERS) for name, table in _TABLES.items()
-}
-PRINTED = frozenset(STRUCTURES)
-
-SHIPPED_EQUATIONS: dict[str, ShipEquations] = {
-    ship.name: ship for ship in (container.SHIP, tanker.SHIP, kvlcc2.SHIP, mmg.SHIP)
-}
-#: Ships with equations of their own by name, registered ones included.
-EQUATIONS = dict(SHIPPED_EQUATIONS)
+# ---- by name ---------------------------------------------------------------------------
 
 
 def list_structures() -> list[str]:
-    """Names of the structures that can be identified, registered ones, grey box and MMG form included."""
-    return [*STRUCTURES, WITH_REFERENCE, mmg.MMG]
+    """Names of the structures that can be identified, registered ones included."""
+    return [*printed_tables(), *REGISTERED_STRUCTURES, *NO_TABLES]
 
 
 def get_structure(name: str) -> Structure:
-    """An identified structure by name.
+    """Return an identified structure by name.
 
     Raises InputError if there is none of that name, it is the grey box, which takes a
     reference ship, or the MMG form, which is no table.
     """
-    if name == mmg.MMG:
-        raise InputError(
-            "structure: 'mmg' found, which is no table of terms; choose one, such as"
-            " 'abkowitz' or 'cubic'"
-        )
-    if name == WITH_REFERENCE:
-        raise InputError(
-            "structure: 'grey-box' found, which is a reference ship and a table of"
-            " terms; give the reference ship: identify(..., structure='grey-box',"
-            " reference_model='tanker'), or shipgym.ships.grey_box"
-        )
-    return STRUCTURES[check_choice(name, list_structures(), "structure")]
+    if name in REGISTERED_STRUCTURES:
+        return REGISTERED_STRUCTURES[name]
+    if name in NO_TABLES:
+        raise InputError(f"structure: expected {NO_TABLES[name]}")
+    return printed_structure(check_choice(name, list_structures(), "structure"))
+
+
+def list_equations() -> list[str]:
+    """Names of ships with equations of their own, registered ones included."""
+    return [*SHIPPED_EQUATIONS, *REGISTERED_EQUATIONS]
+
+
+def get_equations(name: str) -> ShipEquations:
+    """Return a ship's own equations by name; InputError if there are none."""
+    if name in REGISTERED_EQUATIONS:
+        return REGISTERED_EQUATIONS[name]
+    check_choice(name, list_equations(), "equations")
+    ship: ShipEquations = import_module(f"shipgym.ships.{name}").SHIP
+    return ship
 
 
 def get_dynamics(name: str) -> Structure | ShipEquations:
-    """A structure, or the equations of a ship that has her own, by name; InputError if there is none."""
-    return EQUATIONS[name] if name in EQUATIONS else get_structure(name)
+    """Return a structure, or a ship's own equations, by name; InputError if there is none."""
+    if name in list_equations():
+        return get_equations(name)
+    return get_structure(name)
+
+
+# ---- a user's own ----------------------------------------------------------------------
 
 
 def register_structure(
@@ -119,54 +154,53 @@ def register_structure(
     """
     units = {"normalisation": normalisation, "quantity": quantity}
     table = {"name": name, "equations": equations, "source": source, **units}
-    STRUCTURES[name] = own_structure(table, "register_structure")
-    return STRUCTURES[name]
+    structure = own_structure(table, "register_structure")
+    if name not in printed_tables():  # which it equals
+        REGISTERED_STRUCTURES[name] = structure
+    return structure
 
 
 def own_structure(table: Any, where: str) -> Structure:
-    """A structure from the arguments of `register_structure`; messages begin with `where`."""
+    """Make a structure from `register_structure`'s arguments; errors begin with `where`."""
     own: dict[str, Any] = {**USUAL, **check_table(table, where)}
     check_keys(own, ("name", "equations", *USUAL), where)
     for key in ("name", "equations"):
         if key not in own:
             raise InputError(
-                f"{where}: no {key} found, expected a name and equations, such as r ="
-                ' "r, delta"'
+                f'{where}: expected a name and equations, such as r = "r, delta", got no'
+                f" {key}"
             )
-    given = check_table(own["equations"], f"{where}: equations")
+    equations = check_table(own["equations"], f"{where}: equations")
     own["equations"] = {
-        q: _terms(formulas, f"{where}: equations.{q}") for q, formulas in given.items()
+        equation: _terms(given, f"{where}: equations.{equation}")
+        for equation, given in equations.items()
     }
     with placed(where):
         structure = Structure(**own)
     name = structure.name
-    if (
-        name in (*EQUATIONS, WITH_REFERENCE, "auto")
-        or STRUCTURES.get(name, structure) != structure
-    ):
+    taken = (*list_equations(), *NO_TABLES, "auto")
+    other = name in (*printed_tables(), *REGISTERED_STRUCTURES) and (
+        get_structure(name) != structure
+    )
+    if name in taken or other:
         raise InputError(
-            f"{where}: name {name!r} found, which is another structure's; expected a"
-            " new name"
+            f"{where}: name: expected a new one, got {name!r}, which is another"
+            " structure's"
         )
     return structure
 
 
 def _terms(given: Any, where: str) -> tuple[Term, ...]:
     """Terms from formulas, or terms as they are."""
+    formulas = "formulas such as 'v, |v| r, delta'"
     if isinstance(given, str):
         if not given.strip():
-            raise InputError(
-                f"{where}: no terms found, expected formulas such as 'v, |v| r, delta'"
-            )
+            raise InputError(f"{where}: expected {formulas}, got no terms")
         with placed(where):
             return read_terms(given)
     if not isinstance(given, Sequence):
-        raise InputError(
-            f"{where}: {given!r} found, expected formulas such as 'v, |v| r, delta'"
-        )
+        raise unexpected(where, formulas, given)
     for term in given:
         if not isinstance(term, Term):
-            raise InputError(
-                f"{where}: {term!r} found, expected a formula in one text, or Terms"
-            )
+            raise unexpected(where, "a formula in one text, or Terms", term)
     return tuple(given)

@@ -1,8 +1,8 @@
 """The accelerations of a table of terms as a plain function, for the engine to compile.
 
-The function is written from the powers of the terms alone: fixed symbols, numbered
-coefficients and whole numbers, so that no name or text of a model file becomes part of
-a program. A grammar checks that before it is one.
+The function is written from the powers of the terms alone: each symbol is looked up
+among those below, coefficients are numbered, powers are repeated factors. So no name or
+text of a model file becomes part of a program. A grammar checks that before it is one.
 """
 
 import hashlib
@@ -10,53 +10,63 @@ import linecache
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from math import fabs, sqrt
 from typing import Any, NamedTuple
 
 from shipgym.engine.records import Record
-from shipgym.ships.terms import CHANNEL, SHAFT_SPEEDS, SPEEDS, SYMBOLS, TURN_RATES, Term
+from shipgym.ships.terms import CHANNEL, SYMBOLS, VELOCITIES, Term
 
-Powers = dict[str, int]
-Monomial = tuple[str, Powers]
+Equations = Mapping[str, tuple[Term, ...]]
+Powers = dict[str, int]  # of variables
+Monomial = tuple[str, Powers]  # with its coefficient
 
-VELOCITIES = (*SPEEDS, *TURN_RATES, *SHAFT_SPEEDS)
-#: Symbols of terms, and how the function makes them from the state, a line each, those
-#: it needs first.
+MOTION_RATES = ("u", "v", "r", "p", "q")
+
+#: Variable of each symbol.
 VARIABLE = {
     symbol: f"abs_{CHANNEL[symbol]}" if symbol[0] == "|" else symbol
     for symbol in SYMBOLS
 }
-MADE = {
-    **{name: f"motion.{name}" for name in ("u", "v", "r", "p", "phi", "delta", "n")},
+#: Variables, and what each is made of, those that others need first; velocities over U
+#: end in an underscore.
+MADE_OF = {
+    "u": "motion.u",
+    "v": "motion.v",
+    "r": "motion.r",
+    "p": "motion.p",
+    "phi": "motion.phi",
+    "delta": "motion.delta",
+    "n": "motion.n",
     "s": "u * u + v * v",
     "U": "sqrt(s)",
     "per_U": "U * (1.0 / s)",
     "du": "u - ship.speed",
     "dn": "n - ship.shaft",
-    **{
-        VARIABLE[symbol]: f"fabs({CHANNEL[symbol]})"
-        for symbol in SYMBOLS
-        if symbol[0] == "|"
-    },
+    "abs_u": "fabs(u)",
+    "abs_v": "fabs(v)",
+    "abs_r": "fabs(r)",
+    "abs_p": "fabs(p)",
+    "abs_phi": "fabs(phi)",
+    "abs_delta": "fabs(delta)",
+    "abs_n": "fabs(n)",
 }
-MADE |= {f"{VARIABLE[symbol]}_": f"{VARIABLE[symbol]} * per_U" for symbol in VELOCITIES}
+MADE_OF |= {
+    f"{VARIABLE[symbol]}_": f"{VARIABLE[symbol]} * per_U" for symbol in VELOCITIES
+}
 
-RATES = ("u", "v", "r", "p", "q")
-#: Where a table has no equation: the speed stays, and what drift or turn there is dies
-#: out within about a ship length.
-WITHOUT = {
+
+#: Rates where a table has no equation: the speed stays, and what drift or turn there is
+#: dies out within about a ship length.
+DAMPED = {
     "v": "-motion.v * (ship.speed / ship.length)",
     "r": "-motion.r * (ship.speed / ship.length)",
 }
 
-_NAMES = re.findall(
-    r"[A-Za-z_]+(?:\.\w+)?", " ".join([*MADE, *MADE.values(), *WITHOUT.values()])
-)
+_MADE = " ".join([*MADE_OF, *MADE_OF.values(), *DAMPED.values(), "motion.q"])
+_ACCELERATIONS = [f"{rate}dot" for rate in MOTION_RATES]
 _WORD = "|".join(
-    re.escape(word)
-    for word in sorted({*_NAMES, "motion.q", *(f"{q}dot" for q in RATES)})
+    map(re.escape, [*re.findall(r"[A-Za-z_]+(?:\.\w+)?", _MADE), *_ACCELERATIONS])
 )
 #: All that a source may be: these words, numbered coefficients and numbers, joined by
 #: arithmetic.
@@ -68,64 +78,70 @@ GRAMMAR = re.compile(
 )
 
 
-@dataclass(frozen=True)
-class Sum:
-    """One equation: its terms, the power of U in the feature of each, and that in the unit of their sum."""
-
-    terms: tuple[Term, ...]
-    speed_powers: tuple[int, ...]
-    unit: int
+def unit_speeds(equation: str) -> int:
+    """Power of the speed in the unit of what an equation makes up."""
+    return 3 if equation == "q" else 2
 
 
-def accelerations_source(sums: Mapping[str, Sum], damped: bool = True) -> str:
-    """Source of `accelerations(motion, c, ship)`: a factored sum of terms for each equation.
+def speed_power(equation: str, term: Term) -> int:
+    """Power of U of a term in SI units: that of the sum less one per velocity."""
+    return unit_speeds(equation) - term.power(*VELOCITIES)
 
-    Coefficients are numbered in the equations' order. `damped`: whether drift and turn
-    die out where there is no equation of them; else their rate is 0.
+
+def accelerations_source(equations: Equations, prime: bool, damped: bool = True) -> str:
+    """Write the source of `accelerations(motion, c, ship)`: factored sums of terms.
+
+    Coefficients are numbered in the equations' order. `prime`: whether terms are in the
+    prime system. Where one of those has more velocities than the sum, all velocities
+    are divided by U, and the sum is multiplied by its power. `damped`: whether drift
+    and turn die out where there is no equation of them; else their rate is 0.
     """
-    scaled = any(power < 0 for one in sums.values() for power in one.speed_powers)
-    used: set[str] = set()
-    rates, row = {}, 0
-    for equation, one in sums.items():
+    divided = prime and any(
+        speed_power(equation, term) < 0
+        for equation, terms in equations.items()
+        for term in terms
+    )
+    rates = dict(DAMPED) if damped else {}
+    needed: set[str] = set()
+    first = 0
+    for equation, terms in equations.items():
         monomials = []
-        for term, power in zip(one.terms, one.speed_powers, strict=True):
-            factors = _scaled_factors(term) if scaled else _factors(term, power)
-            monomials.append((f"c.c{row}", factors))
-            used |= factors.keys()
-            row += 1
-        unit = one.unit if scaled else 0
-        used |= {"s"} if unit > 1 else set()
-        used |= {"U"} if unit % 2 else set()
-        rates[equation] = (
-            "s * " * (unit // 2) + "U * " * (unit % 2) + f"({factored(monomials)})"
-        )
-    without = WITHOUT if damped else {}
-    lines = [
-        f"    {name} = {MADE[name]}" for name in MADE if name in _with_needed(used)
-    ]
-    lines += [f"    {q}dot = {rates.get(q) or without.get(q, '0.0')}" for q in RATES]
-    yaw = "rdot + motion.q" if "q" in sums else "rdot"
-    lines.append(f"    return udot, vdot, {yaw}, pdot, qdot")
-    return "def accelerations(motion, c, ship):\n" + "\n".join(lines) + "\n"
+        for number, term in enumerate(terms, first):
+            power = 0
+            if prime and not divided:
+                power = speed_power(equation, term)
+            factors = _factors(term, power, divided)
+            needed.update(factors)
+            monomials.append((f"c.c{number}", factors))
+        first += len(terms)
+        rate = f"({factored(monomials)})"
+        if divided:
+            unit = ["s", "U"] if unit_speeds(equation) == 3 else ["s"]
+            needed.update(unit)
+            rate = " * ".join([*unit, rate])
+        rates[equation] = rate
+
+    needed = _with_their_makings(needed)
+    yaw = "rdot + motion.q" if "q" in equations else "rdot"
+    lines = [f"{name} = {made}" for name, made in MADE_OF.items() if name in needed]
+    lines += [f"{name}dot = {rates.get(name, '0.0')}" for name in MOTION_RATES]
+    lines.append(f"return udot, vdot, {yaw}, pdot, qdot")
+    return "\n    ".join(["def accelerations(motion, c, ship):", *lines]) + "\n"
 
 
 @cache
 def accelerations_function(source: str) -> Any:
-    """The function of a source that `accelerations_source` wrote; ValueError for any other text."""
+    """Function of a source by `accelerations_source`; ValueError for any other text."""
     if not GRAMMAR.fullmatch(source):
         raise ValueError(
-            f"accelerations: {source[:200]!r} found, expected sums of products of known"
-            " symbols"
+            "accelerations: expected sums of products of known symbols, got"
+            f" {source[:200]!r}"
         )
     namespace: dict[str, Any] = {"sqrt": sqrt, "fabs": fabs, "__name__": __name__}
     name = f"<accelerations {hashlib.sha256(source.encode()).hexdigest()[:12]}>"
     exec(compile(source, name, "exec"), namespace)
-    linecache.cache[name] = (
-        len(source),
-        None,
-        source.splitlines(keepends=True),
-        name,
-    )  # for tracebacks
+    lines = source.splitlines(keepends=True)
+    linecache.cache[name] = (len(source), None, lines, name)  # for tracebacks
     return namespace["accelerations"]
 
 
@@ -136,7 +152,7 @@ def coefficients_record(n: int, name: str = "TermCoefficients") -> Record:
 
 
 def factored(monomials: Sequence[Monomial]) -> str:
-    """Python source of a sum of products with what they share taken out, symbol by symbol (Horner's scheme).
+    """Write a sum of products, common symbols factored out (Horner's scheme).
 
     Half as many operations as a sum of products, and short chains of them: three times
     as fast. A monomial is its coefficient and the powers of its variables.
@@ -145,52 +161,51 @@ def factored(monomials: Sequence[Monomial]) -> str:
     variable, count = shared.most_common(1)[0] if shared else ("", 0)
     if count < 2:
         return " + ".join(_product(*monomial) for monomial in monomials)
-    inside = [
-        (name, _without(powers, variable))
-        for name, powers in monomials
-        if variable in powers
-    ]
-    outside = [(name, powers) for name, powers in monomials if variable not in powers]
+
+    inside, outside = [], []
+    for coefficient, powers in monomials:
+        if variable not in powers:
+            outside.append((coefficient, powers))
+            continue
+        left = dict(powers)
+        left[variable] -= 1
+        if not left[variable]:
+            del left[variable]
+        inside.append((coefficient, left))
     product = f"{variable} * ({factored(inside)})"
-    return f"{product} + ({factored(outside)})" if outside else product
+    if outside:
+        product += f" + ({factored(outside)})"
+    return product
 
 
 def _product(coefficient: str, powers: Powers) -> str:
-    return " * ".join(
-        [coefficient, *(name for name, power in powers.items() for _ in range(power))]
-    )
+    factors = [coefficient]
+    for variable, power in powers.items():
+        factors += [variable] * power
+    return " * ".join(factors)
 
 
-def _without(powers: Powers, variable: str) -> Powers:
-    """Powers after one factor is taken out."""
-    left = {name: power - (name == variable) for name, power in powers.items()}
-    return {name: power for name, power in left.items() if power}
-
-
-def _scaled_factors(term: Term) -> Powers:
-    """Powers of the variables of a term, all velocities divided by U."""
-    return {
-        f"{VARIABLE[symbol]}_" if symbol in VELOCITIES else VARIABLE[symbol]: power
-        for symbol, power in term.powers
-    }
-
-
-def _factors(term: Term, speed_power: int) -> Powers:
-    """Powers of the variables of a term, with U as often as it takes."""
-    powers = dict(term.powers)
-    speed_power += powers.pop("U", 0)
-    factors = {VARIABLE[symbol]: power for symbol, power in powers.items()}
+def _factors(term: Term, speed_power: int, divided: bool) -> Powers:
+    """Powers of the variables of a term, with those of U or velocities divided by U."""
+    powers = {}
+    for symbol, power in term.powers:
+        if symbol == "U":
+            speed_power += power
+        elif divided and symbol in VELOCITIES:
+            powers[f"{VARIABLE[symbol]}_"] = power
+        else:
+            powers[VARIABLE[symbol]] = power
     if speed_power:
-        factors["U" if speed_power > 0 else "per_U"] = abs(speed_power)
-    return factors
+        powers["U" if speed_power > 0 else "per_U"] = abs(speed_power)
+    return powers
 
 
-def _with_needed(names: set[str]) -> set[str]:
-    """Names and what they are made from."""
-    more = {
-        word
-        for name in names
-        for word in re.findall(r"\w+", MADE[name])
-        if word in MADE
-    }
-    return names if more <= names else _with_needed(names | more)
+def _with_their_makings(names: set[str]) -> set[str]:
+    """Names of variables, and of those that they are made of in turn."""
+    makings = set(names)
+    for name in names:
+        words = re.findall(r"\w+", MADE_OF[name])
+        makings.update(word for word in words if word in MADE_OF)
+    if makings == names:
+        return makings
+    return _with_their_makings(makings)

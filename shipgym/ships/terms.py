@@ -1,43 +1,54 @@
-"""Terms of a manoeuvring model: products of powers of the velocities, the rudder angle and their kin."""
+"""Terms of a manoeuvring model: products of powers of velocities, rudder angle and so on."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Self
 
-from shipgym.checks import did_you_mean, quoted
+from shipgym.checks import (
+    check_table,
+    check_text,
+    check_whole,
+    did_you_mean,
+    quoted,
+    unexpected,
+)
 from shipgym.errors import InputError
 
 # du is the surge speed above service speed, dn the shaft speed above that of service, U
 # the speed through the water, p the roll rate and phi the heel; bars stand for absolute
 # values; all in SI units
-SYMBOLS = (
-    "u",
-    "du",
-    "|u|",
-    "v",
-    "|v|",
-    "r",
-    "|r|",
-    "p",
-    "|p|",
-    "phi",
-    "|phi|",
-    "delta",
-    "|delta|",
-    "n",
-    "dn",
-    "|n|",
-    "U",
-)
+CHANNEL = {
+    "u": "u",
+    "du": "u",
+    "|u|": "u",
+    "v": "v",
+    "|v|": "v",
+    "r": "r",
+    "|r|": "r",
+    "p": "p",
+    "|p|": "p",
+    "phi": "phi",
+    "|phi|": "phi",
+    "delta": "delta",
+    "|delta|": "delta",
+    "n": "n",
+    "dn": "n",
+    "|n|": "n",
+    "U": "U",
+}
+SYMBOLS = tuple(CHANNEL)
 SPEEDS = ("u", "du", "|u|", "v", "|v|", "U")
 TURN_RATES = ("r", "|r|", "p", "|p|")
 ROLL = ("p", "|p|", "phi", "|phi|")
 SHAFT_SPEEDS = ("n", "dn", "|n|")
-SHORT = {"delta": "d", "|delta|": "|d|", "phi": "f", "|phi|": "|f|"}  # in names
+VELOCITIES = (*SPEEDS, *TURN_RATES, *SHAFT_SPEEDS)
 
-CHANNEL = {symbol: symbol.strip("|") for symbol in SYMBOLS} | {"du": "u", "dn": "n"}
 #: Limits of what a file may ask for: power of a symbol, factors of a term, terms of an
 #: equation.
-LARGEST_POWER, MOST_FACTORS, MOST_TERMS = 9, 20, 200
+LARGEST_POWER = 9
+MOST_FACTORS = 20
+MOST_TERMS = 200
 
 
 @dataclass(frozen=True)
@@ -50,7 +61,7 @@ class Term:
 
     @property
     def product(self) -> object:
-        """What it is, whatever its name."""
+        """Identity of the term, whatever its name."""
         return frozenset(self.powers)
 
     def power(self, *symbols: str) -> int:
@@ -58,31 +69,43 @@ class Term:
         return sum(power for symbol, power in self.powers if symbol in symbols)
 
     def check(self, where: str) -> None:
-        """InputError, naming the term, for symbols and powers that cannot be computed."""
+        """Refuse symbols and powers that cannot be computed, naming the term."""
+        place = f"{where}: term '{self.name}'"
+        factors = 0
         for symbol, power in self.powers:
             if symbol not in SYMBOLS:
                 raise InputError(
-                    f"{where}: term '{self.name}': symbol '{symbol}' found, expected"
-                    f" one of {quoted(SYMBOLS)}.{did_you_mean(symbol, SYMBOLS)}"
+                    f"{place}: expected symbols of {quoted(SYMBOLS)}, got"
+                    f" '{symbol}'.{did_you_mean(symbol, SYMBOLS)}"
                 )
             least = -LARGEST_POWER if symbol == "U" else 1
-            whole = isinstance(power, int) and not isinstance(power, bool)
-            if not whole or power == 0 or not least <= power <= LARGEST_POWER:
-                below = " (or negative)" if symbol == "U" else ""
-                raise InputError(
-                    f"{where}: term '{self.name}': power {power!r} of '{symbol}' found,"
-                    f" expected a whole number from 1 to {LARGEST_POWER}{below}"
-                )
-        factors = sum(abs(power) for _, power in self.powers)
+            at = f"{place}: power of '{symbol}'"
+            factors += abs(
+                check_whole(power, at, at_least=least, at_most=LARGEST_POWER)
+            )
+            if power == 0:
+                raise unexpected(at, "an integer other than 0", power)
         if factors > MOST_FACTORS:
             raise InputError(
-                f"{where}: term '{self.name}': {factors} factors found, expected at"
-                f" most {MOST_FACTORS}"
+                f"{place}: expected at most {MOST_FACTORS} factors, got {factors}"
             )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Name and powers, as they stand in a model file."""
+        return {"name": self.name, "powers": dict(self.powers)}
+
+    @classmethod
+    def from_dict(cls, content: Any, where: str) -> Self:
+        """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
+        fields = ("name", "powers")
+        table = check_table(content, where, fields, fields)
+        name = check_text(table["name"], f"{where}.name")
+        powers = check_table(table["powers"], f"{where}.powers")
+        return cls(name, tuple(powers.items()))
 
 
 def read_terms(text: str) -> tuple[Term, ...]:
-    """Terms from formulas separated by commas; InputError names one that cannot be read.
+    """Read terms from formulas separated by commas.
 
     Each formula is a product of symbols (`SYMBOLS`), written side by side with spaces
     between, with powers after `^` and the speed U also below a stroke: `"v, |v| r,
@@ -93,41 +116,60 @@ def read_terms(text: str) -> tuple[Term, ...]:
 
 
 def _read_term(formula: str) -> Term:
+    short = {"delta": "d", "|delta|": "|d|", "phi": "f", "|phi|": "|f|"}
     powers: dict[str, int] = {}
     name = ""
     for factor in re.sub(r"\s*/\s*", " /", formula).split():
-        found = re.fullmatch(r"(/?)(\|?[A-Za-z]+\|?|1)(?:\^([1-9]))?", factor)
-        if found is None or (found[2] != "1" and found[2] not in SYMBOLS):
+        parts = re.fullmatch(r"(/?)(\|?[A-Za-z]+\|?|1)(?:\^([1-9]))?", factor)
+        symbol = parts[2] if parts else ""
+        if parts is None or symbol not in ("1", *SYMBOLS):
             raise InputError(
-                f"terms: '{factor}' found in '{formula}', expected a product of"
-                f" {quoted(SYMBOLS)} with spaces between, such as '|v| r' or"
-                f" 'v^3/U'.{did_you_mean(factor, SYMBOLS)}"
+                f"terms: expected products of {quoted(SYMBOLS)} with spaces between,"
+                f" such as '|v| r' or 'v^3/U', got '{factor}' in"
+                f" '{formula}'.{did_you_mean(factor, SYMBOLS)}"
             )
-        below, symbol, power = found[1], found[2], found[3] or ""
-        name += below + SHORT.get(symbol, symbol) + power
+        stroke = parts[1]
+        exponent = parts[3] or ""
+        name += stroke + short.get(symbol, symbol) + exponent
         if symbol != "1":
-            powers[symbol] = powers.get(symbol, 0) + int(power or 1) * (
-                -1 if below else 1
-            )
+            power = int(exponent or 1)
+            if stroke:
+                power = -power
+            powers[symbol] = powers.get(symbol, 0) + power
     if not name:
         raise InputError(
-            "terms: nothing found between two commas, expected a formula such as"
-            " '|v| r'"
+            "terms: expected a formula such as '|v| r' between two commas, got nothing"
         )
     return Term("0" if name == "1" else name, tuple(powers.items()))
 
 
 def short_terms(words: str, surge: str = "du") -> tuple[Term, ...]:
-    """Terms from short names separated by spaces: letters u v r d (delta), or such between bars, 0 for one.
+    """Read short names separated by spaces: letters u v r d (delta), bars, 0 for one.
 
     `u` is Abkowitz's perturbation from service speed, so that `0u` is the constant's
     change with it, or the symbol that `surge` says.
     """
-    symbols, terms = {"u": surge, "d": "delta"}, []
+    symbols = {"u": surge, "d": "delta"}
+    terms = []
     for word in words.split():
-        factors = re.findall(r"\|.\||.", word.lstrip("0"))
-        powers = {
-            symbols.get(factor, factor): factors.count(factor) for factor in factors
-        }
+        powers: dict[str, int] = {}
+        letters = re.findall(r"\|.\||.", word.lstrip("0"))
+        for letter in letters:
+            symbol = symbols.get(letter, letter)
+            powers[symbol] = powers.get(symbol, 0) + 1
         terms.append(Term(word, tuple(powers.items())))
     return tuple(terms)
+
+
+def read_term_list(content: Any, where: str) -> tuple[Term, ...]:
+    """Read the terms of one equation from a model file."""
+    entries = list_entries(content, where)
+    terms = [Term.from_dict(entry, place) for place, entry in entries.items()]
+    return tuple(terms)
+
+
+def list_entries(content: Any, where: str) -> Mapping[str, Any]:
+    """Entries of a list in a model file, 1 to `MOST_TERMS`, each with its place."""
+    if not isinstance(content, list) or not 1 <= len(content) <= MOST_TERMS:
+        raise unexpected(where, f"a list of 1 to {MOST_TERMS} entries", content)
+    return {f"{where}[{i}]": entry for i, entry in enumerate(content)}

@@ -63,8 +63,7 @@ TAKEN = (
 #: Registered tasks: name to module name.
 TASKS = {
     "CourseKeeping": "shipgym.tasks.course_keeping",
-    "PathFollowing": "shipgym.tasks.path_following_v0",
-    "PathFollowing-v1": "shipgym.tasks.path_following",
+    "PathFollowing": "shipgym.tasks.path_following",
 }
 
 

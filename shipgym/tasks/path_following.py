@@ -48,7 +48,7 @@ from shipgym.tasks.steering import (
     worked,
 )
 
-NAME = "PathFollowing-v1"
+NAME = "PathFollowing"
 REPORTED = (
     "heading_error",
     "cross_track",

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_keys, check_number, check_whole
 from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
@@ -17,7 +16,7 @@ from shipgym.sea.conditions import Weather, as_weather
 from shipgym.ships import ShipModel
 from shipgym.ships.manoeuvring_model import ship_of
 from shipgym.tasks.definition import TaskDefinition, read_definition
-from shipgym.tasks.steering import Helm
+from shipgym.tasks.scales import control_interval
 
 Sea = str | Weather
 
@@ -31,16 +30,11 @@ VECTOR_OPTIONS = (
     "threads",
     "max_episode_steps",
 )
-STEPS_PER_LENGTH = (
-    20.0  # control intervals in the time to travel one ship length, about
-)
 
 ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft")
 #: Rudder orders of a discrete action, parts of the rudder limit.
 RUDDER_ORDERS = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0)
 MEASUREMENTS = ("raw", "filtered")
-#: What every autopilot sees, in order.
-OBSERVATION_NAMES: tuple[str, ...] = Helm._fields
 
 
 class Observed(NamedTuple):
@@ -339,21 +333,6 @@ class Task:
         raise AttributeError(f"task {self.definition.name!r} has no setting {name!r}")
 
 
-def control_interval(model: ShipModel) -> float:
-    """About a twentieth of the time to travel one ship length, as 1, 2 or 5 times a power of ten, s."""
-    return rounded_interval(model.travel_time)
-
-
-def rounded_interval(length_time: float) -> float:
-    """The same for a ship that travels her length in so many seconds."""
-    wanted = length_time / STEPS_PER_LENGTH
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return float(
-        min((1.0, 2.0, 5.0, 10.0), key=lambda step: abs(np.log(step * power / wanted)))
-        * power
-    )
-
-
 def course_keeping_task(**options: Any) -> Task:
     """The task of course keeping by keywords (`Task.of`)."""
     return Task.of("CourseKeeping", **options)
@@ -362,10 +341,3 @@ def course_keeping_task(**options: Any) -> Task:
 def path_following_task(**options: Any) -> Task:
     """The task of path following by keywords (`Task.of`)."""
     return Task.of("PathFollowing", **options)
-
-
-def observation_scales(model: ShipModel) -> Floats:
-    """Physical value of a course-keeping observation of 1, in the order of `OBSERVATION_NAMES`, SI units."""
-    return np.array(
-        [quantity.scale for quantity in course_keeping_task().observed(model)]
-    )

@@ -1,459 +1,407 @@
+"""The benchmark: who takes part, what is run, its results and its command."""
+
 import hashlib
-import inspect
 import json
+import shutil
 import sys
-from copy import deepcopy
-from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 from typer.testing import CliRunner
 
 from agents import LQ, PID, WheelOver, benchmark, load_results
 from agents.agent_file import PRETRAINED
-from agents.benchmarking.contestants import (
-    Contestant,
-    _is_like,
-    check_agents,
-    contestants,
-    names_code,
-    policy_hash,
-    pretrained,
-)
-from agents.benchmarking.replays import EpisodeId, _gathered, rerun
-from agents.benchmarking.results import BenchmarkResult, check_new, versions
-from agents.benchmarking.results_shape import check_summary
-from agents.benchmarking.run import _chosen, _run, checked_part, results_of
-from agents.benchmarking.summary import _count, _place, summary_of
-from agents.benchmarking.verification import Check, _compared, _sampled, verify
+from agents.benchmarking.cells import Cell, TrainingRun, run_cell
+from agents.benchmarking.entries import Entry, check_agents, read_entries
+from agents.benchmarking.replays import EpisodeId, rerun
+from agents.benchmarking.results import BenchmarkResult, check_new
+from agents.benchmarking.results_format import check_summary
+from agents.benchmarking.sources import names_code, policy_hash, pretrained
+from agents.benchmarking.summary import summarise
 from agents.cli import app
-from agents.cli.benchmark_tables import ranking_table
 from agents.controllers.designs import design
-from agents.suites.reference import best_costs, best_known, reference_costs
-from agents.suites.suite import load_suite
+from agents.suites.suite import find_task, load_suite, parse_suite
 from shipgym import load_model
 from shipgym.errors import InputError
 from tests.agents.policies import random_policy
+from tests.agents.small_suite import TEXT, TURNS, write_suite
 from tests.golden.texts import same_text
 
-TASKS = ["mariner-calm"]
-N = 4
+N, FIRST = 4, 1_000_000
+MARINER = load_model("mariner")
+SMALL = parse_suite(TEXT, "small")
+CALM = SMALL.task("calm")
+FAIRWAY = Path(__file__).parents[2] / "examples" / "fairway.py"
 
 
 def shipgym(*arguments):
-    return CliRunner().invoke(
-        app, ["benchmark", *(str(argument) for argument in arguments)]
-    )
+    words = [str(argument) for argument in arguments]
+    return CliRunner().invoke(app, ["benchmark", *words])
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def suite(tmp_path_factory):
+    """The path of the small suite."""
+    return write_suite(tmp_path_factory.mktemp("suite"))
+
+
+@pytest.fixture(scope="module")
+def folder(suite, tmp_path_factory):
     """Results of PID and LQ in one task, four episodes."""
     out = tmp_path_factory.mktemp("benchmark") / "results"
-    benchmark("pid,lq", tasks=TASKS, out=out, episodes=N)
+    benchmark("pid,lq", suite, "calm", out, episodes=N)
     return out
 
 
 @pytest.fixture
 def copy(folder, tmp_path):
     """The same, to be tampered with."""
-    for name in ("results.json", "episodes.parquet"):
-        (tmp_path / name).write_bytes((folder / name).read_bytes())
-    return tmp_path
-
-
-def test_results_are_read_back_as_they_were_written(folder):
-    again, fresh = load_results(folder), benchmark("pid,lq", tasks=TASKS, episodes=N)
-    assert again.ranking == fresh.ranking == ["lq", "pid"]
-    for name, column in fresh.episodes.items():
-        np.testing.assert_array_equal(column, again.episodes[name], err_msg=name)
-    costs = again.figures("lq", "mariner-calm")
-    assert costs.shape == (1, N)
-    found = again.summary["tasks"]["mariner-calm"]["lq"]
-    assert found["cost"]["value"] == costs.mean()
-    assert found["cost"]["low"] < costs.mean() < found["cost"]["high"]
-    assert again.summary["improvement"]["lq"]["pid"]["value"] == np.mean(
-        costs < again.figures("pid", "mariner-calm")
-    )
-
-
-def test_the_file_names_what_it_was_made_with(folder):
-    summary = json.loads((folder / "results.json").read_text())
-    assert {"shipgym", "numpy", "numba", "python", "processor"} <= set(
-        summary["versions"]
-    )
-    assert len(summary["suite"]["sha256"]) == 64
-    assert len(summary["suite"]["tasks"]["mariner-calm"]["model_sha256"]) == 64
-    assert summary["seeds"] == {"first": 1_000_000, "count": N}
-    assert summary["contestants"]["lq"]["source"] == "lq"
-    assert len(summary["tasks"]["mariner-calm"]["lq"]["policy_sha256"][0]) == 64
-
-
-def test_the_table_is_tidy(folder):
-    import pyarrow.parquet as parquet
-
-    table = parquet.read_table(folder / "episodes.parquet")
-    assert table.num_rows == 2 * N
-    assert table.column_names[:4] == ["contestant", "task", "run", "seed"]
-    assert str(table.schema.field("success").type) == "bool"
-    assert (
-        table.column("cross_track_rmse_m").null_count == 2 * N
-    )  # course keeping has no path
-    assert table.column("seed").to_pylist() == 2 * [1_000_000 + k for k in range(N)]
-    assert table.column("run").to_pylist() == 2 * N * [0]
-
-
-@pytest.mark.parametrize(
-    ("asked", "said"),
-    [
-        (
-            ("pdi", "mariner-calm"),
-            "contestant: 'pdi' found, expected one of 'pid', 'lq'",
-        ),
-        (
-            ("pid", "mariner-clam"),
-            "task: 'mariner-clam' found, expected one of 'mariner-calm'",
-        ),
-        (("pid", "mariner-calm", "cots"), "figure: 'cots' found"),
-    ],
-)
-def test_figures_of_nobody_are_refused(folder, asked, said):
-    with pytest.raises(InputError, match=said):
-        load_results(folder).figures(*asked)
-
-
-def test_workers_find_the_same_bit_for_bit(folder, tmp_path):
-    result = benchmark(
-        "pid,lq", tasks=TASKS, out=tmp_path / "two", workers=2, episodes=N
-    )
-    for name, column in load_results(folder).episodes.items():
-        np.testing.assert_array_equal(column, result.episodes[name], err_msg=name)
-
-
-def test_what_was_done_is_kept_and_not_done_again(folder, copy, monkeypatch):
-    parts = copy / "parts"
-    parts.mkdir()
-    for path in (folder / "parts").iterdir():
-        (parts / path.name).write_bytes(path.read_bytes())
-    with pytest.raises(InputError, match=r"already contains results.*--resume"):
-        benchmark("pid,lq", tasks=TASKS, out=copy, episodes=N)
-    asked = []
-    monkeypatch.setattr(
-        "agents.benchmarking.run.evaluate",
-        lambda policy, *rest: asked.append(policy.name) or original(policy, *rest),
-    )
-    from agents.rollouts.metrics import evaluate as original
-
-    result = benchmark("pid,lq,los", tasks=TASKS, out=copy, resume=True, episodes=N)
-    assert asked == [
-        "lq"
-    ]  # los leads the LQ where there is no path; pid and lq are there
-    np.testing.assert_array_equal(
-        result.figures("los", "mariner-calm"), result.figures("lq", "mariner-calm")
-    )
-    assert load_results(copy).summary["contestants"].keys() == {"pid", "lq", "los"}
+    return Path(shutil.copytree(folder, tmp_path / "copy"))
 
 
 class Broken:
+    """Gives no number."""
+
     name = "broken"
 
     def predict(self, observation, state=None, episode_start=None, deterministic=True):
         return np.full((len(observation), 1), np.nan), state
 
 
-def test_a_contestant_that_fails_is_last_and_the_ranking_shows_it():
-    result = benchmark([Broken(), "pid"], tasks=TASKS, episodes=N)
+# --- what is run, and its results
+
+
+def test_results_are_read_back_as_they_were_written(folder, suite):
+    again, fresh = load_results(folder), benchmark("pid,lq", suite, "calm", episodes=N)
+    assert again.ranking == fresh.ranking
+    for name, column in fresh.episodes.items():
+        np.testing.assert_array_equal(column, again.episodes[name], err_msg=name)
+    costs, others = (again.figures(name, "calm") for name in ("lq", "pid"))
+    assert costs.shape == (1, N)
+    cost = again.summary["tasks"]["calm"]["lq"]["cost"]
+    assert cost["low"] < cost["value"] == costs.mean() < cost["high"]
+    better = again.summary["improvement"]["lq"]["pid"]["value"]
+    assert better == np.mean((costs < others) + 0.5 * (costs == others))
+
+
+def test_the_file_names_what_it_was_made_with(folder):
+    summary = json.loads((folder / "results.json").read_text())
+    versions = {"shipgym", "numpy", "numba", "python", "processor"}
+    assert versions <= set(summary["versions"])
+    assert summary["suite"]["name"] == "small-v1"
+    assert (summary["suite"]["file"], summary["suite"]["complete"]) == (
+        "small.toml",
+        False,
+    )
+    assert summary["seeds"] == {"first": FIRST, "count": N}
+    assert summary["controllers"]["lq"]["source"] == "lq"
+    hashes = [
+        summary["suite"]["sha256"],
+        summary["suite"]["tasks"]["calm"]["model_sha256"],
+        summary["tasks"]["calm"]["lq"]["policy_sha256"][0],
+        summary["episodes"]["sha256"],
+    ]
+    assert [len(one) for one in hashes] == [64] * 4
+
+
+def test_the_table_is_tidy(folder):
+    table = parquet.read_table(folder / "episodes.parquet")
+    assert table.column_names[:4] == ["controller", "task", "run", "seed"]
+    assert str(table.schema.field("success").type) == "bool"
+    # course keeping has no path
+    assert table.column("cross_track_rmse_m").null_count == table.num_rows == 2 * N
+    assert table.column("seed").to_pylist() == 2 * [FIRST + k for k in range(N)]
+    assert table.column("run").to_pylist() == 2 * N * [0]
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (("pdi", "calm"), "controller: 'pdi' found, expected one of 'pid', 'lq'"),
+        (("pid", "clam"), "task: 'clam' found, expected one of 'calm'"),
+        (("pid", "calm", "cots"), "figure: 'cots' found"),
+    ],
+)
+def test_figures_of_unknown_names_are_refused(folder, asked, said):
+    with pytest.raises(InputError, match=said):
+        load_results(folder).figures(*asked)
+
+
+def test_workers_find_the_same_bit_for_bit(folder, suite):
+    result = benchmark("pid,lq", suite, "calm", workers=2, episodes=N)
+    for name, column in load_results(folder).episodes.items():
+        np.testing.assert_array_equal(column, result.episodes[name], err_msg=name)
+
+
+def test_what_was_run_is_kept_and_not_run_again(copy, suite):
+    with pytest.raises(InputError, match=r"already contains results.*--resume"):
+        benchmark("pid,lq", suite, "calm", copy, episodes=N)
+    (part,) = [one for one in (copy / "parts").iterdir() if '"pid"' in one.read_text()]
+    kept = part.read_text()
+    part.write_text(kept.replace('\\"failure\\": \\"\\"', '\\"failure\\": \\"kept\\"'))
+    result = benchmark("pid,lq,los", suite, "calm", copy, resume=True, episodes=N)
+    assert load_results(copy).summary["controllers"].keys() == {"pid", "lq", "los"}
+    assert result.summary["tasks"]["calm"]["pid"]["failure"] == "kept"
+    # los leads the LQ where there is no path
+    for name in ("los", "lq"):
+        np.testing.assert_array_equal(
+            result.figures(name, "calm"), load_results(copy).figures("lq", "calm")
+        )
+
+
+def test_a_part_without_costs_is_refused(copy, suite):
+    for part in (copy / "parts").iterdir():
+        part.write_text(part.read_text().replace('\\"cost\\"', '\\"cots\\"'))
+    said = r"part of 'pid' on 'calm': expected cost and other figures of 4 episodes"
+    with pytest.raises(InputError, match=said):
+        benchmark("pid,lq", suite, "calm", copy, resume=True, episodes=N)
+
+
+@pytest.mark.parametrize(
+    "figures",
+    [
+        {"cost": np.zeros(3)},
+        {"overshoot": np.zeros(2)},
+        {"cost": np.zeros((2, 1))},
+        {"cost": np.array(["1", "2"])},
+    ],
+)
+def test_a_cell_is_of_the_episodes_that_were_asked_for(figures):
+    rest = {"failure": "", "seconds_per_action": 0.1, "policy_sha256": None}
+    whole = {"cost": np.zeros(2)}
+    runs = [{"figures": one, **rest} for one in (whole, figures)]
+    with pytest.raises(InputError, match="here: expected cost and other figures of 2"):
+        Cell.from_dict({"refused": "", "runs": runs}, 2, "here")
+    cell = Cell.from_dict({"refused": "", "runs": runs[:1]}, 2, "here")
+    assert cell.costs.tolist() == [[0.0, 0.0]]
+
+
+@pytest.mark.parametrize("episodes", [0, 101, 2.5])
+def test_as_many_episodes_are_run_as_are_scored_at_most(suite, episodes):
+    with pytest.raises(InputError, match=f"episodes: {episodes} found"):
+        benchmark("pid", suite, episodes=episodes)
+
+
+def test_a_controller_that_fails_is_last_and_the_ranking_shows_it(suite):
+    result = benchmark([Broken(), "pid"], suite, "calm", episodes=N)
     assert result.ranking == ["pid", "broken"]
     assert result.summary["ranking"][1]["failed"] == N
-    found = result.summary["tasks"]["mariner-calm"]["broken"]
-    assert "no finite number for 4 of 4 ships" in found["failure"]
-    assert found["metrics"]["failed"]["mean"] == 1.0
+    cell = result.summary["tasks"]["calm"]["broken"]
+    assert "no finite number for 4 of 4 ships" in cell["failure"]
+    assert cell["metrics"]["failed"]["mean"] == 1.0
+    (failure,) = result.failures
+    assert failure.startswith("broken failed in 4 episodes of calm: action nan found")
 
 
-def test_places_are_by_tasks_then_score_then_cost():
-    def entry(tasks, score, cost):
-        return {"tasks": tasks, "score": {"value": score}, "relative_cost": cost}
-
-    dear, cheap, part, unknown = (
-        entry(2, 0.9, 5.0),
-        entry(2, 0.1, 1.0),
-        entry(1, 3.0, 0.5),
-        entry(2, None, None),
-    )
-    for by_score, order in (
-        (True, [dear, cheap, unknown, part]),
-        (False, [cheap, dear, unknown, part]),
-    ):
-        assert (
-            sorted([part, unknown, cheap, dear], key=partial(_place, by_score=by_score))
-            == order
-        )
-
-
-def test_one_that_cannot_take_part_is_said_and_the_rest_go_on():
+def test_one_that_cannot_run_a_task_is_named_and_the_rest_go_on(suite):
     other = LQ.from_model(load_model("kvlcc2"))
-    result = benchmark({"other": other, "pid": "pid"}, tasks=TASKS, episodes=2)
-    refused = result.summary["contestants"]["other"]["refused"]["mariner-calm"]
+    result = benchmark({"other": other, "pid": "pid"}, suite, "calm", episodes=2)
+    refused = result.summary["controllers"]["other"]["refused"]["calm"]
     assert "scale of 'yaw_rate'" in refused
+    assert result.failures == [f"other could not run calm: {refused}"]
     assert result.ranking == ["pid", "other"]
-    assert result.figures("other", "mariner-calm").size == 0
-    assert result.allow_code == ()
+    assert result.figures("other", "calm").size == 0
 
 
-def test_where_nobody_can_take_part_there_are_no_results(tmp_path):
-    for folder in ("new", "empty"):
-        out = tmp_path / folder
-        if folder == "empty":
-            out.mkdir()
-        answer = shipgym(
-            "--controllers",
-            "math:sqrt",
-            "--tasks",
-            "mariner-calm",
-            "--episodes",
-            1,
-            "--workers",
-            1,
-            "--out",
-            out,
-        )
+def test_where_no_controller_can_run_a_task_there_are_no_results(suite, tmp_path):
+    (tmp_path / "empty").mkdir()
+    for name in ("new", "empty"):
+        words = ["--controllers", "math:sqrt", "--suite", suite, "--episodes", 1]
+        answer = shipgym(*words, "--workers", 1, "--out", tmp_path / name)
         assert (answer.exit_code, answer.stdout) == (2, "")
         assert answer.stderr.startswith(
-            "error: controllers: nobody took part in any task; 'sqrt' in"
-            " 'mariner-calm': TypeError: must be "
+            "error: controllers: no controller could run any task; 'sqrt' in 'calm':"
+            " TypeError: must be "
         )
     assert [path.name for path in tmp_path.rglob("*")] == ["empty"]
 
 
-def test_a_write_protected_folder_is_refused_before_the_work(tmp_path, monkeypatch):
-    monkeypatch.setattr("agents.output.os.access", lambda path, mode: path != tmp_path)
-    with pytest.raises(InputError, match="cannot be written to; choose another folder"):
-        benchmark("pid", tasks=TASKS, out=tmp_path / "out", episodes=2)
-    assert not list(tmp_path.iterdir())
+def test_the_ranking_is_of_the_ship_and_the_rest_stands_beside_it(suite, tmp_path):
+    result = benchmark("wheel-over,lq", suite, "turns", tmp_path / "out", episodes=3)
+    assert result.tasks == TURNS
+    assert result.summary == load_results(tmp_path / "out").summary
+    for ranked in result.summary["ranking"]:
+        assert ranked["tasks"] == 1
+        elsewhere = {on: total["tasks"] for on, total in ranked["elsewhere"].items()}
+        assert elsewhere == {"model": 1, "far": 1}
+    assert result.summary["suite"]["tasks"]["turns-far"]["ship"] == "mariner"
+    costs = [result.figures("wheel-over", task).mean() for task in TURNS]
+    assert len(set(costs)) == 3
 
 
-def test_an_agent_that_observes_what_no_task_shows_is_refused_before_anything_is_run(
+def test_scores_are_of_best_known_costs_and_settings_are_those_that_were_tuned(
     tmp_path,
 ):
-    guide = WheelOver.from_model(load_model("mariner"))
-    guide.save(tmp_path / "guide.json")
-    with pytest.raises(InputError) as error:
-        benchmark(
-            str(tmp_path / "guide.json"), tasks=TASKS, out=tmp_path / "out", episodes=2
-        )
-    assert (
-        str(error.value)
-        == f"controllers: 'guide' fits no task asked for: '{tmp_path / 'guide.json'}'"
-        " on task 'mariner-calm': 8 observations found, expected 13; in one and not"
-        " in the other: cross_track, course_error_sin, course_error_cos,"
-        " turn_distance, turn_angle"
-    )
-    assert not (tmp_path / "out").exists()
-    refused = benchmark(
-        {"guide": guide, "pid": "pid"}, tasks=TASKS, episodes=2
-    ).summary["contestants"]
-    assert refused["guide"]["refused"]["mariner-calm"].startswith(
-        "'guide' on task 'mariner-calm': 8 observ"
-    )
-
-
-def test_an_agent_of_the_first_suite_is_told_that_paths_of_the_second_show_more():
-    said = (
-        "that the agent learned with in shipgym/PathFollowing-v0: observation 11 is"
-        " 'next_turn_distance'"
-    )
-    with pytest.raises(
-        InputError, match=rf"fits no task asked for: .*: not those {said}"
-    ):
-        benchmark(
-            str(PRETRAINED / "container-path-ppo.json"),
-            "shipgym-v2",
-            tasks=["sharp-turns"],
-            episodes=2,
-        )
-
-
-def test_training_runs_of_one_contestant(tmp_path):
-    ship = load_model("mariner")
-    for run, frequency in enumerate((0.05, 0.08)):
-        PID.from_model(ship, frequency=frequency).save(
-            tmp_path / f"mariner-calm-pid-{run}.json"
-        )
-    result = benchmark(f"mine={tmp_path}/{{task}}-pid-*.json", tasks=TASKS, episodes=2)
-    assert result.figures("mine", "mariner-calm").shape == (2, 2)
-    assert result.summary["contestants"]["mine"]["runs"] == 2
-    assert len(result.summary["contestants"]["mine"]["files"]) == 2
-    profile = result.summary["improvement"]
-    assert profile == {"mine": {}}
-
-
-def test_functions_of_ones_own(tmp_path, monkeypatch):
-    (tmp_path / "my_autopilots.py").write_text(
-        "from agents import LQ\n\n\ndef gentle(task):\n    return"
-        " LQ.from_model(task.ship, integral_lengths=50.0)\n"
-    )
-    monkeypatch.chdir(tmp_path)
-    before = list(sys.path)
-    by_text = benchmark("my_autopilots:gentle", tasks=TASKS, episodes=2)
-    by_function = benchmark(
-        {"gentle": lambda task: LQ.from_model(task.ship, integral_lengths=50.0)},
-        tasks=TASKS,
-        episodes=2,
-    )
-    assert sys.path == before  # the working folder is on it for this contestant only
-    assert by_text.ranking == ["gentle"]
-    np.testing.assert_array_equal(
-        by_text.figures("gentle", "mariner-calm"),
-        by_function.figures("gentle", "mariner-calm"),
-    )
-    assert len(by_text.summary["contestants"]["gentle"]["files"]) == 1
-    assert (by_text.allow_code, by_function.allow_code) == (
-        ("my_autopilots:gentle",),
-        (),
-    )
-
-
-def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch):
-    kept = {
-        "tuned": {
-            "tasks": {
-                "mariner-calm": {
-                    "lq": {"settings": {"integral_lengths": 80.0}, "cost": 24.0},
-                    "pid": {"settings": {"damping": 0.9}, "cost": 25.0},
-                }
-            }
-        },
-        "best": {
-            "mariner-calm": {
-                "zero": 30.0,
-                "costs": [float(k) for k in range(2)],
-                "by": ["lq", "ppo"],
-            }
-        },
+    tuned = {
+        "lq": {"settings": {"integral_lengths": 80.0}, "cost": 24.0},
+        "pid": {"settings": {"damping": 0.9}, "cost": 25.0},
     }
-    for name, content in kept.items():
-        (tmp_path / f"{name}.json").write_text(json.dumps(content))
-    monkeypatch.setattr(
-        "agents.suites.reference.suite_file",
-        lambda suite, what: tmp_path / f"{what}.json",
+    known = {"zero": 30.0, "costs": [0.0, 1.0] * 50, "by": ["lq", "ppo"] * 50}
+    suite = write_suite(
+        tmp_path, best={"calm": known}, tuned={"tasks": {"calm": tuned}}
     )
-    with pytest.raises(
-        InputError, match=r"best\.json: mariner-calm: expected costs of 100 episodes"
-    ):
-        reference_costs("shipgym-v1")
-    look = benchmark("tuned-lq", tasks=TASKS, episodes=2)
+    look = benchmark("tuned-lq", suite, "calm", episodes=2)
     assert (
         look.summary["reference"] == {}
-    )  # costs of all episodes say nothing of the first two
-    for place in ("agents.benchmarking.summary", "agents.suites.reference"):
-        monkeypatch.setattr(f"{place}.N_EPISODES", 2)
-    result = benchmark(
-        "tuned-best,tuned-lq,tuned-mpc,best-known", tasks=TASKS, episodes=2
-    )
-    own = benchmark(
-        {"own": lambda task: LQ.from_model(task.ship, integral_lengths=80.0)},
-        tasks=TASKS,
-        episodes=2,
-    )
+    )  # costs of all episodes, not of the first two
+    names = "tuned-best,tuned-lq,tuned-mpc,best-known"
+    own = {"own": lambda task: LQ.from_model(task.ship, integral_lengths=80.0)}
+    result, other = (benchmark(one, suite, "calm") for one in (names, own))
     for name in ("tuned-best", "tuned-lq"):
-        np.testing.assert_array_equal(
-            result.figures(name, "mariner-calm"),
-            own.figures("own", "mariner-calm"),
-            err_msg=name,
-        )
-    refused = result.summary["contestants"]["tuned-mpc"]["refused"]["mariner-calm"]
+        costs = result.figures(name, "calm")
+        np.testing.assert_array_equal(costs, other.figures("own", "calm"))
+    refused = result.summary["controllers"]["tuned-mpc"]["refused"]["calm"]
     assert "no tuned settings of 'mpc'" in refused
-    found = result.summary["tasks"]["mariner-calm"]
-    assert (
-        found["best-known"]["score"]["value"] == 1.0
-    )  # its first two costs are 0 and 1
-    cost = found["tuned-lq"]["cost"]["value"]
-    assert found["tuned-lq"]["score"]["value"] == pytest.approx((30.0 - cost) / 29.5)
+    cells = result.summary["tasks"]["calm"]
+    assert cells["best-known"]["score"]["value"] == 1.0
+    cost = cells["tuned-lq"]["cost"]["value"]
+    assert cells["tuned-lq"]["score"]["value"] == pytest.approx((30.0 - cost) / 29.5)
     assert result.ranking == ["best-known", "tuned-best", "tuned-lq", "tuned-mpc"]
-    assert (
-        ranking_table(result).row_count == 4
-    )  # the best known, which acts in no time, too
 
 
-def test_classical_controllers_are_designed_for_the_ship_of_the_task():
-    keeping, path = (
-        load_suite().task(name) for name in ("mariner-calm", "mariner-current")
+def test_a_summary_of_a_hundred_episodes_by_hand(tmp_path):
+    """Two tasks, in one of which 0 and 1 cost the same, and one far from the design."""
+    known = {"calm": (30.0, 20.0), "same": (5.0, 5.0), "calm-far": (40.0, 10.0)}
+    best = {
+        name: {"zero": zero, "costs": [best] * 100, "by": ["lq"] * 100}
+        for name, (zero, best) in known.items()
+    }
+    source = str(write_suite(tmp_path, best=best))
+    tasks = [
+        SimpleNamespace(name=name, on="far" if "far" in name else "ship", suite=source)
+        for name in known
+    ]
+
+    def cell(*costs, times=(1e-6,)):
+        figures = {"cost": np.array(costs * 50)}
+        return Cell([TrainingRun(figures, seconds_per_action=time) for time in times])
+
+    cells = {
+        ("a", "calm"): cell(25.0, 20.0, times=(1e-6, 3e-6)),
+        ("a", "same"): cell(5.0, 5.0),
+        ("a", "calm-far"): cell(10.0, 10.0),
+        ("b", "calm"): cell(30.0, 30.0),
+        ("b", "same"): cell(10.0, 10.0),
+        ("b", "calm-far"): Cell(refused="no"),
+    }
+    summary = summarise(tasks, ["b", "a"], cells)
+    first, second = summary["ranking"]
+    assert (first["name"], first["tasks"], first["scored_tasks"]) == ("a", 2, 1)
+    assert (first["score"]["value"], first["relative_cost"]) == pytest.approx(
+        (0.75, 1.0)
     )
-    assert design("lq", keeping) is design(
-        "lq", path
-    )  # the same ship and interval: designed once
-    guided = design("ilos", path)
-    assert guided.design["dt"] == path.task.interval(path.ship)
-    assert (
-        guided.observation_scales[8]
-        == path.task.corridor * path.ship.particulars["length"]
+    assert (second["score"]["value"], second["relative_cost"]) == pytest.approx(
+        (0.0, np.sqrt(8.0 / 3.0))
     )
-    (led,) = contestants("ilos")[0].policies(keeping, "any")
-    assert led.kind == "lq"
+    far, other_far = first["elsewhere"]["far"], second["elsewhere"]["far"]
+    assert far["score"]["value"] == pytest.approx(1.0)
+    assert (far["tasks"], other_far["tasks"]) == (1, 0)
+    time = summary["tasks"]["calm"]["a"]["microseconds_per_action"]
+    assert time == pytest.approx(2.0)
+    assert summary["reference"]["calm-far"] == {"zero": 40.0, "best": 10.0}
+    thresholds, shares = summary["profile"].values()
+    at = [thresholds.index(one) for one in (-1.0, -0.05, 0.0, 0.5, 1.0)]
+    # scores of 0.5 and 1 of `calm` alone
+    assert [shares["a"][k] for k in at] == [1.0, 1.0, 1.0, 0.5, 0.0]
+    assert [shares["b"][k] for k in at] == [1.0, 1.0, 0.0, 0.0, 0.0]
+    assert summary["improvement"]["a"]["b"]["value"] == 1.0
+
+
+def test_controllers_that_could_run_more_tasks_come_first(tmp_path):
+    """Then those with a higher score, or without scores those that cost less."""
+    best = {
+        name: {"zero": zero, "costs": [0.0] * 100, "by": ["lq"] * 100}
+        for name, zero in {"one": 100.0, "two": 10.0}.items()
+    }
+    tasks = [
+        SimpleNamespace(
+            name=name, on="ship", suite=str(write_suite(tmp_path, best=best))
+        )
+        for name in best
+    ]
+
+    costs = {"part": (1.0,), "cheap": (60.0, 0.1), "dear": (10.0, 5.0)}
+
+    def cells(n_episodes):
+        found = {("part", "two"): Cell(refused="no")}
+        for name, means in costs.items():
+            for task, mean in zip(best, means, strict=False):
+                run = TrainingRun({"cost": np.full(n_episodes, mean)})
+                found[name, task] = Cell([run])
+        return found
+
+    names = list(costs)
+    scored = summarise(tasks, names, cells(100))["ranking"]
+    assert [one["name"] for one in scored] == ["dear", "cheap", "part"]
+    unscored = summarise(tasks, names, cells(2))["ranking"]
+    assert [one["name"] for one in unscored] == ["cheap", "dear", "part"]
+
+
+def test_episodes_without_a_figure_are_not_counted():
+    run = TrainingRun({"terminated": np.array([1.0, 0.0, np.nan])})
+    assert Cell([run, run]).count("terminated") == 2
+    assert Cell([run]).count("failed") == 0
+
+
+# --- who takes part
 
 
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ("lqq", "'lqq' found.*Did you mean 'lq'"),
-        ("pid,pid", "'pid' found twice"),
-        ("x=nobody.json", "'nobody.json' found"),
-        ("no_such_module:make", "'no_such_module:make' cannot be imported"),
-        ("json:no_such_thing", "'json:no_such_thing' cannot be imported"),
-        ("math:pi", r"'math:pi' is 3.14\d*, expected a controller"),
-        ({"a": 3}, "'a' is 3, expected a controller"),
-        (
-            {"a": [LQ.from_model(load_model("mariner")), 3]},
-            "'a' is 3, expected a controller",
-        ),
-        ([], "none found"),
-        ("=pid", "name '' found, expected one without any of , = /"),
-        ({"a,b": "pid"}, "name 'a,b' found, expected one without any of , = /"),
-        ("a/b=pid", "name 'a/b' found, expected one without any of , = /"),
-        (
-            "tests+nobody.json",
-            r"'tests\+nobody.json' found, expected .* a file of an agent that is there",
-        ),
+        ("lqq", "got 'lqq'.*Did you mean 'lq'"),
+        ("one-for-all", "expected one of 'pid'.*got 'one-for-all'"),
+        ("pid,pid", "got 'pid' twice"),
+        ("x=nobody.json", "got 'nobody.json'"),
+        ("no_such_module:make", "got 'no_such_module:make', which cannot be imported"),
+        ("json:no_such_thing", "got 'json:no_such_thing', which cannot be imported"),
+        ("math:pi", r"'math:pi': expected a controller.* got 3.14\d*"),
+        ({"a": 3}, "'a': expected a controller.* got 3"),
+        ({"a": [LQ.from_model(MARINER), 3]}, "'a': expected a controller.* got 3"),
+        ([], "controllers: expected at least one, got none"),
+        ("=pid", r"expected a name without any of , = / .*, got ''"),
+        ({"a,b": "pid"}, "expected a name without any of .*, got 'a,b'"),
+        ("a/b=pid", "expected a name without any of .*, got 'a/b'"),
+        ("tests+nobody.json", r"an existing file of an agent.* got 'tests\+nobody"),
     ],
 )
-def test_wrong_contestants(given, said):
+def test_wrong_controllers_are_refused(given, said):
     with pytest.raises(InputError, match=said):
-        contestants(given)
+        read_entries(given)
 
 
-def test_contestants_are_told_by_texts_functions_controllers_and_names():
-    class Keeps(LQ):
+def test_controllers_are_given_as_texts_functions_objects_and_by_name():
+    class Iterable(LQ):
         def __iter__(self):
             return iter(())
 
     def make(task):
         return pid
 
-    pid, lazy = PID.from_model(load_model("mariner")), Broken()
+    pid, lazy = PID.from_model(MARINER), Broken()
     lazy.name = None
-    iterable = Keeps(**vars(LQ.from_model(load_model("mariner"))))
+    iterable = Iterable(**vars(LQ.from_model(MARINER)))
+    pattern = "{task}-pid-*.json"  # its files are looked for when a task is run
     for given, expected in (
         (" pid , mine = lq ", [("pid", "pid"), ("mine", "lq")]),
         (pid, [("pid", pid)]),
         (iterable, [("lq", iterable)]),
         (make, [("make", make)]),
-        (Contestant("x", "lq"), [("x", "lq")]),
-        (
-            [lazy, "pid", Contestant("x", make)],
-            [("Broken", lazy), ("pid", "pid"), ("x", make)],
-        ),
+        (Entry("x", "lq"), [("x", "lq")]),
+        ([lazy, "pid"], [("Broken", lazy), ("pid", "pid")]),
         ({"both": [pid, make]}, [("both", [pid, make])]),
-        (
-            "{task}-pid-*.json",
-            [("pid", "{task}-pid-*.json")],
-        ),  # found when a task is run
+        (pattern, [("pid", pattern)]),
         ("{task}.zip", [("agent", "{task}.zip")]),
     ):
-        assert [(one.name, one.source) for one in contestants(given)] == expected
-    (both,) = contestants({"both": [pid, make]})
-    assert both.policies(load_suite().task("mariner-calm"), "any") == (pid, pid)
+        found = [(entry.name, entry.source) for entry in read_entries(given)]
+        assert found == expected
+    (both,) = read_entries({"both": [pid, make]})
+    assert both.policies(CALM) == (pid, pid)
 
 
 @pytest.mark.parametrize(
@@ -463,9 +411,7 @@ def test_contestants_are_told_by_texts_functions_controllers_and_names():
         ("my.own:make", True),
         ("make", False),
         (":make", False),
-        ("mine:", False),
         ("mine:two words", False),
-        ("my-own:make", False),
         ("folder/mine:make", False),
     ],
 )
@@ -473,395 +419,279 @@ def test_code_is_named_by_a_module_and_a_function(text, names):
     assert names_code(text) is names
 
 
-def test_a_path_is_like_a_pattern_of_as_many_folders():
-    assert _is_like(("runs", "a.json"), ("runs", "*.json"))
-    assert not _is_like(("runs", "a.json"), ("runs",))
-    assert not _is_like(("runs",), ("runs", "*.json"))
-    assert not _is_like(("runs", "a.json"), ("run", "*.json"))
-
-
-def test_files_that_have_the_name_of_a_contestant_are_not_its_own(
+def test_files_that_have_the_name_of_a_controller_are_not_its_own(
     tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
     for name in ("pid", "best-known", "tuned-lq"):
         (tmp_path / name).write_text("")
-        assert (
-            Contestant(name, name).fingerprint(load_suite().task("mariner-calm")) == {}
-        )
+        assert Entry(name, name).fingerprint(CALM) == {}
 
 
-def test_an_agent_for_one_of_the_tasks_takes_part(tmp_path):
-    tasks = [load_suite().task(name) for name in ("mariner-calm", "mariner-current")]
-    WheelOver.from_model(tasks[1].ship, task=tasks[1].task).save(
-        tmp_path / "guide.json"
+def test_classical_controllers_are_designed_for_the_ship_of_the_task():
+    keeping = parse_suite(TEXT.replace('"mariner"', '"mariner-tls-svm"', 1), "x").tasks[
+        0
+    ]
+    path = SMALL.task("turns").design_task
+    assert design("lq", keeping) is design("lq", path)  # designed once for both
+    guided = design("ilos", path)
+    assert guided.design["dt"] == path.task.interval(path.ship)
+    corridor = path.task.corridor * path.ship.particulars["length"]
+    assert guided.observation_scales[8] == corridor
+    (led,) = Entry("ilos", "ilos").policies(keeping)
+    assert led.kind == "lq"
+
+
+def test_controllers_are_given_the_model_only():
+    task = SMALL.task("turns-far")
+    given = []
+    Entry("mine", lambda one: given.append(one) or LQ.from_model(one.ship)).policies(
+        task
     )
-    (guide,) = contestants(str(tmp_path / "guide.json"))
-    check_agents(guide, tasks)
-    with pytest.raises(InputError, match="'guide' fits no task asked for"):
-        check_agents(guide, tasks[:1])
+    assert (given[0].name, given[0].true_ship, given[0].far) == ("turns", "", {})
+    assert given[0].evaluation.ship.name == "mariner-tls-svm"
+
+
+def test_a_design_on_the_ship_is_refused_wherever_it_is_hidden():
+    task = SMALL.task("turns-far")
+    ship = task.evaluation.ship
+
+    def with_parts(design_task, **parts):
+        policy = LQ.from_model(design_task.ship)
+        for name, part in {"policy": policy, **parts}.items():
+            object.__setattr__(policy, name, part)  # its class is frozen
+        return policy
+
+    (policy,) = Entry("mine", with_parts).policies(task)
+    assert policy.policy is policy
+    hidden = partial(with_parts, fallback=LQ.from_model(ship))
+    for cheat in (lambda one: WheelOver.from_model(ship, task=one.task), hidden):
+        with pytest.raises(InputError, match="got one on the ship 'mariner'"):
+            Entry("cheat", cheat).policies(task)
+    with pytest.raises(InputError, match="LQ: expected a policy made of at most 1000"):
+        Entry("endless", partial(with_parts, base=Mock())).policies(task)
 
 
 @pytest.mark.parametrize(
     ("source", "said"),
     [
-        ("td3", "there is no file of a pretrained td3 agent for task 'mariner-calm'"),
-        (
-            "{task}-x.json",
-            "there is no file of '{task}-x.json' for task 'mariner-calm'",
-        ),
-        (
-            int,
-            (
-                "int: 3 found for task 'mariner-calm', expected a controller with"
-                " `predict`"
-            ),
-        ),
+        ("td3", "there is no pretrained td3 agent for task 'calm'"),
+        ("{task}-x.json", "there is no file '{task}-x.json' for task 'calm'"),
+        (lambda task: 3, "with `predict` for task 'calm', got 3"),
     ],
 )
-def test_one_that_cannot_be_made_for_a_task_is_told(source, said, monkeypatch):
-    made = Contestant("x", (lambda task: 3) if source is int else source)
-    if source is int:
-        made.source.__name__ = "int"
-    with pytest.raises(InputError) as error:
-        made.policies(load_suite().task("mariner-calm"), "any")
-    assert str(error.value) == said
+def test_one_that_cannot_be_made_for_a_task_is_refused(source, said):
+    with pytest.raises(InputError, match=said):
+        Entry("x", source).policies(CALM)
+
+
+def test_a_function_may_raise_anything():
+    def fails(task):
+        raise KeyError("gain")
+
+    cell = run_cell(Entry("mine", fails), CALM, 2)
+    assert (cell.refused, cell.runs) == ("KeyError: 'gain'", ())
+
+
+def test_training_runs_are_files_of_one_controller(suite, tmp_path):
+    for run, frequency in enumerate((0.05, 0.08)):
+        pid = PID.from_model(MARINER, frequency=frequency)
+        pid.save(tmp_path / f"calm-pid-{run}.json")
+    result = benchmark(
+        f"mine={tmp_path}/{{task}}-pid-*.json", suite, "calm", episodes=2
+    )
+    assert result.figures("mine", "calm").shape == (2, 2)
+    about = result.summary["controllers"]["mine"]
+    assert (about["runs"], len(about["files"])) == (2, 2)
+    assert result.summary["improvement"] == {"mine": {}}
+
+
+def test_functions_of_ones_own(suite, tmp_path, monkeypatch):
+    (tmp_path / "my_autopilots.py").write_text(
+        "from agents import LQ\n\n\ndef gentle(task):\n    return"
+        " LQ.from_model(task.ship, integral_lengths=50.0)\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    before = list(sys.path)
+    by_text = benchmark("my_autopilots:gentle", suite, "calm", episodes=2)
+    gentle = {"gentle": lambda task: LQ.from_model(task.ship, integral_lengths=50.0)}
+    by_function = benchmark(gentle, suite, "calm", episodes=2)
+    assert sys.path == before  # the working folder is on it for this controller only
+    costs, others = (one.figures("gentle", "calm") for one in (by_text, by_function))
+    np.testing.assert_array_equal(costs, others)
+    assert len(by_text.summary["controllers"]["gentle"]["files"]) == 1
+    code = "my_autopilots:gentle"
+    assert (by_text.allow_code, by_function.allow_code) == ((code,), ())
+
+
+def test_an_agent_that_fits_no_task_is_refused_before_anything_is_run(suite, tmp_path):
+    guide = WheelOver.from_model(MARINER)
+    guide.save(tmp_path / "guide.json")
+    file = str(tmp_path / "guide.json")
+    said = "controllers: 'guide' fits none of the tasks: .*'calm': 8 observations found"
+    with pytest.raises(InputError, match=said):
+        benchmark(file, suite, "calm", tmp_path / "out", episodes=2)
+    assert not (tmp_path / "out").exists()
+    both = benchmark({"guide": guide, "pid": "pid"}, suite, "calm", episodes=2)
+    assert "8 observations" in both.summary["controllers"]["guide"]["refused"]["calm"]
+
+    path = find_task("sharp-turns")
+    WheelOver.from_model(path.ship, task=path.task).save(file)
+    (entry,) = read_entries(file)
+    check_agents(entry, [CALM, path])  # it fits one of them
+    other = str(PRETRAINED / "course-unstable-ppo-s0.json")
+    with pytest.raises(InputError, match="that the agent learned with"):
+        benchmark(other, suite, "calm", episodes=2)
 
 
 def test_the_hash_of_a_controller_is_that_of_its_content(tmp_path):
-    pid = PID.from_model(load_model("mariner"))
+    pid = PID.from_model(MARINER)
     pid.save(tmp_path / "pid.json")
-    content = json.dumps(
-        json.loads((tmp_path / "pid.json").read_text()), sort_keys=True
-    )
-    assert policy_hash(pid) == hashlib.sha256(content.encode()).hexdigest()
-    assert policy_hash(
-        PID.from_model(load_model("mariner"), damping=0.9)
-    ) != policy_hash(pid)
+    content = json.loads((tmp_path / "pid.json").read_text())
+    text = json.dumps(content, sort_keys=True)
+    assert policy_hash(pid) == hashlib.sha256(text.encode()).hexdigest()
+    assert policy_hash(PID.from_model(MARINER, damping=0.9)) != policy_hash(pid)
     assert policy_hash(Broken()) is None
 
 
 def test_agents_in_the_box_are_found_by_task_and_algorithm():
-    assert [path.name for path in pretrained("container-path", "ppo")] == [
-        "container-path-ppo.json"
-    ]
     runs = [path.name for path in pretrained("course-unstable", "ppo")]
     assert runs == [f"course-unstable-ppo-s{run}.json" for run in range(5)]
-    assert pretrained("container", "ppo") == []
+    assert pretrained("course", "ppo") == []
 
 
-def test_wrong_task_and_suite():
-    with pytest.raises(InputError, match="Did you mean 'mariner-calm'"):
-        benchmark("pid", tasks=["mariner-clam"])
-    with pytest.raises(InputError, match="suite: 'shipgym-v9' found"):
-        benchmark("pid", suite="shipgym-v9")
+# --- tasks and suites of a user's own
 
 
-def test_what_the_results_say_is_true(folder):
-    checks = verify(folder)
-    assert [check.exact for check in checks] == [True, True]
-    assert {check.episodes for check in checks} == {N}
+OWN = """
+name = "own"
+[tasks.fairway]
+environment = "fairway.py"
+model = "kvlcc2"
+options = { action = "rudder-shaft", episode_steps = 20 }
+[tasks.narrow]
+environment = "my_helm:harbour/Fairway-v0"
+options = { half_width = 1.0, episode_steps = 20 }
+"""
+HELM = """
+import numpy as np
+import shipgym
 
-
-@pytest.mark.parametrize(
-    ("asked", "said"),
-    [
-        ({"sample": 0}, "sample: 0 found"),
-        ({"tolerance": -1e-9}, "tolerance: -1e-09 found"),
-        ({"tolerance": np.nan}, "tolerance: nan found"),
-    ],
+shipgym.register_task(
+    "harbour/Fairway-v0", "fairway.py", model="kvlcc2", action="rudder-shaft"
 )
-def test_a_sample_of_nothing_and_a_tolerance_below_zero_are_refused(
-    folder, asked, said
-):
-    with pytest.raises(InputError, match=said):
-        verify(folder, **asked)
 
 
-def test_results_of_another_version_of_a_suite_are_not_verified(copy):
-    summary = json.loads((copy / "results.json").read_text())
-    summary["suite"]["sha256"] = "0" * 64
-    (copy / "results.json").write_text(json.dumps(summary))
-    with pytest.raises(
-        InputError,
-        match="another suite 'shipgym-v1' than that of this version of shipgym",
-    ):
-        verify(copy)
+class Ahead:
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return np.tile([0.0, 0.8], (len(observation), 1)).astype(np.float32), state
 
 
-def told_of(runs=1, source="a"):
-    """What results say of four contestants in three tasks, of which one is an object and one ran nothing."""
-    sources = {"a": "pid", "b": "lq", "object": None, "idle": "los"}
-    found = {name: {"runs": 0 if name == "idle" else runs} for name in sources}
-    return SimpleNamespace(
-        summary={
-            "contestants": {
-                name: {"source": one if source else None}
-                for name, one in sources.items()
-            },
-            "tasks": dict.fromkeys(("one", "two", "three"), found),
-        }
-    )
-
-
-def test_a_sample_takes_the_contestants_by_turns():
-    every = {(name, task) for name in "ab" for task in ("one", "two", "three")}
-    for seed in range(5):
-        pairs = _sampled(told_of(), 8, seed)
-        assert len(pairs) == 6
-        assert set(pairs) == every
-        for turn in (pairs[:2], pairs[2:4], pairs[4:]):
-            assert {name for name, _ in turn} == {"a", "b"}
-        assert _sampled(told_of(), 3, seed) == pairs[:3]
-    assert len({tuple(_sampled(told_of(), 6, seed)) for seed in range(5)}) > 1
-    for nothing in (told_of(runs=0), told_of(source=None)):
-        with pytest.raises(
-            InputError,
-            match="results: no contestant that can be made again; name them by",
-        ):
-            _sampled(nothing, 8, 0)
-    usual = inspect.signature(verify).parameters
-    assert (usual["sample"].default, usual["seed"].default) == (8, 0)
-
-
-@pytest.mark.parametrize("function", [benchmark, rerun, verify])
-def test_work_is_done_in_one_process_unless_more_are_asked_for(function):
-    assert inspect.signature(function).parameters["workers"].default == 1
-
-
-COSTS = np.array([100.0, 50.0, 0.0])
-
-
-def compared(
-    cost=COSTS,
-    turns=(1.0, np.nan, 3.0),
-    *,
-    source="pid",
-    tolerance=None,
-    numpy=None,
-    runs=1,
-):
-    """What a check says of a contestant whose file holds `COSTS`, when it is run again."""
-    known = {**versions(), **({} if numpy is None else {"numpy": numpy})}
-    summary = {
-        "contestants": {"x": {"source": source}},
-        "tasks": {"calm": {}},
-        "seeds": {"count": 3},
-        "versions": known,
-    }
-    table = {
-        "contestant": np.array(["x"] * 3),
-        "task": np.array(["calm"] * 3),
-        "cost": COSTS,
-    }
-    result = BenchmarkResult(
-        summary, {**table, "reversals": np.array([1.0, np.nan, 3.0])}
-    )
-    again = {
-        "cost": np.array(cost),
-        "reversals": np.array(turns),
-        "unknown": np.zeros(3),
-    }
-    found = {
-        "refused": "" if runs else "it is gone",
-        "runs": [{"episodes": again}] * runs,
-    }
-    return _compared(result, "x", "calm", found, tolerance)
-
-
-def test_a_check_passes_up_to_what_is_allowed():
-    of = partial(Check, "x", "calm", 3)
-    assert compared() == of(0.0, True, 0.0, "")
-    near = COSTS + np.array([0.0, 50e-7, 0.0])
-    found = compared(near)
-    assert (found.difference, found.allowed, found.passed) == (
-        pytest.approx(1e-7, rel=1e-6),
-        0.0,
-        False,
-    )
-    assert compared(near, tolerance=1.001e-7).passed
-    assert not compared(near, tolerance=0.999e-7).passed
-    learned = compared(near, source="agent.json")
-    assert (learned.allowed, learned.exact, learned.passed) == (1e-6, False, True)
-    assert not compared(COSTS * (1.0 + 1.05e-6), source="agent.json").passed
-    assert compared(near, source="agent.json", tolerance=0.0).passed is False
-    other = compared(near, numpy="0.1")
-    assert (other.allowed, other.passed) == (1e-6, True)
-    assert other.note == "numpy differ from those of the file"
-    assert compared(COSTS + np.array([0.0, 0.0, 2e-13])).difference == pytest.approx(
-        0.2
-    )  # in units of 1e-12 at least
-
-
-def test_a_check_says_what_is_wrong_beside_the_costs():
-    of = partial(Check, "x", "calm", 3)
-    note = "the costs are the same, but another figure is not"
-    assert compared(turns=(1.0, np.nan, 4.0)) == of(np.inf, False, 0.0, note)
-    note = "numpy differ from those of the file"
-    assert compared(turns=(1.0, 2.0, 3.0), numpy="0.1") == of(np.inf, False, 1e-6, note)
-    assert compared(runs=2) == of(
-        np.inf, False, 0.0, "2 training runs found, 1 in the file"
-    )
-    assert compared(runs=0, source="a.zip") == of(np.inf, False, 1e-6, "it is gone")
-
-
-def _rewritten(copy, change):
-    """Results whose table was changed, with hashes that fit."""
-    result = load_results(copy)
-    columns = {name: values.copy() for name, values in result.episodes.items()}
-    change(columns)
-    BenchmarkResult(result.summary, columns).save(copy)
-
-
-def test_a_result_that_was_touched_up_is_found_out(copy):
-    def flatter(columns):
-        columns["cost"][columns["contestant"] == "lq"] *= 0.99
-
-    _rewritten(copy, flatter)
-    checks = {check.contestant: check for check in verify(copy)}
-    assert (checks["pid"].passed, checks["pid"].difference) == (True, 0.0)
-    assert not checks["lq"].passed
-    assert checks["lq"].difference == pytest.approx(0.01, rel=0.02)
-    told = checks["lq"].to_dict()
-    assert (told["passed"], told["difference"]) == (False, checks["lq"].difference)
-    answer = shipgym("--verify", copy, "--workers", 1)
-    assert answer.exit_code == 1
-    assert same_text("verify", answer.stdout + answer.stderr)
-    assert "1 of 2 differ: lq on mariner-calm" in answer.stderr
+def make(task):
+    return Ahead()
+"""
+ALLOW = ("--allow-code", "fairway.py", "--allow-code", "my_helm:harbour/Fairway-v0")
 
 
 @pytest.fixture
-def renamed(copy, tmp_path, monkeypatch):
-    """Results whose contestant LQ is said to be made of something else; a module that says if it was run."""
+def own(tmp_path, monkeypatch):
+    """A folder in which a user has a task, a helm and a suite."""
+    import gymnasium
+
+    registered = dict(gymnasium.registry)
+    shutil.copy(FAIRWAY, tmp_path / "fairway.py")
+    (tmp_path / "my_helm.py").write_text(HELM)
+    (tmp_path / "own.toml").write_text(OWN)
     monkeypatch.chdir(tmp_path)
-    code = (
-        "open('RAN', 'w').close()\nfrom agents import LQ\nmake = lambda task:"
-        " LQ.from_model(task.ship)\n"
-    )
-    for name in ("evil_code.py", "evil_code"):
-        (tmp_path / name).write_text(code)
+    yield tmp_path
+    sys.modules.pop("my_helm", None)
+    gymnasium.registry.clear()
+    gymnasium.registry.update(registered)
 
-    def rename(source, **files):
-        summary = json.loads((copy / "results.json").read_text())
-        summary["contestants"]["lq"] |= {"source": source, "files": files}
-        (copy / "results.json").write_text(json.dumps(summary))
-        return copy
 
-    yield rename
-    sys.modules.pop("evil_code", None)
+def test_a_suite_of_ones_own_is_run_as_a_shipped_one(own):
+    words = ["--suite", "own.toml", "--controllers", "helm=my_helm:make,lq"]
+    words += ["--episodes", 2, "--workers", 2, "--out", "out", "--no-page"]
+    refused = shipgym(*words)
+    assert (refused.exit_code, refused.stdout) == (2, "")
+    assert "--allow-code fairway.py" in refused.stderr
+    answer = shipgym(*words, *ALLOW)
+    assert answer.exit_code == 0, answer.stderr
+    result = load_results(own / "out")
+    assert result.ranking == ["helm", "lq"]
+    assert result.tasks == ("fairway", "narrow")
+    assert (result.figures("helm", "fairway", "success") == 1.0).all()
+    about = result.summary["suite"]["tasks"]["narrow"]
+    assert about["environment"] == str(own / "fairway.py")
+    (refused, _) = result.summary["controllers"]["lq"]["refused"].values()
+    assert "observation 0 is 'heading_sin'" in refused
+
+
+def test_episodes_of_a_suite_of_ones_own_are_run_again_where_it_is_given(own):
+    code = ["fairway.py", "my_helm:harbour/Fairway-v0"]
+    benchmark("my_helm:make", "own.toml", "fairway", "out", episodes=1, allow_code=code)
+    episode = EpisodeId("make", "fairway", 0, FIRST)
+    refused = rerun(load_results("out"), [episode], "my_helm:make").refused
+    assert "suite: 'own' is none of shipgym's" in refused["make", "fairway"]
+    suite = load_suite("own.toml", code)
+    again = rerun(load_results("out", suite), [episode], "my_helm:make")
+    assert (again.refused, again.different) == ({}, ())
+    assert again.episodes[episode].arguments["task"] == str(own / "fairway.py")
+    other = load_suite(write_suite(own))
+    with pytest.raises(InputError, match="expected results of this suite"):
+        load_results("out", other)
+
+
+# --- files of results, which may come from anybody
+
+
+def rewrite(folder, change):
+    """Change the table of results, with hashes that fit."""
+    result = load_results(folder)
+    columns = {name: values.copy() for name, values in result.episodes.items()}
+    rows = change(columns) or len(columns["seed"])
+    episodes = {**result.summary["episodes"], "rows": rows}
+    BenchmarkResult({**result.summary, "episodes": episodes}, columns).save(folder)
 
 
 @pytest.mark.parametrize(
     "source",
-    [
-        "evil_code:make",
-        "evil_code",
-        "evil_code.py",
-        "*",
-        "/dev/zero",
-        "lq+evil_code:make",
-    ],
+    ["evil_code:make", "evil_code", "evil_code.py", "*", "/dev/zero", "lq+evil:make"],
 )
-def test_results_run_no_code_that_they_name(renamed, source, tmp_path):
-    folder, before = renamed(source), list(sys.path)
-    checks = {check.contestant: check for check in verify(folder)}
-    assert (checks["pid"].passed, checks["pid"].difference) == (True, 0.0)
-    assert not checks["lq"].passed
-    assert (
-        "run only if you name it" in checks["lq"].note
-        or "no such file took part" in checks["lq"].note
-    )
-    answer = shipgym("--verify", folder, "--workers", 1, "--allow-code", "other:make")
-    assert answer.exit_code == 1
-    assert "1 of 2 differ: lq on mariner-calm" in answer.stderr
-    refused = rerun(
-        load_results(folder), [EpisodeId("lq", "mariner-calm", 0, 1_000_000)]
-    ).refused
-    assert list(refused) == [("lq", "mariner-calm")]
+def test_results_run_no_code_that_they_name(copy, suite, source, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code = "open('RAN', 'w').close()\nfrom agents import LQ\n"
+    code += "make = lambda task: LQ.from_model(task.ship)\n"
+    for name in ("evil_code.py", "evil_code"):
+        (tmp_path / name).write_text(code)
+    summary = json.loads((copy / "results.json").read_text())
+    summary["controllers"]["lq"] |= {"source": source, "files": {}}
+    (copy / "results.json").write_text(json.dumps(summary))
+    result, before = load_results(copy, load_suite(suite)), list(sys.path)
+    episode = EpisodeId("lq", "calm", 0, FIRST)
+    assert list(rerun(result, [episode]).refused) == [("lq", "calm")]
     assert not (tmp_path / "RAN").exists()
     assert sys.path == before
+    if source == "evil_code:make":  # unless the user names it
+        assert rerun(result, [episode], {"lq": source}).episodes.keys() == {episode}
+        assert (tmp_path / "RAN").exists()
+        del sys.modules["evil_code"]
 
 
-def test_a_contestant_that_cannot_be_made_again_is_allowed_no_difference(renamed):
-    checks = {check.contestant: check for check in verify(renamed("evil_code:make"))}
-    note = (
-        "'evil_code:make' is code, run only if you name it: --allow-code evil_code:make"
-    )
-    assert checks["lq"] == Check("lq", "mariner-calm", N, np.inf, False, 0.0, note)
-    assert checks["lq"].to_dict()["difference"] is None
-
-
-def test_code_that_is_named_on_the_command_line_is_run(renamed, tmp_path):
-    folder = renamed("evil_code:make")
-    answer = shipgym(
-        "--verify", folder, "--workers", 1, "--allow-code", "evil_code:make"
-    )
-    assert answer.exit_code == 0, answer.output
-    assert (tmp_path / "RAN").exists()
-    episode = EpisodeId("lq", "mariner-calm", 0, 1_000_000)
-    given = rerun(load_results(folder), [episode], {"lq": "evil_code:make"})
-    assert list(given.episodes) == [episode]
-
-
-def test_files_are_verified_by_their_hashes(tmp_path):
-    ship = load_model("mariner")
+def test_files_are_known_by_their_hashes(suite, tmp_path):
     for run in range(2):
-        PID.from_model(ship, frequency=0.05 + 0.01 * run).save(
-            tmp_path / f"mariner-calm-[pid]-{run}.json"
-        )
-    out = tmp_path / "results"
-    benchmark(
-        f"mine={tmp_path}/{{task}}-[[]pid]-*.json", tasks=TASKS, episodes=2, out=out
-    )
-    assert [check.exact for check in verify(out)] == [True]
-    LQ.from_model(ship).save(tmp_path / "mariner-calm-[pid]-1.json")
-    (check,) = verify(out)
-    assert (check.passed, check.episodes) == (False, 4)
-    assert (
-        check.note
-        == f"'{tmp_path}/mariner-calm-[pid]-1.json' is not the file that took part"
-    )
-    (tmp_path / "mariner-calm-[pid]-0.json").unlink()
-    (check,) = verify(out)
-    assert (
-        check.note
-        == f"'{tmp_path}/mariner-calm-[pid]-0.json' is not the file that took part"
-    )
-
-
-def test_an_episode_run_again_costs_the_same_to_a_billionth():
-    costs = np.full(4, 1e6)
-    table = {
-        "contestant": np.array(["a"] * 4),
-        "task": np.array(["calm"] * 4),
-        "cost": costs,
-    }
-    about = {
-        "contestants": {"a": {}},
-        "tasks": {"calm": {}},
-        "seeds": {"first": 100, "count": 4},
-    }
-    again = [
-        1e6 + 0.99e-3,
-        1e6 + 1.05e-3,
-        1e6 - 1.05e-3,
-        np.nan,
-    ]  # the last failed at once
-    run = {
-        "run": 0,
-        "seeds": [100, 101, 102, 103],
-        "costs": again,
-        "episodes": [None] * 4,
-    }
-    found = {
-        ("a", "calm"): {"refused": "", "runs": [run]},
-        ("b", "calm"): {"refused": "it is gone"},
-    }
-    done = _gathered(BenchmarkResult(about, table), found)
-    assert done.different == tuple(
-        EpisodeId("a", "calm", 0, seed) for seed in (101, 102)
-    )
-    assert (done.episodes, done.refused) == ({}, {("b", "calm"): "it is gone"})
+        pid = PID.from_model(MARINER, frequency=0.05 + 0.01 * run)
+        pid.save(tmp_path / f"calm-[pid]-{run}.json")
+    pattern = f"mine={tmp_path}/{{task}}-[[]pid]-*.json"
+    benchmark(pattern, suite, "calm", tmp_path / "out", episodes=2)
+    result = load_results(tmp_path / "out", load_suite(suite))
+    episodes = [EpisodeId("mine", "calm", run, FIRST) for run in range(2)]
+    again = rerun(result, episodes)
+    assert (list(again.episodes), again.different) == (episodes, ())
+    other = LQ.from_model(MARINER)
+    other.save(tmp_path / "calm-[pid]-1.json")
+    said = "calm-[pid]-1.json': expected the file that took part, got another"
+    assert said in rerun(result, episodes).refused["mine", "calm"]
 
 
 @pytest.mark.parametrize(
@@ -870,7 +700,7 @@ def test_an_episode_run_again_costs_the_same_to_a_billionth():
         ("results.json", lambda data: data[:500], "may be cut short"),
         (
             "results.json",
-            lambda data: data.replace(b'"format": 2', b'"format": 9'),
+            lambda data: data.replace(b'"format": 1', b'"format": 9'),
             "format 9 found",
         ),
         (
@@ -879,73 +709,49 @@ def test_an_episode_run_again_costs_the_same_to_a_billionth():
             "unknown key 'rankings'",
         ),
         (
+            "results.json",
+            lambda data: data.replace(b'"shipgym-benchmark"', b'"model"'),
+            "kind: expected 'shipgym-benchmark', got 'model'",
+        ),
+        (
             "episodes.parquet",
             lambda data: data[:-10],
-            "is not the one that results.json was written with",
+            "expected the file that results.json was written with",
         ),
     ],
 )
-def test_broken_results(copy, name, damage, said):
+def test_broken_results_are_refused(copy, name, damage, said):
     path = copy / name
     path.write_bytes(damage(path.read_bytes()))
     with pytest.raises(InputError, match=said):
         load_results(copy)
 
 
-def test_results_that_do_not_agree_with_their_episodes_are_refused(copy):
-    def one_more(columns):
-        columns["contestant"][np.flatnonzero(columns["contestant"] == "lq")[0]] = "pid"
-
-    summary = json.loads((copy / "results.json").read_text())
-    _rewritten(copy, one_more)
-    with pytest.raises(InputError) as error:
-        load_results(copy)
-    assert (
-        str(error.value)
-        == f"{copy / 'results.json'}: 5 episodes of 'pid' on 'mariner-calm' found in"
-        " episodes.parquet, expected 1 runs of 4; run `shipgym benchmark` again"
-    )
-    (copy / "results.json").write_text(
-        json.dumps({k: v for k, v in summary.items() if k != "seeds"})
-    )
-    with pytest.raises(
-        InputError,
-        match=r"results.json: field 'seeds' is missing; run `shipgym benchmark` again$",
-    ):
-        load_results(copy)
-    (copy / "results.json").write_text(json.dumps(summary | {"kind": "model"}))
-    with pytest.raises(
-        InputError, match=r"kind 'model' found, expected .*: not benchmark results"
-    ):
-        load_results(copy / "results.json")
+def one_more(columns):
+    columns["controller"][np.flatnonzero(columns["controller"] == "lq")[0]] = "pid"
 
 
-def test_contestants_of_the_file_and_of_the_table_are_the_same(copy):
-    def exchange(columns):
-        columns["contestant"][columns["contestant"] == "lq"] = "los"
-
-    _rewritten(copy, exchange)
-    with pytest.raises(
-        InputError,
-        match=r"0 episodes of 'lq' on 'mariner-calm' .* expected 1 runs of 4",
-    ):
-        load_results(copy)
+def exchange(columns):
+    columns["controller"][columns["controller"] == "lq"] = "los"
 
 
-def test_rows_of_nobody_in_the_summary_are_refused(copy):
-    result = load_results(copy)
-    columns = {
-        name: np.append(values, values[:1]) for name, values in result.episodes.items()
-    }
-    columns["contestant"][-1] = "los"
-    summary = result.summary | {
-        "episodes": result.summary["episodes"] | {"rows": 2 * N + 1}
-    }
-    BenchmarkResult(summary, columns).save(copy)
-    with pytest.raises(
-        InputError,
-        match=r"1 episodes of 'los' on 'mariner-calm' .* expected 0 runs of 4",
-    ):
+def row_of_another(columns):
+    for name, values in columns.items():
+        columns[name] = np.append(values, values[:1])
+    columns["controller"][-1] = "los"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (one_more, "expected 1 runs of 4 episodes of 'pid' .* got 5 episodes"),
+        (exchange, "expected 1 runs of 4 episodes of 'lq' .* got 0 episodes"),
+        (row_of_another, "expected 0 runs of 4 episodes of 'los' .* got 1 episodes"),
+    ],
+)
+def test_results_that_do_not_agree_with_their_episodes_are_refused(copy, change, said):
+    rewrite(copy, change)
+    with pytest.raises(InputError, match=said):
         load_results(copy)
 
 
@@ -956,15 +762,15 @@ def test_rows_of_nobody_in_the_summary_are_refused(copy):
         (lambda one: one["seeds"].update(count="4"), "r.json: seeds.count: '4' "),
         (
             lambda one: one["ranking"][0].update(name="los"),
-            "r.json: name of a contestant: 'los' found",
+            "r.json: name of a controller: 'los' found",
         ),
         (
             lambda one: one["improvement"].update(los={}),
-            "r.json: name of a contestant: 'los' found",
+            "r.json: name of a controller: 'los' found",
         ),
         (
             lambda one: one["profile"]["shares"].update(los=[]),
-            "r.json: name of a contestant: 'los' found",
+            "r.json: name of a controller: 'los' found",
         ),
         (
             lambda one: one["tasks"].update(rough={}),
@@ -975,17 +781,16 @@ def test_rows_of_nobody_in_the_summary_are_refused(copy):
             "r.json: name of a task: 'rough' found",
         ),
         (
-            lambda one: one["ranking"].pop(0),
-            "r.json: tasks.mariner-calm: name of a contestant: 'lq' found",
+            lambda one: one["ranking"].clear(),
+            "r.json: tasks.calm: name of a controller: 'pid' found",
         ),
-        (
-            lambda one: one["tasks"]["mariner-calm"]["lq"].pop("runs"),
-            r"tasks.mariner-calm.lq.*runs",
-        ),
+        (lambda one: one["tasks"]["calm"]["lq"].pop("runs"), r"tasks.calm.lq.*runs"),
     ],
 )
-def test_a_summary_names_whom_and_what_it_knows(folder, change, said):
-    summary = deepcopy(load_results(folder).summary)
+def test_a_summary_describes_the_controllers_and_tasks_that_it_names(
+    folder, change, said
+):
+    summary = json.loads((folder / "results.json").read_text())
     check_summary(summary, "r.json")
     change(summary)
     with pytest.raises(InputError, match=said):
@@ -997,250 +802,83 @@ def test_what_the_table_of_episodes_needs_is_missed_before_the_work(
 ):
     result = load_results(folder)
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    said = r"not installed, the table of episodes needs it: .*'shipgym\[bench"
     for call in (
-        lambda: check_new(tmp_path / "out", False, "v1"),
+        lambda: check_new(tmp_path / "out", False, "small-v1"),
         lambda: result.save(tmp_path / "out"),
     ):
-        with pytest.raises(
-            InputError,
-            match=r"not installed, the table of episodes needs it: .*'shipgym\[bench",
-        ):
+        with pytest.raises(InputError, match=said):
             call()
     assert not (tmp_path / "out").exists()
 
 
-def test_results_are_written_to_folders_that_are_made(folder, tmp_path):
-    result = load_results(folder)
-    assert result.save(None) is result
-    saved = result.save(tmp_path / "a" / "b")
-    assert load_results(tmp_path / "a" / "b").summary == saved.summary
-    assert len(saved.summary["episodes"]["sha256"]) == 64
-
-
-def test_parts_alone_are_gone_on_with(tmp_path):
-    (tmp_path / "parts").mkdir()
-    assert check_new(tmp_path, True, "shipgym-v1") == tmp_path
-    with pytest.raises(
-        InputError, match="already contains results; continue with --resume"
-    ):
-        check_new(tmp_path, False, "shipgym-v1")
-
-
 def test_a_folder_takes_the_results_of_one_suite_only(copy, tmp_path):
-    assert check_new(tmp_path / "new", False, "shipgym-v1") == tmp_path / "new"
-    assert check_new(copy, True, "shipgym-v1") == copy
-    with pytest.raises(
-        InputError, match="already contains results; continue with --resume"
-    ):
-        check_new(copy, False, "shipgym-v1")
-    with pytest.raises(
-        InputError, match="holds results of another suite than 'shipgym-v2'"
-    ):
-        check_new(copy, True, "shipgym-v2")
-    with pytest.raises(
-        InputError,
-        match=r"results.json: is not a folder, expected one to write the results to",
-    ):
-        check_new(copy / "results.json", False, "shipgym-v1")
-    other = tmp_path / "other"
+    new, parts, other = (tmp_path / name for name in ("new", "parts-only", "other"))
+    (parts / "parts").mkdir(parents=True)
     other.mkdir()
-    assert check_new(other, False, "shipgym-v1") == other
+    for folder, resume in ((new, False), (other, False), (copy, True), (parts, True)):
+        assert check_new(folder, resume, "small-v1") == folder
     (other / "letter.txt").write_text("")
-    with pytest.raises(
-        InputError, match=r"holds 'letter.txt', not a result of a benchmark"
+    for folder, resume, suite, said in (
+        (copy, False, "small-v1", "already contains results; continue with --resume"),
+        (parts, False, "small-v1", "already contains results; continue with --resume"),
+        (copy, True, "other-v1", "expected results of suite 'other-v1', got those of"),
+        (copy / "results.json", False, "small-v1", "expected a folder .* got a file"),
+        (other, True, "small-v1", "or nothing, got 'letter.txt'"),
     ):
-        check_new(other, True, "shipgym-v1")
+        with pytest.raises(InputError, match=said):
+            check_new(folder, resume, suite)
 
 
-def test_a_part_that_was_kept_is_of_its_job():
-    job = {"contestant": "pid", "task": "mariner-calm", "episodes": 2}
+# --- the command
 
-    def part(**figures):
-        return {"refused": "", "runs": [_run(figures, "", 0.1, None)]}
+INTERRUPTED_PILOT = """
+from agents import PID
 
-    whole = part(cost=np.zeros(2), overshoot=np.zeros(2))
-    assert checked_part(whole, job) is whole
-    for wrong in (
-        part(cost=np.zeros(3)),
-        part(overshoot=np.zeros(2)),
-        part(cost=np.zeros((2, 1))),
-        part(cost=np.array(["1", "2"])),
-        {
-            "refused": "",
-            "runs": [*whole["runs"], *part(cost=np.zeros(2))["runs"]],
-        },  # which knows less
-    ):
-        with pytest.raises(
-            InputError,
-            match="part of 'pid' on 'mariner-calm': expected cost and other figures",
-        ):
-            checked_part(wrong, job)
+INTERRUPTED = True
+
+def pilot(task):
+    if INTERRUPTED:
+        raise KeyboardInterrupt
+    return PID.from_model(task.ship)
+"""
 
 
-def test_tasks_are_chosen_by_name_each_once():
-    whole = load_suite("shipgym-v1").tasks
-    assert _chosen("shipgym-v1", None) == whole
-    both = _chosen("shipgym-v1", f"{whole[1].name}, {whole[0].name}, {whole[1].name}")
-    assert both == (whole[1], whole[0])
-    with pytest.raises(InputError, match="tasks: none found, expected at least one"):
-        _chosen("shipgym-v1", [])
-    for asked, ends in (
-        ("strong-current", ["", "-on-model", "-far"]),
-        ("strong-current-far", ["-far"]),
-    ):
-        assert [one.name for one in _chosen("shipgym-v2", [asked])] == [
-            f"strong-current{end}" for end in ends
-        ]
-
-
-@pytest.mark.parametrize("episodes", [0, 101, 2.5])
-def test_as_many_episodes_are_run_as_are_scored_at_most(episodes):
-    with pytest.raises(InputError, match=f"episodes: {episodes} found"):
-        benchmark("pid", tasks=TASKS, episodes=episodes)
-
-
-def test_a_summary_of_two_episodes_by_hand(monkeypatch):
-    """Of two tasks with a ship, in one of which 0 and 1 cost the same, and one far from the design."""
-    references = {"calm": (30.0, 20.0), "same": (5.0, 5.0), "calm-far": (40.0, 10.0)}
-    monkeypatch.setattr(
-        "agents.benchmarking.summary.reference_costs", lambda suite: references
-    )
-    monkeypatch.setattr("agents.benchmarking.summary.N_EPISODES", 2)
-
-    def runs(*costs):
-        known = {
-            "refused": "",
-            "runs": [_run({"cost": np.array(costs)}, "", 1e-6, None)],
-        }
-        return known if costs else {"refused": "no", "runs": []}
-
-    done = {
-        ("a", "calm"): runs(25.0, 20.0),
-        ("a", "same"): runs(5.0, 5.0),
-        ("a", "calm-far"): runs(10.0, 10.0),
-        ("b", "calm"): runs(30.0, 30.0),
-        ("b", "same"): runs(10.0, 10.0),
-        ("b", "calm-far"): runs(),
-    }
-    done["a", "calm"]["runs"] *= 2
-    done["a", "calm"]["runs"][1] = {
-        **done["a", "calm"]["runs"][0],
-        "seconds_per_action": 3e-6,
-    }
-    tasks = [
-        SimpleNamespace(name=name, on="far" if "far" in name else "ship")
-        for name in references
-    ]
-    found = summary_of("mine", tasks, ["b", "a"], done)
-    first, second = found["ranking"]
-    assert (first["name"], first["tasks"], first["scored_tasks"]) == ("a", 2, 1)
-    assert (first["score"]["value"], first["relative_cost"]) == pytest.approx(
-        (0.75, 1.0)
-    )
-    assert (second["score"]["value"], second["relative_cost"]) == pytest.approx(
-        (0.0, np.sqrt(8.0 / 3.0))
-    )
-    assert first["elsewhere"]["far"]["score"]["value"] == pytest.approx(1.0)
-    assert (
-        first["elsewhere"]["far"]["tasks"],
-        second["elsewhere"]["far"]["tasks"],
-    ) == (1, 0)
-    assert found["tasks"]["calm"]["a"]["microseconds_per_action"] == pytest.approx(2.0)
-    assert found["reference"]["calm-far"] == {"zero": 40.0, "best": 10.0}
-    thresholds, shares = found["profile"]["thresholds"], found["profile"]["shares"]
-    at = [thresholds.index(one) for one in (-1.0, -0.05, 0.0, 0.5, 1.0)]
-    assert [shares["a"][k] for k in at] == [
-        1.0,
-        1.0,
-        1.0,
-        0.5,
-        0.0,
-    ]  # scores of 0.5 and 1 of `calm` alone
-    assert [shares["b"][k] for k in at] == [1.0, 1.0, 0.0, 0.0, 0.0]
-    assert found["improvement"]["a"]["b"]["value"] == 1.0
-
-
-def test_episodes_without_a_figure_are_not_counted():
-    lost = {"episodes": {"terminated": np.array([1.0, 0.0, np.nan])}}
-    assert _count([lost, lost], "terminated") == 2
-    assert _count([{"episodes": {}}] * 20, "terminated") == 0
-
-
-def test_a_factory_may_raise_anything_and_best_known_costs_are_kept_by_task(
-    monkeypatch,
-):
-    task = load_suite("shipgym-v1").task("mariner-calm")
-
-    def fails(one, task, suite):
-        raise KeyError("gain")
-
-    monkeypatch.setattr(Contestant, "policies", fails)
-    for source in ("mine:make", fails):
-        done = results_of(Contestant("mine", source), task, "shipgym-v1", 2)
-        assert done == {"refused": "KeyError: 'gain'", "runs": []}
-    with pytest.raises(KeyError):  # of ours it is a fault
-        results_of(Contestant("pid", "pid"), task, "shipgym-v1", 2)
-    known = results_of(Contestant("best-known", "best-known"), task, "shipgym-v1", 3)[
-        "runs"
-    ][0]
-    np.testing.assert_array_equal(
-        known["episodes"]["cost"], best_costs(task, "shipgym-v1")[:3]
-    )
-    zero, one = reference_costs("shipgym-v1")["mariner-calm"]
-    assert (zero, one) == (
-        best_known("shipgym-v1")["mariner-calm"]["zero"],
-        best_costs(task, "shipgym-v1").mean(),
-    )
-    with pytest.raises(
-        InputError,
-        match="no best known costs are kept for task 'mine' of suite 'shipgym-v1'",
-    ):
-        best_costs(replace(task, name="mine"), "shipgym-v1")
-
-
-def test_the_command_ranks_and_writes(tmp_path):
-    answer = shipgym(
-        "--controllers",
-        "pid",
-        "--tasks",
-        "mariner-calm",
-        "--episodes",
-        2,
-        "--workers",
-        1,
-        "--out",
-        tmp_path / "r",
-        "--no-page",
-    )
+def test_the_command_ranks_and_writes(suite, tmp_path):
+    out = tmp_path / "r"
+    words = ["--controllers", "pid", "--suite", suite, "--tasks", "calm"]
+    words += ["--episodes", 2, "--workers", 1, "--out", out, "--no-page"]
+    answer = shipgym(*words)
     assert answer.exit_code == 0, answer.stderr
-    assert same_text(
-        "benchmark", answer.stdout + answer.stderr, r"(?m)(?<=  )\d+\.\d\d$"
-    )  # us by action
-    assert "1 task of 2 episodes" in answer.stdout
-    assert "for a quick look, not for a ranking" in answer.stderr
-    assert load_results(tmp_path / "r").ranking == ["pid"]
-    page = tmp_path / "r" / "index.html"
-    page.touch()
-    again = shipgym(
-        "--controllers",
-        "pid",
-        "--tasks",
-        "mariner-calm",
-        "--episodes",
-        2,
-        "--workers",
-        1,
-        "--out",
-        tmp_path / "r",
-        "--resume",
-        "--json",
-        "--no-page",
-    )
+    micro_seconds = r"(?m)(?<=  )\d+\.\d\d$"
+    assert same_text("benchmark", answer.stdout + answer.stderr, micro_seconds)
+    assert load_results(out).ranking == ["pid"]
+    (out / "index.html").touch()
+    again = shipgym(*words, "--resume", "--json")
     assert json.loads(again.stdout)["ranking"][0]["name"] == "pid"
-    assert not page.exists()  # it would be of the results before
+    assert not (out / "index.html").exists()  # it would be of the results before
 
 
-def test_bad_input_is_told_in_one_line_and_nothing_is_written(tmp_path):
+def test_the_command_goes_on_where_it_was_interrupted(suite, tmp_path, monkeypatch):
+    module = tmp_path / "interrupted_pilot.py"
+    monkeypatch.chdir(tmp_path)
+    words = ["--controllers", "lq,mine=interrupted_pilot:pilot", "--suite", suite]
+    words += ["--tasks", "calm", "--episodes", 2, "--workers", 1, "--out", "r"]
+    module.write_text(INTERRUPTED_PILOT)
+    answer = shipgym(*words)
+    assert answer.exit_code == 130
+    assert "what was done is kept in r: continue with --resume" in answer.stderr
+
+    monkeypatch.setitem(sys.modules, "plotly", None)
+    sys.modules["interrupted_pilot"].INTERRUPTED = False
+    answer = shipgym(*words, "--resume")
+    assert answer.exit_code == 0
+    assert "warning: there is no index.html: plotly" in answer.stderr
+    assert "warning: 2 of 100 episodes: for a quick look" in answer.stderr
+    assert set(load_results("r").ranking) == {"lq", "mine"}
+
+
+def test_bad_input_is_one_message_and_nothing_is_written(suite, tmp_path):
     out = tmp_path / "r"
     cut, weightless, other = (
         tmp_path / f"{name}.json" for name in ("cut", "weightless", "other")
@@ -1248,44 +886,19 @@ def test_bad_input_is_told_in_one_line_and_nothing_is_written(tmp_path):
     random_policy(load_model("kvlcc2")).save(other)
     weightless.write_bytes(other.read_bytes())
     cut.write_bytes(other.read_bytes()[:300])
-    for arguments, said in (
-        (["--controllers", "pdi", "--out", out], "Did you mean 'pid'"),
-        (["--controllers", "pid"], "--out"),
-        (
-            ["--controllers", "pid", "--out", out, "--engine", "rai"],
-            "engine: 'rai' found",
-        ),
-        (["--verify", out], "there is no such file of benchmark results"),
-        (
-            ["--verify", out, "--tasks", "mariner-calm"],
-            "--tasks: found together with --verify, which",
-        ),
-        (
-            ["--submit", tmp_path / "s.json", "--episodes", 9, "--out", out],
-            "--episodes: found together with",
-        ),
-        (["--tasks", "mariner-calm,", "--out", out], "task: '' found, expected one of"),
-        (
-            ["--controllers", f"pid,{cut}", "--tasks", "mariner-calm", "--out", out],
-            "may be cut short",
-        ),
-        (
-            [
-                "--controllers",
-                f"pid,{weightless}",
-                "--tasks",
-                "mariner-calm",
-                "--out",
-                out,
-            ],
-            "no such file",
-        ),
-        (
-            ["--controllers", f"pid,{other}", "--tasks", "mariner-calm", "--out", out],
-            "fits no task asked for",
-        ),
+    calm = ["--suite", suite, "--tasks", "calm"]
+    for words, said in (
+        (["--controllers", "pdi"], "Did you mean 'pid'"),
+        (["--engine", "rai"], "engine: 'rai' found"),
+        (["--suite", "shipgym-v2"], "Did you mean 'shipgym-v1'"),
+        (["--suite", tmp_path / "none.toml"], "there is no such TOML file of a suite"),
+        (["--suite", suite, "--tasks", "calm,"], "task: '' found, expected one of"),
+        ([*calm, "--controllers", f"pid,{cut}"], "may be cut short"),
+        ([*calm, "--controllers", f"pid,{weightless}"], "no such file"),
+        ([*calm, "--controllers", f"pid,{other}"], "fits none of the tasks"),
     ):
-        answer = shipgym(*arguments)
+        answer = shipgym(*words, "--out", out)
         assert (answer.exit_code, answer.stdout) == (2, "")
         assert said in answer.stderr
+    assert "Missing option '--out'" in shipgym("--controllers", "pid").stderr
     assert not out.exists()

@@ -6,14 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from agents import LQ, PID, sail
+from agents import LQ, sail
 from agents.rollouts import rollout as rollout_module
 from agents.rollouts.episodes import _episode, recorded
 from agents.rollouts.metrics import (
     course_changes,
     evaluate,
     fuel_per_distance,
-    metrics,
     path_following,
     reversals,
     steering,
@@ -265,7 +264,11 @@ def test_figures_of_steering_and_of_paths_by_hand():
     """Two episodes of 4 and 2 intervals of 3 s; what is recorded later or at the beginning does not count."""
     sailing = np.array([[1, 1], [1, 1], [1, 0], [1, 0]], dtype=np.bool_)
     run = SimpleNamespace(
-        sailing=sailing, steps=sailing.sum(axis=0).astype(float), dt=3.0
+        sailing=sailing,
+        steps=sailing.sum(axis=0).astype(float),
+        dt=3.0,
+        seeds=SEEDS[:2],
+        task=PATH.task,
     )
     run.states = {"delta": np.radians([[0, 0], [2, 1], [-2, 1], [1, 9], [1, 0]])}
     run.infos = {
@@ -420,39 +423,3 @@ def test_a_controller_that_fails_at_once_has_a_cost_and_no_figures():
         "fuel",
     ):
         assert np.isnan(found.figures[name]).all(), name
-
-
-def test_the_time_and_interventions_of_a_shield_by_hand(lq):
-    """It steers one ship in the first interval, and again in the fourth and fifth; another in the second."""
-    run = evaluate(lq, KEEPING, SEEDS[:3]).run
-    steps = run.sailing.shape[0]
-    shielded = np.zeros((steps, 3), dtype=np.bool_)
-    shielded[[0, 3, 4], 0], shielded[[1, 2], 1] = True, True
-    figures = metrics(replace(run, shielded=shielded))
-    assert figures["interventions"].tolist() == [2.0, 1.0, 0.0]
-    np.testing.assert_allclose(figures["shielded"], [3.0 / steps, 2.0 / steps, 0.0])
-    over = run.sailing.copy()
-    over[3:, 0] = False
-    cut = metrics(replace(run, shielded=shielded, sailing=over))
-    assert cut["interventions"].tolist() == [1.0, 1.0, 0.0]
-    np.testing.assert_allclose(cut["shielded"][0], 1.0 / 3.0)
-
-
-def test_a_shield_is_counted(lq):
-    from agents.policies.shield import Shielded
-
-    reckless = Shielded.from_model(KEEPING.ship, steady(1.0))
-    found = evaluate(reckless, KEEPING, SEEDS[:3]).figures
-    assert not found["terminated"].any()
-    assert (found["interventions"] >= 1.0).all()
-    assert (found["shielded"] > 0.0).all()
-    never = evaluate(Shielded.from_model(KEEPING.ship, lq), KEEPING, SEEDS[:3]).figures
-    np.testing.assert_array_equal(
-        never["cost"], evaluate(lq, KEEPING, SEEDS[:3]).figures["cost"]
-    )
-    assert (
-        evaluate(PID.from_model(KEEPING.ship), KEEPING, SEEDS[:3])
-        .figures["interventions"]
-        .sum()
-        == 0.0
-    )

@@ -2,11 +2,10 @@
 
 import base64
 import gzip
-import inspect
 import json
 import re
 import sys
-from functools import partial
+from dataclasses import replace
 from types import SimpleNamespace
 
 import gymnasium
@@ -15,29 +14,47 @@ import pytest
 from typer.testing import CliRunner
 
 from agents import PID, benchmark
-from agents.benchmarking import page as benchmark_page
-from agents.benchmarking import page_replays
-from agents.benchmarking.page import command, write_page
+from agents.benchmarking.page import command, packed, write_page
 from agents.benchmarking.page_figures import COLOURS
 from agents.benchmarking.page_replays import (
-    bests_of,
+    Choice,
+    best_controllers,
+    choices,
     differences,
-    entries_of,
-    hardest_of,
+    hardest_seed,
     replayable,
-    worst_of,
+    short,
+    usable_controllers,
+    worst_episodes,
 )
+from agents.benchmarking.page_tables import metrics_table
 from agents.benchmarking.replays import EpisodeId, rerun
 from agents.benchmarking.results import BenchmarkResult
 from agents.cli import app
 from agents.rollouts.episodes import recorded
-from agents.suites.suite import load_suite
+from agents.suites.suite import BenchmarkTask
 from shipgym.errors import InputError
 from tests.agents.browser import COMMAND, Browser
+from tests.agents.small_suite import write_suite
 from tests.golden.texts import flat, same_page, same_text
 
-TASKS = ["mariner-calm", "mariner-current"]
-N, FIRST = 4, 1_000_000
+SUITE = """
+name = "small-v1"
+[tasks.calm]
+environment = "course-keeping"
+model = "mariner"
+why = "the easiest"
+options = { episode_steps = 60, change_interval_steps = 25 }
+[tasks.current]
+environment = "path-following"
+model = "mariner"
+why = "a current across the path"
+options = { episode_steps = 150, n_legs = 2, leg_lengths = [5.0, 6.0], corridor = 0.8 }
+sea = { current = { speed = 1.0, towards_deg = 90.0 } }
+"""
+REFERENCES = {"calm": (30.0, 2.0), "current": (3000.0, 40.0)}
+TASKS = list(REFERENCES)
+N, FIRST = 100, 1_000_000
 
 
 class Lazy:
@@ -50,20 +67,23 @@ class Lazy:
 
 
 @pytest.fixture(scope="module")
-def result():
-    """PID, the same again, and one that is given as an object; scores as if the suite had references."""
-    references = {"mariner-calm": (30.0, 20.0), "mariner-current": (3000.0, 900.0)}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            "agents.benchmarking.summary.reference_costs", lambda suite: references
-        )
-        patch.setattr("agents.benchmarking.summary.N_EPISODES", N)
-        found = benchmark(
-            {"pid": "pid", "again": "pid", Lazy.name: Lazy()}, tasks=TASKS, episodes=N
-        )
-    for by_name in found.summary["tasks"].values():
-        for one in by_name.values():
-            one["microseconds_per_action"] = 7.25  # which differs from run to run
+def suite(tmp_path_factory):
+    """The path of a suite with best known costs."""
+    best = {
+        task: {"zero": zero, "costs": [best] * N, "by": ["search"] * N}
+        for task, (zero, best) in REFERENCES.items()
+    }
+    return write_suite(tmp_path_factory.mktemp("suite"), SUITE, best=best)
+
+
+@pytest.fixture(scope="module")
+def result(suite):
+    """PID, the same again, and one that is given as an object."""
+    controllers = {"pid": "pid", "again": "pid", Lazy.name: Lazy()}
+    found = benchmark(controllers, suite)
+    for cells in found.summary["tasks"].values():
+        for cell in cells.values():
+            cell["microseconds_per_action"] = 7.25  # which differs from run to run
     return found
 
 
@@ -74,9 +94,15 @@ def page(result, tmp_path_factory):
     return path
 
 
+def unpacked(page, name):
+    text = page.read_text(encoding="utf-8")
+    found = re.search(rf'<script type="text/plain" id="{name}">(.*?)</script>', text)
+    return gzip.decompress(base64.b64decode(found[1])).decode()
+
+
 def test_the_page_is_the_golden_one(page):
     """Its words and tables, what its figures draw, and the episodes to replay."""
-    versions = r"\| (python|processor|numpy|numba|scipy|control|osqp) \| .*"
+    versions = r"\| (python|processor|numpy|numba|scipy|control) \| .*"
     assert same_page("benchmark page", page.read_text(encoding="utf-8"), versions)
 
 
@@ -87,47 +113,103 @@ def test_the_summary_is_the_golden_one(result):
     assert same_text("benchmark summary", "\n".join(lines))
 
 
-def unpacked(page, name):
+def test_the_page_holds_its_numbers_and_where_they_are_from(result, page):
     text = page.read_text(encoding="utf-8")
-    found = re.search(rf'<script type="text/plain" id="{name}">(.*?)</script>', text)
-    return gzip.decompress(base64.b64decode(found[1])).decode()
+    assert len(text) < 3e6
+    summary = result.summary
+    assert summary["suite"]["sha256"][:16] in text
+    assert summary["suite"]["tasks"]["calm"]["model_sha256"][:16] in text
+    assert summary["versions"]["numba"] in text
+    assert "1000000 to 1000099" in text
+    assert "a &lt;b&gt;lazy one" in text
+    assert "<b>lazy" not in text
+    assert not re.findall(r'(?:src|href)="(?!#)[^"]', text)  # it loads nothing
 
 
-def test_the_worst_come_first_and_the_hardest_is_hard_for_all(result):
-    costs = result.figures("pid", "mariner-calm")[0]
-    worst = worst_of(result, "pid", "mariner-calm", N)
-    assert [episode.seed - FIRST for episode in worst] == np.argsort(-costs).tolist()
-    medians = np.median(
-        [result.figures(name, "mariner-calm")[0] for name in result.ranking], axis=0
-    )
-    assert hardest_of(result, "mariner-calm") == FIRST + np.argmax(medians)
+def test_what_cannot_be_replayed_is_named(page):
+    assert "Not to be replayed: a &lt;b&gt;lazy one" in page.read_text(encoding="utf-8")
+    entries = json.loads(unpacked(page, "replay-data"))["entries"]["calm"]
+    assert {entry["who"] for entry in entries} == {"", "pid", "again"}
 
 
-def test_equals_share_the_first_place(result):
-    assert sorted(bests_of(result, "mariner-calm")) == ["again", "pid"]
+def test_an_episode_to_replay_has_its_cost_to_the_hundredth(result, page):
+    data = json.loads(unpacked(page, "replay-data"))
+    assert len(data["entries"]["calm"]) == 1 + 2 * 2
+    for task, entries in data["entries"].items():
+        for entry in entries:
+            name = entry["who"] or data["runs"][entry["runs"][0]]["name"]
+            cost = result.figures(name, task)[0, entry["seed"] - FIRST]
+            assert entry["cost"] == round(float(cost), 2)
 
 
-def test_each_is_shown_beside_the_best_in_the_same_episode(result):
-    best = bests_of(result, "mariner-calm")[0]
-    (nobody, everybody), *others = entries_of(result, "mariner-calm", 2)
-    assert nobody == ""
-    assert {episode.contestant for episode in everybody} == set(result.ranking)
-    assert len(others) == 2 * 3
-    for who, episodes in others:
-        assert episodes[0].contestant == who
-        assert [episode.contestant for episode in episodes[1:]] == (
-            [] if who == best else [best]
-        )
-        assert len({episode.seed for episode in episodes}) == 1
+def test_the_command_of_the_page_names_what_is_not_the_default(result):
+    words = ["pid,again=pid", "--suite small.toml --out results"]
+    assert all(one in command(result) for one in words)
+    suite = {"name": "shipgym-v1", "file": "", "complete": True}
+    controllers = {"lq": {"source": "lq"}, "mine": {"source": None}}
+    summary = {
+        "controllers": controllers,
+        "suite": suite,
+        "tasks": {"calm": {}, "rough": {}},
+        "seeds": {"count": 100},
+    }
+    whole = "shipgym benchmark --controllers lq,mine=... --suite shipgym-v1"
+    assert command(BenchmarkResult(summary, {})) == f"{whole} --out results"
+    part = summary | {"suite": suite | {"complete": False}, "seeds": {"count": 99}}
+    expected = f"{whole} --tasks calm,rough --episodes 99 --out results"
+    assert command(BenchmarkResult(part, {})) == expected
 
 
-def test_too_many_runs_are_cut_down(result, monkeypatch):
-    count, episodes = replayable(result, 3)
-    assert count == 3
-    monkeypatch.setattr("agents.benchmarking.page_replays.MOST_RUNS", len(episodes) - 1)
-    fewer, fewer_episodes = replayable(result, 3)
-    assert fewer < 3
-    assert set(fewer_episodes) < set(episodes)
+def test_the_same_text_is_packed_the_same_whenever():
+    content = base64.b64decode(packed("a page"))
+    assert gzip.decompress(content) == b"a page"
+    assert content[4:8] == bytes(4)  # the time at which it was packed
+
+
+def test_a_page_that_cannot_be_written_or_drawn_is_refused_at_once(
+    result, tmp_path, monkeypatch
+):
+    told = []
+    with pytest.raises(InputError, match=r"ends in \.html"):
+        write_page(result, tmp_path / "page.txt", progress=told.append)
+    monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
+    with pytest.raises(InputError, match="plotly is not installed"):
+        write_page(result, tmp_path / "index.html", progress=told.append)
+    assert told == []  # nothing was run again
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_the_command_writes_the_page_where_plotly_is_there(
+    suite, tmp_path, monkeypatch, there
+):
+    if not there:
+        monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
+    out = tmp_path / "results"
+    words = ["benchmark", "--controllers", "pid", "--suite", str(suite)]
+    words += ["--tasks", "calm", "--episodes", "2", "--workers", "1"]
+    answer = CliRunner().invoke(app, [*words, "--out", str(out)])
+    assert answer.exit_code == 0, answer.stderr
+    assert (out / "results.json").exists()
+    assert (out / "index.html").exists() == there
+    assert ("there is no index.html: plotly is not installed" in answer.stderr) != there
+
+
+def test_rare_metrics_are_shown_only_where_they_are_not_zero_throughout():
+    def heads(**means):
+        metrics = {name: {"mean": mean, "p95": mean} for name, mean in means.items()}
+        cell = {"cost": {"value": 1.0}, "metrics": metrics, "lost": 0, "failed": 0}
+        cells = {"pid": cell | {"microseconds_per_action": None}}
+        ranking = [{"name": "pid"}]
+        result = BenchmarkResult({"tasks": {"calm": cells}, "ranking": ranking}, {})
+        return {head.text for head in metrics_table(result, "calm", "x").heads}
+
+    assert "outside model" in heads(extrapolating=0.1)
+    assert "outside model" not in heads(extrapolating=0.0)
+    assert "success" in heads(success=0.0)
+    assert "success" not in heads(success=None)
+
+
+# --- episodes that are run again
 
 
 def test_what_is_run_again_costs_the_same(result):
@@ -137,61 +219,72 @@ def test_what_is_run_again_costs_the_same(result):
     assert (again.different, again.refused) == ((), {})
     assert told[-1] == ("episodes run again", 2, 2)
     for episode in episodes:
+        place = 0, episode.seed - FIRST
         found = again.episodes[episode]
-        cost = result.figures("pid", episode.task)[0, episode.seed - FIRST]
-        lost = result.figures("pid", episode.task, "terminated")[
-            0, episode.seed - FIRST
-        ]
-        assert found.rewards.sum() == pytest.approx(-cost)
-        assert (found.seed, found.terminated) == (
-            episode.seed,
-            bool(lost) or bool(found.success),
+        cost, lost = (
+            result.figures("pid", episode.task, name)[place]
+            for name in ("cost", "terminated")
         )
-        assert (found.waypoints is None) == (episode.task == "mariner-calm")
+        assert found.rewards.sum() == pytest.approx(-cost)
+        assert found.seed == episode.seed
+        assert found.terminated == bool(lost or found.success)
         assert found.truncated == (not found.terminated)
+        assert (found.waypoints is None) == (episode.task == "calm")
+
+
+def test_a_changed_result_is_reported_beyond_a_billionth(result):
+    episodes = [EpisodeId("pid", "calm", 0, FIRST + k) for k in range(2)]
+    for change, different in ((1.0 + 1e-10, ()), (1.0 + 1e-8, tuple(episodes))):
+        columns = {**result.episodes, "cost": result.episodes["cost"] * change}
+        assert rerun(replace(result, episodes=columns), episodes).different == different
+
+
+def test_objects_are_replayed_where_they_are_given(result):
+    episode = EpisodeId(Lazy.name, "calm", 0, FIRST)
+    refused = rerun(result, [episode]).refused
+    assert "was an object" in refused[Lazy.name, "calm"]
+
+    def fails(task):
+        raise KeyError("gain")
+
+    refused = rerun(result, [episode], {Lazy.name: fails}).refused
+    assert refused == {(Lazy.name, "calm"): "KeyError: 'gain'"}
+    given = rerun(result, [episode], {Lazy.name: Lazy()})
+    assert (given.refused, given.different) == ({}, ())
+    assert not given.episodes[episode].actions.any()
+
+
+CALM = BenchmarkTask("calm", "course-keeping", "mariner")
+PILOT = PID.from_model(CALM.ship, dt=CALM.task.interval(CALM.ship))
 
 
 def test_an_episode_run_again_is_that_of_the_single_environment():
-    task = load_suite().task("mariner-calm")
-    pilot = PID.from_model(task.ship, dt=task.task.interval(task.ship))
-    (found,), (cost,) = recorded(pilot, task, [FIRST], samples=200)
+    (found,), (cost,) = recorded(PILOT, CALM, [FIRST], samples=200)
     env = gymnasium.make(found.environment, **found.arguments).unwrapped
     observation, _ = env.reset(seed=FIRST)
     rewards, states, over = [], [env.physical_state()], False
     while not over:
-        observation, reward, terminated, truncated, _ = env.step(
-            pilot.predict(observation)[0]
-        )
+        action, _ = PILOT.predict(observation)
+        observation, reward, terminated, truncated, _ = env.step(action)
         rewards.append(reward)
         states.append(env.physical_state())
         over = terminated or truncated
     assert (len(rewards), found.n_steps, found.dt) == (600, 200, 3.0 * env.dt)
-    assert found.rewards == pytest.approx(
-        np.reshape(rewards, (200, 3)).sum(axis=1), abs=1e-9
-    )
+    sums = np.reshape(rewards, (200, 3)).sum(axis=1)
+    assert found.rewards == pytest.approx(sums, abs=1e-9)
     assert cost == pytest.approx(-sum(rewards))
     for name in ("x", "y", "psi", "u", "delta", "set_point"):
-        assert found.states[name] == pytest.approx(
-            [state[name] for state in states[::3]], abs=1e-6
-        )
+        expected = [state[name] for state in states[::3]]
+        assert found.states[name] == pytest.approx(expected, abs=1e-6)
 
 
 def test_the_last_interval_is_filled_up():
-    task = load_suite().task("mariner-current")
-    (whole,), _ = recorded(
-        PID.from_model(task.ship, dt=task.task.interval(task.ship)),
-        task,
-        [FIRST],
-        samples=task.task.episode_steps,
-    )
-    (found,), _ = recorded(
-        PID.from_model(task.ship, dt=task.task.interval(task.ship)),
-        task,
-        [FIRST],
-        samples=-(-task.task.episode_steps // 7),
-    )
+    options = {"n_legs": 1, "episode_steps": 700}
+    path = BenchmarkTask("path", "path-following", "mariner", options=options)
+    (whole,), _ = recorded(PILOT, path, [FIRST], samples=700)
+    (found,), _ = recorded(PILOT, path, [FIRST], samples=100)
     assert whole.success
-    assert whole.n_steps < task.task.episode_steps
+    assert whole.n_steps < 700
     assert found.n_steps == -(-whole.n_steps // 7)
     assert found.states["x"][-1] == whole.states["x"][-1]
     assert found.rewards.sum() == pytest.approx(whole.rewards.sum())
@@ -199,46 +292,89 @@ def test_the_last_interval_is_filled_up():
 
 
 def test_a_controller_that_fails_is_shown_up_to_then():
-    task = load_suite().task("mariner-calm")
-
     class Fails(Lazy):
-        def predict(
-            self, observation, state=None, episode_start=None, deterministic=True
-        ):
+        def predict(self, observation, state=None, episode_start=None, sure=True):
             if (state or 0) == 11:
                 raise ValueError
             return super().predict(observation)[0], (state or 0) + 1
 
-    (found,), (cost,) = recorded(Fails(), task, [FIRST], samples=300)
+    (found,), (cost,) = recorded(Fails(), CALM, [FIRST], samples=300)
     assert (found.n_steps, found.terminated, found.truncated) == (5, False, False)
     assert np.isnan(cost)
 
 
-def test_a_changed_result_is_reported(result):
-    costs = result.episodes["cost"].copy()
-    result.episodes["cost"] = costs * 1.001
-    try:
-        episode = EpisodeId("pid", "mariner-calm", 0, FIRST)
-        assert rerun(result, [episode]).different == (episode,)
-    finally:
-        result.episodes["cost"] = costs
+# --- which episodes are shown
 
 
-def test_objects_are_replayed_where_they_are_given(result):
-    episode = EpisodeId(Lazy.name, "mariner-calm", 0, FIRST)
-    assert (
-        "given as an object"
-        in rerun(result, [episode]).refused[Lazy.name, "mariner-calm"]
+def test_the_worst_come_first_and_the_hardest_is_hard_for_all(result):
+    costs = result.figures("pid", "calm")[0]
+    worst = [one.seed - FIRST for one in worst_episodes(result, "pid", "calm", N)]
+    assert worst == np.argsort(-costs, kind="stable").tolist()
+    every = [result.figures(name, "calm")[0] for name in result.ranking]
+    hardest = int(np.argmax(np.median(every, axis=0)))
+    assert hardest_seed(result, "calm") == FIRST + hardest
+    assert sorted(best_controllers(result, "calm")) == [
+        "again",
+        "pid",
+    ]  # they are equal
+
+
+def test_each_is_shown_with_the_best_in_the_same_episode(result):
+    best = best_controllers(result, "calm")[0]
+    hardest, *others = choices(result, "calm", 2)
+    assert hardest.controller == ""
+    names = {episode.controller for episode in hardest.episodes}
+    assert names == set(result.ranking)
+    assert len(others) == 2 * 3
+    for name, episodes in others:
+        expected = [name] if name == best else [name, best]
+        assert [episode.controller for episode in episodes] == expected
+        assert len({episode.seed for episode in episodes}) == 1
+
+
+def made_up(costs, means, ranking):
+    """What the page asks of results in one task."""
+    cells = {name: {"cost": {"value": mean}} for name, mean in means.items()}
+    return SimpleNamespace(
+        ranking=ranking,
+        tasks=["calm"],
+        summary={"tasks": {"calm": cells}, "seeds": {"first": 100}},
+        figures=lambda name, task: costs[name],
     )
 
-    def fails(task):
-        raise KeyError("gain")
 
-    refused = rerun(result, [episode], {Lazy.name: fails}).refused
-    assert refused == {(Lazy.name, "mariner-calm"): "KeyError: 'gain'"}
-    given = rerun(result, [episode], {Lazy.name: Lazy()})
-    assert (given.refused, given.different) == ({}, ())
-    assert not given.episodes[episode].actions.any()
+def test_worst_hardest_and_best_by_hand():
+    """Two training runs of `a` and one of `b`; a cost that is no number is the worst."""
+    costs = {
+        "a": np.array([[1.0, 3.0, 2.0], [0.0, 9.0, np.nan]]),
+        "b": np.array([[1.0, 1.0, 4.0]]),
+    }
+    ranking = ["best-known", "b", "a", "c"]
+    for mean, best in ((2.0, ["b"]), (1.0 + 1e-13, ["b", "a"]), (None, ["b"])):
+        means = {"a": mean, "b": 1.0, "best-known": 0.5}
+        result = made_up(costs, means, ranking)
+        assert usable_controllers(result, "calm") == ["b", "a"]
+        assert best_controllers(result, "calm") == best
+    worst = worst_episodes(result, "a", "calm", 3)
+    assert [(one.run, one.seed) for one in worst] == [(1, 102), (1, 101), (0, 101)]
+    assert hardest_seed(result, "calm") == 102
+    costs["a"][1, 2] = 2.0
+    assert hardest_seed(result, "calm") == 101  # medians of 0.75, 3.5 and 3
+    assert choices(result, "calm", 1) == [
+        Choice("", [EpisodeId(name, "calm", 0, 101) for name in "ba"]),
+        Choice("b", [EpisodeId("b", "calm", 0, 102)]),
+        Choice("a", [EpisodeId("a", "calm", 1, 101), EpisodeId("b", "calm", 0, 101)]),
+    ]
+    nobody = made_up({}, {"best-known": 1.0}, ["best-known"])
+    assert (hardest_seed(nobody, "calm"), best_controllers(nobody, "calm")) == (100, [])
+
+
+def test_a_page_holds_three_hundred_runs_at_most():
+    costs = {"pid": np.arange(1.0, 312.0)[None]}
+    result = made_up(costs, {"pid": 1.0}, ["pid"])
+    for wanted, count in ((311, 300), (299, 299)):
+        found, episodes = replayable(result, wanted)
+        assert (found, len(episodes)) == (count, count)
 
 
 def test_differences_add_up():
@@ -246,106 +382,22 @@ def test_differences_add_up():
     assert np.cumsum(steps) / 10**decimals == pytest.approx([1.0, -2.3, 300.0])
 
 
-def test_the_command_names_what_is_not_the_default(result):
-    said = command(result)
-    assert "pid,again=pid" in said
-    assert "--tasks mariner-calm,mariner-current --episodes 4 --out results" in said
-
-
-def test_the_whole_suite_is_the_default_of_the_command():
-    tasks = dict.fromkeys(task.name for task in load_suite("shipgym-v1").tasks)
-    about = {
-        "contestants": {"lq": {"source": "lq"}, "mine": {"source": None}},
-        "seeds": {"count": 100},
-    }
-    about |= {"suite": {"name": "shipgym-v1"}, "tasks": tasks}
-    whole = (
-        "shipgym benchmark --controllers lq,mine=... --suite shipgym-v1 --out results"
-    )
-    assert command(SimpleNamespace(summary=about)) == whole
-    tasks.popitem()
-    some = command(SimpleNamespace(summary={**about, "seeds": {"count": 99}}))
-    assert some.endswith(f"--tasks {','.join(tasks)} --episodes 99 --out results")
-
-
-def test_the_same_text_is_packed_the_same_whenever():
-    packed = base64.b64decode(benchmark_page.packed("a page"))
-    assert gzip.decompress(packed) == b"a page"
-    assert packed[4:8] == bytes(4)  # the time at which it was packed
-
-
-def test_a_page_that_cannot_be_drawn_is_refused_before_episodes_are_run_again(
-    result, tmp_path, monkeypatch
-):
-    monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
-    monkeypatch.setattr(
-        benchmark_page, "rerun", lambda *given: pytest.fail("was run again")
-    )
-    with pytest.raises(InputError, match="plotly is not installed"):
-        write_page(result, tmp_path / "index.html")
-
-
-def test_a_page_holds_three_hundred_runs_at_most():
-    costs, count = np.arange(1.0, 312.0)[None], 311
-    result = SimpleNamespace(
-        ranking=["pid"],
-        tasks=["calm"],
-        summary={
-            "tasks": {"calm": {"pid": {"cost": {"value": 1.0}}}},
-            "seeds": {"first": FIRST},
-        },
-        figures=lambda name, task: costs,
-    )
-    usual = inspect.signature(write_page).parameters
-    assert (usual["worst"].default, usual["workers"].default) == (3, 1)
-    for wanted, found in ((count, 300), (299, 299)):
-        assert replayable(result, wanted)[0] == found
-    assert len(replayable(result, count)[1]) == 300
-
-
-def test_a_task_that_only_the_best_known_ran_has_a_first_episode():
-    summary = {
-        "tasks": {"calm": {"best-known": {"cost": {"value": 1.0}}}},
-        "seeds": {"first": FIRST},
-    }
-    result = SimpleNamespace(ranking=["best-known"], summary=summary)
-    assert (hardest_of(result, "calm"), bests_of(result, "calm")) == (FIRST, [])
-
-
 def test_histories_are_as_fine_as_they_are_read():
-    """Heel to 0.01 deg, shaft speed to 0.1 1/min, wind to 0.1 m/s and 1 deg, current to 0.01 m/s."""
-    fine = {
-        "x": 0.1,
-        "y": 0.1,
-        "psi": 0.1,
-        "delta": 0.1,
-        "heading_error": 0.1,
-        "course_order": 0.1,
-    }
-    fine |= {
-        "rudder_order": 0.1,
-        "cross_track_error": 0.1,
-        "speed": 0.01,
-        "yaw_rate": 0.001,
-        "heel": 0.01,
-    }
-    fine |= {
-        "shaft_speed": 0.1,
-        "wind_speed": 0.1,
-        "wind_from": 1.0,
-        "current_speed": 0.01,
-    }
-    fine |= {"current_towards": 1.0, "reward_so_far": 0.001}
+    """Heel to 0.01 deg, shaft speed to 0.1 1/min, wind to 0.1 m/s, current to 0.01 m/s."""
+    fine = {"heel": 0.01, "shaft_speed": 0.1, "wind_speed": 0.1, "current_speed": 0.01}
     values = [123.45678, 123.98766]
-    whole = {
-        "series": dict.fromkeys(fine, values),
-        "parts": {"a": values, "b": [0.0, 0.0]},
-        "rewards": values,
-    }
-    found = page_replays.short({**whole, "other": {"u": values}, "name": "pid"})
+    found = short(
+        {
+            "series": dict.fromkeys(fine, values),
+            "parts": {"a": values, "b": [0.0, 0.0]},
+            "rewards": values,
+            "other": {"u": values},
+            "name": "pid",
+        }
+    )
 
-    def told(packed):
-        decimals, *steps = packed
+    def told(differences):
+        decimals, *steps = differences
         return np.cumsum(steps) / 10.0**decimals
 
     for name, step in fine.items():
@@ -353,72 +405,7 @@ def test_histories_are_as_fine_as_they_are_read():
         assert told(found["series"][name]) == pytest.approx(expected, abs=1e-9), name
     assert told(found["rewards"]) == pytest.approx([123.4568, 123.9877], abs=1e-9)
     assert list(found["parts"]) == ["a"]  # what is 0 throughout is not kept
-    assert told(found["parts"]["a"]) == pytest.approx([123.4568, 123.9877], abs=1e-9)
     assert (found["other"], found["name"]) == ({}, "pid")
-
-
-def test_the_page_holds_its_numbers_and_where_they_are_from(result, page):
-    text = page.read_text(encoding="utf-8")
-    assert len(text) < 3e6
-    assert result.summary["suite"]["sha256"][:16] in text
-    assert result.summary["suite"]["tasks"]["mariner-calm"]["model_sha256"][:16] in text
-    assert result.summary["versions"]["numba"] in text
-    assert "1000000 to 1000003" in text
-    assert "a &lt;b&gt;lazy one" in text
-    assert "<b>lazy" not in text
-    assert not re.findall(r'(?:src|href)="(?!#)[^"]', text)  # it loads nothing
-
-
-def test_the_page_says_why_one_cannot_be_replayed(page):
-    assert "Not to be replayed: a &lt;b&gt;lazy one" in page.read_text(encoding="utf-8")
-    names = {
-        entry["who"]
-        for entry in json.loads(unpacked(page, "replay-data"))["entries"][
-            "mariner-calm"
-        ]
-    }
-    assert names == {"", "pid", "again"}
-
-
-def test_an_episode_to_replay_has_its_cost_to_the_hundredth(result, page):
-    data = json.loads(unpacked(page, "replay-data"))
-    assert len(data["entries"]["mariner-calm"]) == 1 + 2 * 2
-    for task, entries in data["entries"].items():
-        for entry in entries:
-            costs = result.figures(
-                entry["who"] or data["runs"][entry["runs"][0]]["name"], task
-            )
-            assert entry["cost"] == round(float(costs[0, entry["seed"] - FIRST]), 2)
-
-
-def test_a_page_that_cannot_be_written_is_refused_at_once(result, tmp_path):
-    with pytest.raises(InputError, match=r"ends in \.html"):
-        write_page(result, tmp_path / "page.txt")
-
-
-@pytest.mark.parametrize("there", [True, False])
-def test_the_command_writes_the_page_where_plotly_is_there(
-    tmp_path, monkeypatch, there
-):
-    if not there:
-        monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
-    out = tmp_path / "results"
-    words = [
-        "benchmark",
-        "--controllers",
-        "pid",
-        "--tasks",
-        "mariner-calm",
-        "--episodes",
-        "2",
-        "--workers",
-        "1",
-    ]
-    answer = CliRunner().invoke(app, [*words, "--out", str(out)])
-    assert answer.exit_code == 0, answer.stderr
-    assert (out / "results.json").exists()
-    assert (out / "index.html").exists() == there
-    assert ("there is no index.html: plotly is not installed" in answer.stderr) != there
 
 
 # --- in the browser
@@ -468,10 +455,8 @@ def test_a_click_on_a_head_sorts_and_another_turns_round(opened):
     opened.click(f"{head} button", 0.5)
     assert [float(key) for key in column(opened, "costs-table", 1)] == up[::-1]
     assert opened.run(f"document.querySelector('{head}').ariaSort") == "descending"
-    assert (
-        opened.run("document.querySelectorAll('#costs-table [aria-sort=none]').length")
-        == 3
-    )
+    unsorted = "document.querySelectorAll('#costs-table [aria-sort=none]').length"
+    assert opened.run(unsorted) == 3
 
 
 def test_a_key_sorts_texts_and_what_has_no_number_stays_last(opened):
@@ -486,9 +471,8 @@ def test_a_key_sorts_texts_and_what_has_no_number_stays_last(opened):
 
 
 def test_scores_come_with_the_best_first(opened):
-    opened.run(
-        "document.querySelector('#ranking-table thead th:nth-child(3) button').click()"
-    )
+    head = "#ranking-table thead th:nth-child(3) button"
+    opened.run(f"document.querySelector('{head}').click()")
     scores = [float(key) for key in column(opened, "ranking-table", 2)]
     assert scores == sorted(scores, reverse=True)
 
@@ -510,37 +494,29 @@ def test_all_figures_are_drawn_for_who_prints_without_scrolling(opened):
 
 
 def test_tabs_show_one_task_at_a_time(opened):
-    shown = (
-        "[...document.querySelectorAll('[role=tabpanel]')].filter((p) =>"
-        " !p.hidden).map((p) => p.id)"
-    )
-    assert opened.run(shown) == ["task-mariner-calm"]
+    panels = "[...document.querySelectorAll('[role=tabpanel]')]"
+    shown = f"{panels}.filter((p) => !p.hidden).map((p) => p.id)"
+    assert opened.run(shown) == ["task-calm"]
     opened.run("document.querySelector('[role=tab]').focus()")
     opened.press("ArrowRight")
-    assert opened.run(shown) == ["task-mariner-current"]
-    opened.run(
-        "document.querySelector('#costs-table a[href=\"#task-mariner-calm\"]').click()"
-    )
-    opened.wait(f"{shown}[0] === 'task-mariner-calm'")
+    assert opened.run(shown) == ["task-current"]
+    link = '#costs-table a[href="#task-calm"]'
+    opened.run(f"document.querySelector('{link}').click()")
+    opened.wait(f"{shown}[0] === 'task-calm'")
 
 
 def test_a_chosen_episode_is_replayed_and_its_ship_moves(opened, result):
-    opened.run("document.querySelector('[data-replay=\"mariner-current\"]').click()")
-    ready = "document.getElementById('player').contentDocument?.querySelectorAll('.ship').length"
-    opened.wait(f"{ready} === 2")  # PID twice, in the hardest episode
-    assert (
-        opened.run("document.getElementById('replay-task').value") == "mariner-current"
-    )
+    opened.run("document.querySelector('[data-replay=\"current\"]').click()")
+    frame = "document.getElementById('player').contentDocument"
+    ships = f"{frame}?.querySelectorAll('.ship').length"
+    opened.wait(f"{ships} === 2")  # PID twice, in the hardest episode
+    assert opened.run("document.getElementById('replay-task').value") == "current"
     other = result.ranking[1] if result.ranking[1] != Lazy.name else result.ranking[0]
     opened.run(
         "(() => { const who = document.getElementById('replay-who'); who.value ="
         f" '{other}'; who.dispatchEvent(new Event('change')); }})()"
     )
-    opened.wait(
-        f"{ready} === 2 && document.getElementById('player').contentDocument.readyState"
-        " === 'complete'"
-    )
-    frame = "document.getElementById('player').contentDocument"
+    opened.wait(f"{ships} === 2 && {frame}.readyState === 'complete'")
     where = f"{frame}.querySelector('.ship').getAttribute('transform')"
     begin = opened.run(where)
     opened.run(
@@ -549,26 +525,18 @@ def test_a_chosen_episode_is_replayed_and_its_ship_moves(opened, result):
         " })); })()"
     )
     opened.wait(f"{where} !== '{begin}'")
+    colour = COLOURS[result.ranking.index(other)]
     chip = (
         "[...document.querySelectorAll('.chips button')].find((each) =>"
         f" each.dataset.name === '{other}')"
     )
-    assert (
-        opened.run(f"{chip}.style.getPropertyValue('--run')")
-        == COLOURS[result.ranking.index(other)]
-    )
-    assert (
-        opened.run(
-            f"{frame}.querySelector('#legend li').style.getPropertyValue('--run')"
-        )
-        == (COLOURS[result.ranking.index(other)])
-    )
-    legend = opened.run(f"{frame}.getElementById('legend').textContent")
-    assert other in legend
-    worst = worst_of(result, other, "mariner-current", 1)[0]
-    assert f"seed {worst.seed}" in opened.run(
-        "document.getElementById('replay-episode').selectedOptions[0].text"
-    )
+    entry = f"{frame}.querySelector('#legend li')"
+    for shown in (chip, entry):
+        assert opened.run(f"{shown}.style.getPropertyValue('--run')") == colour
+    assert other in opened.run(f"{frame}.getElementById('legend').textContent")
+    worst = worst_episodes(result, other, "current", 1)[0]
+    chosen = "document.getElementById('replay-episode').selectedOptions[0].text"
+    assert f"seed {worst.seed}" in opened.run(chosen)
 
 
 @pytest.mark.parametrize("width", [1200, 400])
@@ -577,12 +545,10 @@ def test_nothing_sticks_out(opened, width):
     opened.wait(f"innerWidth === {width}")
     for name in ("profile", "tasks", "replays"):
         see(opened, name)
-    opened.wait(
-        "document.getElementById('player').contentDocument?.querySelector('.ship') !="
-        " null"
-    )
+    frame = "document.getElementById('player').contentDocument"
+    opened.wait(f"{frame}?.querySelector('.ship') != null")
     assert opened.run("document.documentElement.scrollWidth") <= width
-    inner = "document.getElementById('player').contentDocument.documentElement"
+    inner = f"{frame}.documentElement"
     assert opened.run(f"{inner}.scrollWidth <= {inner}.clientWidth")
 
 
@@ -597,104 +563,3 @@ def test_everything_that_can_be_operated_has_a_name(opened):
     assert len(operated) > 40
     unnamed = [node for node in operated if not node["name"]["value"].strip()]
     assert len(unnamed) <= 1  # the corner of the matrix
-
-
-def test_runs_are_numbered_where_there_are_several():
-    def called(runs):
-        summary = {"tasks": {"calm": {"ppo": {"runs": runs}}}}
-        return page_replays._called(
-            SimpleNamespace(summary=summary), EpisodeId("ppo", "calm", 1, FIRST)
-        )
-
-    assert [called(runs) for runs in (1, 2, 5)] == ["ppo", "ppo, run 2", "ppo, run 2"]
-
-
-def test_rare_metrics_are_shown_only_where_they_are_not_zero_throughout():
-    def shown(metric, *means):
-        found = {
-            k: {"metrics": {metric: {"mean": mean}}} for k, mean in enumerate(means)
-        }
-        return benchmark_page._is_shown(metric, found)
-
-    assert shown("shielded", 0.0, 0.1)
-    assert not shown("shielded", 0.0, 0.0)
-    assert not shown("shielded", None, 0.0)
-    assert shown("success", 0.0)
-    assert shown("success", None, 0.0)
-    assert not shown("success", None, None)
-    assert not benchmark_page._is_shown("success", {"pid": {"metrics": {}}})
-
-
-def test_who_failed_or_did_not_take_part_is_told_with_the_task():
-    tasks = {
-        "calm": {
-            "pid": {"failed": 0, "failure": ""},
-            "mine": {"failed": 3, "failure": "no number"},
-        },
-        "rough": {"pid": {"failed": 0, "failure": ""}},
-    }
-    contestants = {
-        "pid": {"refused": {}},
-        "mine": {"refused": {"rough": "other observations"}},
-    }
-    result = BenchmarkResult({"tasks": tasks, "contestants": contestants}, {})
-    assert result.failures == [
-        "mine did not take part in rough: other observations",
-        "mine failed in 3 episodes of calm: no number",
-    ]
-
-
-def test_the_hardest_episode_has_tracks_where_there_is_a_path(result):
-    worst = {task: hardest_of(result, task) for task in TASKS}
-    for task, names in (
-        ("mariner-calm", {"histories"}),
-        ("mariner-current", {"histories", "tracks"}),
-    ):
-        one = EpisodeId("pid", task, 0, worst[task])
-        suited = load_suite().task(task)
-        pilot = PID.from_model(suited.ship, dt=suited.task.interval(suited.ship))
-        episodes = recorded(pilot, suited, [worst[task]]).episodes
-        again = SimpleNamespace(episodes={one: episodes[0]})
-        assert benchmark_page._hardest(result, again, task).keys() == names
-        assert benchmark_page._hardest(result, SimpleNamespace(episodes={}), task) == {}
-
-
-def test_worst_hardest_and_best_by_hand(monkeypatch):
-    """Two training runs of `a` and one of `b` in three episodes; a cost that is no number is the worst."""
-    costs = {
-        "a": np.array([[1.0, 3.0, 2.0], [0.0, 9.0, np.nan]]),
-        "b": np.array([[1.0, 1.0, 4.0]]),
-    }
-    means = {
-        "a": {"cost": {"value": 2.0}},
-        "b": {"cost": {"value": 1.0}},
-        "best-known": {"cost": {"value": 0.5}},
-    }
-    result = SimpleNamespace(
-        ranking=["best-known", "b", "a", "c"],
-        tasks=["calm"],
-        summary={"tasks": {"calm": means}, "seeds": {"first": 100}},
-        figures=lambda name, task: costs[name],
-    )
-    assert page_replays.contestants_of(result, "calm") == ["b", "a"]
-    assert page_replays.bests_of(result, "calm") == ["b"]
-    means["a"]["cost"]["value"] = 1.0 + 1e-13
-    assert page_replays.bests_of(result, "calm") == ["b", "a"]
-    means["a"]["cost"]["value"] = None
-    assert page_replays.bests_of(result, "calm") == ["b"]
-    worst = page_replays.worst_of(result, "a", "calm", 3)
-    assert [(one.run, one.seed) for one in worst] == [(1, 102), (1, 101), (0, 101)]
-    assert page_replays.hardest_of(result, "calm") == 102
-    costs["a"][1, 2] = 2.0
-    assert page_replays.hardest_of(result, "calm") == 101  # medians of 0.75, 3.5 and 3
-    of = partial(EpisodeId, task="calm")
-    entries = page_replays.entries_of(result, "calm", 1)
-    assert entries == [
-        ("", [of("b", run=0, seed=101), of("a", run=0, seed=101)]),
-        ("b", [of("b", run=0, seed=102)]),
-        ("a", [of("a", run=1, seed=101), of("b", run=0, seed=101)]),
-    ]
-    for most, count, shown in ((20, 3, 6), (5, 2, 5), (4, 1, 4), (1, 1, 4)):
-        monkeypatch.setattr(page_replays, "MOST_RUNS", most)
-        found, episodes = page_replays.replayable(result, 3)
-        assert (found, len(episodes)) == (count, shown)

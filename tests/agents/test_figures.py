@@ -48,7 +48,7 @@ def test_criteria_are_drawn_in_per_cent_of_their_limits():
     assert list(only(figure, "IMO limit").x) == [100.0, 100.0]
     assert list(figure.layout.yaxis.range) == [1.5, -0.5]
     assert list(figure.layout.yaxis.ticktext) == [
-        figures.WORDS["criteria"][name] for name in ("advance", "stopping")
+        figures.CRITERIA[name] for name in ("advance", "stopping")
     ]
 
 

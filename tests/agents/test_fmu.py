@@ -10,8 +10,9 @@ from fmpy import validation
 from agents import LQ, TurnRate, WheelOver
 from agents.deployment import fmu
 from agents.deployment.autopilot import Autopilot
-from agents.deployment.c99 import autopilot_source, ship_source
+from agents.deployment.autopilot_c99 import autopilot_source
 from agents.deployment.fmu import write_fmu
+from agents.deployment.ship_c99 import ship_source
 from shipgym.errors import InputError
 from shipgym.sea import Current, Weather, Wind
 from shipgym.tasks.task import Task
@@ -74,7 +75,7 @@ BY_A_BRIDGE = {
     "second_turn_distance": 2000.0,
     "second_turn_angle": -0.4,
 }
-ALONG_ARCS = Task.of("PathFollowing-v1", dt=2 * DT)
+ALONG_ARCS = Task.of("PathFollowing", dt=2 * DT)
 PILOTS = {
     "lq": LQ.from_model(MARINER, dt=2 * DT),
     "turn_rate": TurnRate.from_model(MARINER, dt=2 * DT),
@@ -103,9 +104,7 @@ def test_what_is_in_the_way_and_what_is_missing_is_said(tmp_path, monkeypatch):
         InputError, match=r"lq\.fmu: is not a file; choose another name"
     ):
         write_fmu(source, tmp_path / "lq.fmu")
-    with pytest.raises(
-        InputError, match=r"fmi: '1\.0' found, expected one of '2\.0', '3\.0'"
-    ):
+    with pytest.raises(InputError, match=r"fmi: expected one of '2\.0', '3\.0'"):
         write_fmu(source, tmp_path / "other.fmu", "1.0")
     monkeypatch.setenv("CC", "no-such-compiler")
     with pytest.raises(InputError, match="no C compiler for Linux found"):

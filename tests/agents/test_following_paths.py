@@ -71,12 +71,14 @@ def test_what_is_seen_beyond_does_not_matter_but_must_begin_as_designed_for():
     random = np.random.default_rng(0)
     seen = random.uniform(-1.0, 1.0, (5, 13))
     np.testing.assert_array_equal(pid.predict(seen)[0], pid.predict(seen[:, :8])[0])
-    with pytest.raises(InputError, match=r"shape \(5, 7\) found"):
+    with pytest.raises(
+        InputError, match=r"observation: expected shape .* got \(5, 7\)"
+    ):
         pid.predict(seen[:, :7])
     names, scales = list(pid.observation_names), list(pid.observation_scales)
     pid.check_fits([*names, "cross_track"], [*scales, 1.0])
     with pytest.raises(
-        InputError, match="observation 0 is 'cross_track', expected 'heading_error_sin'"
+        InputError, match="0: expected 'heading_error_sin', got 'cross_track'"
     ):
         pid.check_fits(["cross_track", *names], [1.0, *scales])
     with pytest.raises(

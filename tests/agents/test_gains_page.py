@@ -151,7 +151,7 @@ def test_a_rate_of_turn_is_steered_as_the_page_says():
 
 def test_wheel_over_is_what_the_page_says():
     agent, random = (
-        WheelOver.from_model(MARINER, task=Task.of("PathFollowing-v1")),
+        WheelOver.from_model(MARINER, task=Task.of("PathFollowing")),
         np.random.default_rng(1),
     )
     bridge, gains, integral = Autopilot(agent), agent.gains, 0.0

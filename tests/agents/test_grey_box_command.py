@@ -99,7 +99,7 @@ def test_a_grey_box_takes_the_most_similar_ship_if_none_is_named(ship_file):
         (
             'method = "rm-svm"\nreference_model = "auto"\nfolds = "luck"',
             [],
-            "folds: 'luck' found",
+            "folds: expected one of 'trials', 'largest-rudder', got 'luck'",
         ),
         ('structure = "gray-box"', [], "Did you mean 'grey-box'"),
     ],

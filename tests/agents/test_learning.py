@@ -97,13 +97,18 @@ def test_a_policy_adds_to_a_controller_by_default_where_there_can_be_one(algorit
     assert load_settings(algorithm).base == "lq"
     assert load_settings(algorithm, "path-following").base == "ilos"
     for task in load_suite().tasks:
-        assert load_settings(algorithm, "path-following", task.name).base == "tuned"
+        found = load_settings(
+            algorithm, task.environment, task.name, suite="shipgym-v1"
+        )
+        assert found.base == "tuned"
     for asked in (
         {"given": {"base": "none"}},
         {"action": "rudder-discrete"},
         {"action": "rudder-shaft"},
     ):
-        settings = load_settings(algorithm, "path-following", "container-path", **asked)
+        settings = load_settings(
+            algorithm, "path-following", "sharp-turns", suite="shipgym-v1", **asked
+        )
         assert (settings.base, settings.action_repeat) == ("none", 1)
         assert settings == load_settings(algorithm, given={"base": "none"})
 

@@ -5,14 +5,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from agents.engines.jobs import JobEngine
 
 from agents import LQ, PID, sail
-from agents.engines.jobs import JobEngine
-from agents.verification import index_uncertainty
 from agents.verification.index_uncertainty import (
+    NominalRuns,
+    SailedDraws,
+    joined,
     nominal_runs,
     sail_draws,
     uncertainty_of,
+    with_paths,
 )
 from agents.verification.monte_carlo import draw_jobs, monte_carlo
 from shipgym import InputError, load_model
@@ -84,7 +87,7 @@ def test_jobs_change_nothing_in_what_is_sailed(found, ship, pilots):
     drawn = ship.sample(DRAWS, SEED)
     together = sail(pilots[1], drawn, seeds=SEED + np.arange(DRAWS))
     np.testing.assert_array_equal(found.episodes[1].cost, together.cost)
-    whole = uncertainty_of(ship, nominal_runs(ship), [sail_draws(ship, drawn)])
+    whole = uncertainty_of(ship, nominal_runs(ship), sail_draws(ship, drawn))
     for name, criterion in whole.criteria.items():
         assert criterion.to_dict() == found.manoeuvres.criteria[name].to_dict()
     for one, other in zip(
@@ -102,40 +105,6 @@ def test_wrong_arguments(ship, pilots):
         JobEngine("lokal").check()
 
 
-def test_draws_that_run_away_in_any_manoeuvre_count_once_and_have_no_paths(
-    ship, monkeypatch
-):
-    """Of seven draws the second runs away in one criterion, the fifth loses the runs that are kept."""
-    module = "agents.verification.index_uncertainty"
-    away = np.arange(7) == 1
-    criteria = {
-        "overshoot": SimpleNamespace(drawn=SimpleNamespace(ran_away=away)),
-        "advance": SimpleNamespace(
-            drawn=SimpleNamespace(ran_away=np.zeros(7, dtype=bool))
-        ),
-        "stop": SimpleNamespace(drawn=None),
-    }
-    monkeypatch.setattr(f"{module}.imo_manoeuvres", lambda model: {})
-    monkeypatch.setattr(f"{module}.imo_criteria", lambda model, found: criteria)
-    parts = []
-    for part in (np.arange(3), np.arange(3, 7)):
-        kept = part[part != 4]
-        parts.append(
-            {
-                "values": {},
-                "ran_away": {},
-                "lost": part == 4,
-                "headings": kept,
-                "paths": kept,
-            }
-        )
-    found = uncertainty_of(ship, ("zigzag", "circle"), parts)
-    assert found.criteria.keys() == {"overshoot", "advance"}
-    assert found.unstable.tolist() == [False, True, False, False, True, False, False]
-    assert found.zigzag_headings.tolist() == list(found.circle_paths) == [0, 2, 3, 5, 6]
-    assert (found.zigzag, found.circle) == ("zigzag", "circle")
-
-
 def test_draws_are_shared_out_in_jobs_of_25_that_go_on_with_the_seeds(ship):
     drawn = ship.sample(51, 0)
     jobs = draw_jobs([], ship, drawn, 7)
@@ -146,20 +115,6 @@ def test_draws_are_shared_out_in_jobs_of_25_that_go_on_with_the_seeds(ship):
     ]
     rows = [row for job in jobs for row in job["coefficients"]]
     assert rows == [list(draw.coefficients.values()) for draw in drawn]
-
-
-def test_forty_circles_are_kept_for_the_report_and_all_headings(ship, monkeypatch):
-    none = SimpleNamespace(drawn=SimpleNamespace(ran_away=np.zeros(45, dtype=bool)))
-    monkeypatch.setattr(index_uncertainty, "imo_manoeuvres", lambda model: {})
-    monkeypatch.setattr(
-        index_uncertainty, "imo_criteria", lambda model, found: {"advance": none}
-    )
-    part = {"values": {}, "ran_away": {}, "lost": np.zeros(45, dtype=bool)}
-    found = uncertainty_of(
-        ship, ("", ""), [part | {"headings": np.arange(45), "paths": np.arange(45)}]
-    )
-    assert list(found.circle_paths) == list(range(40))
-    assert len(found.zigzag_headings) == 45
 
 
 def test_runs_are_kept_for_25_and_30_lengths_and_the_circle_within_the_rudder_s_limit(
@@ -179,3 +134,46 @@ def test_runs_are_kept_for_25_and_30_lengths_and_the_circle_within_the_rudder_s_
             (25.0, 30.0), abs=0.11
         )
         assert np.diff(circle.t) == pytest.approx(0.1 * time)
+
+
+def sailed(count, lost=()):
+    """Draws of which some lose the runs that are kept, headings and paths by their number."""
+    numbers = [np.full((3, 2), float(k)) for k in range(count) if k not in lost]
+    return SailedDraws(
+        values={"turn": {"advance": np.arange(float(count))}},
+        ran_away={"turn": np.zeros(count, dtype=bool)},
+        lost=np.isin(np.arange(count), lost),
+        headings=numbers,
+        paths=numbers,
+    )
+
+
+def criteria_of(*ran_away):
+    """Criteria, some with draws that run away, one that could not be sailed."""
+    drawn = [SimpleNamespace(drawn=SimpleNamespace(ran_away=row)) for row in ran_away]
+    return dict(enumerate([*drawn, SimpleNamespace(drawn=None)]))
+
+
+def test_draws_that_run_away_in_any_manoeuvre_count_once_and_have_no_paths(ship):
+    """Of seven draws the second runs away in one criterion, the fifth loses the runs that are kept."""
+    away = np.arange(7) == 1
+    criteria = criteria_of(away, np.zeros(7, dtype=bool))
+    found = with_paths(criteria, NominalRuns("zigzag", "circle"), sailed(7, [4]))
+    assert found.unstable.tolist() == [False, True, False, False, True, False, False]
+    numbers = [path[0, 0] for path in found.circle_paths]
+    assert numbers == found.zigzag_headings[:, 0, 0].tolist() == [0, 2, 3, 5, 6]
+    assert (found.zigzag, found.circle) == ("zigzag", "circle")
+
+
+def test_parts_are_joined_in_their_order():
+    whole = joined([sailed(3, [1]), sailed(2)])
+    assert whole.values["turn"]["advance"].tolist() == [0.0, 1.0, 2.0, 0.0, 1.0]
+    assert whole.lost.tolist() == [False, True, False, False, False]
+    assert [heading[0, 0] for heading in whole.headings] == [0.0, 2.0, 0.0, 1.0]
+
+
+def test_forty_circles_are_kept_for_the_report_and_all_headings(ship):
+    criteria = criteria_of(np.zeros(45, dtype=bool))
+    found = with_paths(criteria, NominalRuns("", ""), sailed(45))
+    assert [path[0, 0] for path in found.circle_paths] == list(range(40))
+    assert len(found.zigzag_headings) == 45

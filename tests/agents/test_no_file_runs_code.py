@@ -149,7 +149,8 @@ def source_of(content):
         model = ShipModel.from_dict(content)
     except InputError:
         return None
-    return accelerations_source(model.table._sums)
+    table = model.table
+    return accelerations_source(table.equations, table.normalisation == "prime")
 
 
 def test_names_and_comments_change_no_source_and_nothing_else_is_taken():
@@ -236,7 +237,7 @@ def test_powers_are_small_whole_numbers(power):
     path = ("structure", "equations", "v", 0, "powers", "v")
     with pytest.raises(
         InputError,
-        match=r"equations\.v: term 'v': power .* of 'v' found, expected a whole number",
+        match=r"equations\.v: term 'v': power of 'v': expected",
     ):
         ShipModel.from_dict(put(SMALL, path, False, power))
     shares = load_model("mariner").to_dict() | {
@@ -272,7 +273,7 @@ def test_powers_are_small_whole_numbers(power):
         }
     }
     with pytest.raises(
-        InputError, match=r"share 'X_udot': .* expected an acceleration alone"
+        InputError, match=r"share 'X_udot': expected an acceleration alone"
     ):
         ShipModel.from_dict(shares)
     shares["structure"]["shares"]["u"][0]["powers"]["udot"] = 1
@@ -285,11 +286,11 @@ def test_terms_and_their_factors_are_not_without_number():
     for listed, said in (
         (
             [{"name": "v", "powers": {"v": 9, "r": 9, "u": 9}}],
-            "27 factors found, expected at most 20",
+            "expected at most 20 factors, got 27",
         ),
         (
             [{"name": f"v{k}", "powers": {"v": 1}} for k in range(201)],
-            "expected a list of terms, 1 to 200",
+            "expected a list of 1 to 200 entries",
         ),
     ):
         with pytest.raises(InputError, match=said):
@@ -313,7 +314,8 @@ def test_terms_and_their_factors_are_not_without_number():
     ],
 )
 def test_what_is_no_sum_of_terms_is_not_made_a_function(line):
-    source = accelerations_source(load_model("mariner-tls-svm").table._sums)
+    table = load_model("mariner-tls-svm").table
+    source = accelerations_source(table.equations, prime=True)
     first, *rest = source.splitlines(keepends=True)
     accelerations_function(source)
     with pytest.raises(ValueError, match="expected sums of products of known symbols"):
@@ -353,7 +355,7 @@ def test_a_ship_file_names_models_and_no_code(evil, option):
     ship.write_text(text.format(option, "evil.py"))
     with pytest.raises(
         InputError,
-        match=rf"ship.toml: \[identify\].{option}: 'evil.py' found, which is code",
+        match=rf"ship.toml: \[identify\].{option}: expected data",
     ):
         ShipFile.load(ship)
     ship.write_text(text.format(option, "evil.json"))
@@ -408,9 +410,7 @@ def test_a_run_goes_on_with_the_code_that_its_user_names_again(tmp_path):
     plan = make_plan(given)
     begin_folder(tmp_path / "run", plan, "shipgym train")
     assert read_plan(tmp_path / "run", given).configuration() == plan.configuration()
-    with pytest.raises(
-        InputError, match=r"options\.reward: '.*reward.py' found, which is code"
-    ):
+    with pytest.raises(InputError, match=r"options\.reward: expected data"):
         read_plan(tmp_path / "run")
 
 
@@ -445,7 +445,7 @@ def test_an_agent_only_records_what_it_learned_with(evil):
 def test_a_suite_names_no_code(evil, line):
     text = f'name = "own"\n[tasks.one]\nenvironment = "course-keeping"\n{line}\n'
     text += "" if line.startswith("model") else 'model = "mariner"\n'
-    with pytest.raises(InputError, match="found, which is code"):
+    with pytest.raises(InputError, match="expected data, got"):
         parse_suite(text, "suite.toml")
     suite = parse_suite(
         'name = "own"\n[tasks.one]\nenvironment = "course-keeping"\nmodel ='

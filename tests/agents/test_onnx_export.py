@@ -9,7 +9,7 @@ import onnxruntime
 import pytest
 from typer.testing import CliRunner
 
-from agents import LQ, Shielded
+from agents import LQ
 from agents.cli import app
 from agents.policies.onnx_export import export_onnx, onnx_model
 from shipgym.errors import InputError
@@ -87,11 +87,7 @@ def test_the_metadata_say_what_it_observes(tmp_path):
         0.6,
         "lq",
     )
-    assert (found["history"], found["hold"], found["action_repeat"]) == (
-        2,
-        1,
-        1,
-    )  # older names too
+    assert found["action_repeat"] == 1
     assert not found.keys() & {"training", "network", "format", "kind"}
 
 
@@ -145,12 +141,8 @@ def test_the_command_writes_it(tmp_path):
 
 
 def test_what_is_no_network_is_refused(tmp_path):
-    shield = Shielded.from_model(MARINER, POLICIES["relu"])
-    for policy, name in ((shield, "Shielded"), (LQ_MARINER, "LQ")):
-        with pytest.raises(
-            InputError, match=f"policy: {name} found, expected a learned policy"
-        ):
-            export_onnx(policy, tmp_path / "policy.onnx")
+    with pytest.raises(InputError, match="policy: LQ found, expected a learned policy"):
+        export_onnx(LQ_MARINER, tmp_path / "policy.onnx")
 
 
 def test_without_onnx_the_extra_is_named(tmp_path, monkeypatch):

@@ -1,3 +1,5 @@
+"""Folders of results are whole, locked, and never over other files."""
+
 import errno
 import os
 import re
@@ -22,7 +24,7 @@ from agents.output import (
     whole_folder,
 )
 from shipgym import InputError
-from shipgym.files import remove_drafts
+from shipgym.drafts import remove_drafts
 
 ROOT = Path(__file__).parents[2]
 
@@ -97,7 +99,7 @@ def test_a_folder_with_other_files_is_refused(tmp_path):
 
 def test_a_file_is_refused(tmp_path):
     (tmp_path / "ship").write_text("")
-    with pytest.raises(InputError, match="is not a folder"):
+    with pytest.raises(InputError, match="expected a folder to write the results to"):
         check_folder(tmp_path / "ship", NAMES)
 
 
@@ -215,9 +217,9 @@ def test_a_page_is_a_file_that_can_be_written(tmp_path):
     for name, message in (
         (
             "page.txt",
-            r"page.txt: ending '.txt' found, expected a file that ends in .html",
+            r"page.txt: expected a file that ends in .html",
         ),
-        ("folder.html", r"folder.html: is a folder, expected a file to write to"),
+        ("folder.html", r"folder.html: expected a file to write to, got a folder"),
         (
             "absent/page.html",
             "its folder does not exist or cannot be written; choose another",
@@ -239,7 +241,7 @@ def test_a_lock_without_words_is_another_process(tmp_path):
     command = ["shipgym", "identify", "a b", *["x"] * 500]
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(output.sys, "argv", command)
-        told = output._this_process()
+        told = output.process_description()
     assert re.fullmatch(
         rf"process {os.getpid()} on \S+ since [-0-9]+ [0-9:+-]+ \(shipgym identify 'a"
         r" b' x .*\)",
@@ -253,7 +255,7 @@ def test_what_a_link_leads_to_is_not_replaced(tmp_path):
     (tmp_path / "linked").symlink_to(tmp_path / "own")
     with pytest.raises(
         InputError,
-        match="linked: is not a folder, expected one to write the results to",
+        match="linked: expected a folder to write the results to",
     ):
         check_folder(tmp_path / "linked", NAMES)
     (tmp_path / "file").write_text("")

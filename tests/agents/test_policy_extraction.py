@@ -134,7 +134,7 @@ def test_what_it_learned_in_is_recorded():
     )
     assert policy.env_id == "shipgym/PathFollowing-v0"
     assert policy.env_options == {"sea": "moderate", "leg_lengths": [5.0, 9.0]}
-    assert policy.observation_names[-1] == "turn_angle"
+    assert policy.observation_names[-1] == "second_turn_angle"
     assert policy.model_name == "mariner"
     policy.check_fits_model(MARINER)
 

@@ -3,6 +3,7 @@
 import re
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -13,8 +14,8 @@ from agents.cli import app
 from agents.controllers import registry
 from agents.controllers.controller import Controller
 from agents.controllers.designs import design_base
-from agents.controllers.memory import records
-from agents.suites.suite import load_suite
+from agents.controllers.law import Nothing, linear_law
+from agents.suites.suite import find_task
 from shipgym import load_model
 from shipgym.errors import InputError
 from tests.agents.policies import random_policy
@@ -23,7 +24,7 @@ MINE = """
 from dataclasses import dataclass
 from agents import Controller, register_controller
 from agents.controllers.linear_loop import sample_ship
-from shipgym.tasks.task import control_interval
+from shipgym.tasks.scales import control_interval
 
 
 @register_controller
@@ -52,19 +53,27 @@ def mine(tmp_path, monkeypatch):
     sys.path[:] = path
 
 
+class LastOrder(NamedTuple):
+    """What `Sluggish` remembers."""
+
+    order: float
+
+
+class Sluggish(LQ):
+    """Half of its last order goes into the next one."""
+
+    memory_record = LastOrder
+
+    def steer(self, seen, memory):
+        plain, _ = linear_law(seen, Nothing(), self.parameters)
+        order = 0.5 * (plain + memory.order)
+        return order, LastOrder(order)
+
+
 def test_what_a_controller_of_ones_own_remembers_is_a_record_with_names():
-    """Its last order, half of which goes into the next one; another controller's memory is refused."""
-    lq, ship = LQ.from_model(load_model("mariner")), load_model("mariner")
-
-    class Sluggish(LQ):
-        record = np.dtype([("order", "f8")])
-
-        def steer(self, seen, memory, begins):
-            order, _ = super().steer(seen, memory, begins)
-            order = 0.5 * (order + records(memory, self.record)["order"])
-            return order, order[:, None]
-
-    sluggish = Sluggish(**vars(lq))
+    """Another controller's memory is refused."""
+    ship = load_model("mariner")
+    lq, sluggish = LQ.from_model(ship), Sluggish.from_model(ship)
     check_controller(sluggish, ship, n_steps=4)
     seen = np.zeros((2, 8), np.float32)
     seen[:, 0], seen[:, 1] = np.sin(0.1), np.cos(0.1)
@@ -73,9 +82,7 @@ def test_what_a_controller_of_ones_own_remembers_is_a_record_with_names():
     plain, _ = lq.predict(seen)
     assert state.shape == (2, sluggish.memory_size) == (2, 1)
     np.testing.assert_allclose([first, second], [0.5 * plain, 0.75 * plain], rtol=1e-6)
-    with pytest.raises(
-        InputError, match=r"state: shape \(2, 3\) found, expected \(2, 1\)"
-    ):
+    with pytest.raises(InputError, match=r"state: expected shape \(2, 1\)"):
         sluggish.predict(seen, np.zeros((2, 3)))
 
 
@@ -90,20 +97,23 @@ def test_a_controller_of_ones_own_is_one_file(mine, tmp_path, monkeypatch):
     again = load_agent(tmp_path / "pd.json", ship)
     assert type(again) is my_controllers.PD
     assert again.gains == controller.gains
-    task = load_suite("shipgym-v1").task("mariner-calm")
+    task = find_task("sharp-turns")
     assert isinstance(design_base("my-pd", task), my_controllers.PD)
     results = [
         benchmark(
-            "my-pd,lq,file=pd.json", tasks=["mariner-calm"], episodes=2, workers=workers
+            "my-pd,lq,file=pd.json",
+            tasks=["sharp-turns-on-model"],
+            episodes=2,
+            workers=workers,
         )
         for workers in (1, 2)
     ]
     for result in results:
-        costs = result.figures("my-pd", "mariner-calm")
+        costs = result.figures("my-pd", "sharp-turns-on-model")
         np.testing.assert_array_equal(
-            costs, results[0].figures("my-pd", "mariner-calm")
+            costs, results[0].figures("my-pd", "sharp-turns-on-model")
         )
-        assert (costs > result.figures("lq", "mariner-calm")).all()
+        assert (costs > result.figures("lq", "sharp-turns-on-model")).all()
 
 
 def test_the_command_line_finds_a_class_by_its_module(mine, tmp_path):
@@ -112,7 +122,7 @@ def test_the_command_line_finds_a_class_by_its_module(mine, tmp_path):
         "--controllers",
         "my_controllers:PD",
         "--tasks",
-        "mariner-calm",
+        "sharp-turns-on-model",
         "--episodes",
         "2",
     ]
@@ -133,8 +143,8 @@ def test_what_is_no_controller_is_refused():
 
     for wrong, message in (
         (3, "expected a subclass of agents.Controller"),
-        (Nameless, "Nameless.kind is ''"),
-        (Clashing, "kind 'lq' is that of agents.controllers.lq:LQ already"),
+        (Nameless, "Nameless.kind: expected a name"),
+        (Clashing, "got 'lq', which is that of agents.controllers.lq:LQ"),
     ):
         with pytest.raises(InputError, match=re.escape(message)):
             register_controller(wrong)
@@ -157,7 +167,8 @@ def test_a_kind_is_a_name_and_no_other_controller_s(monkeypatch):
 
     for kind in ("", "my lq", "my,lq", "my/lq"):
         with pytest.raises(
-            InputError, match=f"Mine.kind is '{kind}', expected a name such as 'my-lq'"
+            InputError,
+            match=f"Mine.kind: expected a name such as 'my-lq', got '{kind}'",
         ):
             register_controller(of_kind(kind))
     first = of_kind("my-lq")
@@ -168,14 +179,14 @@ def test_a_kind_is_a_name_and_no_other_controller_s(monkeypatch):
     other.__qualname__ = "Other"
     with pytest.raises(
         InputError,
-        match="kind 'my-lq' is that of mine:Mine already, expected another one",
+        match="got 'my-lq', which is that of mine:Mine",
     ):
         register_controller(other)
     assert registry.controller_class("my-lq") is first
 
 
 def test_a_base_is_a_classical_controller_of_a_file_or_none(tmp_path):
-    task = load_suite("shipgym-v1").task("mariner-calm")
+    task = find_task("sharp-turns")
     made = LQ.from_model(task.ship, integral_lengths=33.0)
     made.save(tmp_path / "mine.json")
     base = design_base(str(tmp_path / "mine.json"), task)
@@ -183,6 +194,7 @@ def test_a_base_is_a_classical_controller_of_a_file_or_none(tmp_path):
     assert design_base("none", task) is None
     random_policy(task.ship).save(tmp_path / "learned.json")
     with pytest.raises(
-        InputError, match=r"learned\.json holds a learned policy, expected a classical"
+        InputError,
+        match=r"learned\.json: expected a classical controller, got a learned",
     ):
         design_base(str(tmp_path / "learned.json"), task)

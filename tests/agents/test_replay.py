@@ -297,7 +297,7 @@ def test_the_command_writes_the_page(recorded):
         ('{"name": "mariner", "format": 1}', "kind: None found, expected 'episode'"),
         (
             '{"kind": "episode", "format": 9}',
-            "format 9 found, this version of shipgym reads format 1",
+            "expected format 1, which this version of shipgym reads, got 9",
         ),
     ],
 )

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from jinja2 import UndefinedError
 
-from agents.cli import _print_result
+from agents.cli.autopilot import print_autopilot
 from agents.cli.standard_trials import StandardTrials
-from agents.cli.trials_page import _readable, write_page
+from agents.cli.trials_page import readable_index, write_page
 from agents.output import check_page
 from agents.verification.figures import band, translucent
 from agents.verification.page import write_report
@@ -135,7 +135,7 @@ def test_the_report_is_the_golden_one(source):
 
 
 def test_the_chain_prints_its_golden_tables(chain, capsys):
-    _print_result(chain[1], Path("report.html"), DRAWS)
+    print_autopilot(chain[1], Path("report.html"), DRAWS)
     shown = capsys.readouterr()
     assert same_text("autopilot", shown.out + shown.err)
 
@@ -164,7 +164,7 @@ def test_limits_that_are_not_kept_and_designs_that_are_refused_are_warned_of(
             manoeuvres=found, standards=rows, refused={"lqg": "no such sensor"}
         ),
     )
-    _print_result(result, Path("report.html"), DRAWS)
+    print_autopilot(result, Path("report.html"), DRAWS)
     first, *_, last = capsys.readouterr().err.splitlines()
     assert first == "warning: ISO 11674, course change: 3.2 deg, limit 2.5"
     assert last == "warning: no LQG autopilot: no such sensor"
@@ -292,7 +292,7 @@ def test_hostile_names_of_models_and_manoeuvres_stay_text(tmp_path):
     ],
 )
 def test_an_index_is_told_in_words_with_its_unit(index, words):
-    assert _readable(index) == words
+    assert readable_index(index) == words
 
 
 def test_a_page_that_cannot_be_drawn_is_refused_before_any_work(tmp_path, monkeypatch):

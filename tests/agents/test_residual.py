@@ -27,7 +27,8 @@ SHIPS, STEPS, HISTORY, AUTHORITY = 3, 11, 3, 0.4
 
 
 def ships(env, n=SHIPS, seed=7):
-    return ShipVecEnv(env, n, seed=seed, noise=1.0, sea="rough", episode_steps=5)
+    options = {"model": "mariner", "noise": 1.0, "sea": "rough", "episode_steps": 5}
+    return ShipVecEnv(env, n, seed=seed, **options)
 
 
 def by_hand(env, base, seed, outputs):
@@ -343,15 +344,21 @@ def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(
         ),
         (
             lambda: ResidualVecEnv(ships(COURSE), BASES["lq"][1], authority=3.0),
-            "authority: 3",
+            "authority: expected .*got 3",
         ),
-        (lambda: ResidualVecEnv(ships(COURSE), frame_stack=0), "frame_stack: 0"),
-        (lambda: ResidualVecEnv(ships(COURSE), action_repeat=0), "action_repeat: 0"),
+        (
+            lambda: ResidualVecEnv(ships(COURSE), frame_stack=0),
+            "frame_stack: expected .*got 0",
+        ),
+        (
+            lambda: ResidualVecEnv(ships(COURSE), action_repeat=0),
+            "action_repeat: expected .*got 0",
+        ),
         (lambda: ResidualVecEnv(ships(COURSE), "lq"), "base: str found"),
         (lambda: ResidualVecEnv(ships(COURSE), BASES["ilos-lqg"][1]), "cross_track"),
         (
             lambda: ResidualVecEnv(ships(COURSE), LQ.from_model(load_model("kvlcc2"))),
-            "base: the scale of",
+            "base: scale of",
         ),
         (
             lambda: ResidualVecEnv(

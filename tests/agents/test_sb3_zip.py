@@ -17,8 +17,7 @@ from stable_baselines3 import DQN, PPO, SAC, TD3
 from stable_baselines3.common.vec_env import VecFrameStack, VecNormalize
 
 from agents import benchmark
-from agents.benchmarking.contestants import check_agents, contestants
-from agents.benchmarking.verification import verify
+from agents.benchmarking.entries import check_agents, read_entries
 from agents.policies.network import Network
 from agents.policies.sb3_zip import (
     Sb3Agent,
@@ -29,12 +28,13 @@ from agents.policies.sb3_zip import (
     _weights,
     read_sb3,
 )
-from agents.suites.suite import load_suite
+from agents.suites.suite import BenchmarkTask
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
+from tests.agents.small_suite import write_suite
 from tests.agents.test_policy_extraction import QUICK, Doubled, one_thread, seen, strong
 
-TASK = load_suite().task("mariner-calm")
+TASK = BenchmarkTask("calm", "course-keeping", "mariner")
 QUICK_OFF_POLICY = {
     "learning_starts": 4,
     "buffer_size": 50,
@@ -81,18 +81,13 @@ def test_the_commands_are_those_of_torch(kind, settings, tmp_path):
     )
 
 
-def test_a_zip_takes_part_and_is_verified(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    saved(tmp_path)
-    result = benchmark(
-        "lq,model.zip", tasks=[TASK.name], out="results", episodes=2, workers=1
-    )
-    assert result.figures("model", TASK.name).shape == (1, 2)
-    assert [check.passed for check in verify("results")] == [True, True]
-    saved(tmp_path, learning_rate=0.01)
-    assert {check.contestant: check.note for check in verify("results")}[
-        "model"
-    ] == "'model.zip' is not the file that took part"
+def test_a_zip_takes_part_in_a_benchmark(tmp_path):
+    _, path = saved(tmp_path)
+    suite = write_suite(tmp_path)
+    result = benchmark(f"lq,{path}", suite=suite, tasks=["calm"], episodes=2, workers=1)
+    costs = result.figures("model", "calm")
+    assert costs.shape == (1, 2)
+    assert (costs > 0.0).all()
 
 
 REFUSED = {
@@ -111,7 +106,7 @@ REFUSED = {
         "16 observations within .* expected the task's 8",
     ),
     "other task": (
-        lambda: {"env": ships("shipgym/PathFollowing-v1")},
+        lambda: {"env": ships("shipgym/PathFollowing-v0")},
         "15 observations within",
     ),
     "other action": (
@@ -125,7 +120,7 @@ REFUSED = {
 def test_what_would_steer_otherwise_than_it_learned_is_refused(name, tmp_path):
     make, message = REFUSED[name]
     saved(tmp_path, **make())
-    (one,) = contestants(str(tmp_path / "model.zip"))
+    (one,) = read_entries(str(tmp_path / "model.zip"))
     with pytest.raises(InputError, match=rf"model\.zip.*{message}"):
         check_agents(one, [TASK])
 
@@ -200,8 +195,8 @@ def test_what_is_no_such_zip_is_refused(tmp_path):
         path.write_bytes(content)
         with pytest.raises(InputError, match="not a zip of stable-baselines3"):
             read_sb3(path)
-    with pytest.raises(InputError, match=r"no_such\.zip' found, expected one of"):
-        contestants(str(tmp_path / "no_such.zip"))
+    with pytest.raises(InputError, match=r"expected one of .*no_such\.zip"):
+        read_entries(str(tmp_path / "no_such.zip"))
 
 
 def zipped(compression=zipfile.ZIP_STORED, **members):

@@ -5,8 +5,9 @@ from dataclasses import fields
 
 import pytest
 
-from agents.benchmarking.contestants import pretrained
-from agents.suites.suite import ENVIRONMENTS, load_suite
+from agents.benchmarking.sources import pretrained
+from agents.suites.environments import SHORT_NAMES
+from agents.suites.suite import load_suite
 from agents.training.plan import (
     EVALUATION_SEED,
     N_EVALUATIONS,
@@ -16,7 +17,6 @@ from agents.training.plan import (
     check_same,
     first_difference,
     make_plan,
-    read_environment,
     training_options,
 )
 from agents.training.settings import (
@@ -27,7 +27,6 @@ from agents.training.settings import (
     changed,
     load_settings,
     make_settings,
-    present_names,
     read_settings_file,
 )
 from shipgym import InputError
@@ -223,8 +222,9 @@ def test_a_value_comes_from_the_nearest_table():
     assert (residual.base, residual.n_steps, residual.clip_range) == ("lq", 256, 0.2)
     assert load_settings("ppo", "path-following").base == "ilos"
     assert load_settings("ppo", action="rudder-shaft") == scratch
-    assert load_settings("ppo", task=load_suite().tasks[0].name).base == "tuned"
-    assert load_settings("ppo", task="no task of the suite") == residual
+    on_task = load_settings("ppo", "path-following", "roll-limit", suite="shipgym-v1")
+    assert on_task.base == "tuned"
+    assert load_settings("ppo", task="of no suite") == residual
     assert load_settings("ppo", given={"gamma": 0.5, "n_steps": 128}).gamma == 0.5
     for algorithm, kind in ALGORITHMS.items():
         table = load_settings(algorithm).to_dict()
@@ -239,16 +239,18 @@ def test_a_value_comes_from_the_nearest_table():
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_tuned_settings_are_the_golden_ones(algorithm):
-    """From nothing, beside a base in each environment, and what differs from these in tasks of the suites."""
-    usual = {name: load_settings(algorithm, name).to_dict() for name in ENVIRONMENTS}
+    """From nothing, beside a base in each environment, and what differs from these in tasks of the suite."""
+    usual = {name: load_settings(algorithm, name).to_dict() for name in SHORT_NAMES}
     own = {}
-    for suite in ("shipgym-v1", "shipgym-v2"):
-        for task in load_suite(suite).tasks:
-            found = load_settings(algorithm, task.environment, task.name).to_dict()
-            as_usual = usual[task.environment]
-            own[task.name] = {
-                name: value for name, value in found.items() if value != as_usual[name]
-            }
+    tasks = [task for task in load_suite().tasks if task.on == "ship"]
+    for task in tasks:
+        as_usual = usual[task.environment]
+        found = load_settings(
+            algorithm, task.environment, task.name, suite="shipgym-v1"
+        ).to_dict()
+        own[task.name] = {
+            name: value for name, value in found.items() if value != as_usual[name]
+        }
     told = {
         "from nothing": load_settings(algorithm, given=FREE).to_dict(),
         **usual,
@@ -272,13 +274,8 @@ def test_settings_of_the_command_line_and_of_files(tmp_path):
             InputError, match=r"expected name=value, such as --set gamma=0\.98"
         ):
             named_values([wrong], "--set", "gamma=0.98")
-    assert present_names({"history": 2, "hold": 3, "gamma": 1}) == {
-        "frame_stack": 2,
-        "action_repeat": 3,
-        "gamma": 1,
-    }
     path = tmp_path / "mine.toml"
-    path.write_text("hold = 3\ngamma = 1\n")
+    path.write_text("action_repeat = 3\ngamma = 1\n")
     assert read_settings_file(path, "ppo") == {"action_repeat": 3, "gamma": 1.0}
     path.write_text("gamma = \n")
     with pytest.raises(InputError, match=r"mine\.toml: not valid TOML"):
@@ -317,20 +314,12 @@ def test_the_first_difference_of_two_configurations_is_told():
 def test_seas_and_lists_in_the_options_of_a_run_come_back_from_json():
     weather = Weather(name="stream", current=Current(speed=1.5, towards_deg=90.0))
     assert _read([weather.to_dict(), ["calm", 2.0]], "sea") == [weather, ["calm", 2.0]]
-    plan = make_plan(Given("ppo", task="mariner-current", seed=2, randomise=True))
+    options = {"sea": [weather, "calm"]}
+    plan = make_plan(Given("ppo", options=options, seed=2, randomise=True))
     again = Plan.from_configuration(json.loads(json.dumps(plan.configuration())), 3)
     assert again.configuration() == plan.configuration()
     assert again.task.options == plan.task.options
     assert (again.seed, again.randomise, again.threads) == (2, True, 3)
-
-
-def test_environments_are_known_by_short_name_and_by_id():
-    assert read_environment("course-keeping") == ("course-keeping", {})
-    assert read_environment("shipgym/PathFollowing-v0") == ("path-following", {})
-    assert read_environment("shipgym/CourseKeepingDiscrete-v0") == (
-        "course-keeping",
-        {"action": "rudder-discrete"},
-    )
 
 
 def test_what_is_not_given_is_as_it_was():
@@ -379,7 +368,7 @@ def test_all_agents_were_chosen_on_the_same_hundred_episodes():
     ]
     assert [
         json.loads(path.read_text())["training"]["evaluation_seeds"] for path in paths
-    ] == [seeds] * 12
+    ] == [seeds] * 12 * 5  # training runs
     assert (
         min(min(task.seeds) for task in load_suite().tasks)
         >= EVALUATION_SEED + N_EVALUATIONS
@@ -462,11 +451,11 @@ def test_domain_randomisation_draws_ships_seas_and_speeds_and_leaves_what_was_as
             "action: 'rudder-shaft' found, but 'mariner' has no shaft",
         ),
         (
-            {"task": "mariner-calm", "options": {"noise": 1.0}},
+            {"task": "sharp-turns", "options": {"noise": 1.0}},
             "--task: found together with --option, which",
         ),
         (
-            {"task": "mariner-calm", "model": "kvlcc2"},
+            {"task": "sharp-turns", "model": "kvlcc2"},
             "--task: found together with --model, which",
         ),
         (
@@ -500,7 +489,7 @@ def test_plans_that_cannot_be_are_refused(arguments, message):
 
 def test_an_unknown_algorithm_is_told_before_an_unknown_task():
     with pytest.raises(InputError, match="algorithm: 'pqo' found"):
-        make_plan(Given("pqo", task="mariner-clam"))
+        make_plan(Given("pqo", task="sharp-trns"))
     with pytest.raises(InputError, match="which sac does not learn; take ppo"):
         make_plan(
             Given("sac", environment="shipgym/CourseKeepingDiscrete-v0", settings=FREE)

@@ -7,17 +7,19 @@ import pytest
 
 from agents import LQ, PID, WheelOver
 from agents.deployment.steering import Limits
-from agents.verification import standards as module
 from agents.verification.standards import (
     REQUIREMENTS,
-    Row,
+    Requirement,
     heading_control,
-    kept,
+    heading_control_in_waves,
+    heading_values,
+    rate_of_turn,
     standards,
     track_control,
+    track_values,
 )
+from agents.verification.steered import SteeredRun, settled, steer_to_heading
 from agents.verification.tracks import keep_track, track_task
-from shipgym.errors import InputError
 from tests.agents.policies import MARINER
 
 
@@ -56,7 +58,7 @@ def test_an_autopilot_that_is_too_weak_and_a_late_turn_fail_their_rows(track):
 
 def test_what_was_not_simulated_is_neither_passed_nor_failed():
     rows = [
-        Row("it", "", "", 1.0, "deg", least, value)
+        Requirement("it", "", "", 1.0, "deg", least, value)
         for least in (False, True)
         for value in (None, 2.0)
     ]
@@ -64,7 +66,7 @@ def test_what_was_not_simulated_is_neither_passed_nor_failed():
 
 
 def test_a_heading_that_falls_silent_is_handed_over_and_the_rest_is_steered():
-    found = kept(
+    found = steer_to_heading(
         MARINER, PID.from_model(MARINER), lost=["heading"], limits=Limits(silence_s=5.0)
     )
     assert found.alarm == "no heading for 5 s"
@@ -73,35 +75,22 @@ def test_a_heading_that_falls_silent_is_handed_over_and_the_rest_is_steered():
 
 
 def test_a_course_is_kept_for_forty_ship_lengths_of_which_the_first_ten_do_not_count():
-    found = kept(MARINER, PID.from_model(MARINER))
+    found = steer_to_heading(MARINER, PID.from_model(MARINER))
     assert (found.alarm, found.alarm_at) == ("", np.inf)
     assert found.t[-1] == pytest.approx(40.0 * MARINER.travel_time, abs=1.0)
-    assert module._settled(found.t)[0] == pytest.approx(
-        10.0 * MARINER.travel_time, abs=1.0
-    )
+    assert settled(found.t)[0] == pytest.approx(10.0 * MARINER.travel_time, abs=1.0)
 
 
-def test_what_no_simulation_shows_of_a_ship_has_no_value(monkeypatch):
+def test_what_no_simulation_shows_of_a_ship_has_no_value():
     """Neither waves, of which her particulars do not tell, nor a rate of turn."""
-
-    def unknown(*_, **__):
-        raise InputError("not known")
-
-    monkeypatch.setattr(module, "kept", unknown)
-    monkeypatch.setattr(module.TurnRate, "from_model", unknown)
-    assert module._sea(MARINER, PID.from_model(MARINER)) == {}
-    assert module._rate_of_turn(MARINER) == {}
-
-
-def test_what_is_largest_without_a_warning_is_that_of_the_quiet_intervals():
-    run = module.Run(
-        *[np.zeros(4)] * 5, [], [[], ["off track"], ["off heading"], []], "", np.inf
+    pilot = PID.from_model(MARINER)
+    small = replace(MARINER.particulars, beam=None, draught=None)
+    unknown = replace(MARINER, particulars=small)
+    assert heading_control_in_waves(unknown, pilot) == {}
+    straight = replace(
+        MARINER, coefficients=MARINER.coefficients | {"N_d": 0.0, "Y_d": 0.0}
     )
-    size = np.array([1.0, 9.0, 7.0, 3.0])
-    assert module._unwarned(run, size, "off track") == 7.0
-    assert module._unwarned(run, size, "off heading") == 9.0
-    always = run._replace(warnings=[["off track"]] * 4)
-    assert module._unwarned(always, size, "off track") == 0.0
+    assert rate_of_turn(straight) == {}
 
 
 def made_up(errors, warnings=None, **more):
@@ -109,10 +98,17 @@ def made_up(errors, warnings=None, **more):
     n = len(errors)
     given, order = more.pop("given", [{}] * n), np.full(n, more.pop("order", 5.0))
     zeros, rest = np.zeros(n), {"alarm": "", "alarm_at": np.inf} | more
-    told = warnings or [[]] * n
-    return module.Run(
-        np.arange(float(n)), np.array(errors), zeros, zeros, order, given, told, **rest
-    )
+    t, warned = np.arange(float(n)), warnings or [[]] * n
+    return SteeredRun(t, np.array(errors), zeros, zeros, order, given, warned, **rest)
+
+
+def test_what_is_largest_without_a_warning_is_that_of_the_quiet_intervals():
+    run = made_up([0.0] * 4, [[], ["off track"], ["off heading"], []])
+    size = np.array([1.0, 9.0, 7.0, 3.0])
+    assert run.unwarned(size, "off track") == 7.0
+    assert run.unwarned(size, "off heading") == 9.0
+    always = run._replace(warnings=[["off track"]] * 4)
+    assert always.unwarned(size, "off track") == 0.0
 
 
 @pytest.mark.parametrize(
@@ -120,22 +116,13 @@ def made_up(errors, warnings=None, **more):
     [(0.95, 0.0, 7.0), (-0.95, 0.95, 7.0), (1.05, 0.0, np.inf)],
 )
 def test_a_turn_counts_where_it_ends_within_a_degree_of_the_course(
-    last, overshoot, rudder, monkeypatch
+    last, overshoot, rudder
 ):
-    turn = made_up(
-        [30.0, 12.0, 11.0, last], [["off heading"], ["off heading"], [], []], order=-7.0
-    )
+    warned = [["off heading"], ["off heading"], [], []]
+    turn = made_up([30.0, 12.0, 11.0, last], warned, order=-7.0)
     straight = made_up([9.0, 0.3, -0.4, 0.2])  # the first quarter does not count
-    asked = []
-
-    def run_of(model, pilot, sea="calm", heading=0.0, **more):
-        asked.append((heading, {**more}))
-        lost = made_up([0.0] * 4, alarm="no heading", alarm_at=63.5)
-        return lost if "lost" in more else turn if heading else straight
-
-    monkeypatch.setattr(module, "kept", run_of)
-    found = heading_control(MARINER, None)
-    assert found == pytest.approx(
+    silent = made_up([0.0] * 4, alarm="no heading", alarm_at=63.5)
+    assert heading_values(turn, turn, straight, silent) == pytest.approx(
         {
             "heading_calm": 0.4,
             "overshoot": overshoot,
@@ -144,56 +131,36 @@ def test_a_turn_counts_where_it_ends_within_a_degree_of_the_course(
             "heading_lost": 3.5,
         }
     )
-    narrow = {"limits": Limits(order_deg=10.0)}
-    assert asked == [
-        (30.0, {}),
-        (30.0, narrow),
-        (0.0, {}),
-        (0.0, {"lost": ["heading"]}),
-    ]
 
 
 @pytest.mark.parametrize(
     ("warned", "lead"),
     [([], 1.0), ([3, 4, 5], 2.0), ([1, 2, 3], 4.0), ([0, 1, 2, 3], 0.0)],
 )
-def test_a_turn_is_announced_from_the_last_quiet_interval_on(
-    warned, lead, track, monkeypatch
-):
+def test_a_turn_is_announced_from_the_last_quiet_interval_on(warned, lead, track):
     """Begun where the reach is passed, in the fifth interval; one that was never quiet tells no lead.
 
     The route ends four intervals after the last, of 10 m each.
     """
-    reach = track.controller.gains["turn_reach"]
-    to_go = reach + 10.0 * np.array([4.0, 3.0, 2.0, 1.0, 0.0, -1.0])
+    guide = track.controller
+    to_go = guide.gains["turn_reach"] + 10.0 * np.array([4.0, 3.0, 2.0, 1.0, 0.0, -1.0])
     given = [{"next_turn_distance": one, "next_turn_angle": 0.5} for one in to_go]
     given += [
         {"next_turn_distance": one, "next_turn_angle": 0.0}
         for one in (60.0, 50.0, 40.0)
     ]
-    told = [["course change ahead"] if k in warned else [] for k in range(9)]
-    along = made_up(
-        [0.0] * 9,
-        told,
-        given=given,
-        alarm="the end of the route is reached",
-        alarm_at=13.0,
-    )
+    warnings = [["course change ahead"] if k in warned else [] for k in range(9)]
+    end = {"alarm": "the end of the route is reached", "alarm_at": 13.0}
+    along = made_up([0.0] * 9, warnings, given=given, **end)
     off = [{"cross_track": one} for one in (150.0, -53.0, 9.0)]
     aside = made_up([0.0] * 3, [["off track"], [], []], given=off)
-    lost = made_up([0.0] * 3, alarm="no latitude", alarm_at=63.0)
+    silent = made_up([0.0] * 3, alarm="no latitude", alarm_at=63.0)
 
-    def run_of(model, one, limits, **more):
-        assert limits == Limits(off_track_m=50.0)
-        return lost if "lost" in more else aside if more.get("aside") else along
-
-    monkeypatch.setattr(module, "_on_track", run_of)
-    found = track_control(MARINER, track)
-    length, dt = MARINER.particulars["length"], track.controller.design["dt"]
+    found = track_values(guide, along, aside, silent)
     assert found["early_indication"] == lead
     assert found["off_track"] == pytest.approx(53.0 - 50.0)
     assert found["position_lost"] == 3.0
+    dt = guide.design["dt"]
     assert found["route_ended"] == pytest.approx(13.0 - (8.0 + 4.0 * dt))
-    assert found["cross_track"] == pytest.approx(track.largest[0] / length)
     along = along._replace(alarm="no heading")
-    assert track_control(MARINER, track)["route_ended"] == np.inf
+    assert track_values(guide, along, aside, silent)["route_ended"] == np.inf

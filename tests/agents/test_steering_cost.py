@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fleet import Pilots
 
 from agents import LQ, PID, sail
 from agents.rollouts.rollout import episode_costs
@@ -21,30 +20,25 @@ TANKER = load_model("tanker")  # unstable on its course
 def best_cost(controller, model, task):
     """Least mean cost over the same gains: drawn about the best of those before, all sailed side by side."""
     random = np.random.default_rng(0)
+    names, n_gains = list(controller.gains), len(controller.gains)
     seeds, engine = np.tile(SEEDS, TRIED), Engine(model, TRIED * len(SEEDS), task)
-    mean, covariance = (
-        np.zeros(len(controller.gains)),
-        0.4**2 * np.eye(len(controller.gains)),
-    )
+    mean, covariance = np.zeros(n_gains), 0.4**2 * np.eye(n_gains)
     least = np.inf
     for _ in range(ROUNDS):
-        factors = np.exp(random.multivariate_normal(mean, covariance, TRIED))
-        pilots = [
-            replace(
-                controller,
-                gains={
-                    k: v * f
-                    for (k, v), f in zip(controller.gains.items(), row, strict=True)
-                },
-            )
-            for row in factors
-        ]
-        lanes = Pilots([pilot for pilot in pilots for _ in SEEDS])
-        costs = episode_costs(lanes, engine, seeds).reshape(TRIED, -1).mean(axis=1)
-        best = np.log(factors[np.argsort(costs)[:KEPT]])
+        logarithms = random.multivariate_normal(mean, covariance, TRIED)
+        # a law takes arrays too: gains of each ship
+        of_ships = np.repeat(np.exp(logarithms), len(SEEDS), axis=0)
+        gains = {
+            name: controller.gains[name] * of_ships[:, k]
+            for k, name in enumerate(names)
+        }
+        costs = episode_costs(replace(controller, gains=gains), engine, seeds)
+        by_gains = costs.reshape(TRIED, -1).mean(axis=1)
+
+        best = logarithms[np.argsort(by_gains)[:KEPT]]
         step, mean = best.mean(axis=0) - mean, best.mean(axis=0)
         covariance = np.cov(best.T) + np.outer(step, step)
-        least = min(least, costs.min())
+        least = min(least, by_gains.min())
     return least
 
 

@@ -12,8 +12,8 @@ import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
-from agents.cli.training import _print_tuning
-from agents.engines.jobs import JobEngine
+from agents.cli.training import print_tuning
+from agents.jobs import JobEngine
 from agents.training import tuning
 from agents.training.plan import Given, make_plan
 from agents.training.settings import ALGORITHMS, load_settings
@@ -197,7 +197,7 @@ def test_trials_are_told_the_best_first(tmp_path, capsys):
         ),
         Trial(3, varied, {}, None, (), "diverged"),
     )
-    _print_tuning(Tuning(trials, trials[2]), tmp_path)
+    print_tuning(Tuning(trials, trials[2]), tmp_path)
     assert same_text("tune", capsys.readouterr().out)
 
 
@@ -251,9 +251,7 @@ def test_folder_of_something_else_is_refused(trainings, tmp_path):
         InputError, match=r"every trial diverged, the first: not finite, gamma 0\.99$"
     ):
         tune(plan(), tmp_path / "other", 5, training=trainings.diverges)
-    with pytest.raises(
-        InputError, match="trials: 0 found, expected a whole number of at least 1"
-    ):
+    with pytest.raises(InputError, match="trials: expected an integer of at least 1"):
         tune(plan(), tmp_path / "none", 0, training=trainings.bowl)
 
 
@@ -285,7 +283,7 @@ def test_a_study_with_another_table_of_trials_is_no_study_of_optuna(
 def test_what_a_training_returns_has_to_be_a_result(trainings, tmp_path):
     with pytest.raises(
         InputError,
-        match=r"trial 0\.cost: 'low' found, expected a whole number or a number",
+        match=r"trial 0\.cost: expected an integer or a number",
     ):
         tune(plan(), tmp_path / "study", 1, training=trainings.broken)
 
@@ -326,14 +324,13 @@ def test_one_that_was_stopped_early_is_the_best_only_where_none_has_finished(tmp
     assert _best([diverged, *stopped]) is stopped[1]
     assert _best([diverged, *stopped, finished]) is finished
     on_task = make_plan(
-        Given("ppo", task="mariner-calm", seed=4, settings={"base": "none"})
+        Given("ppo", task="sharp-turns", seed=4, settings={"base": "none"})
     )
     _write_best(tmp_path, on_task, [diverged, *stopped])
     lines = (tmp_path / "best.toml").read_text().splitlines()
     assert (
-        lines[0]
-        == "# Trial 2 of 3: no trial has finished, seed 4, ppo on mariner-calm with"
-        " mariner."
+        lines[0] == "# Trial 2 of 3: no trial has finished, seed 4, ppo on sharp-turns"
+        " with mariner-tls-svm."
     )
 
 
@@ -431,7 +428,7 @@ def test_trials_are_trainings_that_stop_when_they_fall_behind():
     ("arguments", "message"),
     [
         (["pppo"], "Did you mean 'ppo'"),
-        (["ppo", "--task", "mariner-clam"], "Did you mean 'mariner-calm'"),
+        (["ppo", "--task", "sharp-trns"], "Did you mean 'sharp-turns'"),
         (["ppo", "--set", "gama=0.9"], "Did you mean 'gamma'"),
         (["ppo", "--engine", "rays"], "Did you mean 'ray'"),
         (["ppo", "--address", "h:1"], "it is for engine 'ray'"),
@@ -465,7 +462,8 @@ def test_the_command_asks_for_what_it_was_told_and_shows_trials_best_first(
                 plan.configuration()["seed"],
             )
         )
-        asked.append((out, trials_asked, fixed, where.workers, progress))
+        asked.append((out, trials_asked, fixed, where.workers))
+        progress(1, trials_asked, None)
         assert (
             plan.threads == 1
         )  # of each of the trials that are done beside one another
@@ -488,7 +486,7 @@ def test_the_command_asks_for_what_it_was_told_and_shows_trials_best_first(
     told = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
     assert asked == [
         (0.9, 10_000, 0),
-        (tmp_path, 20, ("gamma",), 1, None),
+        (tmp_path, 20, ("gamma",), 1),
     ]  # ten evaluations on the way
     assert [trial["cost"] for trial in told["trials"]] == [5.0, None, 4.25]
     assert (told["best"], told["settings"]) == (2, str(tmp_path / "best.toml"))
@@ -505,7 +503,7 @@ def test_the_command_asks_for_what_it_was_told_and_shows_trials_best_first(
     lines = CliRunner().invoke(app, words).stdout.splitlines()
     assert asked[2:] == [
         (0.9, 50, 7),
-        (tmp_path, 3, ("gamma", "evaluate_every"), 2, None),
+        (tmp_path, 3, ("gamma", "evaluate_every"), 2),
     ]
     assert [line.split() for line in lines if line.strip()[:1].isdigit()] == [
         ["2", "4.250", "finished", "learning_rate", "0.000312,", "batch_size", "64"],

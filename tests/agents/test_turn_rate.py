@@ -6,36 +6,37 @@ import numpy as np
 import pytest
 
 from agents import TurnRate, check_controller, load_agent, step_response
-from agents.controllers import turn_rate
-from agents.controllers.turn_rate import steady_turns
+from agents.controllers.law import Signals
+from agents.controllers.turn_rate import (
+    SteadyTurns,
+    TurnRateMemory,
+    course_rate,
+    steady_turns,
+)
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle
 from shipgym.ships import load_model
 from shipgym.ships.linear import straight_running
 
 MARINER, TANKER = load_model("mariner"), load_model("tanker")
+STILL = Signals(*np.zeros(len(Signals._fields)))
 
 
 def turned(agent, model, rate, seconds):
     """Yaw rates, rad/s, and rudder orders of a ship that is ordered a rate of turn, from straight running."""
-    dt, state, memory = agent.design["dt"], model.service_state.copy(), np.zeros((1, 2))
+    dt, state = agent.design["dt"], model.service_state.copy()
+    memory = TurnRateMemory(0.0, 0.0, 0.0)
+    yaw_rate = model.state_names.index("r")
     rates, orders = [], []
-    for step in range(int(seconds / dt)):
-        seen = {name: np.zeros(1) for name in agent.observation_names} | {
-            "heading_error_cos": np.ones(1)
-        }
-        seen |= {
-            "yaw_rate": state[None, model.state_names.index("r")],
-            "rate_of_turn": np.array([rate]),
-        }
-        order, memory = agent.steer(seen, memory, np.array([step == 0]))
-        limited = np.clip(order, -model.steering.limit, model.steering.limit)
+    for _ in range(int(seconds / dt)):
+        seen = STILL._replace(yaw_rate=state[yaw_rate], rate_of_turn=rate)
+        order, memory = agent.steer(seen, memory)
         commands = np.tile(model.service_command, (2, 1))
-        commands[:, 0] = limited[0]
+        commands[:, 0] = np.clip(order, -model.steering.limit, model.steering.limit)
         trial = model.simulate(commands, 0.5 * dt, state=state)
         state = np.array([trial[name][-1] for name in model.state_names])
-        rates.append(state[model.state_names.index("r")])
-        orders.append(float(order[0]))
+        rates.append(state[yaw_rate])
+        orders.append(float(order))
     return np.array(rates), np.array(orders)
 
 
@@ -127,27 +128,28 @@ def test_it_is_a_controller_with_margins_and_a_file(tmp_path):
     agent.save(tmp_path / "it.json")
     again = load_agent(tmp_path / "it.json", MARINER)
     assert np.array_equal(again.rudders, agent.rudders)
-    with pytest.raises(InputError, match=r"rate_deg_min: 1000 found, expected"):
+    with pytest.raises(InputError, match=r"^rate_deg_min: "):
         TurnRate.from_model(MARINER, rate_deg_min=1000.0)
 
 
-def test_a_ship_that_three_tenths_of_the_rudder_do_not_turn_changes_courses_at_the_least_rate(
-    monkeypatch,
-):
+def test_a_ship_that_three_tenths_of_the_rudder_do_not_turn_changes_courses_at_the_least_rate():
     """A fiftieth of speed over length."""
-    table = np.array([-0.01, 0.0, 0.01]), np.radians([-15.0, 0.0, 15.0])
-    monkeypatch.setattr(turn_rate, "steady_turns", lambda *_: table)
-    time = MARINER.particulars["length"] / MARINER.particulars["speed"]
-    assert TurnRate.from_model(MARINER).gains["rate"] == pytest.approx(0.02 / time)
+    table = SteadyTurns(np.array([-0.01, 0.0, 0.01]), np.radians([-15.0, 0.0, 15.0]))
+    rate = course_rate(MARINER, table, neutral=0.0)
+    assert rate == pytest.approx(0.02 / MARINER.travel_time)
 
 
-def test_the_integral_waits_while_the_rudder_is_at_its_limit():
-    agent, memory = TurnRate.from_model(MARINER), np.array([[0.02, 0.0]])
-    seen = {"heading_error_sin": np.zeros(1), "heading_error_cos": np.ones(1)}
-    for rate, waits in ((-0.003, False), (-0.5, True), (0.5, True)):
-        seen |= {"yaw_rate": np.array([rate]), "rate_of_turn": np.array([0.001])}
-        order, after = agent.steer(seen, memory, np.array([False]))
-        assert (abs(order[0]) >= MARINER.steering.limit) == waits
-        off = agent.smoothing * 0.001 - rate
-        more = 0.0 if waits else agent.gains["integral"] * agent.design["dt"] * off
-        assert after[0] == pytest.approx([0.02 + more, agent.smoothing * 0.001])
+@pytest.mark.parametrize(
+    ("yaw_rate", "waits"), [(-0.003, False), (-0.5, True), (0.5, True)]
+)
+def test_the_integral_waits_while_the_rudder_is_at_its_limit(yaw_rate, waits):
+    agent = TurnRate.from_model(MARINER)
+    gains, smoothing = agent.gains, agent.parameters.smoothing
+    seen = STILL._replace(yaw_rate=yaw_rate, rate_of_turn=0.001)
+    order, after = agent.steer(seen, TurnRateMemory(0.02, 0.0, 1.0))
+
+    assert (abs(order) >= MARINER.steering.limit) == waits
+    off = smoothing * 0.001 - yaw_rate
+    more = 0.0 if waits else gains["integral"] * agent.design["dt"] * off
+    assert after.integral == pytest.approx(0.02 + more)
+    assert after.followed == pytest.approx(smoothing * 0.001)

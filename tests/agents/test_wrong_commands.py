@@ -10,6 +10,7 @@ import wrong_commands
 from rich.text import Text
 
 from agents.cli import terminal
+from agents.cli.tables import plain_table
 
 ROOT = Path(__file__).parents[2]
 SAMPLE = random.Random(0).sample(list(wrong_commands.lines()), 60)
@@ -46,10 +47,10 @@ def test_an_output_that_cannot_be_written_is_told(words):
 
 def test_names_from_files_do_not_steer_the_terminal(capsys):
     name = "\x1b[31mred\x1b]0;title\x07 [bold]ship[/] :ship: \u202eright to left\x9b2J"
-    table = terminal.plain_table(name, name)
+    table = plain_table(name, name)
     table.add_row(name, Text(name))
     for printed in (name, Text(name), table):
-        terminal.out.print(printed, soft_wrap=True)
+        terminal.console.print(printed, soft_wrap=True)
     terminal.warn(name)
     shown = capsys.readouterr()
     for text in (shown.out, shown.err):

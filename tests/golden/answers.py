@@ -13,7 +13,7 @@ import numpy as np
 
 import shipgym
 from shipgym.manoeuvres.standard import FAMILIES
-from shipgym.ships.structures import EQUATIONS, PRINTED, SHIPPED_EQUATIONS, STRUCTURES
+from shipgym.ships.structures import REGISTERED_EQUATIONS, REGISTERED_STRUCTURES
 from shipgym.trials.trial import KINDS, Trial
 from tests.golden.store import Floats, numbers_in
 
@@ -125,8 +125,8 @@ def words(answers: Any, place: str = "") -> list[str]:
 def as_shipped() -> Iterator[None]:
     """An empty folder, and nothing registered but what is shipped, whatever was registered before."""
     tables = (
-        (STRUCTURES, PRINTED),
-        (EQUATIONS, SHIPPED_EQUATIONS),
+        (REGISTERED_STRUCTURES, ()),
+        (REGISTERED_EQUATIONS, ()),
         (FAMILIES, SHIPPED_FAMILIES),
     )
     before, kinds = [dict(table) for table, _ in tables], KINDS[:]

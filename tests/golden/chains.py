@@ -14,6 +14,7 @@ import numpy as np
 
 import shipgym
 from agents import benchmark
+from agents.suites.suite import load_suite
 from identification import identify
 from tests.golden.store import Floats, numbers_in, vector
 
@@ -23,20 +24,7 @@ SHIP_FILE = ROOT / "examples" / "mariner" / "ship.toml"
 OF_THE_RUN = ("time", "duration", "version", "path", "software")
 
 CONTESTANTS = ("pid", "lq", "ppo")
-TASKS = (
-    "mariner-calm",
-    "kvlcc2-large-turns",
-    "mariner-rough",
-    "kvlcc2-noise",
-    "container-path",
-    "tanker-shallow-path",
-    "mariner-current",
-    "kvlcc2-current",
-    "mariner-sharp-turns",
-    "kvlcc2-sharp-turns",
-    "container-roll-path",
-    "container-rough-path",
-)
+TASKS = tuple(task.name for task in load_suite().tasks if task.on == "ship")
 EPISODES = 3
 KEYS = ("contestant", "task", "run", "seed")
 
@@ -74,8 +62,6 @@ def record_demo(_: str) -> dict[str, Floats]:
         words = [
             "autopilot",
             str(SHIP_FILE),
-            "--agent",
-            "mariner-calm-ppo",
             "--out",
             str(out),
         ]

@@ -40,7 +40,7 @@ class Case:
     Attributes
     ----------
     env : str
-        Its id without the package, and without the version if that is the first.
+        Its id without the package and the version.
     options : dict
         Its keywords.
     single : bool
@@ -74,7 +74,7 @@ class Case:
     @property
     def id(self) -> str:
         """Its id."""
-        return f"shipgym/{self.env}" if "-v" in self.env else f"shipgym/{self.env}-v0"
+        return f"shipgym/{self.env}-v0"
 
 
 def longer(name: str, stretch: float) -> Any:
@@ -153,7 +153,8 @@ def cases() -> dict[str, Case]:
         {"model": "kvlcc2-rm-svm", "model_uncertainty": "posterior", "sea": "rough"},
     )
     found[f"{COURSE} Roll astern"] = Case(
-        f"{COURSE}Roll", {"action": "rudder-shaft", "sea": "rough"}
+        f"{COURSE}Roll",
+        {"model": "container", "action": "rudder-shaft", "sea": "rough"},
     )
     found[f"{PATH} waypoints"] = Case(
         PATH, {"waypoints": CORNERS, "lookahead": 2.0, "corridor": 0.7}
@@ -165,7 +166,7 @@ def cases() -> dict[str, Case]:
             "n_legs": 8,
             "leg_lengths": (5.0, 8.0),
             "max_turn_deg": 110.0,
-            "acceptance": 2.0,
+            "turn_radius": 1.5,
             "ground": 8.0,
         },
     )

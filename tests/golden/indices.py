@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from shipgym.errors import UnstableModelError
+from shipgym.errors import InputError, UnstableModelError
 from shipgym.manoeuvres import (
     excitation,
     execution,
     imo,
+    imo_rules,
     intervals,
     pull_outs,
     registry,
@@ -21,6 +22,7 @@ from shipgym.manoeuvres import (
     spirals,
     standard,
     turning,
+    verdicts,
     zigzags,
 )
 from shipgym.manoeuvres.intervals import IndexInterval
@@ -64,7 +66,7 @@ def excited() -> Answers:
     """Rudder and shaft sequences by seed, with usual and other settings."""
     ship, other = model("mariner"), model("container")
     steps = partial(
-        excitation._steps, np.arange(0.0, 90.0, 0.7), (-0.2, 0.5), (3.0, 11.0)
+        excitation.random_levels, np.arange(0.0, 90.0, 0.7), (-0.2, 0.5), 3.0, 11.0
     )
     return {
         "binary": lambda: excitation.prbs_rudder(ship, duration=120.0, dt=1.5),
@@ -167,7 +169,7 @@ def zigzagged() -> Answers:
             for name, one in sailed.items()
         },
         "reversals": {
-            name: lambda one=one: execution.reversals(one)
+            name: lambda one=one: [*execution.reversals(one)]
             for name, one in sailed.items()
         },
         "executed": {
@@ -264,7 +266,7 @@ def turned() -> Answers:
         "trials": sailed,
         "indices": {name: lambda one=one: indices(one) for name, one in sailed.items()},
         "length": lambda: indices(port, 150.0),
-        "track": lambda: turning.track_from_order(port, 150.0),
+        "track": lambda: [*turning.track_from_order(port, 150.0)],
         "refused": [
             lambda k=k: circle(ship, **k)
             for k in (
@@ -340,7 +342,7 @@ def spiralled() -> Answers:
         "reverse": reverse,
         "loop": loop,
         "indices": [lambda one=one: read(one) for one in (direct, reverse)],
-        "usual rates": lambda: spirals._one_way(
+        "usual rates": lambda: spirals.one_way(
             [180.0 / np.pi * a / ship.travel_time for a in spirals.REVERSE_RATES],
             "a",
             "b",
@@ -395,7 +397,7 @@ def spiralled() -> Answers:
             for one in (ship, unstable)
         ],
         "effect": [
-            settling._rudder_effect(one, np.inf)
+            settling.rudder_effect(one, np.inf)
             for one in (ship, model("container"), unstable)
         ],
         "angles": (
@@ -473,7 +475,7 @@ def judged() -> Answers:
     """Criteria from made-up indices, intervals, measured trials and limits."""
     ship = replace(model("mariner-tls-svm"), envelope=None)
     tanker = model("tanker")
-    names = list(imo.imo_manoeuvres(ship))
+    names = list(imo_rules.imo_manoeuvres(ship))
     lengths = np.linspace(2.4, 2.6, 40)
     zigzag = {
         "overshoot_1_deg": interval(9.0, *np.linspace(8.0, 9.5, 40)),
@@ -508,23 +510,21 @@ def judged() -> Answers:
     runs = [circling, zigzagging, wide]
 
     def by(trial: Trial, **changed: Any) -> Any:
-        return imo._measured(
+        return verdicts.measured_indices(
             ship, Trial(trial.t, trial.channels | changed, kind=trial.kind)
         )
 
     def sure(share: float) -> Any:
         draws = interval(2.0, *np.where(np.arange(200) < share * 200, 2.0, 3.0))
-        return imo._decided(
-            imo._criterion([{"a_lengths": draws}], "a_lengths", 2.5, "5.3"),
-            "turn",
-            False,
-        )
+        rule = imo_rules.Rule("turn", "a_lengths", "5.3", 2.5)
+        criterion = verdicts.criterion_of(rule, [{"a_lengths": draws}])
+        return verdicts.decided_by_model(criterion, "turn", False)
 
     def outside(scale: float) -> bool:
         narrow = replace(boxed.envelope, shape=np.diag([1e-3, 1e-3, 1e-3, scale]))
-        return imo._outside(
+        return verdicts.outside_envelope(
             replace(ship, envelope=narrow),
-            imo.imo_manoeuvres(ship)["zigzag 10/10, starboard first"],
+            imo_rules.imo_manoeuvres(ship)["zigzag 10/10, starboard first"],
         )
 
     return {
@@ -543,19 +543,19 @@ def judged() -> Answers:
                 {
                     **{
                         name: found.get(name, stop)
-                        for name in imo.imo_manoeuvres(tanker)
+                        for name in imo_rules.imo_manoeuvres(tanker)
                     }
                 },
             )["stopping"].to_dict()
         ),
-        "container": lambda: imo._stopping(model("container"), None).to_dict(),
+        "container": lambda: imo.stopping_criterion(model("container"), None).to_dict(),
         "measured": {
             name: lambda one=one: one.to_dict()
-            for name, one in imo.with_measured(plain_criteria, ship, runs).items()
+            for name, one in verdicts.with_measured(plain_criteria, ship, runs).items()
         },
         "probabilities": [
             one.probability
-            for one in imo.with_measured(plain_criteria, ship, runs).values()
+            for one in verdicts.with_measured(plain_criteria, ship, runs).values()
         ],
         "trials": [lambda one=one: by(one) for one in runs],
         "fast": [
@@ -565,24 +565,33 @@ def judged() -> Answers:
             len(by(wide, delta_command=wide["delta_command"] * k))
             for k in (0.93, 0.96, 1.04, 1.06)
         ],
-        "other kind": lambda: imo._measured(ship, circling.with_(kind="spiral")),
-        "no position": lambda: imo._measured(ship, measured(circling, x=None)),
-        "no speed": lambda: imo._measured(ship, measured(circling, u=None)),
+        "other kind": lambda: verdicts.measured_indices(
+            ship, circling.with_(kind="spiral")
+        ),
+        "no position": lambda: verdicts.measured_indices(
+            ship, measured(circling, x=None)
+        ),
+        "no speed": lambda: verdicts.measured_indices(ship, measured(circling, u=None)),
         "limits": [
-            imo.overshoot_limits_deg(one)
+            imo_rules.overshoot_limits_deg(one)
             for one in (5.0, 9.0, 10.5, 20.0, 28.0, 29.0, 30.5, 40.0)
         ],
         "words": [
-            imo.trial_in_words(ship, one) for one in ("turning circle", "zigzag 10/10")
+            imo_rules.trial_in_words(ship, one)
+            for one in ("turning circle", "zigzag 10/10")
         ],
-        "limited": imo.trial_in_words(
+        "limited": imo_rules.trial_in_words(
             replace(ship, steering=SteeringGear(25.0)), "turning circle"
         ),
         "sure": [lambda k=k: sure(k) for k in (0.0, 0.02, 0.03, 0.5, 0.97, 0.98, 1.0)],
-        "beyond": lambda: imo._decided(plain_criteria["advance"], "35 deg turn", True),
+        "beyond": lambda: verdicts.decided_by_model(
+            plain_criteria["advance"], "35 deg turn", True
+        ),
         "outside": [outside(k) for k in (1.0, 5.6, 6.3, 6.9, 20.0)],
         "unboxed": [
-            imo._outside(one, imo.imo_manoeuvres(tanker)["crash stop"])
+            verdicts.outside_envelope(
+                one, imo_rules.imo_manoeuvres(tanker)["crash stop"]
+            )
             for one in (ship, boxed)
         ],
         "assessed": lambda: {
@@ -618,7 +627,7 @@ def spread() -> Answers:
         if one.coefficients["X_u"] > 0.0:
             raise UnstableModelError("runs away", 1.0, {})
         if one.coefficients["Y_v"] > 0.0:
-            raise imo.InputError("nothing")
+            raise InputError("nothing")
         return turning.turning_indices(circle(one))
 
     def changed(**factors: float) -> ShipModel:
@@ -637,7 +646,7 @@ def spread() -> Answers:
     t = np.arange(4.0)
 
     def physical(name: str, size: float) -> None:
-        registry._check_physical(
+        registry.check_physical(
             ship,
             Trial(
                 t,
@@ -730,9 +739,9 @@ def settled() -> Answers:
     """Legs that last until the motion is steady, and a helmsman who holds a yaw rate."""
     ship = model("mariner")
     voyage = settling.Voyage(ship, 2.0, Conditions())
-    first = voyage.settle(voyage.hold(0.1, 0.0))
+    first = [*voyage.settle(voyage.hold(0.1, 0.0))]
     at_rate = voyage.rate_helmsman()
-    second = voyage.settle(at_rate(-0.004))
+    second = [*voyage.settle(at_rate(-0.004))]
     after = voyage.trial("random")
     usual = settling.Voyage(
         model("container"), None, Conditions(), model("container").service_state * 0.7
@@ -760,8 +769,8 @@ def settled() -> Answers:
             lambda dt=dt: settling.Voyage(ship, dt, Conditions()).dt
             for dt in (0.0, 20.0, 21.0)
         ],
-        "wrong rudder": lambda: settling._rudder_effect(away, np.inf),
-        "shallow": settling._rudder_effect(model("tanker"), 30.0),
+        "wrong rudder": lambda: settling.rudder_effect(away, np.inf),
+        "shallow": settling.rudder_effect(model("tanker"), 30.0),
     }
 
 

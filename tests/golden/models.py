@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from shipgym import interchange
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.stages import Sums
 from shipgym.manoeuvres import towing_tank
@@ -39,7 +38,9 @@ from shipgym.ships import (
     terms,
 )
 from shipgym.ships.envelope import Envelope, smallest_ellipsoid
-from shipgym.ships.particulars import BOUNDS, Particulars, clarke_added_masses
+from shipgym.ships.particulars import Particulars, clarke_added_masses
+from shipgym.ships.particulars_limits import LIMITS
+from shipgym.ships.prime_inertia import prime_inertia
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.trial import Trial
@@ -162,15 +163,11 @@ def reference_ships() -> Answers:
         found[f"{one.name} vessel"] = lambda one=one: (
             one.vessel(one.coefficients, True).state_names
         )
-    kvlcc2.PACKAGE_FORM = True
-    try:
-        p, c = kvlcc2.SHIP.particulars, kvlcc2.Coefficients(PACKAGE_FORM=1.0)
-        found["package form"] = [
-            list(kvlcc2.accelerations(m, c, of(p, 11.9)))
-            for m in motions(7.0, 1.179, 11.9)
-        ]
-    finally:
-        kvlcc2.PACKAGE_FORM = False
+    p, c = kvlcc2.SHIP.particulars, kvlcc2.Coefficients(PACKAGE_FORM=1.0)
+    found["package form"] = [
+        list(kvlcc2.package_accelerations(m, c, of(p, 11.9)))
+        for m in motions(7.0, 1.179, 11.9)
+    ]
     found["power law"] = [
         mmg.power_law(x, 0.37) for x in (0.0, 0.009, 0.012, 0.3, 1.7, 3.9, 4.5)
     ]
@@ -221,7 +218,10 @@ def tables() -> Answers:
             ("service", {"q": "r, delta, n r"}),
         )
     }
-    for name, table in (structures.STRUCTURES | own).items():
+    printed = {
+        one: structures.get_structure(one) for one in structures.printed_tables()
+    }
+    for name, table in (printed | own).items():
         shaft = 1.9 if "n" in table.command_names else 0.0
         values = dict(
             zip(
@@ -233,7 +233,10 @@ def tables() -> Answers:
         if isinstance(table, shared_structure.SharedStructure):
             values |= {one: -0.01 for one in values if one.endswith("dot")}
         numbers_ = table.term_numbers(values, p, shaft)
-        function = term_functions.accelerations_function(table._source)
+        source = term_functions.accelerations_source(
+            table.equations, table.normalisation == "prime"
+        )
+        function = term_functions.accelerations_function(source)
         c = term_functions.coefficients_record(len(numbers_))(*numbers_)
         found[name] = {
             "numbers": numbers_,
@@ -267,20 +270,12 @@ def tables() -> Answers:
             "cubic",
             "abkowitz",
         ):
-            found[name]["source"] = table._source
+            found[name]["source"] = source
             found[name]["back"] = table.from_dict(table.to_dict()) == table
-    found["matrix"] = lambda: structures.STRUCTURES["linear"].acceleration_matrix(p)
-    found["no shaft"] = lambda: structures.STRUCTURES["cubic"].acceleration_matrix(p)
-    found["grammar"] = [
-        bool(term_functions.GRAMMAR.fullmatch(text))
-        for text in (
-            table._source,
-            table._source + "x",
-            table._source.replace("motion.u", "motion.__class__"),
-        )
-    ]
+    found["matrix"] = lambda: structures.get_structure("linear").acceleration_matrix(p)
+    found["no shaft"] = lambda: structures.get_structure("cubic").acceleration_matrix(p)
     found["undamped"] = term_functions.accelerations_source(
-        structures.STRUCTURES["nomoto"]._sums, damped=False
+        structures.get_structure("nomoto").equations, prime=False, damped=False
     )
     return found
 
@@ -309,6 +304,16 @@ def terms_and_refusals() -> Answers:
             "own",
             "own",
             {q: shared_structure.read_shares(text) for q, text in given.items()},
+        )
+
+    def products(n: int) -> tuple[terms.Term, ...]:
+        """So many different terms."""
+        return tuple(
+            term(
+                f"t{i}",
+                tuple((q, i // 9**k % 9 + 1) for k, q in enumerate("uvr")),
+            )
+            for i in range(n)
         )
 
     formulas = (
@@ -396,22 +401,10 @@ def terms_and_refusals() -> Answers:
             )
         },
         "many": refused(
-            lambda n: term_table._check_terms(
-                tuple(
-                    term(f"t{i}", (("u", i % 9 + 1), ("v", i // 9 + 1)))
-                    for i in range(n)
-                ),
-                "si",
-                "here",
+            lambda n: term_table.Structure(
+                "own", "own", {"r": products(n)}, "si", "acceleration"
             ),
-            (0, 1, 81),
-        ),
-        "most": refused(
-            lambda n: term_table._check_terms((term("a", ()),) * n, "si", "here"),
-            (201,),
-        ),
-        "too many": asked(
-            lambda: term_table._check_terms((term("a", ()),) * 201, "si", "here")
+            (0, 1, 81, 201),
         ),
         "own": [
             lambda o=o: own(o)
@@ -446,16 +439,16 @@ def terms_and_refusals() -> Answers:
             made.coefficient_names,
             made.names("v"),
             made.added_mass(values),
-            made.inertia(values, p),
+            made.prime_inertia(values, p),
             made.term_numbers(values, p),
             made.equations,
         ],
-        "not positive": lambda: made.inertia(dict.fromkeys(values, 0.5), p),
+        "not positive": lambda: made.prime_inertia(dict.fromkeys(values, 0.5), p),
         "free": lambda: made.acceleration_matrix(p),
         "back": shared_structure.SharedStructure.from_dict(made.to_dict()) == made,
         "inertia": [
-            term_table.inertia(p),
-            lambda: term_table.inertia(replace(p, xg=70.0, yaw_gyradius=0.01)),
+            prime_inertia(p),
+            lambda: prime_inertia(replace(p, xg=70.0, yaw_gyradius=0.01)),
         ],
     }
 
@@ -522,7 +515,8 @@ def particulars() -> Answers:
         "require": lambda: mapping({"length": 151.0}).require("mass"),
         "dict": HULL.to_dict(),
         "short dict": mapping({"length": 9.0}).to_dict(),
-        "again": Particulars.from_dict(HULL.completed().to_dict()) == HULL.completed(),
+        "again": Particulars.from_mapping(HULL.completed().to_dict())
+        == HULL.completed(),
         "wrong": [lambda w=w: mapping(w) for w in wrong],
         "shares": {
             name: refused(
@@ -540,13 +534,13 @@ def particulars() -> Answers:
             name: refused(
                 lambda k, name=name, given=given: mapping({"length": 4.0, name: k}),
                 [
-                    k * given[edge]
-                    for edge in ("above", "below")
-                    if edge in given
+                    k * bound
+                    for bound in (given.above, given.below)
+                    if bound is not None
                     for k in (0.95, 1.05)
                 ],
             )
-            for name, given in BOUNDS.items()
+            for name, given in LIMITS.items()
             if name != "length"
         },
         "masses": [
@@ -961,7 +955,7 @@ def simulated() -> Answers:
         "wind": [
             simulate.wind_accelerations(Trial(t, blown)),
             simulate.wind_accelerations(
-                Trial(t, blown), structures.STRUCTURES["nomoto"]
+                Trial(t, blown), structures.get_structure("nomoto")
             ),
         ],
         "wrong": wrong,
@@ -1131,7 +1125,7 @@ def files() -> Answers:
             ).converted_accelerations(samples, HULL),
         ],
         "unknown shaft": lambda: [
-            catalogue.converted_model("tanker", HULL, GEAR).own_table.shaft,
+            catalogue.converted_model("tanker", HULL, GEAR).dynamics.shaft,
             catalogue.converted_model(box, HULL, GEAR).name,
         ],
         "fitted": lambda: catalogue.fitted_box(model("mariner-tls-svm")).ship.name,
@@ -1145,7 +1139,7 @@ def files() -> Answers:
             model_file.numbers_hash(model("norrbin"))
             == json.loads(Path("saved.json").read_text())["sha256"]
         ),
-        "envelope": lambda: model_file.read_envelope(
+        "envelope": lambda: Envelope.from_dict(
             model("mariner-tls-svm").envelope.to_dict(), "here"
         ),
     }
@@ -1213,8 +1207,8 @@ def kernels() -> Answers:
         "none": lambda: replace(box, kernel=None),
         "again": lambda: (
             ShipModel.from_dict(
-                ShipModel("k", "box", HULL, GEAR, values, own_table=box).to_dict()
-            ).own_table.kernel
+                ShipModel("k", "box", HULL, GEAR, values, dynamics=box).to_dict()
+            ).dynamics.kernel
         ),
         "vessel": lambda: len(box.vessel(values, True).state_names),
         "sum": kernel_boxes.sum_accelerations(
@@ -1316,125 +1310,12 @@ def own_equations() -> Answers:
             container.SHIP.command_names,
             container.SHIP.to_dict(),
         ],
-        "named": equations._named("shipgym.ships.kvlcc2") is kvlcc2.SHIP,
         "reduced": [str(one) for one in container.SHIP.__reduce__()[1]],
-        "arms": container.hull(0.1, 0.2, 0.3, 0.4, 1, 2, 3, 4, 5, 6, 7, 8),
-    }
-
-
-def exchanged() -> Answers:
-    """Parameter sets of MSS and shipmmg, frames and datasets."""
-    t = np.array([0.0, 0.5, 1.7])
-    trial = Trial(
-        t,
-        {"u": [6.0, 6.1, 6.2], "r": [0.01, 0.02, 0.0]},
-        name="one",
-        kind="zigzag",
-        derived=["u"],
-        repaired={"u": 2},
-        notes=["told"],
-        length=7.0,
-    )
-    mss, boxed, package = (
-        interchange.to_mss(model("mariner")),
-        interchange.to_mss(model("container")),
-        catalogue.kvlcc2(form="shipmmg"),
-    )
-    mmg_parameters = interchange.to_shipmmg(package, 1019.0)
-    basic = {
-        **mmg_parameters["basic_params"],
-        "I_zG": 1.3 * mmg_parameters["basic_params"]["I_zG"],
-    }
-
-    def ship(one: ShipModel) -> Any:
-        return [
-            one.name,
-            one.structure,
-            one.coefficients,
-            one.particulars,
-            one.steering,
-            one.service_shaft_speed,
-            one.provenance,
-        ]
-
-    def without(given: Mapping[str, Any], *names: str, **more: Any) -> dict[str, Any]:
-        return {
-            name: value for name, value in given.items() if name not in names
-        } | more
-
-    frame, dataset = interchange.to_frame(trial), interchange.to_xarray(trial)
-    return {
-        "mss": mss,
-        "container": boxed,
-        "no mss": lambda: interchange.to_mss(model("tanker")),
-        "from mss": lambda: ship(interchange.from_mss(mss, "back", 1000.0)),
-        "from container": lambda: ship(interchange.from_mss(boxed, "back")),
-        "changed": (
-            lambda: ship(
-                interchange.from_mss({**boxed, "Xvv": -0.005, "delta_max": 12.0})
-            ).__getitem__(2)
-        ),
-        "length": lambda: interchange.from_mss({**boxed, "L": 170.0}),
-        "missing": lambda: interchange.from_mss(without(mss, "Xu")),
-        "unknown": lambda: interchange.from_mss({**mss, "Zw": 1.0}),
-        "text": lambda: interchange.from_mss({**mss, "Xu": "a"}),
-        "no gear": lambda: ship(interchange.from_mss(without(mss, "delta_max")))[4],
-        "shipmmg": mmg_parameters,
-        "nomoto": lambda: interchange.to_shipmmg(model("mariner")),
-        "published": lambda: interchange.to_shipmmg(model("kvlcc2")),
-        "from shipmmg": lambda: ship(
-            interchange.from_shipmmg(
-                {**mmg_parameters, "basic_params": basic},
-                7.7,
-                shaft_speed=1.6,
-                density=1019.0,
-                steering=GEAR,
-                name="back",
-            )
-        ),
-        "usual": lambda: ship(interchange.from_shipmmg(mmg_parameters, 7.7)),
-        "kt": lambda: ship(
-            interchange.from_shipmmg(
-                {"kt_params": {"K": 0.07, "T": 31.0}}, 7.7, length=151.0, steering=GEAR
-            )
-        ),
-        "kt length": lambda: interchange.from_shipmmg(
-            {"kt_params": {"K": 0.07, "T": 31.0}}, 7.7
-        ),
-        "no table": lambda: interchange.from_shipmmg({}, 7.7),
-        "a field": lambda: interchange.from_shipmmg({"kt_params": {"K": 0.07}}, 7.7),
-        "a text": lambda: interchange.from_shipmmg(
-            {"kt_params": {"K": "a", "T": 1.0}}, 7.7
-        ),
-        "frame": [
-            frame.index.to_numpy(),
-            frame.to_numpy(),
-            list(frame.columns),
-            str(frame.index.name),
-            frame.attrs["shipgym"],
+        "hull": [
+            hull(container.State(0.9, 0.1, 0.2, 0.3, 0.4), container.PUBLISHED)
+            for hull in (container.sway_hull, container.roll_hull, container.yaw_hull)
         ],
-        "back": lambda: interchange.from_frame(frame),
-        "other frame": lambda: interchange.from_frame(
-            frame.rename_axis("t").pipe(lambda f: f.__class__({"u": [1.0]}))
-        ),
-        "dataset": [
-            dataset["u"].to_numpy(),
-            dataset["t"].attrs,
-            dataset["r"].attrs,
-            list(dataset["u"].dims),
-            dataset.attrs["shipgym"],
-        ],
-        "from dataset": lambda: interchange.from_xarray(dataset),
-        "other dataset": lambda: interchange.from_xarray(dataset.drop_attrs()),
-        "episode": lambda: interchange.from_frame(without_facts(frame)),
     }
-
-
-def without_facts(frame: Any) -> Any:
-    """A frame that tells of neither a trial nor an episode."""
-    other = frame.copy()
-    other.attrs["shipgym"] = "{}"
-    return other
 
 
 QUESTIONS = Questions(
@@ -1451,6 +1332,5 @@ QUESTIONS = Questions(
         "kernels": kernels,
         "checked": checked,
         "own equations": own_equations,
-        "exchanged": exchanged,
     }
 )

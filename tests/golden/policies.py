@@ -1,7 +1,6 @@
 """Golden sections `policies` and `bridge`: what steers on board, over fixed observations and readings.
 
-`policies` has networks with weights at random in every option, shields, and the policy
-for all ships. `bridge` has autopilots as they stand on a bridge, the helm, routes, and
+`policies` has networks with weights at random in every option. `bridge` has autopilots as they stand on a bridge, the helm, routes, and
 a simulated ship's instruments.
 """
 
@@ -12,22 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from agents import LQ, PID, Shielded
-from agents.agent_file import read_agent
+from agents import LQ, PID
 from agents.controllers.registry import controller_class
-from agents.deployment.autopilot import Autopilot, bounds
-from agents.deployment.c99 import autopilot_source, ship_source
-from agents.deployment.nmea import Reading, readings, sentences
+from agents.deployment.autopilot import Autopilot, observation_bounds
+from agents.deployment.helm import Helm
+from agents.deployment.nmea import NmeaReading, readings, sentences
 from agents.deployment.route import Route
+from agents.deployment.sensors import HelmSensors, Limits
 from agents.deployment.simulated import SimulatedShip
-from agents.deployment.steering import Helm, Limits, Sensors
-from agents.policies.one_for_all import base_for, context
 from agents.policies.policy import LearnedPolicy, order_numbers, toward
-from agents.policies.shield import Limits as ShieldLimits
-from agents.policies.shield import interventions
 from shipgym import load_model
-from shipgym.ships.scaling import scale_model
-from shipgym.tasks.task import Task, path_following_task
+from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER, random_network, random_policy
 from tests.golden.controllers import SHIPS, flattened, series
 from tests.golden.store import Floats, numbers_in, vector
@@ -52,12 +46,11 @@ POLICIES: dict[str, Callable[[], Any]] = {
     ),
     "wheel-over": lambda: path_policy(action_repeat=2, authority=0.6),
 }
-SHIELDS = ("shield", "shield on paths", "shield in lengths")
 
 
 def path_policy(**more: Any) -> LearnedPolicy:
-    """One that adds to wheel-over on paths of version 1."""
-    task = Task.of("PathFollowing-v1")
+    """One that adds to wheel-over on paths."""
+    task = Task.of("PathFollowing")
     shown = task.observed(MARINER)
     base = controller_class("wheel-over").from_model(MARINER, task=task)  # type: ignore[attr-defined]
     return LearnedPolicy(
@@ -65,24 +58,22 @@ def path_policy(**more: Any) -> LearnedPolicy:
         tuple(one.name for one in shown),
         tuple(one.scale for one in shown),
         base=base,
-        env_id="shipgym/PathFollowing-v1",
+        env_id="shipgym/PathFollowing-v0",
         model_name="mariner",
         **more,
     )
 
 
 def cases() -> list[str]:
-    """Learned policies, shields, and the policy for all ships."""
-    return [*POLICIES, *SHIELDS, "functions", "one for all"]
+    """Learned policies."""
+    return [*POLICIES, "functions"]
 
 
 def record(case: str) -> dict[str, Floats]:
     """The values of a case."""
     if case in POLICIES:
         return of_policy(POLICIES[case]())
-    if case in SHIELDS:
-        return of_shield(case)
-    return record_functions() if case == "functions" else record_one_for_all()
+    return record_functions()
 
 
 def of_policy(policy: Any) -> dict[str, Floats]:
@@ -109,119 +100,15 @@ def of_policy(policy: Any) -> dict[str, Floats]:
     }
 
 
-class Swinging:
-    """Swings the rudder whatever it sees, and once gives no number."""
-
-    def predict(
-        self, observation: Any, state: Any = None, *_: Any, **__: Any
-    ) -> tuple[Any, Any]:
-        """Commands of rudder and shaft."""
-        step = 0 if state is None else state
-        rudder = np.full(np.shape(observation)[:-1], np.sin(0.3 * step))
-        if step == 30 and rudder.ndim:
-            rudder[0] = np.nan
-        return np.stack([rudder, 0.9 + 0.0 * rudder], axis=-1), step + 1
-
-
-def of_shield(case: str) -> dict[str, Floats]:
-    """Who steers, when, and what, under limits of one's own; on paths before a turn."""
-    model = load_model("mariner-tls-svm")
-    limits = ShieldLimits(
-        envelope_out=1.3,
-        envelope_back=0.9,
-        out_lengths=0.11,
-        runaway_deg=7.0,
-        back_deg=4.0,
-        calm_lengths=0.23,
-        turn_lengths=5.0,
-    )
-    more: dict[str, Any] = {"limits": limits} if case != "shield" else {}
-    policy: Any = Swinging()
-    if case == "shield on paths":
-        policy = path_policy()
-        more["fallback"] = LQ.from_model(model, dt=1.3)
-    if case == "shield in lengths":
-        more["dt"] = 2.3
-    shield = Shielded.from_model(model, policy, **more)
-    state, actions, watched, who = None, [], [], []
-    for step, seen in enumerate(series(shield.observation_names, 70, 0.3)):
-        action, state = shield.predict(
-            seen, state, np.full(SHIPS, step in (0, 50)) & (np.arange(SHIPS) < 2)
-        )
-        actions.append(action)
-        watched.append(state.watch.sum(axis=0))
-        who.append(interventions(state).steering)
-    met = interventions(state)
-    return {
-        "commands": vector(actions),
-        "watch": vector(watched),
-        "who": vector(who),
-        "count": vector(met.count),
-        "intervals": vector(met.intervals),
-        **numbers_in(shield.limits.__dict__, "limits"),
-        "scales": vector(shield.observation_scales),
-        "dt": vector(shield.dt),
-    }
-
-
 def record_functions() -> dict[str, Floats]:
     """Functions of policies at numbers worth a look."""
     single = np.array([[0.7, -1.3], [0.2, 0.4]], np.float32)
-    policy = random_policy(rate_limit=0.3)
-    broken = np.array(
-        [[0.0, 0.7, np.nan], [2.0, np.nan, 0.1], [1.0, -0.4, 0.9]], np.float32
-    )
-    inputs = series(policy.observation_names, 2)[1].astype(np.float32)
     return {
         "toward": vector(
             toward(single, np.array([[0.1, -0.2], [0.25, -0.9]], np.float32), 0.17)
         ),
         "orders": vector(order_numbers([[-0.93], [0.11], [0.49], [1.0]])),
-        "decided": vector(policy._decided(inputs, broken)),
     }
-
-
-def record_one_for_all() -> dict[str, Floats]:
-    """What it is told of ships and paths, its base by the fleet's rule, and what is made for a ship."""
-    agent, found = read_agent("one-for-all"), {}
-    tasks = {
-        "v1": Task.of("PathFollowing-v1"),
-        "narrow": Task.of("PathFollowing-v1", corridor=0.6, turn_radius=3.3),
-    }
-    rule = {
-        "lookahead": 1.3,
-        "reach": 0.8,
-        "crab_share": 1.7,
-        "rudder_weight": 0.6,
-        "rate_weight": 1.9,
-        "integral": 0.7,
-        "lookahead_power": 0.4,
-        "reach_power": -0.3,
-        "integral_power": 1.1,
-    }
-    for name in ("mariner", "tanker"):
-        model = load_model(name)
-        for where, task in tasks.items():
-            told = context(model, task)
-            base = base_for(model, task, rule).to_dict()
-            found |= {
-                f"{name} {where} told": told,
-                f"{name} {where} inputs": agent.inputs(told),
-            }
-            found |= numbers_in(
-                base, f"{name} {where} base", left_out=("margins", "format")
-            )
-    ship = scale_model(load_model("container-abc-lssvr"), 1.7)
-    made = agent.for_ship(ship, tasks["narrow"])
-    found |= {f"made {name}": values for name, values in of_policy(made).items()}
-    found |= numbers_in(made.training["outside"], "outside") | {
-        "authority": vector(made.authority)
-    }
-    low, high = agent.fleet[:, 2], agent.fleet[:, 3]
-    beyond = agent.outside(
-        low + (high - low) * np.linspace(-0.13, 1.17, len(low)), "ship"
-    )
-    return found | numbers_in(beyond, "beyond") | {"fleet": vector(agent.fleet)}
 
 
 #: Kinds of autopilots on a bridge, and learned ones.
@@ -230,7 +117,6 @@ ABOARD: dict[str, Callable[[], Any]] = {
         kind: lambda kind=kind: controller_class(kind).from_model(MARINER)  # type: ignore[misc]
         for kind in (
             "pid",
-            "pid-filtered",
             "lq",
             "lqg",
             "turn-rate",
@@ -240,10 +126,7 @@ ABOARD: dict[str, Callable[[], Any]] = {
         )
     },
     "wheel-over": lambda: controller_class("wheel-over").from_model(
-        MARINER, task=Task.of("PathFollowing-v1")
-    ),  # type: ignore[attr-defined]
-    "old wheel-over": lambda: controller_class("wheel-over").from_model(
-        MARINER, task=path_following_task()
+        MARINER, task=Task.of("PathFollowing")
     ),  # type: ignore[attr-defined]
     "learned": random_policy,
     "residual": POLICIES["residual"],
@@ -276,8 +159,6 @@ def of_autopilots() -> dict[str, Floats]:
                 "rate_of_turn": 0.004 * (k > 15),
                 "cross_track": 90.0 - 7.0 * k,
                 "course": 0.35 + 0.2 * np.sin(0.3 * k),
-                "turn_distance": 700.0 - 20.0 * k,
-                "turn_angle": 0.7,
                 "next_turn_distance": 500.0 - 20.0 * k,
                 "next_turn_angle": -0.6,
                 "second_turn_distance": 1300.0 - 20.0 * k,
@@ -286,7 +167,9 @@ def of_autopilots() -> dict[str, Floats]:
             orders.append(pilot.step({one: given[one] for one in pilot.inputs}))
         inside = [pilot.dt, pilot.limit, pilot.integral, pilot.last_command]
         found |= {f"{name} orders": vector(orders), f"{name} inside": vector(inside)}
-    return found | {f"bounds {name}": vector(pair) for name, pair in bounds().items()}
+    return found | {
+        f"bounds {name}": vector(pair) for name, pair in observation_bounds().items()
+    }
 
 
 def track(radius: float = 610.0) -> Route:
@@ -324,12 +207,10 @@ def of_helm() -> dict[str, Floats]:
     """Orders of a helm with readings of several instruments; what it makes of silence and disagreement."""
     limits = Limits(
         silence_s=2.2,
-        disagreement_deg=4.0,
-        disagreement_kn=3.0,
+        disagreement=0.8,
         rudder_deg=6.0,
         rudder_rate_deg_s=3.1,
         persistence_s=1.3,
-        position_m=70.0,
         order_deg=21.0,
         off_heading_deg=7.0,
         off_track_m=130.0,
@@ -350,9 +231,9 @@ def of_helm() -> dict[str, Floats]:
             ]
         )
     }
-    sensors = Sensors(limits)
+    sensors = HelmSensors(limits)
     for one in (("course", 0.7), ("speed", 6.1), ("heading", 0.4)):
-        sensors.take(Reading(*one, "GP"), 1.0)
+        sensors.take(NmeaReading(*one, "GP"), 1.0)
     found["over ground"] = vector(
         list(sensors.numbers(["surge", "sway", "heading"], 2.0).values())
     )
@@ -381,7 +262,7 @@ def of_helm() -> dict[str, Floats]:
             }
             for quantity, value in told.items():
                 if not (quantity == "yaw_rate" and k > 33):
-                    helm.sensors.take(Reading(quantity, value, "II"), now)
+                    helm.sensors.take(NmeaReading(quantity, value, "II"), now)
             helm.watch(1.0, now)
             helm.steer(now)
             rows.append(
@@ -400,7 +281,7 @@ def of_helm() -> dict[str, Floats]:
 def of_helm_on_a_route() -> dict[str, Floats]:
     """A ship in a current and wind, steered along a route by what her instruments show."""
     guide = controller_class("wheel-over").from_model(
-        MARINER, task=Task.of("PathFollowing-v1")
+        MARINER, task=Task.of("PathFollowing")
     )  # type: ignore[attr-defined]
     places = np.array([[54.0, 7.5], [54.012, 7.5], [54.02, 7.53], [54.03, 7.53]])
     helm = Helm(
@@ -416,7 +297,7 @@ def of_helm_on_a_route() -> dict[str, Floats]:
     )
     for k in range(420):
         for name, value in ship.measured().items():
-            helm.sensors.take(Reading(name, value, "II"), 1.0 * k)
+            helm.sensors.take(NmeaReading(name, value, "II"), 1.0 * k)
         helm.watch(1.0, 1.0 * k)
         helm.steer(1.0 * k)
         ship.order = helm.order
@@ -429,7 +310,7 @@ def of_helm_on_a_route() -> dict[str, Floats]:
         "track": vector(rows),
         "said": vector(said),
         "seconds": vector(
-            helm._seconds_to_turn(
+            helm.seconds_to_turn(
                 {
                     "next_turn_distance": 900.0,
                     "next_turn_angle": 0.3,
@@ -455,24 +336,8 @@ def of_instruments() -> dict[str, Floats]:
 
 
 def texts(name: str) -> str:
-    """A text of what is exported or sent over NMEA 0183."""
-    kind, _, what = name.partition(" ")
-    if kind == "ship":
-        models = {
-            "deep": ("mariner", np.inf),
-            "shallow": ("tanker", 31.0),
-            "rolling": ("container", np.inf),
-        }
-        source = ship_source(load_model(models[what][0]), f"my-{what}", models[what][1])
-        notes = f"{source.notes} {source.step!r} {source.inputs} {source.outputs}"
-        return f"{source.header}\n{source.source}\n{notes}"
-    if kind == "autopilot":
-        source = autopilot_source(ABOARD[what]())
-        return (
-            f"{source.header}\n{source.source}\n{source.step!r} {source.inputs}"
-            f" {source.outputs}"
-        )
-    return "\n".join(said_by_helm() if what == "helm" else said_by_ship())
+    """Sentences of NMEA 0183 that are sent."""
+    return "\n".join(said_by_helm() if name == "nmea helm" else said_by_ship())
 
 
 def said_by_helm() -> list[str]:
@@ -502,9 +367,9 @@ def said_by_helm() -> list[str]:
                 "course": 0.61,
             }
             for quantity, value in told.items():
-                helm.sensors.take(Reading(quantity, value, "II"), now)
+                helm.sensors.take(NmeaReading(quantity, value, "II"), now)
             if kind == "lq":
-                helm.sensors.take(Reading("heading", 0.8, "GP"), now)
+                helm.sensors.take(NmeaReading("heading", 0.8, "GP"), now)
             helm.watch(1.0, now)
             helm.steer(now)
             said += [helm.status, helm.sentences()]
@@ -536,16 +401,4 @@ def said_by_ship() -> list[str]:
     return said
 
 
-TEXTS = (
-    "ship deep",
-    "ship shallow",
-    "ship rolling",
-    "autopilot pid-filtered",
-    "autopilot lqg",
-    "autopilot wheel-over",
-    "autopilot residual",
-    "autopilot turn-rate",
-    "autopilot ilos",
-    "nmea helm",
-    "nmea ship",
-)
+TEXTS = ("nmea helm", "nmea ship")

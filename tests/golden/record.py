@@ -1,9 +1,8 @@
 """Golden results of the engine: recorded before it is rebuilt, compared after each step of the rebuilding.
 
-    python tests/golden/record.py                   # write
-    tests/golden/results/SECTION.npz python tests/golden/record.py --compare         #
-    compute again; exit code 1 beyond the tolerance python tests/golden/record.py
-    --compare --only environments --only derivatives --worst 20
+    python tests/golden/record.py             # write tests/golden/results/SECTION.npz
+    python tests/golden/record.py --compare   # exit code 1 beyond the tolerance
+    python tests/golden/record.py --compare --only environments --only demo --worst 20
 
 Only public names are used, so that it runs whatever modules are called inside.
 Deviations are differences over the largest number of the same quantity. What each

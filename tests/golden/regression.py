@@ -668,7 +668,7 @@ def record_references() -> dict[str, Any]:
         mariner(),
         structure=box.name,
         coefficients=blank,
-        own_table=box,
+        dynamics=box,
         covariance=None,
     )
     found["bare"] = bare_metrics(model, [one.part(slice(0, 60))])

@@ -13,7 +13,7 @@ from agents.rollouts.course_keeping import sail, step_response
 from agents.rollouts.episodes import recorded
 from agents.rollouts.rollout import episode_costs, rollout
 from agents.suites.reference import best_costs, load_tuned, reference_costs
-from agents.suites.suite import BenchmarkTask, list_suites, load_suite, parse_suite
+from agents.suites.suite import BenchmarkTask, load_suite, parse_suite
 from shipgym import ShipModel, load_model
 from shipgym.tasks.task import Task
 from tests.golden.store import Floats, numbers_in, vector
@@ -27,7 +27,7 @@ environment = "course-keeping"
 model = "mariner"
 options = { noise = 0.7, dt = 1.3 }
 [tasks.b]
-environment = "path-following-v1"
+environment = "path-following"
 model = "mariner-tls-svm"
 ship = "mariner"
 sea = { current = { speed = 0.5, towards_deg = 90.0 } }
@@ -111,7 +111,7 @@ def of_paths() -> dict[str, Floats]:
         "in time": {},
         "late": {"reach_lengths": 0.02, "lookahead_lengths": 6.0},
     }.items():
-        task = BenchmarkTask("path", "path-following-v1", "mariner", options=options)
+        task = BenchmarkTask("path", "path-following", "mariner", options=options)
         guide = WheelOver.from_model(task.ship, task=task.task, **more)
         found |= {
             f"{name} {one}": values for one, values in figures(guide, task).items()
@@ -250,26 +250,21 @@ def of_functions() -> dict[str, Floats]:
 def of_suites() -> dict[str, Floats]:
     """Tasks of the suites: their scales, intervals and weights, the ships behind them, best costs."""
     found: dict[str, Floats] = {}
-    own = parse_suite(SUITE, "mine").tasks
-    first, second = (load_suite(name).tasks for name in list_suites())
-    for task in (*first, *second[:9], *own):
-        ship, asked, _ = task.sailed
+    own, tasks = parse_suite(SUITE, "mine").tasks, load_suite().tasks
+    for task in (*tasks[:9], *own):
+        ship, asked, _ = task.evaluation
         gear = [ship.steering.limit, ship.steering.rate, ship.steering.time_constant]
         scales = [one.scale for one in asked.observed(ship)]
         told = [
             asked.interval(ship),
             asked.episode_steps,
             asked.rudder_weight,
-            len(task.handed_out.name),
+            len(task.design_task.name),
             len(task.env_id),
         ]
         found[f"{task.on} {task.name}"] = vector(
             [*gear, *scales, *told, *task.seeds[[0, -1]]]
         )
-    found |= numbers_in(reference_costs(list_suites()[1]), "reference")
-    found["best"] = (
-        best_costs(first[0], list_suites()[0])[::9]
-        if first[0].name in reference_costs(list_suites()[0])
-        else vector(0)
-    )
-    return found | numbers_in(load_tuned(list_suites()[0])["mariner-calm"], "tuned")
+    found |= numbers_in(reference_costs("shipgym-v1"), "reference")
+    found["best"] = best_costs(tasks[0])[::9]
+    return found | numbers_in(load_tuned("shipgym-v1")["sharp-turns"], "tuned")

@@ -1,8 +1,8 @@
-"""What stands on a bridge orders, shows and sends what was recorded; exported C is the recorded one."""
+"""What stands on a bridge orders, shows and sends what was recorded."""
 
 import pytest
 
-from tests.golden import policies, refusals
+from tests.golden import policies
 from tests.golden.record import beyond_tolerance
 from tests.golden.texts import same_text
 
@@ -15,10 +15,5 @@ def test_what_is_ordered_and_measured_is_golden(case):
 
 @pytest.mark.parametrize("name", policies.TEXTS)
 def test_what_is_exported_and_sent_is_golden(name):
-    """C and sentences of NMEA 0183 are what they were when this was recorded."""
+    """Sentences of NMEA 0183 are what they were when this was recorded."""
     assert same_text(f"bridge/{name.replace(' ', '-')}", policies.texts(name))
-
-
-def test_what_is_refused_is_said_in_the_golden_words():
-    """Numbers beyond a limit are refused, those within it accepted, in the words that were recorded."""
-    assert same_text("refusals/deployment", refusals.text("deployment"))

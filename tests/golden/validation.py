@@ -24,23 +24,27 @@ from identification import (
     sensitivity,
 )
 from identification.design.experiment import standard_candidates
-from identification.design.reduced import zigzag_sensitivity
-from identification.design.reduction import table_of
+from identification.design.sensitivity import table_of, zigzag_sensitivity
 from identification.estimators.estimator import FitTask
 from identification.estimators.methods import METHODS
 from identification.report.comparison import comparison_page
-from identification.simulation_error import formulas, mmg_prior, similarity
-from identification.simulation_error.maximum_a_posteriori import _groups
+from identification.simulation_error import (
+    formulas,
+    hull_formulas,
+    mmg_prior,
+    similarity,
+)
+from identification.simulation_error.posterior import held_out_groups
 from identification.simulation_error.prior import (
     reference_prior,
     virtual_trials,
-    with_prior,
 )
-from identification.simulation_error.segments import (
+from identification.simulation_error.pulled import with_prior
+from identification.simulation_error.segments import cut
+from identification.simulation_error.shooting import (
     about_mean,
     averaged,
     channel_units,
-    cut,
 )
 from identification.uncertainty.bootstrap import (
     bootstrap_covariance,
@@ -52,8 +56,9 @@ from identification.uncertainty.model_error import model_error, scale_of, withou
 from identification.validation import diagnostics, guard, warnings
 from identification.validation.closed_loop import closed_loop
 from identification.validation.folds import held_out_rows, of_largest_rudder, pieces
+from identification.validation.hard_turn import hard_turn_features
 from identification.validation.prediction import predict, trial_metrics
-from identification.validation.ranking import Standing, in_turn
+from identification.validation.ranking import RankedFit, in_turn
 from identification.validation.selection import methods_of, reference_of, select
 from identification.validation.start import with_start
 from shipgym import Particulars, ShipModel, Trial, UnstableModelError
@@ -149,7 +154,7 @@ def record_formulas() -> dict[str, Any]:
         refused(lambda: mmg_prior.mmg_prior("clarke", TANKER)),
         refused(lambda: mmg_prior.mmg_prior("mariner", TANKER)),
         refused(lambda: mmg_prior.mmg_prior("auto", FERRY)),
-        refused(lambda: mmg_prior.formula_coefficients("x", TANKER)),
+        refused(lambda: hull_formulas.formula_coefficients("x", TANKER)),
         refused(
             lambda: similarity.correlations(
                 [1.0, np.nan, np.nan], {"a": [1.0, 2.0, 3.0]}
@@ -208,9 +213,7 @@ def record_guard() -> dict[str, Any]:
     ship, one, two = mariner(), *trials()[:2]
     found: dict[str, Any] = {}
     for structure in ("abkowitz", "cubic", "nomoto2", "mmg4dof", "steering7"):
-        sizes = guard.hard_turn_features(
-            get_structure(structure), ship.particulars, 1.3
-        )
+        sizes = hard_turn_features(get_structure(structure), ship.particulars, 1.3)
         found[structure] = sizes
     linear = fitted("tables", LINEAR).model
     changes: dict[str, dict[str, float]] = {
@@ -230,8 +233,10 @@ def record_guard() -> dict[str, Any]:
         run = clean_zigzag().with_channels(
             {"u": np.linspace(5.0, u, len(clean_zigzag()))}
         )
-        found[f"runs, {name}"] = guard._runs_away(ship, lambda r=run: r, 0.0)
-    found["reversed"] = sampled(guard._reversed(linear, 10.0, 5.0)["psi"])
+        found[f"runs, {name}"] = guard.why_unphysical(
+            ship, guard.Simulation("run", lambda r=run: r)
+        )
+    found["reversed"] = sampled(guard.reversed_rudder(linear, 10.0, 5.0)["psi"])
     derived = Trial(one.t, one.channels, derived=("u", "v", "r"), name="derived")
     no_track = Trial(
         one.t,
@@ -264,8 +269,8 @@ def record_guard() -> dict[str, Any]:
     )
     found["why"] = [
         warnings.why_unstable(gone),
-        warnings._why_lost(linear, False),
-        warnings._why_lost(wild, True),
+        warnings.why_lost(linear, False),
+        warnings.why_lost(wild, True),
     ]
     diverged = {
         name: {**m, "diverged": True} for name, m in gone.metrics["trials"].items()
@@ -315,7 +320,7 @@ def record_diagnostics() -> dict[str, Any]:
             series, np.sin(series), np.arange(-45, 46, 6)
         ),
         "inflation": [diagnostics.variance_inflation(scaled[:, :6]), condition],
-        "pairs": diagnostics._collinear_pairs(scaled[:, :7], [*"abcdefg"]),
+        "pairs": diagnostics.collinear_pairs(scaled[:, :7], [*"abcdefg"]),
         "apart": [
             len(diagnostics.without_overlap(replace(samples, window=w)))
             for w in (1, 2, 3, 8)
@@ -345,7 +350,7 @@ def record_diagnostics() -> dict[str, Any]:
             scale_of([(9.0, 1e-9, 0.1)]),
         ],
         "groups": [
-            _groups([SimpleNamespace(trial=k) for k in which])
+            held_out_groups([SimpleNamespace(trial=k) for k in which])
             for which in ((0, 1, 2, 6, 6), (3,) * 7)
         ],
         "mean": [
@@ -476,7 +481,7 @@ def record_selection() -> dict[str, Any]:
         len(turns[1]),
         *(len(in_turn(identified_none, trials(), n)[1]) for n in (0, 9)),
     ]
-    one = Standing("a", "b", 3, True, 0, 0.3, 1.0, 0.1, {})
+    one = RankedFit("a", "b", 3, True, 0, 0.3, 1.0, 0.1, {})
     ranks = [
         one,
         replace(one, ran_away=1),
@@ -535,11 +540,9 @@ def record_comparison() -> dict[str, Any]:
 def page() -> str:
     """The page of the comparison, one error beyond what its figure shows."""
     ranking = compared()
-    last = ranking.standings[-1]
+    last = ranking.ranked[-1]
     beyond = replace(last, error=2.7, errors=dict.fromkeys(last.errors, 2.7))
-    return comparison_page(
-        replace(ranking, standings=(*ranking.standings[:-1], beyond))
-    )
+    return comparison_page(replace(ranking, ranked=(*ranking.ranked[:-1], beyond)))
 
 
 def record_design() -> dict[str, Any]:

@@ -16,10 +16,9 @@ from unittest.mock import patch
 import numpy as np
 
 from agents import LQ, PID, WheelOver
-from agents.engines.jobs import HERE
-from agents.verification import chain
+from agents.jobs import HERE
+from agents.verification import chain, steered
 from agents.verification import standards as asked
-from agents.verification.chain import verify
 from agents.verification.figures import (
     costs_figure,
     criteria_figure,
@@ -27,17 +26,23 @@ from agents.verification.figures import (
     steps_figure,
     tracks_figure,
 )
-from agents.verification.index_uncertainty import nominal_runs, uncertainty_of
+from agents.verification.index_uncertainty import (
+    SailedDraws,
+    nominal_runs,
+    uncertainty_of,
+)
 from agents.verification.monte_carlo import do_draws, draw_jobs, keeps_course
-from agents.verification.page import headline, verification_view
 from agents.verification.refusal import (
     lost_control,
+    refused_designs,
     rudder_effect,
     simpler_structures,
     why_refused,
 )
 from agents.verification.result import Verification, verification_metrics
 from agents.verification.tracks import Track, keep_track, track_task
+from agents.verification.verify import design_autopilots, verify
+from agents.verification.view import headline, verification_view
 from shipgym import InputError, ShipFile, ShipModel, load_model
 from tests.golden.chains import SHIP_FILE
 from tests.golden.store import Floats, numbers_in, vector
@@ -86,6 +91,11 @@ def verified() -> Verification:
         )
 
 
+def viewed() -> Any:
+    """What the template shows of it."""
+    return verification_view(verified(), float(model().particulars["length"]))
+
+
 @cache
 def track() -> Track:
     """The track under wheel-over that turns a little late."""
@@ -122,7 +132,8 @@ def of_draws() -> dict[str, Floats]:
     )
     (job,) = draw_jobs([PID.from_model(model())], model(), wild, 11)
     part = do_draws(job)
-    told = uncertainty_of(model(), nominal_runs(model()), [part["sailed"]])
+    sailed = SailedDraws(**part["sailed"])
+    told = uncertainty_of(model(), nominal_runs(model()), sailed)
     found = {
         f"episodes {name}": vector(values)
         for name, values in part["episodes"][0].items()
@@ -165,16 +176,18 @@ def of_track() -> dict[str, Floats]:
 def of_heading_control() -> dict[str, Floats]:
     """Values of heading control and of turns at a set rate, under PID that overshoots."""
     pilot = PID.from_model(model(), damping=0.5)
-    with patch.object(asked, "LENGTHS", 17.0):
+    with patch.object(steered, "LENGTHS", 17.0):
         return numbers_in(
-            asked.heading_control(model(), pilot) | asked._rate_of_turn(model())
+            asked.heading_control(model(), pilot) | asked.rate_of_turn(model())
         )
 
 
 def of_seas() -> dict[str, Floats]:
     """Values of heading control in a seaway."""
-    with patch.object(asked, "LENGTHS", 11.0):
-        return numbers_in(asked._sea(model(), LQ.from_model(model())))
+    with patch.object(steered, "LENGTHS", 11.0):
+        return numbers_in(
+            asked.heading_control_in_waves(model(), LQ.from_model(model()))
+        )
 
 
 def of_track_control() -> dict[str, Floats]:
@@ -184,19 +197,17 @@ def of_track_control() -> dict[str, Floats]:
 
 def of_metrics() -> dict[str, Floats]:
     """The metrics of a verification, and what its page is given."""
-    view = verification_view(verified())
+    view = viewed()
+    passed = [row.passed for row in view.criteria]
     shown = {
-        name: view[name]
-        for name in (
-            "unstable",
-            "course_unstable",
-            "met",
-            "missed",
-            "pilots",
-            "cheaper",
-        )
+        "unstable": view.unstable,
+        "course_unstable": view.course_unstable,
+        "met": passed.count(True),
+        "missed": passed.count(False),
+        "pilots": view.pilots,
+        "cheaper": view.cheaper,
     }
-    with patch.object(asked, "LENGTHS", 6.0):
+    with patch.object(steered, "LENGTHS", 6.0):
         rows = asked.standards(model(), LQ.from_model(model()), [])
     limits = {
         row.name: [
@@ -216,7 +227,9 @@ def of_metrics() -> dict[str, Floats]:
 def of_figures() -> dict[str, Floats]:
     """What the figures draw, thinned."""
     one, length = verified(), model().particulars["length"]
-    steps = {pilot.name: pilot.step[1:] for pilot in one.pilots}
+    steps = {
+        pilot.name: (pilot.step.heading, pilot.step.rudder) for pilot in one.pilots
+    }
     drawn = {
         "criteria": criteria_figure(one.manoeuvres.criteria),
         "manoeuvres": manoeuvres_figure(one.manoeuvres, length),
@@ -282,7 +295,7 @@ def of_refusals() -> dict[str, Floats]:
 
 def said() -> str:
     """Verdicts and refusals in words."""
-    view = verification_view(verified())
+    view = viewed()
     ranking = [
         {
             "structure": name,
@@ -305,12 +318,14 @@ def said() -> str:
         *(f"{name}: {why_refused(fit)}" for name, fit in fits().items()),
     ]
     lines += [str(lost_control(np.arange(41) < lost)) for lost in (2, 3)]
-    lines += [str(simpler_structures(ranking, "a")), str(view["gains"])]
-    lines += [
-        f"{name}: {', '.join(view[name])}"
-        for name in ("criteria", "designs", "linear", "learned")
-    ]
-    lines += [f"{name}: {view[name]}" for name in ("best", "certain", "draws", "seed")]
+    gains = [(row.signal, row.unit, row.gains) for row in view.gains]
+    lines += [str(simpler_structures(ranking, "a")), str(gains)]
+    lines.append(f"criteria: {', '.join(row.name for row in view.criteria)}")
+    for name in ("designs", "linear"):
+        lines.append(f"{name}: {', '.join(getattr(view, name))}")
+    lines.append(view.introduction)
+    for name in ("best", "certain", "draws", "seed"):
+        lines.append(f"{name}: {getattr(view, name)}")
     return "\n".join([*lines, *_decided()])
 
 
@@ -332,18 +347,19 @@ def _decided() -> list[str]:
             )
             for one in found.pilots
         ]
-        after, refusal = chain._decided(replace(found, pilots=tuple(worse)), fit)
-        lines += [f"lost {lost}: {refusal}", str(after.refused)]
-    controllers, guides, refused = chain._designed(
+        refusals = refused_designs(replace(found, pilots=tuple(worse)), fit)
+        refused = {**found.refused, **refusals.by_design}
+        lines += [f"lost {lost}: {refusals.of_all}", str(refused)]
+    designed = design_autopilots(
         model(), ["lq", "lq", "turn-rate", "los", "wheel-over"]
     )
-    lines += [
-        f"{[one.kind for one in controllers]} {[one.kind for one in guides]} {refused}"
-    ]
+    guides = designed.guides
+    kinds = [one.kind for one in designed.controllers]
+    lines += [f"{kinds} {[one.kind for one in guides]} {designed.refused}"]
     for call in (
-        lambda: chain._designed(model(), ["los"]),
-        lambda: chain._check_fits(guides[0], model(), "agent 'los'"),
-        lambda: chain._check_fits(
+        lambda: design_autopilots(model(), ["los"]),
+        lambda: chain.check_guest(guides[0], model(), "agent 'los'"),
+        lambda: chain.check_guest(
             PID.from_model(load_model("kvlcc2")), model(), "agent 'pid'"
         ),
     ):

@@ -61,7 +61,7 @@ SMOOTH = shipgym.Weather(
 
 def cases() -> dict[str, Case]:
     """All cases by name."""
-    course, path, path_v0 = "CourseKeeping", "PathFollowing-v1", "PathFollowing"
+    course, path = "CourseKeeping", "PathFollowing"
     return {
         "course": Case(
             course,
@@ -77,16 +77,18 @@ def cases() -> dict[str, Case]:
             },
         ),
         "course single": Case(course, {**COSTS, **COURSES, "dt": 5.5}, single=True),
-        "course roll": Case("CourseKeepingRoll", {**COSTS, **COURSES, "sea": "rough"}),
+        "course roll": Case(
+            "CourseKeepingRoll",
+            {**COSTS, **COURSES, "model": "container", "sea": "rough"},
+        ),
         "path": Case(
             path,
             {**COSTS, **LEGS, **RUDDER, "noise": 0.7, "sea": [GUSTS, SMOOTH]},
             swing=0.1,
         ),
         "path single": Case(path, {**COSTS, **LEGS, **RUDDER}, single=True, swing=0.7),
-        "path v0": Case(path_v0, {**COSTS, **LEGS, "acceptance": 0.8}, swing=0.1),
-        "path v0 discrete": Case(
-            "PathFollowingDiscrete", {**COSTS, **LEGS, "acceptance": 0.8}, swing=0.7
+        "path discrete": Case(
+            "PathFollowingDiscrete", {**COSTS, **LEGS, **RUDDER}, swing=0.7
         ),
     }
 

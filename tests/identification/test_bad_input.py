@@ -37,7 +37,10 @@ def test_a_rudder_that_never_moves_excites_nothing(
     cao_zigzag: Trial, refusal: Callable[..., str]
 ) -> None:
     told = refusal(changed(cao_zigzag, "still", delta=0.0 * cao_zigzag.t))
-    assert "trial 'still': the rudder stays at 0.00 deg throughout" in told
+    assert (
+        "trial 'still': expected a rudder that moves, got one that stays at 0.00"
+        in told
+    )
     assert "such as a zigzag" in told
 
 
@@ -67,7 +70,7 @@ def test_a_motion_that_never_changes_is_named(
         changed(cao_zigzag, "flat", **{channel: 0.0 * cao_zigzag.t}),
         structure=structure,
     )
-    assert f"trial 'flat': channel '{channel}' never changes" in told
+    assert f"got a channel '{channel}' that never changes" in told
     assert "choose a structure without that equation" in told
 
 
@@ -116,7 +119,7 @@ def test_fewer_samples_than_terms(
         name="short",
     )
     told = refusal(few)
-    assert "trial 'short': 12 samples found, in all 11 rows for 15 coefficients" in told
+    assert "the 15 coefficients of an equation, got 12, in all 11 rows" in told
 
 
 @pytest.mark.parametrize("rank", [0, -1, 1.5, np.nan])
@@ -125,7 +128,7 @@ def test_a_truncation_that_keeps_nothing(
 ) -> None:
     assert (
         refusal(cao_zigzag, rank=rank)
-        == f"rank: {rank} found, expected a whole number of at least 1, or None"
+        == f"rank: expected an integer of at least 1 (or None), got {rank}"
     )
 
 
@@ -140,21 +143,21 @@ def test_a_weight_that_is_none(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"window": 1.5}, "window: 1.5 found, expected a whole number of at least 1"),
-        ({"method": "abc-lssvr", "seed": -1}, "seed: -1 found"),
+        ({"window": 1.5}, "window: expected an integer of at least 1"),
+        ({"method": "abc-lssvr", "seed": -1}, "seed: expected"),
         (
             {"method": "abc-lssvr", "optimiser": {"name": "abc", "round": 3}},
             "optimiser: round found",
         ),
         (
             {"method": "abc-lssvr", "optimiser": {"rounds": 3}},
-            "optimiser: None found, expected one of 'abc'",
+            "optimiser: expected one of 'abc'",
         ),
         (
             {"method": "ls", "C": 1.0},
             "settings: C found, which method 'ls' does not know",
         ),
-        ({"prior": "clarke", "prior_strength": np.nan}, "prior_strength: nan found"),
+        ({"prior": "clarke", "prior_strength": np.nan}, "prior_strength: expected"),
         (
             {"method": "rm-svm"},
             (
@@ -168,7 +171,7 @@ def test_a_weight_that_is_none(
         ),
         (
             {"structure": "grey-box", "reference_model": "auto", "prior": "clarke"},
-            "prior: 'clarke' found with",
+            "prior: expected none with",
         ),
     ],
 )
@@ -232,7 +235,7 @@ def test_values_that_are_none(cao_zigzag: Trial) -> None:
     sway[100] = np.nan
     with pytest.raises(
         InputError,
-        match=r"trial 'holes': v: nan found at sample 100, .*repair = \"interp",
+        match=r"trial 'holes': v: expected finite numbers, got nan at sample 100; .*repair = \"interp",
     ):
         changed(cao_zigzag, "holes", v=sway)
 

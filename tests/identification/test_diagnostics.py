@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from identification import LSSVM, IdentificationResult, Samples, identify
-from identification.validation import diagnostics
+from identification.validation.checks import check_trials, is_still
 from identification.validation.diagnostics import (
     autocorrelation,
-    check_trials,
     diagnose,
     variance_inflation,
     without_overlap,
@@ -111,24 +110,6 @@ def test_a_short_zigzag_in_a_long_record_moves(mariner: ShipModel) -> None:
     check_trials([with_rudder(delta)], mariner.table)
 
 
-@pytest.mark.parametrize(
-    ("noise_deg", "limit_deg"),
-    [(0.0, 0.5), (0.08, 0.5), (0.2, 1.2), (0.45, 2.7), (0.6, 3.0)],
-)
-def test_a_rudder_moves_by_half_a_degree_and_six_times_its_noise_but_for_three_degrees(
-    noise_deg: float, limit_deg: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """For three samples at least: two beside each other are outliers."""
-    monkeypatch.setattr(
-        diagnostics.preprocess, "noise_level", lambda t, values: np.radians(noise_deg)
-    )
-    t, plateau = np.arange(100.0), np.zeros(100)
-    for size, samples, still in ((0.98, 3, True), (1.02, 3, False), (9.0, 2, True)):
-        plateau[50:53] = 0.0
-        plateau[50 : 50 + samples] = np.radians(size * limit_deg)
-        assert diagnostics._is_still(t, plateau) == still
-
-
 def test_orders_at_every_sample_are_no_noise(mariner: ShipModel) -> None:
     check_trials(
         [with_rudder(np.random.default_rng(0).choice([-10.0, 10.0], 300))],
@@ -148,23 +129,11 @@ def test_times_that_nearly_coincide_are_refused(
         name="twice.csv",
     )
     message = (
-        r"twice\.csv': samples at 100 and 100\.0000\d+ s are only .* remove the"
-        r" repeated row"
+        r"twice\.csv': expected samples about 1 s apart, got .* remove the repeated"
+        r" row"
     )
     with pytest.raises(InputError, match=message):
         identify([twice], particulars=mariner.particulars)
-
-
-def test_the_shortest_step_is_a_ten_thousandth_of_the_usual_one() -> None:
-    def stepping(shortest: float) -> Trial:
-        t = 2.0 * np.arange(9.0)
-        return Trial(np.append(t, t[-1] + shortest), {"u": np.ones(10)}, name="run")
-
-    diagnostics._check_steps(stepping(2.05e-4))
-    with pytest.raises(
-        InputError, match=r"only 0\.00019 s apart, expected a step near the usual 2 s"
-    ):
-        diagnostics._check_steps(stepping(1.9e-4))
 
 
 def test_each_equation_tells_its_numbers() -> None:
@@ -204,3 +173,31 @@ def test_rows_without_overlap_are_a_window_apart() -> None:
     assert apart(1) == [0, 1, 2, 3, 4, 5, 6]  # steps
     assert apart(4) == [0, 2, 4, 6]  # half windows apart
     assert apart(3) == [0, 3, 6]
+
+
+@pytest.mark.parametrize(
+    ("noise_deg", "limit_deg"), [(0.0, 0.5), (0.08, 0.5), (0.2, 1.2), (0.6, 3.0)]
+)
+def test_a_rudder_moves_by_half_a_degree_and_six_times_its_noise_but_for_three_degrees(
+    noise_deg: float, limit_deg: float
+) -> None:
+    """A plateau of some samples: two beside each other are outliers."""
+    noise = noise_deg * np.random.default_rng(4).standard_normal(400)
+    for size, samples, still in ((0.3, 40, True), (1.6, 40, False), (9.0, 2, True)):
+        plateau = np.zeros(400)
+        plateau[200 : 200 + samples] = size * limit_deg
+        assert is_still(with_rudder(plateau + noise)) == still
+
+
+def test_the_shortest_step_is_a_ten_thousandth_of_the_usual_one(
+    mariner: ShipModel,
+) -> None:
+    def stepping(shortest: float) -> Trial:
+        t = 2.0 * np.arange(9.0)
+        channels = {name: np.ones(10) for name in ("u", "v", "r")}
+        channels["delta"] = np.sin(np.arange(10.0))
+        return Trial(np.append(t, t[-1] + shortest), channels, name="run")
+
+    check_trials([stepping(2.05e-4)], mariner.table)
+    with pytest.raises(InputError, match=r"about 2 s apart, got 0\.00019 s from 16 to"):
+        check_trials([stepping(1.9e-4)], mariner.table)

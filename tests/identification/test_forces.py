@@ -196,7 +196,7 @@ def test_a_table_of_shares_survives_its_file(tmp_path) -> None:  # type: ignore[
 def test_trials_of_the_other_kind_are_refused() -> None:
     free = SHIP.simulate(np.zeros((600, 1)), 0.1)
     with pytest.raises(
-        InputError, match="'pmm18' found, which is identified from captive tests"
+        InputError, match="got 'pmm18', which is identified from captive tests"
     ):
         identify([free], "pmm18", particulars=PARTICULARS)
     with pytest.raises(
@@ -208,11 +208,15 @@ def test_trials_of_the_other_kind_are_refused() -> None:
         match="'abkowitz' found, which is identified from free-running trials",
     ):
         identify_forces(tank_tests(), "abkowitz", PARTICULARS)
-    with pytest.raises(InputError, match="mass of the ship and the added mass"):
+    with pytest.raises(
+        InputError, match="expected a positive inertia, got mass of the ship"
+    ):
         ShipModel(
             "wrong", "pmm18", PARTICULARS, SHIP.steering, TABLE_11 | {"Y_vdot": 1.0}
         ).ship_numbers()
-    with pytest.raises(InputError, match="structure: name: ' ' found"):
+    with pytest.raises(
+        InputError, match="structure: name: expected a non-empty string"
+    ):
         replace(PMM18, name=" ")
 
 

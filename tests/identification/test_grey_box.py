@@ -21,7 +21,7 @@ from identification.estimators.rm_svm import (
 )
 from identification.regression.grey_box import chosen_box
 from identification.regression.samples import Samples
-from identification.report.figures import search_figure
+from identification.report.choice_figures import search_figure
 from identification.search.pattern_search import pattern_search
 from identification.simulation_error.similarity import (
     check_alike,
@@ -281,7 +281,7 @@ def test_a_reference_ship_is_alike_by_a_correlation_of_a_half() -> None:
     check_alike("tanker", 0.51, "leave it")
     with pytest.raises(
         InputError,
-        match=r"a similarity of 0\.49, expected at least 0\.5; leave it, or name",
+        match=r"at least 0\.5, got \'tanker\' with 0\.49 as the best; leave it, or name",
     ):
         check_alike("tanker", 0.49, "leave it")
 
@@ -290,7 +290,7 @@ def test_the_largest_rudder_needs_a_smaller_one(trials: list[Trial]) -> None:
     assert of_largest_rudder(trials, "folds").tolist() == [False, False, True, True]
     with pytest.raises(
         InputError,
-        match=r"folds: 'largest-rudder' found, but all trials to fit \(2\) reach 20",
+        match=r"folds: expected some trials with less rudder .* reach 20 deg",
     ):
         of_largest_rudder(trials[2:], "folds")
 
@@ -342,7 +342,7 @@ def test_the_search_for_the_bands_is_drawn(rm_svm: IdentificationResult) -> None
     for q, search in rm_svm.searches.items():
         assert search.x.tolist() == search.course[-1].tolist() == [chosen[q]["epsilon"]]
         assert list(search.history) == sorted(search.history, reverse=True)
-    figure = search_figure(rm_svm)
+    figure = search_figure(rm_svm.searches)
     assert [note.text for note in figure.layout.annotations][
         1
     ] == "best insensitive band"
@@ -415,7 +415,7 @@ def test_the_exact_reference_leaves_nothing_to_learn(
                 "reference_model": "tanker",
                 "C": -1.0,
             },
-            r"C: -1",
+            r"C: expected .*got -1",
         ),
         (
             {
@@ -424,7 +424,7 @@ def test_the_exact_reference_leaves_nothing_to_learn(
                 "reference_model": "tanker",
                 "objective": "luck",
             },
-            r"objective: 'luck' found",
+            r"objective: expected .*got 'luck'",
         ),
         (
             {
@@ -433,7 +433,7 @@ def test_the_exact_reference_leaves_nothing_to_learn(
                 "reference_model": "tanker",
                 "folds": "luck",
             },
-            r"folds: 'luck' found",
+            r"folds: expected .*got 'luck'",
         ),
     ],
 )
@@ -564,7 +564,8 @@ def test_the_most_similar_ship_is_not_taken_unnamed_where_she_is_not_alike() -> 
     )
     run = Trial(np.arange(3.0), {c: np.ones(3) for c in ("u", "v", "r", "delta")})
     with pytest.raises(
-        InputError, match=r"none is like this ship; .* choose structure \"abkowitz\" or"
+        InputError,
+        match=r"expected a ship like this one, .* choose structure \"abkowitz\" or",
     ):
         chosen_box("auto", ship, [run])
     box, found = chosen_box("kvlcc2", ship, [run.with_channels({"n": np.ones(3)})])
@@ -589,6 +590,6 @@ def test_how_alike_ships_are_does_not_depend_on_the_units_of_what_is_compared() 
     )
     with pytest.raises(
         InputError,
-        match=r"only 2 of block coefficient, .* are known, expected at least 3",
+        match=r"expected at least 3 of block coefficient, .* got 2",
     ):
         correlations([0.8, 6.0, np.nan, np.nan, np.nan], rows)

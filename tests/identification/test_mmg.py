@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
@@ -16,19 +16,20 @@ import pytest
 import shipgym
 from identification import IdentificationResult, identify
 from identification.options import Options
-from identification.simulation_error import maximum_a_posteriori
-from identification.simulation_error.maximum_a_posteriori import (
-    LARGEST,
-    Estimate,
-    _groups,
-    _Problem,
-    checked_mmg,
-)
-from identification.simulation_error.mmg_prior import (
+from identification.simulation_error.hull_formulas import (
     HULL_FORMULAS,
     formula_coefficients,
-    mmg_prior,
-    reference_coefficients,
+)
+from identification.simulation_error.maximum_a_posteriori import (
+    checked_mmg,
+    strongest_as_good,
+)
+from identification.simulation_error.mmg_prior import mmg_prior, reference_coefficients
+from identification.simulation_error.posterior import (
+    LARGEST,
+    Estimate,
+    Posterior,
+    held_out_groups,
 )
 from identification.validation.warnings import model_warnings
 from shipgym import InputError, Particulars, ShipModel, Trial
@@ -91,7 +92,7 @@ def test_kvlcc2_in_the_general_form_has_her_own_accelerations() -> None:
         )
     other_wake = dict(kvlcc2.SHIP.coefficients) | {"PACKAGE_FORM": 1.0}
     with pytest.raises(
-        InputError, match="form 'shipmmg' found, expected the published one"
+        InputError, match="expected the published form, got that of shipmmg"
     ):
         mmg.standard_form(other_wake, 1.179, 11.85)
 
@@ -300,7 +301,7 @@ def test_main_dimensions_outside_the_range_are_said_and_an_unlike_reference_refu
     assert any(r.startswith("L/B 10 is outside") for r in remarks)
     with pytest.raises(
         InputError,
-        match=r"none is like this ship; the best is 'kvlcc2' with a similarity of -",
+        match=r"expected a ship like this one, .* got 'kvlcc2' with -",
     ):
         mmg_prior("auto", slim)
     named = mmg_prior("kvlcc2", slim)
@@ -309,7 +310,7 @@ def test_main_dimensions_outside_the_range_are_said_and_an_unlike_reference_refu
         "reference ship 'kvlcc2' is not like this one: similarity -"
     )
     with pytest.raises(
-        InputError, match="'tanker' found, which is not written in the MMG form"
+        InputError, match=r"expected a ship in the MMG form, .* got 'tanker'"
     ):
         mmg_prior("tanker", L7)
     assert mmg_prior("auto", L7).source == "kvlcc2-l7"
@@ -448,25 +449,25 @@ def test_its_result_is_saved_and_loaded_like_any_other(
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"method": "ls"}, r"method: 'ls' found with structure 'mmg'"),
+        ({"method": "ls"}, r"method: expected none with structure 'mmg', got 'ls'"),
         (
             {"uncertainty": "bootstrap"},
-            r"settings: uncertainty found, which structure 'mmg' does not know",
+            r"settings: expected those of structure 'mmg', got uncertainty",
         ),
-        ({"rank": 3}, r"settings: rank found, which structure 'mmg' does not know"),
+        ({"rank": 3}, r"settings: expected those of structure 'mmg', got rank"),
         (
             {"prior": "kijima", "reference_model": "auto"},
-            r"reference_model: 'auto' found together with prior 'kijima'",
+            r"reference_model: expected it without prior, got 'auto' and prior 'kijima'",
         ),
         (
             {"reference_model": "mariner"},
-            r"'mariner' found, which is not written in the MMG form",
+            r"expected a ship in the MMG form, .* got 'mariner'",
         ),
         (
             {"prior": "clarke"},
-            r"prior: 'clarke' found with structure 'mmg', expected 'yoshimura'",
+            r"prior: expected 'yoshimura', .* got 'clarke'",
         ),
-        ({"prior_strength": 0.0}, r"prior_strength: 0"),
+        ({"prior_strength": 0.0}, r"prior_strength: expected .*got 0"),
     ],
 )
 def test_options_it_does_not_have(options: dict[str, Any], message: str) -> None:
@@ -481,7 +482,8 @@ def test_a_trial_without_shaft_speed_or_with_a_still_rudder_is_refused() -> None
         trial.t, {**trial.channels, "delta": np.zeros(len(trial))}, name="idle"
     )
     with pytest.raises(
-        InputError, match=r"'idle': the rudder stays at 0\.00 deg throughout"
+        InputError,
+        match=r"'idle': expected a rudder that moves, got one that stays at 0\.00",
     ):
         identify([idle], "mmg", particulars=L7)
     without = Trial(
@@ -493,92 +495,8 @@ def test_a_trial_without_shaft_speed_or_with_a_still_rudder_is_refused() -> None
         identify([without], "mmg", particulars=L7)
 
 
-class Constant(_Problem):
-    """Four rows of one channel, two trials, each a ship length long: one number is to be found, by hand."""
-
-    def __init__(self, measured: float) -> None:
-        self.groups = np.array([0, 0, 1, 1])
-        self.segments = [measured, measured, 0.0, 0.0]
-
-    def _weight(self, segment: Any) -> float:
-        return 1.0
-
-    def rows(self, z: Any, which: Any, scales: Any, strength: float) -> tuple[Any, Any]:
-        errors = (z[0] - np.take(self.segments, which)) / scales[0]
-        return (
-            np.append(errors, strength * z),
-            np.append(np.ones(len(which)) / scales[0], strength)[:, None],
-        )
-
-
-def test_standard_errors_grow_by_what_is_held_out_beyond_what_is_expected() -> None:
-    """Of 9, 9 from 0, 0 and the reverse: (9 + 9) / 2^2 / (2 / 2^2 + 2^2) = 1 from the former, 0.
-
-    In scales of 2 their squares are 2 (9 / 2)^2 and 2 (1 / 2)^2, one each but for the
-    variance of the fit, of 1 / (2 / 2^2 + 1) with the prior as it is.
-    """
-    fit = Estimate(np.array([3.0]), np.array([2.0]), 2.0, np.eye(1), 1)
-    error, factor = Constant(9.0).held_out(fit, np.array([1.0]))
-    assert error == pytest.approx(np.sqrt((81.0 + 1.0) / 2.0))
-    assert factor == pytest.approx(np.sqrt((40.5 + 0.5 - 4.0) / (2 * 0.5 / 1.5)))
-    assert Constant(0.1).held_out(fit, np.array([1.0]))[1] == 1.0
-
-
-@pytest.mark.parametrize(
-    ("held_out", "strength"),
-    [((1.0, 1.09, 1.2), 2.0), ((1.0, 1.11, 1.09), 3.0), ((1.0, 1.11, 1.12), 1.0)],
-)
-def test_the_strongest_prior_within_a_tenth_of_the_least_error_is_taken(
-    held_out: tuple[float, ...], strength: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """With the standard errors of its own fit times the factor, in the prior's deviations."""
-
-    class Given(_Problem):
-        def __init__(self, blank: ShipModel, *_: Any) -> None:
-            super().__init__(blank, [], prior)
-
-        def solve(self, start: Any, strength: float) -> Estimate:
-            begun.append(start[0])
-            return Estimate(
-                np.full(41, 0.1 * strength),
-                np.ones(4),
-                strength,
-                strength**2 * np.eye(41),
-                5,
-            )
-
-        def held_out(self, whole: Estimate, scales: Any) -> tuple[float, float]:
-            return held_out[round(whole.strength) - 1], 1.5
-
-    begun: list[float] = []
-    prior = mmg_prior("kvlcc2-l7", L7)
-    monkeypatch.setattr(maximum_a_posteriori, "_Problem", Given)
-    monkeypatch.setattr(maximum_a_posteriori, "cut", lambda *_, **more: [])
-    monkeypatch.setattr(maximum_a_posteriori, "_groups", lambda _: None)
-    problem: Any = SimpleNamespace(blank=ship_of({}), used=())
-    model, report = maximum_a_posteriori.fit_mmg(
-        problem, Options(reference_model="kvlcc2-l7")
-    )
-    assert begun == [0.0, 0.1, 0.2]
-    assert (report["prior_strength"], report["evaluations"], report["segments"]) == (
-        strength,
-        15,
-        0,
-    )
-    assert report["errors_held_out"] == dict(zip("123", held_out, strict=True))
-    k = mmg.IDENTIFIED.index("N_r")
-    assert model.coefficients["N_r"] == pytest.approx(
-        prior.mean["N_r"] + 0.1 * strength * prior.deviation[k]
-    )
-    assert model.covariance is not None
-    errors = dict(
-        zip(model.coefficients, np.sqrt(np.diag(model.covariance)), strict=True)
-    )
-    assert errors["N_r"] == pytest.approx(1.5 * strength * prior.deviation[k])
-
-
 @pytest.fixture(scope="module")
-def exact() -> _Problem:
+def exact() -> Posterior:
     """A zigzag without noise of the ship that the prior takes for the likeliest."""
     prior = mmg_prior("kvlcc2-l7", L7)
     ship = replace(ship_of({}, prior.ship), coefficients=dict(prior.mean))
@@ -588,11 +506,11 @@ def exact() -> _Problem:
         np.column_stack([order, np.full(1000, ship.service_shaft_speed)]), 0.1
     )
     channels = {name: run[name] for name in ("u", "v", "r", "psi", "delta", "n")}
-    return _Problem(ship, [Trial(run.t, channels)], prior)
+    return Posterior(ship, [Trial(run.t, channels)], prior)
 
 
 def test_errors_are_those_of_the_segments_and_their_slopes_are_derivatives(
-    exact: _Problem,
+    exact: Posterior,
 ) -> None:
     """Segments of 1.7 ship lengths, samples 0.067 ship lengths apart at least: here 3 steps."""
     everything, zero = np.arange(len(exact.segments)), np.zeros(len(mmg.IDENTIFIED))
@@ -600,13 +518,13 @@ def test_errors_are_those_of_the_segments_and_their_slopes_are_derivatives(
     assert len(exact.segments) == round(100.0 / (1.7 * travel))
     samples = [s.inputs[s.samples >= 0, 0] for s in exact.segments]
     assert np.concatenate([np.diff(t) for t in samples]) == pytest.approx(0.3)
-    errors, slopes = exact.simulated(zero, everything)
+    errors, slopes = exact.errors(zero, everything)
     assert np.abs(errors).max() < 0.01 * exact.floors.min()
     size = 0.05
     for name in ("N_v", "Y_r", "thrust"):
         k = mmg.IDENTIFIED.index(name)
         ahead, behind = (
-            exact.simulated(zero + h * (np.arange(41) == k), everything)[0]
+            exact.errors(zero + h * (np.arange(41) == k), everything)[0]
             for h in (size, -size)
         )
         scale = np.abs(slopes[:, :, k]).max()
@@ -616,7 +534,7 @@ def test_errors_are_those_of_the_segments_and_their_slopes_are_derivatives(
 
 
 def test_errors_over_one_ship_length_are_one_error_and_no_scale_is_below_its_floor(
-    exact: _Problem,
+    exact: Posterior,
 ) -> None:
     everything, zero = np.arange(len(exact.segments)), np.zeros(len(mmg.IDENTIFIED))
     speed, length = 1.179, 7.0
@@ -625,7 +543,7 @@ def test_errors_over_one_ship_length_are_one_error_and_no_scale_is_below_its_flo
     off = np.array([3.0, 2.0, 0.5, 4.0]) * exact.floors
     shifted, segments = copy(exact), exact.segments
     shifted.segments = [replace(s, measured=s.measured + off) for s in segments]
-    errors, _ = shifted.simulated(zero, everything)
+    errors, _ = shifted.errors(zero + 1e-12, everything)
     weights = [(s.inputs[-1, 0] - s.inputs[0, 0]) * speed / length for s in segments]
     np.testing.assert_allclose(
         np.sum(errors**2, axis=0), off**2 * sum(weights), rtol=1e-2
@@ -634,8 +552,7 @@ def test_errors_over_one_ship_length_are_one_error_and_no_scale_is_below_its_flo
         shifted.scales(errors, everything), np.maximum(off, exact.floors), rtol=1e-2
     )
     z = 0.1 * np.arange(41.0)
-    shifted.kept = {}
-    rows, slopes = shifted.rows(z, everything, 1e-9 * exact.floors, 2.0)
+    rows, slopes = shifted.residuals(z, everything, 1e-9 * exact.floors, 2.0)
     np.testing.assert_array_equal(rows[-41:], 2.0 * z)
     np.testing.assert_array_equal(slopes[-41:], 2.0 * np.eye(41))
     assert np.abs(rows[:-41]).max() == LARGEST
@@ -651,75 +568,7 @@ def test_errors_over_one_ship_length_are_one_error_and_no_scale_is_below_its_flo
 )
 def test_segments_are_held_out_by_trials(trials: list[int], groups: list[int]) -> None:
     segments: Any = [SimpleNamespace(trial=trial) for trial in trials]
-    assert _groups(segments).tolist() == groups
-
-
-class Linear(_Problem):
-    """Measured numbers of one channel, each a ship length of one segment, all to be met by one."""
-
-    def __init__(self, measured: list[float], floor: float = 1e-3) -> None:
-        self.measured, self.floors, self.kept = (
-            np.array(measured),
-            np.array([floor]),
-            {},
-        )
-        self.segments, self.renewed, self.sailed = [None] * len(measured), 0, 0
-
-    def _weight(self, segment: Any) -> float:
-        return 1.0
-
-    def simulated(self, z: Any, which: Any) -> tuple[Any, Any]:
-        self.sailed += 1
-        return (z[0] - self.measured[which])[:, None], np.ones((len(which), 1, 1))
-
-    def scales(self, errors: Any, which: Any) -> Any:
-        self.renewed += 1
-        return super().scales(errors, which)
-
-
-def test_the_most_probable_number_is_that_of_the_data_and_the_prior_by_their_scatter() -> (
-    None
-):
-    """The prior counts by its strength squared, for the uncertainty by one; scales are renewed in between."""
-    problem = Linear([3.0, 5.0, 4.0])
-    found = problem.solve(np.zeros(1), 2.0)
-    s = found.scales[0]
-    assert found.z == pytest.approx([12.0 / s**2 / (3.0 / s**2 + 4.0)], rel=1e-6)
-    assert found.covariance == pytest.approx(np.array([[1.0 / (3.0 / s**2 + 1.0)]]))
-    assert (found.strength, problem.renewed) == (2.0, 3)
-    again = Linear([3.0, 5.0, 4.0])
-    near = again.solve(found.z, 2.0)
-    assert again.renewed == 2  # from an earlier fit
-    assert near.scales == pytest.approx(
-        np.sqrt(np.mean((found.z - [3.0, 5.0, 4.0]) ** 2)), rel=0.05
-    )
-    assert Linear([4.0, 4.0]).solve(np.zeros(1), 0.01).scales == pytest.approx(
-        [1e-3]
-    )  # of the floor
-
-
-def test_what_was_just_simulated_is_not_simulated_again() -> None:
-    problem, both, one = Linear([3.0, 5.0]), np.array([0, 1]), np.array([1])
-    for z, which in ((1.0, both), (1.0, both), (2.0, both), (2.0, one), (2.0, one)):
-        errors, _ = problem.at(np.array([z]), which)
-        assert errors[:, 0].tolist() == (z - problem.measured[which]).tolist()
-    assert problem.sailed == 3
-
-
-def test_ships_that_run_away_have_large_errors_and_no_slopes() -> None:
-    class Lost(Linear):
-        def simulated(self, z: Any, which: Any) -> tuple[Any, Any]:
-            errors = np.array([[np.nan], [np.inf], [-2e9], [6.0]])
-            return errors, np.array([np.inf, -np.inf, np.nan, 4.0])[:, None, None]
-
-    problem = Lost([0.0] * 4, floor=0.01)
-    rows, slopes = problem.rows(np.array([0.5]), np.arange(4), np.array([2.0]), 3.0)
-    assert rows.tolist() == [1e3, 1e3, -1e3, 3.0, 1.5]
-    assert slopes.ravel().tolist() == [0.0, 0.0, 0.0, 2.0, 3.0]
-    errors, _ = problem.simulated(np.zeros(1), np.arange(4))
-    assert problem.scales(errors, np.arange(4)).tolist() == [
-        1.0
-    ]  # a hundred times the floor
+    assert held_out_groups(segments).tolist() == groups
 
 
 def test_the_method_of_the_mmg_form_is_map_whether_it_was_named_or_not() -> None:
@@ -729,3 +578,78 @@ def test_the_method_of_the_mmg_form_is_map_whether_it_was_named_or_not() -> None
     ]
     for prior in ({"prior": "kijima"}, {"reference_model": "auto"}):
         assert checked_mmg(Options(**prior)).method == "map"  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("errors", "chosen"),
+    [([1.0, 1.09, 1.2], 1), ([1.0, 1.11, 1.09], 2), ([1.0, 1.11, 1.12], 0)],
+)
+def test_the_strongest_prior_within_a_tenth_of_the_least_error_is_taken(
+    errors: list[float], chosen: int
+) -> None:
+    assert strongest_as_good(errors) == chosen
+
+
+class Constant(Posterior):
+    """Measured numbers of one channel, each a ship length of one segment, all to be met by one."""
+
+    def __init__(
+        self, measured: list[float], trials: Sequence[int] = (), floor: float = 1e-3
+    ) -> None:
+        self.measured = np.array(measured)
+        self.floors = np.array([floor])
+        trials = trials or range(len(measured))
+        self.segments = [SimpleNamespace(trial=trial) for trial in trials]  # type: ignore[misc]
+
+    def independent_errors(self, segment: Any) -> float:
+        return 1.0
+
+    def errors(self, z: Any, which: Any) -> tuple[Any, Any]:
+        return (z[0] - self.measured[which])[:, None], np.ones((len(which), 1, 1))
+
+
+def test_standard_errors_grow_by_what_is_held_out_beyond_what_is_expected() -> None:
+    """Of 9, 9 from 0, 0 and the reverse: (9 + 9) / 2^2 / (2 / 2^2 + 2^2) = 1 from the former, 0.
+
+    In scales of 2 their squares are 2 (9 / 2)^2 and 2 (1 / 2)^2, one each but for the
+    variance of the fit, of 1 / (2 / 2^2 + 1) with the prior as it is.
+    """
+    fit = Estimate(np.array([3.0]), np.array([2.0]), 2.0, np.eye(1), 1)
+    far = Constant([9.0, 9.0, 0.0, 0.0], [0, 0, 1, 1])
+    error, factor = far.held_out(fit, np.array([1.0]))
+    assert error == pytest.approx(np.sqrt((81.0 + 1.0) / 2.0))
+    assert factor == pytest.approx(np.sqrt((40.5 + 0.5 - 4.0) / (2 * 0.5 / 1.5)))
+    near = Constant([0.1, 0.1, 0.0, 0.0], [0, 0, 1, 1])
+    assert near.held_out(fit, np.array([1.0])).factor == 1.0
+
+
+def test_the_most_probable_number_is_that_of_the_data_and_the_prior_by_their_scatter() -> (
+    None
+):
+    """The prior counts by its strength squared, for the uncertainty by one."""
+    problem = Constant([3.0, 5.0, 4.0])
+    found = problem.most_probable(np.zeros(1), 2.0)
+    s = found.scales[0]
+    assert found.z == pytest.approx([12.0 / s**2 / (3.0 / s**2 + 4.0)], rel=1e-6)
+    assert found.covariance == pytest.approx(np.array([[1.0 / (3.0 / s**2 + 1.0)]]))
+    near = problem.most_probable(found.z, 2.0)
+    rms = np.sqrt(np.mean((found.z - [3.0, 5.0, 4.0]) ** 2))
+    assert near.scales == pytest.approx(rms, rel=0.05)
+    met = Constant([4.0, 4.0]).most_probable(np.zeros(1), 0.01)
+    assert met.scales == pytest.approx([1e-3])  # of the floor
+
+
+def test_ships_that_run_away_have_large_errors_and_no_slopes() -> None:
+    class Lost(Constant):
+        def errors(self, z: Any, which: Any) -> tuple[Any, Any]:
+            errors = np.array([[np.nan], [np.inf], [-2e9], [6.0]])
+            return errors, np.array([np.inf, -np.inf, np.nan, 4.0])[:, None, None]
+
+    problem = Lost([0.0] * 4, floor=0.01)
+    which = np.arange(4)
+    rows, slopes = problem.residuals(np.array([0.5]), which, np.array([2.0]), 3.0)
+    assert rows.tolist() == [1e3, 1e3, -1e3, 3.0, 1.5]
+    assert slopes.ravel().tolist() == [0.0, 0.0, 0.0, 2.0, 3.0]
+    errors, _ = problem.errors(np.zeros(1), which)
+    hundred_floors = [1.0]
+    assert problem.scales(errors, which).tolist() == hundred_floors

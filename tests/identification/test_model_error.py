@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,25 +11,20 @@ from certainty import case
 from identification import IdentificationResult, Samples, identify
 from identification.estimators.methods import METHODS, fit_all, get_method
 from identification.estimators.rm_svm import RMSVM
-from identification.pipeline import _covariance, _left_out
 from identification.regression.grey_box import chosen_box
-from identification.uncertainty import model_error as errors_of
-from identification.uncertainty.bootstrap import influence_covariance
 from identification.uncertainty.model_error import (
     DEFAULT,
+    PredictionError,
+    error_sizes,
+    index_errors,
     model_error,
+    motion_errors,
     scale_of,
     without_trial,
 )
-from identification.validation.closed_loop import Leg, _sail, closed_loop
+from identification.validation.closed_loop import closed_loop, legs
 from identification.validation.prediction import predict
-from identification.validation.warnings import (
-    _not_corrected,
-    _not_refined,
-    _shaft_ignored,
-    _why_lost,
-    held_out_error,
-)
+from identification.validation.warnings import held_out_error
 from shipgym import InputError, ShipModel, Trial, load_model
 from shipgym.manoeuvres import zigzag, zigzag_indices
 from shipgym.ships.simulate import simulate
@@ -65,200 +59,21 @@ def test_leaving_a_trial_out_of_the_normal_equations_is_a_fit_without_it(
     assert len(rest) == 40
 
 
-def test_what_a_trial_moved_a_refinement_by_is_taken_back_as_from_a_mean(
-    mariner: ShipModel,
-) -> None:
-    """Coefficients that are means over trials: without one they are the means over the others, exactly."""
-    own = np.random.default_rng(0).uniform(-1.0, 1.0, (4, len(mariner.coefficients)))
-    inertia, covariance = (
-        np.diag(np.linspace(1.0, 2.0, own.shape[1])),
-        np.eye(own.shape[1]),
-    )
-    mean = own.mean(axis=0)
-    influences = [
-        np.outer([0.25, 0.75], (one - mean) / 4.0 @ inertia) for one in own
-    ]  # of two stretches
-    problem = SimpleNamespace(
-        used=(None,) * 4, blank=SimpleNamespace(acceleration_matrix=inertia)
-    )
-    refined = SimpleNamespace(covariance=covariance, influences=influences)
-    found = _left_out(
-        SimpleNamespace(model=mariner.with_coefficients(mean)),
-        problem,
-        refined,
-        covariance,
-    )
-    for k, model in enumerate(found):
-        expected = np.delete(own, k, axis=0).mean(axis=0)
-        np.testing.assert_allclose(list(model.coefficients.values()), expected)
-        np.testing.assert_allclose(model.covariance, 4.0 / 3.0 * covariance)
-    problem.used = (None,) * 2  # nothing is learned from leaving out one of two
-    assert _left_out(SimpleNamespace(model=mariner), problem, refined, covariance) == []
-
-
-@pytest.mark.parametrize(
-    ("width", "stretches"), [(2.0, 5), (4.0, 2), (7.0, 1), (50.0, 1)]
-)
-def test_a_block_of_a_refinement_is_the_time_to_sail_a_ship_length_but_a_stretch_at_least(
-    width: float, stretches: int
-) -> None:
-    """Ten seconds; influences are on the accelerations, which are twice the coefficients."""
-    influences = [
-        np.cumsum(np.random.default_rng(k).standard_normal((40, 2)), axis=0)
-        for k in range(2)
-    ]
-    blank = SimpleNamespace(travel_time=10.0, acceleration_matrix=2.0 * np.eye(2))
-    refined = SimpleNamespace(
-        covariance=np.diag([4.0, 8.0]), influences=influences, width=width
-    )
-    drawn = _covariance(None, None, blank, refined, "bootstrap")
-    np.testing.assert_allclose(drawn, influence_covariance(influences, stretches) / 4.0)
-    np.testing.assert_allclose(
-        _covariance(None, None, blank, refined, "analytic"), np.diag([1.0, 2.0])
-    )
-
-
 def test_the_factor_is_that_at_which_errors_with_their_noise_are_of_size_one() -> None:
     rng = np.random.default_rng(0)
     variance, noise = rng.uniform(0.5, 2.0, 4000), rng.uniform(0.0, 4.0, 4000)
     errors = rng.standard_normal(4000) * np.sqrt(9.0 * variance + noise)
-    assert scale_of(
-        list(zip(errors**2, variance, noise, strict=True))
-    ) == pytest.approx(3.0, rel=0.05)
-    assert scale_of([(1.05, 1.0, 1.0)]) == pytest.approx(np.sqrt(0.05))
-    assert scale_of([(0.99, 1.0, 1.0)]) == 1e-3  # the noise explains it
-    assert scale_of([(0.95e6, 1.0, 0.0)]) == pytest.approx(1e3 * np.sqrt(0.95))
-    assert scale_of([(1.05e6, 1.0, 0.0)]) == 1e3
+    rows = zip(errors**2, variance, noise, strict=True)
+    found = scale_of([PredictionError(*row) for row in rows])
+    assert found == pytest.approx(3.0, rel=0.05)
 
+    def one(square: float, noise: float) -> float:
+        return scale_of([PredictionError(square, 1.0, noise)])
 
-def test_the_factor_is_the_mean_of_motion_and_indices_never_below_one_and_larger_for_few_trials(
-    noisy_fit: IdentificationResult,
-    noisy_trials: list[Trial],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Student's t with three degrees of freedom is 3.182 where the normal distribution has 1.96."""
-    motion, indices = [(4.0, 1.0, 0.0)], [(16.0, 1.0, 0.0)]
-    monkeypatch.setattr(errors_of, "_motion_errors", lambda *_: motion)
-    monkeypatch.setattr(errors_of, "_index_errors", lambda *_: indices)
-
-    def found() -> dict[str, object]:
-        return model_error(noisy_fit.model, [noisy_fit.model] * 3, noisy_trials[:3])
-
-    few = 3.1824463 / 1.96
-    told = {
-        "how": "trials left out in turn",
-        "trials": 3,
-        "for_few_trials": pytest.approx(few),
-    }
-    both = {"motion": pytest.approx(2.0), "indices": pytest.approx(4.0)}
-    assert found() == {
-        "factor": pytest.approx(few * np.sqrt(10.0)),
-        **told,
-        **both,
-        "fitted": both,
-    }
-    motion, indices = [(0.01, 1.0, 0.0)], []
-    small = {"motion": pytest.approx(0.1)}
-    assert found() == {"factor": 1.0, **told, **small, "fitted": small}
-    seen = iter([*[motion] * 3, [], motion, motion])
-    monkeypatch.setattr(errors_of, "_motion_errors", lambda *_: next(seen))
-    why = "assumed: only 2 of 3 trials can be predicted when they are left out"
-    assert found() == {"factor": 2.5, "how": why, "fitted": small}
-
-
-@pytest.mark.parametrize("count", [1, 3])
-def test_the_factor_is_at_least_what_the_models_errors_on_its_own_trials_ask_for(
-    count: int,
-    noisy_fit: IdentificationResult,
-    noisy_trials: list[Trial],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Errors of size 9 on the trials that were fitted, of 0.1 on those left out; 2.5 is assumed of one."""
-    left_out, size = (
-        replace(noisy_fit.model, name="left out"),
-        {noisy_fit.model.name: 81.0, "left out": 0.01},
-    )
-    monkeypatch.setattr(
-        errors_of, "_motion_errors", lambda own, *_: [(size[own.name], 1.0, 0.0)]
-    )
-    monkeypatch.setattr(errors_of, "_index_errors", lambda *_: [])
-
-    def found() -> dict[str, object]:
-        return model_error(noisy_fit.model, [left_out] * count, noisy_trials[:count])
-
-    told = {"factor": pytest.approx(9.0), "how": "errors on the fitted trials"}
-    assert found() | told == found()
-    assert found()["fitted"] == {"motion": pytest.approx(9.0)}
-    size[noisy_fit.model.name] = 4.0
-    assert found()["factor"] == (2.5 if count == 1 else pytest.approx(2.0))
-    monkeypatch.setattr(errors_of, "_motion_errors", lambda *_: [])
-    assert found()["factor"] == 2.5  # the model runs away on its own trials
-
-
-@pytest.mark.parametrize(("lost", "known"), [(10, True), (11, False)])
-def test_a_trial_says_something_where_half_of_the_models_drawn_can_sail_it(
-    lost: int, known: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Errors of 0.3 against draws that are 0.1 beside; half of squared normal numbers are below 0.455."""
-    t = np.arange(9.0)
-    trial = Trial(t, {"psi": 0.0 * t}, kind="zigzag")
-    monkeypatch.setattr(errors_of, "predict", lambda model, trial: model)
-    own, beside = {"psi": 0.0 * t + 0.3}, {"psi": 0.0 * t + 0.4}
-    drawn = [beside] * (20 - lost) + [None] * lost
-    found = errors_of._motion_errors(own, drawn, trial, trial)
-    assert found == ([pytest.approx((0.09, 0.01 / 0.455, 0.0))] if known else [])
-    assert errors_of._motion_errors(None, drawn, trial, trial) == []
-    assert (
-        errors_of._motion_errors(own, [own] * 20, trial, trial) == []
-    )  # no draw says how certain it is
-    monkeypatch.setattr(errors_of, "index_reader", lambda *_: lambda run: run)
-    monkeypatch.setattr(errors_of, "closed_loop", lambda model, trial: model)
-    monkeypatch.setattr(errors_of, "_reading_noise", lambda *_: 0.07)
-    measured = SimpleNamespace(
-        overshoot_1_deg=7.0, overshoot_2_deg=None, advance_lengths=3.0
-    )
-    model = SimpleNamespace(
-        overshoot_1_deg=9.0, overshoot_2_deg=8.0, advance_lengths=None
-    )
-    other = SimpleNamespace(
-        overshoot_1_deg=10.0, overshoot_2_deg=8.5, advance_lengths=3.0
-    )
-    runs = [other] * (20 - lost) + [None] * lost
-    indices = errors_of._index_errors(model, runs, trial, measured)  # type: ignore[arg-type]
-    assert indices == ([pytest.approx((4.0, 1.0 / 0.455, 0.07))] if known else [])
-
-
-def test_an_index_is_read_to_the_noise_of_its_channel_and_a_part_of_a_step(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A time that is known to a step of 6 s has a standard deviation of 6 s / sqrt(12)."""
-    t, noise = 6.0 * np.arange(9.0), {"psi": 0.02, "x": 40.0}
-    channels = {
-        name: np.full(9, value)
-        for name, value in {"u": 5.0, "r": -0.01, **noise}.items()
-    }
-    channels["u"][3], channels["r"][5] = 8.0, 0.004
-    monkeypatch.setattr(errors_of, "noise_level", lambda t, values: values[0])
-    model = SimpleNamespace(particulars={"length": 100.0})
-
-    def variance(index: str, kind: str, *left_out: str) -> float:
-        kept = {
-            name: values for name, values in channels.items() if name not in left_out
-        }
-        return errors_of._reading_noise(Trial(t, kept, kind=kind), index, model)  # type: ignore[arg-type]
-
-    timing = 36.0 / 12.0
-    overshoot = np.degrees(1.0) ** 2 * (0.02**2 + timing * 0.01**2)
-    assert variance("overshoot_1_deg", "zigzag") == pytest.approx(overshoot)
-    assert variance("initial_turning_lengths", "zigzag") == pytest.approx(
-        timing * 64.0 / 1e4
-    )
-    assert variance("advance_lengths", "turning-circle") == pytest.approx(
-        (1600.0 + timing * 64.0) / 1e4
-    )
-    assert variance("advance_lengths", "turning-circle", "x") == pytest.approx(
-        timing * 64.0 / 1e4
-    )
+    assert one(1.05, 1.0) == pytest.approx(np.sqrt(0.05))
+    assert one(0.99, 1.0) == 1e-3  # the noise explains it
+    assert one(0.95e6, 0.0) == pytest.approx(1e3 * np.sqrt(0.95))
+    assert one(1.05e6, 0.0) == 1e3
 
 
 def test_intervals_hold_the_truth_of_a_ship_of_other_equations() -> None:
@@ -332,58 +147,6 @@ def test_a_ship_that_was_steered_on_the_approach_predicts_her_own_zigzag(
     assert found.overshoot_2_deg == pytest.approx(truth.overshoot_2_deg, abs=0.15)
 
 
-def test_a_leg_ends_where_its_heading_is_reached_within_twice_the_measured_time() -> (
-    None
-):
-    """A ship that turns by 0.1 rad/s whatever is ordered, in steps of a fiftieth of a ship length, 0.2 s."""
-    orders: list[np.ndarray] = []
-
-    def states(first: np.ndarray, n_steps: int) -> np.ndarray:
-        return np.vstack([first, np.empty((n_steps, 3))])
-
-    def run(name: str, states: np.ndarray, commands: np.ndarray, dt: float) -> None:
-        orders.append(commands)
-        t, (psi, rate, _) = dt * np.arange(len(states)), states[0]
-        states[:] = np.column_stack([psi + rate * t, rate + 0.0 * t, t**2])
-
-    ship = SimpleNamespace(
-        name="turning",
-        service_command=np.array([0.0, 9.0]),
-        command_names=("delta", "n"),
-        state_names=("psi", "u", "x"),
-        turns_astern=False,
-        service_shaft_speed=9.0,
-    )
-    passage = SimpleNamespace(model=ship, dt=0.2, states=states, run=run)
-    trial = Trial(np.array([0.0, 50.0, 100.0]), {"n": [1.0, 1.5, 2.0]})
-
-    def sailed(
-        duration: float, target: float | None, rate: float = 0.1
-    ) -> tuple[np.ndarray, np.ndarray]:
-        leg, state = Leg(-0.3, duration, target), np.array([0.0, rate, 0.0])
-        return _sail(passage, trial, state, leg, 50.0)  # type: ignore[arg-type]
-
-    times, states = sailed(1.0, None)
-    np.testing.assert_allclose(times, 50.0 + 0.2 * np.arange(1, 6))
-    np.testing.assert_allclose(states[:, 0], 0.1 * (times - 50.0))
-    np.testing.assert_allclose(
-        orders[-1], np.column_stack([np.full(5, -0.3), 1.5 + 0.002 * np.arange(5)])
-    )
-    assert len(sailed(0.1, None)[0]) == 2  # two steps at least
-    assert len(sailed(2.35, 0.5)[0]) == 0  # not reached in 4.8 s
-    for target, rate in ((0.51, 0.1), (-0.51, -0.1)):
-        times, states = sailed(2.6, target, rate)
-        assert (times[-1], states[-1, 0]) == pytest.approx((55.1, target))
-        assert states[-1, 2] == pytest.approx(
-            (5.0**2 + 5.2**2) / 2.0
-        )  # between the two steps
-        assert len(times) == 26
-    assert sailed(2.6, 0.015)[0] == pytest.approx([50.15])  # within the first step
-    assert len(sailed(2.6, 0.0)[0]) == 0
-    rolling = SimpleNamespace(state_names=("u", "phi"))
-    assert closed_loop(rolling, trial) is None  # type: ignore[arg-type]
-
-
 def test_the_worst_errors_on_trials_held_out_are_said(
     noisy_fit: IdentificationResult,
 ) -> None:
@@ -402,7 +165,7 @@ def test_a_reference_ship_that_is_like_no_ship_at_hand_is_refused() -> None:
     )
     with pytest.raises(
         InputError,
-        match=r"'auto' found, but none is like this ship; .* similarity of 0\.04",
+        match=r"'auto' expected a ship like this one, .* got '\w+' with 0\.04",
     ):
         chosen_box("auto", mmg_ship("seiun-maru").particulars, [still])
 
@@ -414,77 +177,109 @@ def test_a_correction_left_out_has_an_uncertainty_and_is_said() -> None:
     assert np.all(np.diag(bare.inverse_moment_) > 0.0)
 
 
-class Found:
-    """As much of a fit as a warning looks at."""
-
-    def __init__(self, model: ShipModel, **more: object) -> None:
-        self.model, self.coefficients = model, model.coefficients
-        self.__dict__.update(more)
+@pytest.fixture(scope="module")
+def wide(noisy_fit: IdentificationResult) -> ShipModel:
+    """The model with standard errors that are four times too large."""
+    return replace(noisy_fit.model, covariance=16.0 * noisy_fit.model.covariance)
 
 
-def test_the_bare_reference_is_said_with_its_similarity(mariner: ShipModel) -> None:
-    known = {"reference": {"name": "tanker", "similarity": {"tanker": 0.6}}}
-    none = replace(
-        mariner, coefficients=dict.fromkeys(mariner.coefficients, 0.0), provenance=known
-    )
-    assert (
-        "bare reference ship 'tanker', with a similarity of 0.6"
-        in _not_corrected(Found(none))[0]
-    )
-    assert not _not_corrected(Found(replace(none, coefficients=mariner.coefficients)))
-
-
-def test_a_refinement_that_was_given_up_is_said() -> None:
-    said = _not_refined({"refinement": {"decision": "not refined: it runs away"}})
-    assert (
-        "output-error was not refined: it runs away: the model is its start" in said[0]
-    )
-    assert not _not_refined({"refinement": {"decision": "refined"}})
-
-
-def test_shaft_speeds_that_a_structure_ignores_are_said(mariner: ShipModel) -> None:
-    t = np.arange(10.0)
-    channels = {"u": 0.0 * t, "v": 0.0 * t, "n": 1.0 + 0.05 * t}
-    trial = Trial(t, channels, name="acceleration.csv", use="fit")
-    said = _shaft_ignored(Found(mariner, trials=[trial]))[0]
-    assert "the shaft speed varies by" in said
-    assert "acceleration.csv starts from rest" in said
-    assert "such as cubic" in said
-    for knows in (
-        "kvlcc2",
-        "mariner-nomoto",
-    ):  # the shaft, and no surge that it would change
-        assert not _shaft_ignored(Found(load_model(knows), trials=[trial]))
-    unknown = Trial(t, {"u": 0.0 * t, "v": 0.0 * t}, use="fit")
-    held = trial.with_(use="validate")
-    assert not _shaft_ignored(Found(mariner, trials=[unknown, held]))
-    steady = Trial(
-        t,
-        {"u": 0.0 * t + 7.7, "v": 0.0 * t, "n": 0.0 * t + 1.0},
-        name="z.csv",
-        use="fit",
-    )
-    assert not _shaft_ignored(Found(mariner, trials=[steady]))
-
-
-def test_only_a_ship_that_is_unstable_for_sure_is_said_to_be(
-    noisy_fit: IdentificationResult,
+def test_the_factor_is_the_mean_of_motion_and_indices_and_larger_for_few_trials(
+    noisy_fit: IdentificationResult, noisy_trials: list[Trial]
 ) -> None:
-    """Of a stable ship whose model is uncertain nothing is said about her course stability."""
-    assert _why_lost(noisy_fit.model, False).startswith(
-        "likely the model is taken beyond"
+    """Student's t with three degrees of freedom is 3.182 where the normal distribution has 1.96."""
+    model, trials = noisy_fit.model, noisy_trials[:3]
+    sure = replace(model, covariance=1e-2 * model.covariance)
+    sizes = error_sizes([sure] * 3, trials)
+    motion, indices = sizes.by_kind["motion"], sizes.by_kind["indices"]
+    assert sizes.factor == pytest.approx(np.sqrt((motion**2 + indices**2) / 2.0))
+    assert sizes.predicted == 3
+    found = model_error(model, [sure] * 3, trials)
+    few = 3.1824463 / 1.96
+    assert found["for_few_trials"] == pytest.approx(few)
+    assert found["factor"] == pytest.approx(few * sizes.factor)
+    assert (found["how"], found["trials"]) == ("trials left out in turn", 3)
+    assert (found["motion"], found["indices"]) == (motion, indices)
+
+
+def test_the_factor_is_never_below_one_and_at_least_that_of_the_own_trials(
+    noisy_fit: IdentificationResult, noisy_trials: list[Trial], wide: ShipModel
+) -> None:
+    model, trials = noisy_fit.model, noisy_trials[:3]
+    assert model_error(wide, [wide] * 3, trials)["factor"] == 1.0
+    sure = replace(model, covariance=1e-4 * model.covariance)
+    found = model_error(sure, [wide] * 3, trials)
+    assert found["how"] == "errors on the fitted trials"
+    assert found["factor"] == error_sizes([sure] * 3, trials).factor > 1.0
+    alone = model_error(wide, [wide], trials[:1])
+    assert (alone["factor"], alone["how"][:8]) == (DEFAULT, "assumed:")
+
+
+def test_a_model_that_runs_away_on_a_trial_says_nothing_of_it(
+    noisy_fit: IdentificationResult, noisy_trials: list[Trial]
+) -> None:
+    model, trials = noisy_fit.model, noisy_trials[:3]
+    lost = replace(
+        model, coefficients=model.coefficients | {"N_r": -model.coefficients["N_r"]}
     )
-    assert _why_lost(noisy_fit.model, True).startswith(
-        "it was fitted to such, so its structure"
+    assert motion_errors(lost, [model] * 20, trials[0], trials[0]) == []
+    most_lost = [model] * 9 + [lost] * 11
+    assert motion_errors(model, most_lost, trials[0], trials[0]) == []
+    assert motion_errors(model, [model] * 20, trials[0], trials[0]) == []  # no scatter
+    found = model_error(model, [model, model, lost], trials)
+    why = "assumed: only 2 of 3 trials can be predicted when they are left out"
+    assert found["how"] == why
+
+
+def test_an_error_is_that_of_the_model_and_its_variance_that_of_the_draws(
+    mariner: ShipModel,
+) -> None:
+    """Of channels and overshoots without noise, the rudder known at every second."""
+    run = zigzag(mariner, 20, 20, duration=400, dt=1.0)
+    names = ("x", "y", "psi", "u", "v", "r", "delta")
+    trial = Trial(run.t, {name: run[name] for name in names}, kind="zigzag")
+
+    def turned(factor: float) -> ShipModel:
+        c = mariner.coefficients
+        return replace(mariner, coefficients=c | {"N_r": factor * c["N_r"]})
+
+    own, draw = turned(1.05), turned(1.07)
+    psi = motion_errors(own, [draw] * 20, trial, trial)[-1]
+    mine, drawn = predict(own, trial), predict(draw, trial)
+    assert mine is not None
+    assert drawn is not None
+    expected = np.mean((mine["psi"] - trial["psi"]) ** 2)
+    assert psi.square == pytest.approx(expected)
+    assert psi.variance == pytest.approx(
+        np.mean((drawn["psi"] - mine["psi"]) ** 2) / 0.455
     )
-    unstable = {**noisy_fit.coefficients, "N_r": noisy_fit.coefficients["N_r"] * 0.5}
-    sure = replace(
-        noisy_fit.model,
-        coefficients=unstable,
-        covariance=1e-6 * noisy_fit.model.covariance,
-    )
-    assert _why_lost(sure, True).startswith(
-        "a ship that is unstable on a straight course"
-    )
-    unsure = replace(sure, covariance=400.0 * noisy_fit.model.covariance)
-    assert not _why_lost(unsure, True).startswith("a ship that is unstable")
+    assert psi.noise > 0.0  # a corner of the rudder between two samples
+
+    errors = index_errors(own, [draw] * 20, trial, trial)
+    again = zigzag_indices(closed_loop(own, trial), 160.93, 20.0)
+    truth = zigzag_indices(trial, 160.93, 20.0)
+    first_overshoot = (again.overshoot_1_deg - truth.overshoot_1_deg) ** 2
+    assert first_overshoot in [pytest.approx(error.square) for error in errors]
+    # an index is known to a step of 1 s, of a standard deviation of 1 / sqrt(12) s
+    rate = np.degrees(np.abs(trial["r"]).max())
+    assert rate**2 / 12.0 in [pytest.approx(error.noise) for error in errors]
+
+
+def test_legs_have_the_rudder_that_was_held_and_the_heading_of_its_reversal(
+    mariner: ShipModel,
+) -> None:
+    run = zigzag(mariner, 20, 10, duration=400, dt=1.0)
+    names = ("psi", "u", "v", "r", "delta")
+    found = legs(Trial(run.t, {name: run[name] for name in names}, kind="zigzag"))
+    orders = [np.degrees(leg.order) for leg in found if leg.target is not None]
+    targets = [np.degrees(leg.target) for leg in found if leg.target is not None]
+    assert np.abs(orders) == pytest.approx(20.0, abs=0.01)
+    assert targets == pytest.approx(10.0 * np.sign(orders), abs=0.3)
+    assert found[-1].target is None
+    assert sum(leg.duration for leg in found) == pytest.approx(400.0)
+
+
+def test_a_ship_whose_roll_is_not_recorded_sails_no_zigzag_in_closed_loop(
+    mariner: ShipModel,
+) -> None:
+    run = zigzag(mariner, 10, 10, duration=300, dt=1.0)
+    assert closed_loop(load_model("container"), run) is None

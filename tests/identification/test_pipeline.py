@@ -292,7 +292,8 @@ def test_fewer_samples_than_coefficients_are_refused(
         name="short.csv",
     )
     with pytest.raises(
-        InputError, match=r"short\.csv.*14 samples.*13 rows for 15.*add trials"
+        InputError,
+        match=r"short\.csv.*the 15 coefficients.* got 14, in all 13 rows; add",
     ):
         identify([short], particulars=mariner.particulars)
 
@@ -317,13 +318,13 @@ def test_missing_channel_is_named_with_the_remedy(
         ({"structure": "abkowits"}, "abkowitz"),
         (
             {"method": "svm"},
-            r"method: 'svm' found, expected one of .*'tls-svm'.*Did you mean",
+            r"method: expected one of .*'tls-svm'.*Did you mean",
         ),
         ({"samples": "cubic"}, "samples: 'cubic'"),
         ({"tank": 4}, "tank"),
         (
             {"hold_out": ["turn"]},
-            "hold_out: 'turn' found, expected one of 'zigzag_15_15'",
+            "hold_out: expected one of 'zigzag_15_15'",
         ),
         (
             {"reference_model": "kvlcc2"},
@@ -386,9 +387,7 @@ def test_service_speeds_that_are_not_given_are_the_median_of_those_at_the_start(
         match=r"'rest': starts with a shaft speed of 0 1/s, .* give service_shaft",
     ):
         _shaft_speed(None, rest, surge)
-    with pytest.raises(
-        InputError, match="service_shaft_speed: 0 found, expected a number > 0"
-    ):
+    with pytest.raises(InputError, match="service_shaft_speed: expected a number > 0"):
         _shaft_speed(0.0, trials, surge)
 
 
@@ -415,7 +414,7 @@ def test_a_trial_of_heading_and_rudder_alone_is_one_at_service_speed_for_a_form_
 def test_no_trial_to_fit_and_two_of_one_name_are_refused(
     cao_zigzag: Trial, mariner: ShipModel
 ) -> None:
-    with pytest.raises(InputError, match='none is marked use = "fit"'):
+    with pytest.raises(InputError, match='at least one that is marked use = "fit"'):
         identify([cao_zigzag.with_(use="validate")], particulars=mariner.particulars)
     with pytest.raises(InputError, match="two of them named 'zigzag_15_15'"):
         identify([cao_zigzag, cao_zigzag], particulars=mariner.particulars)

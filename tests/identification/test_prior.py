@@ -13,17 +13,23 @@ import shipgym
 from identification import IdentificationResult, identify
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.regression.samples import build_samples
-from identification.simulation_error import prior
 from identification.simulation_error.formulas import (
     clarke_derivatives,
     formula_coefficients,
     kijima_derivatives,
 )
 from identification.simulation_error.prior import (
-    Pulled,
+    Prior,
     reference_prior,
+    reference_turns,
     virtual_trials,
 )
+from identification.simulation_error.pulled import (
+    pulled_estimator,
+    relative_error,
+    strongest_as_good,
+)
+from identification.validation.folds import sample_folds
 from shipgym import Particulars, ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
@@ -238,87 +244,6 @@ def test_the_strength_may_be_judged_by_the_largest_rudder(target: ShipModel) -> 
     assert provenance["prior_scores"]["inf"] == pytest.approx(np.mean(errors), rel=1e-3)
 
 
-class Errors(Pulled):
-    """Estimators are their strengths, and the errors of each on four stretches are given."""
-
-    def at(self, strength: float, samples: Any = None) -> Any:
-        return strength
-
-
-def pulled(
-    monkeypatch: pytest.MonkeyPatch,
-    table: dict[float, list[float]],
-    steady_from: float = 0.0,
-) -> Any:
-    monkeypatch.setattr(prior, "STRENGTHS", tuple(table))
-    monkeypatch.setattr(
-        prior, "_folds", lambda *_: [(None, k) for k in range(len(table[0.0]))]
-    )
-    monkeypatch.setattr(prior, "_error", lambda strength, held: table[strength][held])
-    monkeypatch.setattr(prior, "with_coefficients", lambda _, strength: strength)
-    monkeypatch.setattr(
-        prior, "reasons_unstable", lambda strength, _: strength < steady_from
-    )
-    given: Any = SimpleNamespace(blank=None, trials=(), name="hers")
-    return Errors(given, given, given, given)
-
-
-def test_the_strongest_pull_within_a_standard_error_of_the_best_is_chosen(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Worse by 0.10 and 0.12 on average, where the standard error of both is 0.2 / root(4 - 1) = 0.115."""
-    table = {
-        0.0: [2.0] * 4,
-        1.0: [1.0] * 4,
-        3.0: [1.3, 0.9, 1.3, 0.9],
-        np.inf: [1.32, 0.92, 1.32, 0.92],
-    }
-    best, scores = pulled(monkeypatch, table).chosen_strength()
-    assert best == 3.0
-    assert scores == pytest.approx({"0": 2.0, "1": 1.0, "3": 1.1, "inf": 1.12})
-    one = {0.0: [1.0], 1.0: [1.0], 2.0: [1.1]}
-    assert pulled(monkeypatch, one).chosen_strength()[0] == 1.0
-
-
-@pytest.mark.parametrize(("steady_from", "found"), [(0.0, 1.0), (3.0, 3.0), (9.0, 1.0)])
-def test_a_strength_is_raised_until_the_ship_does_not_run_away_if_that_helps(
-    steady_from: float, found: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    table = {
-        0.0: [2.0] * 4,
-        1.0: [1.0] * 4,
-        2.0: [2.0] * 4,
-        3.0: [2.0] * 4,
-        4.0: [2.0] * 4,
-    }
-    assert pulled(monkeypatch, table, steady_from).steady_strength(1.0) == found
-
-
-class Rows(list[int]):
-    """Samples that say of which trial they are."""
-
-    @property
-    def trial(self) -> Floats:
-        return np.array(self)
-
-    def select(self, which: Floats) -> list[int]:
-        return np.flatnonzero(which).tolist()
-
-
-def test_held_out_are_trials_or_fifths_of_a_single_one() -> None:
-    task: Any = SimpleNamespace(samples=Rows([0, 0, 2, 1]))
-    found = [(list(fit), list(held)) for fit, held in prior._folds(task, "trials")]
-    assert found == [([2, 3], [0, 1]), ([0, 1, 2], [3]), ([0, 1, 3], [2])]
-    task = SimpleNamespace(samples=Rows([3] * 7))
-    assert [held for _, held in prior._folds(task, "trials")] == [
-        [0, 1],
-        [2],
-        [3, 4],
-        [5],
-        [6],
-    ]
-
-
 def test_a_pull_is_that_of_generalised_ridge_regression() -> None:
     """(X'X + S) w = X'y + S w0 with S = strength^2 n duration^2 R'R (Hoerl & Kennard 1970)."""
     random = np.random.default_rng(0)
@@ -328,15 +253,13 @@ def test_a_pull_is_that_of_generalised_ridge_regression() -> None:
         np.array([[2.0, 0.5], [0.0, 1.0]]),
     )
     centre = np.array([0.7, -0.4])
-    pull = prior.Prior(
-        "hers", {"r": centre}, {"r": root}, {"r": np.ones(2, dtype=bool)}
-    )
+    pull = Prior("hers", {"r": centre}, {"r": root}, {"r": np.ones(2, dtype=bool)})
     samples: Any = SimpleNamespace(
         features={"r": X}, targets={"r": y}, duration=np.full(30, 0.5)
     )
     S = 0.3**2 * 30 * 0.5**2 * root.T @ root
     full = TruncatedLSSVM(selection="full", fit_intercept=False)
-    found = prior._toward(full, samples, "r", pull, 0.3)
+    found = pulled_estimator(full, samples, "r", pull, 0.3)
     np.testing.assert_allclose(
         found.coef_, np.linalg.solve(X.T @ X + S, X.T @ y + S @ centre), rtol=1e-9
     )
@@ -344,8 +267,8 @@ def test_a_pull_is_that_of_generalised_ridge_regression() -> None:
     both: Any = SimpleNamespace(
         features={"r": X, "v": X}, targets={"r": y, "v": X @ found.coef_}
     )
-    assert prior._error({"r": found}, samples) == pytest.approx(left)
-    assert prior._error({"r": found, "v": found}, both) == pytest.approx(0.5 * left)
+    assert relative_error({"r": found}, samples) == pytest.approx(left)
+    assert relative_error({"r": found, "v": found}, both) == pytest.approx(0.5 * left)
 
 
 def test_virtual_trials_are_of_both_sides_and_twenty_ship_lengths(
@@ -383,27 +306,33 @@ def test_auto_takes_the_ship_most_alike(
     [
         (
             {"structure": "cubic", "prior": "clarke"},
-            r"prior: 'clarke' found with structure 'cubic'",
+            r"prior: expected a structure with the terms v, r and delta",
         ),
         (
             {"structure": "nomoto", "prior": "kijima"},
-            r"prior: 'kijima' found with structure 'nomoto'",
+            r"formula 'kijima' gives coefficients, got 'nomoto'",
         ),
         (
             {"structure": "grey-box", "reference_model": "tanker", "prior": "kvlcc2"},
-            r"prior: 'kvlcc2' found with structure 'grey-box'",
+            r"prior: expected none with structure 'grey-box'",
         ),
         ({"prior": "titanic"}, r"titanic"),
-        ({"prior": "tanker", "prior_strength": -1.0}, r"prior_strength: -1"),
+        (
+            {"prior": "tanker", "prior_strength": -1.0},
+            r"prior_strength: expected .*got -1",
+        ),
         ({"prior_strength": 1.0}, r"prior_strength: 1.0 found without a prior"),
         (
             {"prior_folds": "largest-rudder"},
             r"prior_folds: 'largest-rudder' found without a prior",
         ),
-        ({"prior": "tanker", "prior_folds": "luck"}, r"prior_folds: 'luck' found"),
+        (
+            {"prior": "tanker", "prior_folds": "luck"},
+            r"prior_folds: expected .*got 'luck'",
+        ),
         (
             {"prior": "tanker", "prior_folds": "largest-rudder"},
-            r"all trials to fit \(2\) reach 20",
+            r"prior_folds: expected some .* got 2 trials that all reach 20",
         ),
     ],
 )
@@ -452,64 +381,18 @@ def test_formulas_are_those_printed() -> None:
     assert kijima_derivatives(ship) == pytest.approx(kijima | rudder)
 
 
-@pytest.mark.parametrize(("steady", "told"), [(1.0, None), (3.0, 1.0), (np.inf, 1.0)])
-def test_a_strength_that_had_to_be_raised_is_told(
-    steady: float, told: float | None
-) -> None:
-    """Infinity, which JSON does not know, as none."""
-
-    class Chosen(Errors):
-        def at(self, strength: float, samples: Any = None) -> Any:
-            return {
-                "r": SimpleNamespace(strength=strength),
-                "v": SimpleNamespace(strength=strength),
-            }
-
-        def chosen_strength(
-            self, folds: str = "trials"
-        ) -> tuple[float, dict[str, float]]:
-            return 1.0, {folds: 0.5}
-
-        def steady_strength(self, least: float) -> float:
-            return steady
-
-    given: Any = SimpleNamespace(name="hers")
-    found = Chosen(given, given, given, given).fitted(None, "by luck")
-    expected = {"prior_source": "hers", "prior_scores": {"by luck": 0.5}}
-    expected |= {"prior_strength": None if np.isinf(steady) else steady}
-    expected |= {} if told is None else {"prior_raised_from": told}
-    for one in found.values():
-        assert (one.strength, one.prior_) == (steady, expected)  # type: ignore[attr-defined]
-    fixed = Chosen(given, given, given, given).fitted(2.0, "by luck")
-    assert fixed["r"].prior_ == {"prior_source": "hers", "prior_strength": 2.0}  # type: ignore[attr-defined]
-
-
-def test_turns_of_a_reference_ship_are_every_second_sample_of_her_virtual_ones(
-    target: ShipModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    runs = [
-        Trial(np.arange(5.0), {"u": np.full(5, float(k))}, name=f"virtual-{k}")
-        for k in range(7)
-    ]
-    monkeypatch.setattr(prior, "_at_target", lambda *_: target)
-    monkeypatch.setattr(prior, "virtual_trials", lambda _: runs)
-    turns = prior.reference_turns("tanker", target)
-    assert [turn["u"][0] for turn in turns] == [3.0, 4.0, 5.0, 6.0]
-    assert [turn.t.tolist() for turn in turns] == [[0.0, 2.0, 4.0]] * 4
-
-
 def test_the_prior_itself_leaves_only_what_it_does_not_know_to_the_data() -> None:
     """Known: 2 of the first term. The second is fitted to what it leaves, and alone is uncertain."""
     X = np.array([[1.0, 1.0], [2.0, 0.0], [0.0, 1.0], [1.0, -1.0]])
     y = X @ [2.0, 3.0] + [0.1, 9.0, -0.1, 0.0]
-    pull = prior.Prior(
+    pull = Prior(
         "hers", {"r": np.array([2.0, 0.0])}, {}, {"r": np.array([True, False])}
     )
     samples: Any = SimpleNamespace(
         features={"r": X}, targets={"r": y}, duration=np.ones(4)
     )
     full = TruncatedLSSVM(selection="full", fit_intercept=False)
-    found = prior._toward(full, samples, "r", pull, np.inf)
+    found = pulled_estimator(full, samples, "r", pull, np.inf)
     assert found.coef_ == pytest.approx([2.0, 3.0])
     np.testing.assert_allclose(found.inverse_moment_, [[0.0, 0.0], [0.0, 1.0 / 3.0]])
     np.testing.assert_allclose(
@@ -517,6 +400,36 @@ def test_the_prior_itself_leaves_only_what_it_does_not_know_to_the_data() -> Non
     )
     assert found.predict(X) == pytest.approx(X @ [2.0, 3.0])
     known = replace(pull, known={"r": np.ones(2, dtype=bool)})
-    held = prior._toward(full, samples, "r", known, np.inf)
+    held = pulled_estimator(full, samples, "r", known, np.inf)
     assert held.coef_ == pytest.approx([2.0, 0.0])
     assert not held.covariance_.any()
+
+
+def test_the_strongest_pull_within_a_standard_error_of_the_best_is_chosen() -> None:
+    """Worse by 0.10 and 0.12 on average, where the standard error of both is 0.2 / root(4 - 1) = 0.115."""
+    errors = [[2.0] * 4, [1.0] * 4, [1.3, 0.9, 1.3, 0.9], [1.32, 0.92, 1.32, 0.92]]
+    assert strongest_as_good(np.array(errors)) == 2
+    assert strongest_as_good(np.array([[1.0], [1.0], [1.1]])) == 1
+
+
+def test_held_out_are_trials_or_fifths_of_a_single_one(
+    target: ShipModel, short_trials: list[Trial]
+) -> None:
+    table = get_structure("steering7")
+    samples = build_samples(short_trials, table, target.particulars)
+    folds = sample_folds(short_trials, samples, "trials")
+    assert [set(fold.held.trial) for fold in folds] == [{0}, {1}]
+    assert [set(fold.fit.trial) for fold in folds] == [{1}, {0}]
+    single = build_samples(short_trials[:1], table, target.particulars)
+    fifths = sample_folds(short_trials[:1], single, "trials")
+    sizes = [len(fold.held) for fold in fifths]
+    assert (len(sizes), sum(sizes)) == (5, len(single))
+    assert max(sizes) - min(sizes) <= 1
+
+
+def test_turns_of_a_reference_ship_have_half_of_the_samples(target: ShipModel) -> None:
+    turns = reference_turns("tanker", target)
+    angles = [float(np.degrees(turn["delta"][-1])) for turn in turns]
+    assert angles == pytest.approx([35.0, -35.0, 15.0, -15.0], abs=0.01)
+    for turn in turns:
+        np.testing.assert_allclose(turn.t, 0.1 * target.travel_time * np.arange(201))

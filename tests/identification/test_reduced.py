@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from identification import ReducedIdentification, identify_reduced
-from identification.design.reduced import zigzag_sensitivity
+from identification.design.sensitivity import zigzag_sensitivity
 from shipgym import InputError, ShipModel, Trial
 from shipgym.ships import get_structure
 
@@ -42,7 +42,7 @@ def test_the_model_carries_its_table(
 ) -> None:
     found.reduced.model.save(tmp_path / "model.json")
     loaded = ShipModel.load(tmp_path / "model.json")
-    assert loaded.own_table == found.structure == get_structure(found.structure.name)
+    assert loaded.dynamics == found.structure == get_structure(found.structure.name)
     effects = zigzag_sensitivity(loaded)
     assert effects == found.to_dict()["sensitivity"]
     assert next(iter(effects)) in loaded.coefficients
@@ -56,7 +56,7 @@ def test_a_grey_box_is_refused(noisy_trials: list[Trial], mariner: ShipModel) ->
     }
     with pytest.raises(
         InputError,
-        match="structure: 'grey-box' found, whose table adds to a reference ship",
+        match="got 'grey-box', whose table adds to a reference ship",
     ):
         identify_reduced(noisy_trials, **options)
 
@@ -67,6 +67,6 @@ def test_a_structure_with_a_memory_of_yaw_is_refused(
     options = {"particulars": mariner.particulars, "structure": "nomoto2"}
     with pytest.raises(
         InputError,
-        match="structure: 'nomoto2' found, whose memory of yaw has no regression",
+        match="got 'nomoto2', whose memory of yaw has no regression",
     ):
         identify_reduced(noisy_trials, **options)

@@ -8,26 +8,32 @@ from typing import Any
 import numpy as np
 import pytest
 
-import identification.simulation_error.refine as refinement
 from identification import IdentificationResult, build_samples, identify
 from identification.estimators.estimator import FitTask
 from identification.estimators.methods import get_method
-from identification.simulation_error.refine import Refinement, refine, split_settings
+from identification.simulation_error.output_error import OutputError, in_bins
+from identification.simulation_error.refine import (
+    Refinement,
+    refine,
+    split_settings,
+    term_sizes,
+)
 from identification.simulation_error.segments import (
+    compared_channels,
+    cut,
+    segment_edges,
+    smoothed_states,
+)
+from identification.simulation_error.shooting import (
     Shooter,
-    _edges,
-    _states,
-    _without_start,
     about_mean,
     averaged,
     channel_units,
-    compared_channels,
-    cut,
+    without_start,
 )
-from identification.validation.guard import GuardedFit, guarded_fit
+from identification.validation.guard import guarded_fit
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
-from shipgym.ships import get_structure
 from shipgym.ships.simulate import LONGEST_STEP
 
 
@@ -98,18 +104,21 @@ def test_segments_cover_a_trial_and_the_second_set_begins_half_a_segment_later(
 def test_edges_divide_a_trial_alike() -> None:
     """As many as come nearest to the duration; the second set begins half of it later."""
     t = np.arange(100.0)
-    assert _edges(t, 33.0, 0.0).tolist() == [0, 33, 66, 99]
-    assert _edges(t, 38.0, 0.0).tolist() == [0, 33, 66, 99]  # 2.6 of them
-    assert _edges(t, 33.0, 0.5).tolist() == [
+    assert segment_edges(t, 33.0, 0.0).tolist() == [0, 33, 66, 99]
+    assert segment_edges(t, 38.0, 0.0).tolist() == [0, 33, 66, 99]  # 2.6 of them
+    assert segment_edges(t, 33.0, 0.5).tolist() == [
         17,
         58,
         99,
     ]  # 2.5 of them: the last are longer
-    assert _edges(t, 500.0, 0.0).tolist() == [0, 99]
-    assert _edges(t, 500.0, 0.5).tolist() == []
-    assert _edges(t, 4.0, 0.0).tolist() == [0, 99]  # none of fewer than five samples
-    assert _edges(t, 99.0 / 19.0, 0.0).tolist()[:3] == [0, 6, 11]
-    assert _edges(t[:5], 2.0, 0.0).tolist() == [0, 4]
+    assert segment_edges(t, 500.0, 0.0).tolist() == [0, 99]
+    assert segment_edges(t, 500.0, 0.5).tolist() == []
+    assert segment_edges(t, 4.0, 0.0).tolist() == [
+        0,
+        99,
+    ]  # none of fewer than five samples
+    assert segment_edges(t, 99.0 / 19.0, 0.0).tolist()[:3] == [0, 6, 11]
+    assert segment_edges(t[:5], 2.0, 0.0).tolist() == [0, 4]
 
 
 def test_blocks_are_averaged_and_offsets_compared_with_their_mean() -> None:
@@ -124,16 +133,16 @@ def test_what_a_start_may_explain_is_projected_out() -> None:
     """The rest is that of least squares over the start, and the move its solution."""
     rng = np.random.default_rng(0)
     value, slope = rng.standard_normal(12), rng.standard_normal((12, 5))
-    rest, slopes, move = _without_start(value, slope, 2)
+    rest, slopes, move = without_start(value, slope, 2)
     best = -np.linalg.lstsq(slope[:, 3:], value)[0]
     np.testing.assert_allclose(move, best, atol=1e-12)
     np.testing.assert_allclose(rest, value + slope[:, 3:] @ best, atol=1e-12)
     np.testing.assert_allclose(slope[:, 3:].T @ slopes, np.zeros((2, 3)), atol=1e-12)
     value[3] = np.nan  # a ship that ran away
-    rest, slopes, move = _without_start(value, slope, 2)
+    rest, slopes, move = without_start(value, slope, 2)
     np.testing.assert_array_equal(rest, value)
     np.testing.assert_array_equal(move, [0.0, 0.0])
-    assert _without_start(value, slope, 0)[1].shape == (12, 5)
+    assert without_start(value, slope, 0)[1].shape == (12, 5)
 
 
 def test_jacobian_is_that_of_central_differences(
@@ -335,7 +344,7 @@ def test_extra_trials_need_the_channels_of_the_structure(
         cao_zigzag.t, {c: cao_zigzag[c] for c in ("u", "r", "delta")}, name="lacking"
     )
     with pytest.raises(
-        InputError, match="extra trial 'lacking': channel 'v' is missing"
+        InputError, match=r"extra trial 'lacking': channel 'v' is missing, expected"
     ):
         identify(
             [cao_zigzag],
@@ -345,97 +354,12 @@ def test_extra_trials_need_the_channels_of_the_structure(
         )
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("segment_lengths", 0.0),
-        ("segment_start", "anywhere"),
-        ("pull", -1.0),
-        ("extra_weight", 0.0),
-        ("anchor_weight", 0.0),
-    ],
-)
-def test_refinements_that_cannot_be_are_refused(name: str, value: Any) -> None:
-    with pytest.raises(InputError, match=f"{name}: .* found"):
-        Refinement(**{name: value})
-
-
-@pytest.mark.parametrize(
-    ("pull", "tried"), [(1e-3, [1e-3, 1e-2, 0.1, 1.0]), (0.0, [0.0, 1e-9, 1e-8, 1e-7])]
-)
-def test_a_refined_model_that_runs_away_is_pulled_ten_times_harder_three_times(
-    pull: float, tried: list[float], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Then the start stays; each attempt is told with its reasons."""
-    asked: list[float] = []
-
-    def solve(strength: float) -> Any:
-        asked.append(strength)
-        return SimpleNamespace(parameters=strength)
-
-    problem = SimpleNamespace(
-        scales=np.ones(3),
-        solve=solve,
-        model=lambda strength: strength,
-        estimators=lambda _: {},
-        width=2.5,
-        covariance=lambda *given: (given, []),
-        report=lambda _: {"segments": 7},
-    )
-    monkeypatch.setattr(refinement, "_Problem", lambda *_: problem)
-    monkeypatch.setattr(refinement, "reasons_unstable", lambda *_: ["it spins"])
-    given: Any = "start"
-    start, task = GuardedFit(given, {}, True, {}), SimpleNamespace(trials=())
-    kept = refine(start, task, Refinement(pull=pull), 20.0)  # type: ignore[arg-type]
-    assert asked == pytest.approx(tried)
-    assert kept.fit is start
-    assert (kept.covariance, kept.influences, kept.width) == (None, [], 0.0)
-    assert kept.report["decision"] == "not refined: it runs away"
-    assert [one["pull"] for one in kept.report["rejected"]] == asked
-    assert [one["reasons"] for one in kept.report["rejected"]] == [["it spins"]] * 4
-    monkeypatch.setattr(
-        refinement,
-        "reasons_unstable",
-        lambda strength, _: ["it spins"] * (strength < tried[2]),
-    )
-    refined = refine(start, task, Refinement(pull=pull), 20.0)  # type: ignore[arg-type]
-    assert (refined.fit.model, refined.report["pull"]) == (pytest.approx(tried[2]),) * 2
-    assert len(refined.report["rejected"]) == 2
-    assert refined.covariance[1:] == (refined.report["pull"], 20.0)  # type: ignore[index]
-    assert refined.width == 2.5
-
-
-def given_problem(**attributes: Any) -> Any:
-    """A refinement of which some attributes are known."""
-    problem = object.__new__(refinement._Problem)
-    vars(problem).update(attributes)
-    return problem
-
-
-def test_a_pull_counts_by_all_that_is_compared_and_an_offset_by_a_degree() -> None:
-    segments = [SimpleNamespace(measured=np.zeros((rows, 3))) for rows in (10, 20)]
-    problem = given_problem(own=segments, first=np.zeros(5), sizes=np.zeros(3))
-    expected = [*[np.sqrt(1e-2 * 90)] * 3, *[180.0 / np.pi] * 2]
-    np.testing.assert_allclose(problem._prior_weights(1e-2), expected)
-
-
-def test_scales_are_root_mean_squares_by_sample_of_the_trials_to_fit() -> None:
-    """Blocks stand for more samples than one, here two for eight; extra trials do not count."""
-    segments = [SimpleNamespace(measured=np.zeros((8, 2)))]
-    problem = given_problem(
-        own=segments, rows=4, shooter=SimpleNamespace(units=np.array([5.0, 0.1]))
-    )
-    shooting = SimpleNamespace(residuals=np.array([1.0, 0.0, 3.0, 0.0, 99.0, 99.0]))
-    found = problem._scales(shooting, np.array([2.0, 0.3]))
-    np.testing.assert_allclose(found, [np.sqrt((2.0**2 + 6.0**2) / 8.0), 1e-10])
-
-
 def test_a_term_of_size_one_makes_up_the_whole_change() -> None:
     X = np.array([[1.0, 0.0, 2.0], [-1.0, 0.0, 4.0]])
     samples: Any = SimpleNamespace(
         features={"r": X}, targets={"r": np.array([6.0, 8.0])}
     )
-    sizes = refinement._term_sizes(samples, "r")
+    sizes = term_sizes(samples, "r")
     np.testing.assert_allclose(
         sizes, np.sqrt(50.0) / np.array([1.0, np.inf, np.sqrt(10.0)]), atol=1e-300
     )
@@ -450,18 +374,9 @@ def test_scores_of_the_same_time_are_added_up_by_trial() -> None:
         SimpleNamespace(trial=1, times=np.array([5.0, 6.0, 9.0])),
     ]
     scores = 10.0 ** np.arange(9.0)[:, None]
-    first, second = refinement._in_bins(scores, segments, 2.0)
+    first, second = in_bins(scores, segments, 2.0)
     assert first.ravel().tolist() == [11.0, 1100.0 + 1e4, 0.0, 1e5]
     assert second.ravel().tolist() == [1e6, 1e7, 1e8]
-
-
-def test_a_memory_of_yaw_cannot_be_refined() -> None:
-    blank: Any = SimpleNamespace(table=get_structure("nomoto2"), structure="nomoto2")
-    with pytest.raises(
-        InputError,
-        match="structure 'nomoto2' with a memory of yaw found, whose state no",
-    ):
-        refinement._check_refinable(blank, ())
 
 
 def test_settings_of_a_refinement_reach_to_their_bounds_and_stand_apart() -> None:
@@ -474,8 +389,7 @@ def test_settings_of_a_refinement_reach_to_their_bounds_and_stand_apart() -> Non
         assert Refinement(**least).plain()[next(iter(least))] == next(
             iter(least.values())
         )  # type: ignore[arg-type]
-    own, rest = split_settings({"pull": 0.5, "rank": 3, "staggered": False}, True)
-    assert own is not None
+    own, rest = split_settings({"pull": 0.5, "rank": 3, "staggered": False})
     assert (own.pull, own.staggered, own.segment_lengths, own.segment_start) == (
         0.5,
         False,
@@ -489,7 +403,6 @@ def test_settings_of_a_refinement_reach_to_their_bounds_and_stand_apart() -> Non
         None,
     )
     assert rest == {"rank": 3}
-    assert split_settings({"pull": 0.5}, False) == (None, {"pull": 0.5})
 
 
 def test_channels_are_compared_in_units_of_the_ship(mariner: ShipModel) -> None:
@@ -503,7 +416,9 @@ def test_states_are_smoothed_but_for_the_rudder_and_begin_at_the_origin(
     mariner: ShipModel, noisy_trials: list[Trial]
 ) -> None:
     trial = noisy_trials[0]
-    found = dict(zip(mariner.state_names, _states(trial, mariner).T, strict=True))
+    found = dict(
+        zip(mariner.state_names, smoothed_states(trial, mariner).T, strict=True)
+    )
     assert not found["x"].any()
     assert not found["y"].any()
     np.testing.assert_array_equal(found["delta"], trial["delta"])
@@ -553,3 +468,41 @@ def test_compared_samples_are_an_interval_apart_and_the_grid_no_coarser_than_the
             third.start, [0.0, 0.0, 0.0, 0.3, 0.2, 0.1, 0.0], atol=1e-12
         )
         assert third.times[0] == 0.0
+
+
+def given_problem(**attributes: Any) -> OutputError:
+    """A fit by segments of which some parts are known."""
+    shooter: Any = SimpleNamespace(
+        term_sizes=np.ones(3), channels=("u", "r"), units=np.array([5.0, 0.1])
+    )
+    parts = {"further": (), "start": np.zeros(5), "staggered": False} | attributes
+    return OutputError(shooter, **parts)
+
+
+def test_a_pull_counts_by_all_that_is_compared_and_an_offset_by_a_degree() -> None:
+    segments = [SimpleNamespace(measured=np.zeros((rows, 3))) for rows in (10, 20)]
+    expected = [*[np.sqrt(1e-2 * 90)] * 3, *[180.0 / np.pi] * 2]
+    weights = given_problem(fitted=segments).pull_weights(1e-2)
+    np.testing.assert_allclose(weights, expected)
+
+
+def test_scales_are_root_mean_squares_by_sample_of_the_trials_to_fit() -> None:
+    """Blocks stand for more samples than one, here two for eight; extra trials do not count."""
+    segment = SimpleNamespace(measured=np.zeros((8, 2)), blocks=[0, 4])
+    shooting: Any = SimpleNamespace(
+        residuals=np.array([1.0, 0.0, 3.0, 0.0, 99.0, 99.0])
+    )
+    found = given_problem(fitted=[segment]).scales(shooting, np.array([2.0, 0.3]))
+    np.testing.assert_allclose(found, [np.sqrt((2.0**2 + 6.0**2) / 8.0), 1e-10])
+
+
+def test_a_memory_of_yaw_cannot_be_refined(
+    mariner: ShipModel, cao_zigzag: Trial
+) -> None:
+    with pytest.raises(InputError, match=r"without a memory of yaw, .* got 'nomoto2'"):
+        identify(
+            [cao_zigzag],
+            "nomoto2",
+            "output-error",
+            particulars=mariner.particulars,
+        )

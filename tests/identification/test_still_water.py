@@ -14,11 +14,11 @@ from identification import identify
 from identification.regression import current, still_water
 from identification.regression.still_water import in_still_water, through_water
 from identification.regression.wind import measured_wind
-from identification.report.sea import _current, sea_sentences, track_figure
+from identification.report.sea import current_text, sea_sentences, track_figure
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, zigzag
-from shipgym.sea.conditions import Current, Weather, Wind
+from shipgym.sea import Current, Weather, Wind
 from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.wind import AIR_DENSITY, wind_curves
 from shipgym.ships.simulate import open_loop
@@ -585,7 +585,7 @@ def test_what_a_ship_of_the_prior_does_is_the_same_to_both_sides() -> None:
 )
 def test_a_current_is_told_with_set_and_drift_and_what_became_of_it(row, said):
     """A knot is 0.514444 m/s; the water sets to the north-west, 53 degrees from north."""
-    told = _current({"north": NORTH, "east": EAST, **row})
+    told = current_text({"north": NORTH, "east": EAST, **row})
     assert told == f"current of 0.50 m/s (0.97 knots) towards 307 deg, {said}"
 
 

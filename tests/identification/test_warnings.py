@@ -9,15 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from identification import IdentificationResult
 from identification.validation.prediction import trial_metrics
 from identification.validation.warnings import (
     exactly_collinear,
     held_out_error,
     model_warnings,
     undetermined,
+    why_lost,
     why_unstable,
 )
-from shipgym import ShipModel, Trial
+from shipgym import ShipModel, Trial, load_model
 
 
 def trial(offset: float = 0.0, **settings: Any) -> Trial:
@@ -54,6 +56,7 @@ def fit(
         "diagnostics": {"r": equation},
         "trials": (),
         "metrics": {"trials": {"runs/a.csv": {"use": use, "rmse": {"psi": heading}}}},
+        "coefficients": model.coefficients,
     }
     return SimpleNamespace(**given | changes)
 
@@ -148,10 +151,10 @@ def test_the_worst_of_what_was_held_out_is_said(mariner: ShipModel) -> None:
         == "Worst errors on held-out trials: heading 3.1 deg rms (c.csv), second"
         " overshoot 35 % (c.csv)."
     )
-    late = {"initial_turning_lengths": pair(1.0, 1.3)}
+    late = {"advance_lengths": pair(1.0, 1.3)}
     assert (
         said({**first, **late})
-        == "Worst errors on held-out trials: heading 2 deg rms (a.csv), initial turning"
+        == "Worst errors on held-out trials: heading 2 deg rms (a.csv), advance"
         " 30 % (a.csv)."
     )
 
@@ -206,3 +209,47 @@ def test_why_a_model_must_not_be_used(mariner: ShipModel) -> None:
     assert why_unstable(marked) == "its simulation runs away (rudder +35 deg)"
     bare = fit(replace(mariner, provenance=None), stable=False)
     assert why_unstable(bare) == "its simulation runs away (in a standard manoeuvre)"
+
+
+def test_the_bare_reference_is_said_with_its_similarity(mariner: ShipModel) -> None:
+    known = given(mariner, reference={"name": "tanker", "similarity": {"tanker": 0.6}})
+    (said,) = model_warnings(fit(known, coefficients={"c_r": 0.0}))
+    assert "bare reference ship 'tanker', with a similarity of 0.6" in said
+    assert not model_warnings(fit(known, coefficients={"c_r": 0.1}))
+
+
+def test_a_refinement_that_was_given_up_is_said(mariner: ShipModel) -> None:
+    decision = {"decision": "not refined: it runs away"}
+    (said,) = model_warnings(fit(given(mariner, refinement=decision)))
+    assert "output-error was not refined: it runs away: the model is its start" in said
+    assert not model_warnings(fit(given(mariner, refinement={"decision": "refined"})))
+
+
+def test_shaft_speeds_that_a_structure_ignores_are_said(mariner: ShipModel) -> None:
+    t = np.arange(10.0)
+    channels = {"u": 0.0 * t, "v": 0.0 * t, "n": 1.0 + 0.05 * t}
+    run = Trial(t, channels, name="acceleration.csv", use="fit")
+    (said,) = model_warnings(fit(given(mariner), trials=[run]))
+    assert "the shaft speed varies by" in said
+    assert "acceleration.csv starts from rest" in said
+    assert "such as cubic" in said
+    # the shaft is known, or there is no surge that it would change
+    for knows in ("kvlcc2", "mariner-nomoto"):
+        assert not model_warnings(fit(given(load_model(knows)), trials=[run]))
+    unknown = Trial(t, {"u": 0.0 * t, "v": 0.0 * t}, use="fit")
+    held = run.with_(use="validate")
+    assert not model_warnings(fit(given(mariner), trials=[unknown, held]))
+
+
+def test_only_a_ship_that_is_unstable_for_sure_is_said_to_be(
+    noisy_fit: IdentificationResult,
+) -> None:
+    """Of a stable ship whose model is uncertain nothing is said about her course stability."""
+    model = noisy_fit.model
+    assert why_lost(model, False).startswith("likely the model is taken beyond")
+    assert why_lost(model, True).startswith("it was fitted to such, so its structure")
+    unstable = {**model.coefficients, "N_r": model.coefficients["N_r"] * 0.5}
+    sure = replace(model, coefficients=unstable, covariance=1e-6 * model.covariance)
+    assert why_lost(sure, True).startswith("a ship that is unstable on a straight")
+    unsure = replace(sure, covariance=400.0 * model.covariance)
+    assert not why_lost(unsure, True).startswith("a ship that is unstable")

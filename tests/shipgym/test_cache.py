@@ -18,11 +18,11 @@ from filelock import FileLock, Timeout
 from platformdirs import user_cache_path
 
 import shipgym
+from shipgym.drafts import draft_name
 from shipgym.engine import cache_folder, compiling
 from shipgym.engine.disk_cache import DiskCache
 from shipgym.engine.voyages import Voyages
 from shipgym.errors import InputError
-from shipgym.files import draft_name
 from shipgym.instruments.sensor_set import shipped_sensors
 from shipgym.tasks.definition import read_definition
 
@@ -353,7 +353,7 @@ def test_who_waits_at_a_terminal_sees_one_line(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("task", ["PathFollowing", "PathFollowing-v1"])
+@pytest.mark.parametrize("task", ["CourseKeeping", "PathFollowing"])
 def test_loops_over_ships_are_vectorised(task, monkeypatch):
     monkeypatch.setattr(
         compiling, "usable_folder", lambda: None

@@ -48,7 +48,7 @@ from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import shipped_sensors
 from shipgym.sea.open_sea import sea_parts
 from shipgym.ships.catalogue import kvlcc2, kvlcc2_l7
-from shipgym.ships.term_functions import Sum, accelerations_source
+from shipgym.ships.term_functions import accelerations_source
 from shipgym.ships.terms import Term
 from shipgym.tasks.definition import read_definition
 from tests.shipgym.outer import outer
@@ -204,9 +204,8 @@ def test_the_form_of_a_ship_is_compiled_and_may_be_chosen():
 
 
 def test_no_text_of_a_file_becomes_part_of_a_program():
-    source = accelerations_source(
-        {"r": Sum((Term("import os", (("r", 1),)),), (0,), 2)}
-    )
+    term = Term("import os", (("r", 1),))
+    source = accelerations_source({"r": (term,)}, prime=False)
     assert "import" not in source
 
 
@@ -393,8 +392,8 @@ def test_a_function_within_another_is_refused_with_what_it_uses_of_it():
     assert (
         str(caught.value)
         == f"{__file__}, line {within.__code__.co_firstlineno}, in within: "
-        "uses variables of the function around it (inner), expected a function at the "
-        "top of a file"
+        "expected a function at the top of a file, got one that uses variables of the "
+        "function around it (inner)"
     )
 
 
@@ -773,5 +772,5 @@ def test_loops_of_two_tasks_share_the_step_of_a_ship_but_not_that_of_another_shi
         return loop.inner(made.parts["sail_lanes"])
 
     mariner = sailing("CourseKeeping", "mariner-tls-svm")
-    assert sailing("PathFollowing-v1", "mariner-tls-svm") is mariner
+    assert sailing("PathFollowing", "mariner-tls-svm") is mariner
     assert sailing("CourseKeeping", "kvlcc2-mmg") is not mariner

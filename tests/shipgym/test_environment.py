@@ -14,11 +14,7 @@ from shipgym import InputError, load_model
 from shipgym.envs.engine import episode_keys
 from shipgym.envs.environment import rudder_orders
 
-PATH, FIRST, COURSE = (
-    "shipgym/PathFollowing-v1",
-    "shipgym/PathFollowing-v0",
-    "shipgym/CourseKeeping-v0",
-)
+PATH, COURSE = "shipgym/PathFollowing-v0", "shipgym/CourseKeeping-v0"
 HOOK = [[0.0, 0.0], [1500.0, 0.0], [2900.0, 1400.0]]
 SEA = {
     "model": "mariner",
@@ -72,7 +68,7 @@ def same(first, second):
     [
         (one, {"episode_steps": 20}),
         (many, {"episode_steps": 20}),
-        (partial(many, FIRST), {**SEA, "autoreset_mode": "SameStep"}),
+        (partial(many, COURSE), {**SEA, "autoreset_mode": "SameStep"}),
     ],
 )
 def test_copies_step_identically_and_on_their_own(make, options, again):
@@ -126,20 +122,20 @@ def test_states_that_do_not_fit_are_refused_and_change_nothing():
         },
     }
     before = env.physical_state()
-    first, tanker, short, vector = (
-        one(FIRST),
+    course, tanker, short, vector = (
+        one(COURSE),
         one(model="mariner-tls-svm"),
         one(waypoints=HOOK),
         many(),
     )
-    for other in (first, tanker, short, vector):
+    for other in (course, tanker, short, vector):
         other.reset(seed=0)
-    states = [other.unwrapped.get_state() for other in (first, tanker, short, vector)]
+    states = [other.unwrapped.get_state() for other in (course, tanker, short, vector)]
     for given, message in [
         (
             states[0],
             (
-                "state: task 'PathFollowing' found, expected 'PathFollowing-v1': .*"
+                "state: task 'CourseKeeping' found, expected 'PathFollowing': .*"
                 " same version"
             ),
         ),
@@ -150,12 +146,12 @@ def test_states_that_do_not_fit_are_refused_and_change_nothing():
         (blind, "state: observations are not finite"),
         (
             {**state, "engine": {**state["engine"], "made_for": 3}},
-            "state: made_for: 3 found, expected a table",
+            "state: made_for: expected a table",
         ),
-        ({**state, "asked": "x"}, "state: asked: 'x' found, expected a table"),
+        ({**state, "asked": "x"}, "state: asked: expected a table"),
         ({**state, "row_keys": "x"}, "state: row_keys 'x' found"),
         ({}, "state: field 'asked' is missing"),
-        (3, "state: 3 found, expected a table"),
+        (3, "state: expected a table"),
     ]:
         with pytest.raises(InputError, match=message):
             env.set_state(given)
@@ -203,10 +199,10 @@ def test_a_model_index_chooses_among_the_ships_that_are_drawn_from():
     for wrong in (-1, 256, 1.0, "first"):
         with pytest.raises(
             InputError,
-            match=r"model_index: .* found, expected a whole number of at least 0",
+            match=r"model_index: expected an integer of at least 0",
         ):
             env.reset(options={"model_index": wrong})
-    with pytest.raises(InputError, match=r"model_index: 1 found.* at most 0"):
+    with pytest.raises(InputError, match=r"model_index: expected.* at most 0"):
         one().reset(options={"model_index": 1})
     with pytest.raises(InputError, match="options: unknown key 'waypoints'"):
         env.reset(options={"waypoints": HOOK})

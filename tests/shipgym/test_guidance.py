@@ -106,8 +106,8 @@ def test_random_paths_differ_and_are_drawn_evenly():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((0, (300.0, 900.0), 60.0), "n_legs: 0 found"),
-        ((2, (0.0, 900.0), 60.0), "leg_length: 0 found"),
+        ((0, (300.0, 900.0), 60.0), "n_legs: expected .*got 0"),
+        ((2, (0.0, 900.0), 60.0), "leg_length: expected .*got 0"),
         ((2, (900.0, 300.0), 60.0), "the least length first"),
     ],
 )

@@ -14,8 +14,7 @@ from shipgym.manoeuvres.execution import (
     reached,
     reversals,
 )
-from shipgym.manoeuvres.imo import overshoot_limits_deg
-from shipgym.manoeuvres.zigzags import _overshoot_deg
+from shipgym.manoeuvres.imo_rules import overshoot_limits_deg
 
 
 @pytest.fixture(scope="module")
@@ -185,7 +184,7 @@ def test_a_duration_has_two_steps_at_least():
     assert (number_of_steps(1.0, 0.5), number_of_steps(100.0, 0.3)) == (2, 333)
     with pytest.raises(
         InputError,
-        match=r"duration: 0\.7 s found, expected at least two steps of dt = 0\.5 s",
+        match=r"duration: expected at least two steps of dt = 0\.5 s, got 0\.7 s",
     ):
         number_of_steps(0.7, 0.5)
 
@@ -266,7 +265,7 @@ def test_imo_assessment_of_mariner(mariner):
 
 def test_a_zigzag_that_never_reaches_its_heading_says_so_with_its_trial(mariner):
     with pytest.raises(
-        ManoeuvreError, match=r"heading changed by .* in 60 s, expected 40 deg"
+        ManoeuvreError, match=r"expected the heading to change by 40 deg, .* in 60 s"
     ) as error:
         manoeuvres.zigzag(mariner, 5, 40, duration=60)
     trial = error.value.trial
@@ -303,18 +302,27 @@ def test_a_ship_that_does_not_answer_its_rudder_fails_the_zigzag_criteria(marine
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda m: manoeuvres.zigzag(m, -20), "rudder_deg: -20 found"),
-        (lambda m: manoeuvres.zigzag(m, 20, 20, duration=0), "duration: 0 found"),
-        (lambda m: manoeuvres.zigzag(m, 20, 20, dt=float("nan")), "dt: nan found"),
+        (lambda m: manoeuvres.zigzag(m, -20), "rudder_deg: expected .*got -20"),
+        (
+            lambda m: manoeuvres.zigzag(m, 20, 20, duration=0),
+            "duration: expected .*got 0",
+        ),
+        (
+            lambda m: manoeuvres.zigzag(m, 20, 20, dt=float("nan")),
+            "dt: expected .*got nan",
+        ),
         (
             lambda m: manoeuvres.zigzag(m, 20, 20, switch="later"),
-            "switch: 'later' found",
+            "switch: expected .*got 'later'",
         ),
         (
             lambda m: manoeuvres.turning_circle(m, 0.0),
             "expected an angle that turns the ship",
         ),
-        (lambda m: manoeuvres.turning_circle(m, 120.0), "rudder_deg: 120 found"),
+        (
+            lambda m: manoeuvres.turning_circle(m, 120.0),
+            "rudder_deg: expected .*got 120",
+        ),
     ],
 )
 def test_wrong_arguments(mariner, call, message):
@@ -325,9 +333,9 @@ def test_wrong_arguments(mariner, call, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"heading_deg": 0.0}, "heading_deg: 0 found"),
-        ({"heading_deg": 181.0}, "heading_deg: 181 found"),
-        ({"rudder_deg": 91.0}, "rudder_deg: 91 found"),
+        ({"heading_deg": 0.0}, "heading_deg: expected .*got 0"),
+        ({"heading_deg": 181.0}, "heading_deg: expected .*got 181"),
+        ({"rudder_deg": 91.0}, "rudder_deg: expected .*got 91"),
         ({"switch": "insde"}, "Did you mean 'inside'"),
     ],
 )
@@ -399,9 +407,12 @@ def test_an_overshoot_is_the_furthest_beyond_the_switch_before_the_end(
     """Of a ship whose heading was 3 deg before the first order."""
     psi = np.radians(3.0 + side * np.array([0.0, 0.0, 5.0, *headings]))
     t = np.arange(float(len(psi)))
-    found = _overshoot_deg(Trial(t, {"psi": psi}), 1.0, 3.0, t[-1], 10.0)
-    assert found is None if overshoot is None else found == pytest.approx(overshoot)
-    assert _overshoot_deg(Trial(t, {"psi": psi}), 1.0, 3.0, t[-1], None) is None
+    order = np.full(len(t), -side)  # reversed at 3 s
+    order[:3] = [0.0, side, side]
+    channels = {"psi": psi, "delta_command": 0.2 * order, "u": 0.0 * t, "v": 0.0 * t}
+    found = manoeuvres.zigzag_indices(Trial(t, channels), 100.0, 10.0)
+    assert found.overshoot_1_deg == (overshoot and pytest.approx(overshoot))
+    assert found.overshoot_2_deg is None
 
 
 @pytest.mark.parametrize(("turned", "steady"), [(1.49, False), (1.51, True)])

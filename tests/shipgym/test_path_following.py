@@ -6,22 +6,23 @@ from itertools import pairwise
 import gymnasium
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import shipgym
 from shipgym import InputError
-from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.motion import Motion, Ship, ground_velocity
 from shipgym.engine.records import leaves
 from shipgym.envs.engine import Engine
+from shipgym.sea import Current, Waves, Weather, Wind
 from shipgym.tasks import path_following
-from shipgym.tasks.contract import Interval
+from shipgym.tasks.contract import Interval, Readings
 from shipgym.tasks.guidance import Path, wrapped
-from shipgym.tasks.path_following import Settings, State, fix, leg_from
+from shipgym.tasks.path_following import Settings, State, fix, leg_from, observe
 from shipgym.tasks.steering import RudderWork, worked
 from shipgym.tasks.task import Task
 
-ID = "shipgym/PathFollowing-v1"
+ID = "shipgym/PathFollowing-v0"
 LENGTH, SPEED = 160.93, 7.7175  # of the Mariner
 RADIUS = 4.0 * LENGTH
 SHIP = Ship(LENGTH, SPEED, 0.6, 0.05, 0.0, 1.5, np.inf, SPEED)
@@ -30,6 +31,11 @@ HOOK = np.array(
 )  # turns of 45 degrees
 LINE = np.array([[0.0, 0.0], [40.0 * LENGTH, 0.0]])
 WIDE = {"ground": 40.0}  # a sea in which nobody runs aground
+TROUBLED = Weather(
+    current=Current(1.0, towards_deg=90.0),
+    wind=Wind(10.0, from_deg=0.0),
+    waves=Waves(2.0, 8.0),
+)
 
 
 def pd(seen):
@@ -62,7 +68,6 @@ def divided(path, parts):
     ("path", "cost"), [(LINE, 16.11), (HOOK, 50.99)], ids=["line", "hook"]
 )
 def test_dividing_a_leg_changes_nothing(path, cost):
-    """The first version's cost of the straight path rises from 13.2 to 105.2 with four legs."""
     costs = [-sail(waypoints=divided(path, parts))[0].sum() for parts in (1, 2, 4, 8)]
     assert costs[0] == pytest.approx(cost, abs=0.01)
     np.testing.assert_allclose(costs, costs[0], rtol=1e-6)
@@ -184,11 +189,178 @@ def test_two_turns_are_seen_ahead():
     assert checked == {0, 1, 2, 3, 4}
 
 
+def test_given_waypoints_are_sailed_in_every_episode():
+    env = gymnasium.make(ID, model="mariner", waypoints=HOOK).unwrapped
+    for seed in (0, 1):
+        env.reset(seed=seed)
+        np.testing.assert_array_equal(env.waypoints, HOOK)
+        state = env.physical_state()
+        assert state["x"] == pytest.approx(0.0, abs=1e-9)
+        assert abs(state["y"]) <= 0.5 * env.corridor
+        assert abs(state["psi"]) <= np.pi / 12
+
+
+def test_drawn_paths_follow_from_the_seed_and_keep_to_their_bounds():
+    options = {"n_legs": 6, "leg_lengths": (5.0, 9.0), "max_turn_deg": 40.0}
+    task = Task.of("PathFollowing", **options)
+    engine = Engine(shipgym.load_model("mariner"), 200, task)
+    engine.reset(np.arange(200))
+    paths = [Path(engine.waypoints(lane)) for lane in range(200)]
+    lengths = np.concatenate([path.lengths for path in paths]) / LENGTH
+    turns = np.degrees(np.concatenate([path.turns[:-1] for path in paths]))
+    assert 5.0 <= lengths.min() < 5.1
+    assert 8.9 < lengths.max() <= 9.0
+    assert -40.0 <= turns.min() < -39.0
+    assert 39.0 < turns.max() <= 40.0
+    assert abs(turns.mean()) < 4.0 * 40.0 / np.sqrt(3.0 * turns.size)
+    single = gymnasium.make(ID, model="mariner", **options).unwrapped
+    for seed in (5, 6):
+        single.reset(seed=seed)
+        np.testing.assert_array_equal(single.waypoints, paths[seed].waypoints)
+    single.reset()
+    assert not np.array_equal(single.waypoints, paths[6].waypoints)
+
+
+@pytest.mark.parametrize("model", ["mariner", "kvlcc2"])
+def test_a_course_autopilot_follows_the_path_as_it_is(model):
+    rewards, infos, _ = sail(model=model, seed=1)
+    assert infos[-1]["success"]
+    assert not any(info["success"] for info in infos[:-1])
+    assert not any(info["grounded"] for info in infos)
+    assert infos[-1]["reward_end"] == 0.0
+    assert np.mean([info["in_corridor"] for info in infos]) > 0.9
+    assert -1.0 < rewards.mean() < 0.0
+
+
+def test_the_reward_is_the_sum_of_its_named_parts():
+    rewards, infos, env = sail(waypoints=HOOK, sea=TROUBLED, seed=2)
+    parts = env.task.reward_parts
+    sums = [sum(info[name] for name in parts) for info in infos]
+    np.testing.assert_allclose(rewards, sums, rtol=1e-12)
+    assert set(parts) == {name for name in infos[0] if name.startswith("reward_")}
+    shown = {name: np.array([info[name] for info in infos]) for name in infos[0]}
+    off = shown["cross_track"] / env.corridor
+    pace = np.diff(shown["distance_made_good"]) / env.dt / SPEED
+    missing = np.clip(1.0 - pace, 0.0, 2.0)
+    off_path = np.isclose(shown["reward_cross_track"], -(off**2), rtol=1e-9)
+    slow = np.isclose(shown["reward_progress"][1:], -missing, atol=1e-9)
+    switches = 2  # to the next leg, on which both are measured again
+    assert (~off_path).sum() <= switches
+    assert (~slow).sum() <= 2 * switches
+    np.testing.assert_array_equal(shown["in_corridor"], np.abs(off) <= 1.0)
+
+
+def test_running_aground_ends_the_episode_and_says_so():
+    rewards, infos, _ = sail(
+        lambda seen, step, env: [0.0 if step < 50 else 1.0], waypoints=HOOK
+    )
+    last = infos[-1]
+    assert (last["grounded"], last["success"], last["in_corridor"]) == (1, 0, 0)
+    assert abs(last["cross_track"]) > 4.0 * LENGTH
+    left = 1500 - len(rewards)
+    assert last["reward_end"] == pytest.approx(-left * (4.0**2 + 2.0))
+
+
+def test_a_propeller_that_holds_ahead_only_is_stopped_by_an_order_astern():
+    """The thrust polynomial of KVLCC2 would push a ship ahead that reverses her shaft."""
+    runs = []
+    for order in (-1.0, 0.0):
+        env = gymnasium.make(ID, model="kvlcc2", action="rudder-shaft").unwrapped
+        env.reset(seed=0)
+        for _ in range(50):
+            seen, *_ = env.step(np.array([0.0, order], dtype=np.float32))
+        runs.append(seen)
+    np.testing.assert_array_equal(*runs)
+    assert env.physical_state()["n_command"] == 0.0
+    assert env.physical_state()["u"] < 0.9 * env.model.particulars["speed"]
+
+
+def test_a_current_sets_the_ship_off_and_course_error_shows_it():
+    north = [[0.0, 0.0], [9000.0, 0.0]]
+    across = Weather(current=Current(1.0, towards_deg=90.0))
+    env = gymnasium.make(ID, model="mariner", waypoints=north, sea=across).unwrapped
+    seen, _ = env.reset(seed=1)
+    names = {name: k for k, name in enumerate(env.observation_names)}
+    for _ in range(400):
+        before = env.physical_state()
+        seen, *_ = env.step(np.array([pd(seen)], dtype=np.float32))
+    state = env.physical_state()
+    made_good = np.arctan2(state["y"] - before["y"], state["x"] - before["x"])
+    off = state["set_point"] - made_good
+    assert seen[names["course_error_sin"]] == pytest.approx(np.sin(off), abs=1e-3)
+    assert seen[names["course_error_cos"]] == pytest.approx(np.cos(off), abs=1e-3)
+    drift = made_good - state["psi"]
+    assert drift == pytest.approx(np.cos(state["psi"]) / state["u"], abs=0.01)
+    calm = gymnasium.make(ID, model="mariner", waypoints=north).unwrapped
+    for one in (env, calm):
+        one.reset(seed=1)
+        for _ in range(30):
+            one.step(np.zeros(1, dtype=np.float32))
+    set_off = env.physical_state()["y"] - calm.physical_state()["y"]
+    assert set_off == pytest.approx(30.0, abs=0.1)
+
+
+angles, speeds = st.floats(-3.1, 3.1), st.floats(-3.0, 3.0)
+
+
+@given(angles, angles, st.floats(0.5, 8.0), speeds, speeds, speeds)
+def test_course_over_ground_is_the_way_that_the_ship_moves_on_every_leg(
+    leg, psi, u, v, north, east
+):
+    """Worked with vectors north and east: way through the water, turned by the heading, and the current."""
+    motion = Motion(30.0, -40.0, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    ahead, aside = ground_velocity(motion, north, east)
+    over_ground = (u + 1j * v) * np.exp(1j * psi) + north + 1j * east
+    turned = (ahead + 1j * aside) * np.exp(1j * psi)
+    assert turned == pytest.approx(over_ground, abs=1e-9)
+    assume(abs(over_ground) > 0.01)
+    plan = np.array([0.0, 0.0, 2000.0 * np.cos(leg), 2000.0 * np.sin(leg)])
+    readings = Readings(
+        30.0, -40.0, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, psi, ahead, aside
+    )
+    interval = Interval(1.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    seen = observe(readings, on_path(RADIUS, plan), interval, SHIP, Settings())
+    across = np.imag((30.0 - 40.0j) * np.exp(-1j * leg))
+    assert seen.cross_track == pytest.approx(across, abs=1e-9)
+    course = leg - np.arctan2(across, 2.5 * LENGTH)
+    off = np.exp(1j * course) / over_ground
+    error = seen.course_error_cos + 1j * seen.course_error_sin
+    assert error == pytest.approx(off / abs(off), abs=1e-6)
+
+
+def test_a_ship_without_way_has_no_course_over_ground():
+    readings = Readings(0.0, 0.0, 0.3, *[0.0] * 7, 0.3, 0.0, 0.0)
+    state = on_path(RADIUS, np.array([0.0, 0.0, 900.0, 900.0]))
+    seen = observe(readings, state, Interval(1.0, 0.0, *[0.0] * 5), SHIP, Settings())
+    assert (seen.course_error_sin, seen.course_error_cos) == (0.0, 0.0)
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    st.integers(0, 2**31 - 1),
+    st.lists(st.floats(-1.0, 1.0, width=32), min_size=1, max_size=30),
+    st.booleans(),
+)
+def test_observations_stay_in_their_space_and_are_never_nan(seed, actions, troubled):
+    options = {"sea": ["calm", TROUBLED], "noise": 3.0} if troubled else {}
+    sharp = {"max_turn_deg": 150.0, "leg_lengths": (2.0, 4.0), "turn_radius": 0.2}
+    env = gymnasium.make(ID, model="mariner", **WIDE, **sharp, **options).unwrapped
+    env.reset(seed=seed)
+    for action in actions * 10:
+        order = np.array([action], dtype=np.float32)
+        observation, reward, terminated, *_ = env.step(order)
+        assert observation in env.observation_space
+        assert np.isfinite(reward)
+        assert reward <= 0.0
+        if terminated:
+            break
+
+
 def test_each_episode_has_one_of_a_list_of_paths():
     engine = Engine(
         shipgym.load_model("mariner"),
         40,
-        Task.of("PathFollowing-v1", waypoints=[LINE, HOOK]),
+        Task.of("PathFollowing", waypoints=[LINE, HOOK]),
     )
     engine.reset(np.arange(40))
     ends = [engine.waypoints(lane)[-1].tolist() for lane in range(40)]
@@ -207,7 +379,7 @@ def test_the_mirrored_voyage_earns_the_same():
     symmetric = replace(
         mariner, coefficients={**mariner.coefficients, **dict.fromkeys(even, 0.0)}
     )
-    task = Task.of("PathFollowing-v1", waypoints=HOOK)
+    task = Task.of("PathFollowing", waypoints=HOOK)
     engine = Engine(symmetric, 1, task)
     mirror = Engine(symmetric, 1, task.changed(waypoints=HOOK * [1.0, -1.0]))
     mirrored = {
@@ -383,8 +555,17 @@ def test_a_reversal_is_a_way_back_of_the_rudder_and_not_its_noise():
             {"max_turn_deg": 120.0},
             "leg_lengths: the least: 8 found, expected a number >= 13.8.*turns",
         ),
+        ({"waypoints": [[0.0, 0.0]]}, r"shape \(1, 2\) found, expected at least 2"),
+        ({"waypoints": [[0.0, 0.0], [np.nan, 1.0]]}, "waypoints: row 1 is"),
+        ({"waypoints": "north"}, "waypoints: shape"),
+        ({"corridor": 5.0}, "ground: 4 found, expected a number > 5"),
+        ({"leg_lengths": (9.0, 8.0)}, "leg_lengths: the largest: 8 found"),
+        ({"leg_lengths": (5.0,)}, "leg_lengths: .* expected the least and the largest"),
+        ({"max_turn_deg": 170.0}, "max_turn_deg: 170 found"),
+        ({"n_legs": 0}, "n_legs: 0 found"),
+        ({"lookahead": 0.0}, "lookahead: 0 found"),
         ({"turn_radius": 0.0}, "turn_radius: 0 found"),
-        ({"acceptance": 1.0}, "unknown key 'acceptance'"),
+        ({"turn_radios": 1.0}, "Did you mean 'turn_radius'"),
     ],
 )
 def test_a_path_that_cannot_be_planned_is_refused(options, message):

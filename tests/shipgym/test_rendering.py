@@ -106,7 +106,7 @@ def test_the_same_scene_gives_the_same_picture(renderer):
 def test_an_unknown_mode_is_refused():
     with pytest.raises(
         InputError,
-        match=r"render_mode: 'ansi' found, expected one of 'human', 'rgb_array'\.",
+        match=r"render_mode: expected one of 'human', 'rgb_array', got 'ansi'\.",
     ):
         Renderer("ansi")
 

@@ -150,15 +150,15 @@ def test_the_turn_of_a_pull_out_is_that_of_the_spiral():
         (lambda m: manoeuvres.direct_spiral(m, [10, 12, -10]), "rise or fall"),
         (
             lambda m: manoeuvres.direct_spiral(m, [50, 0, -50]),
-            r"rudder_deg\[0\]: 50 found",
+            r"rudder_deg\[0\]: expected .*got 50",
         ),
-        (lambda m: manoeuvres.direct_spiral(m, dt=-1.0), "dt: -1 found"),
+        (lambda m: manoeuvres.direct_spiral(m, dt=-1.0), "dt: expected .*got -1"),
         (lambda m: manoeuvres.reverse_spiral(m, [1, 0.5]), "yaw_rate_deg_s: "),
         (
             lambda m: manoeuvres.pull_out(m, 0.0),
             "expected an angle that turns the ship",
         ),
-        (lambda m: manoeuvres.pull_out(m, 60.0), "rudder_deg: 60 found"),
+        (lambda m: manoeuvres.pull_out(m, 60.0), "rudder_deg: expected .*got 60"),
     ],
 )
 def test_wrong_arguments(call, message):
@@ -169,9 +169,9 @@ def test_wrong_arguments(call, message):
 def test_a_tolerance_and_a_method_that_are_none_are_refused():
     t = np.arange(50.0)
     still = Trial(t, {"delta": np.zeros(50), "r": np.zeros(50)})
-    with pytest.raises(InputError, match="tolerance_deg: 0 found"):
+    with pytest.raises(InputError, match=r"tolerance_deg: expected .*got 0"):
         manoeuvres.spiral_from_trial(still, tolerance_deg=0.0)
-    with pytest.raises(InputError, match="spiral method: 'dirct' found"):
+    with pytest.raises(InputError, match=r"spiral method: expected .*got 'dirct'"):
         manoeuvres.spiral_indices(
             Spiral(still, np.array([1.0, 0, -1]), np.array([1.0, 0.5, -0.1]), "dirct")
         )
@@ -182,11 +182,11 @@ def test_what_a_trial_lacks_is_named():
     still = Trial(t, {"delta": np.zeros(50), "r": np.zeros(50)})
     with pytest.raises(InputError, match="'r' is missing"):
         manoeuvres.spiral_from_trial(Trial(t, {"delta": np.zeros(50)}))
-    with pytest.raises(InputError, match="1 steady turns found"):
+    with pytest.raises(InputError, match="got 1 steady turns"):
         manoeuvres.spiral_from_trial(still)
-    with pytest.raises(InputError, match="no pull-out found"):
+    with pytest.raises(InputError, match="got no pull-out"):
         manoeuvres.pull_out_indices(still)
-    with pytest.raises(InputError, match="rudder angles go one way only"):
+    with pytest.raises(InputError, match="got rudder angles that go one way only"):
         manoeuvres.spiral_indices(
             Spiral(still, np.array([1.0, 0, -1]), np.array([1.0, 0.1, -1.0]), "direct")
         )

@@ -80,16 +80,16 @@ def test_a_lag_is_at_least_nine_twentieths_of_a_step(step, frequency):
     [
         (
             {"rudder_limit_deg": -3.0},
-            "rudder_limit_deg: -3 found, expected a number > 0",
+            "rudder_limit_deg: expected a number > 0",
         ),
         (
             {"rudder_limit_deg": 120},
-            "rudder_limit_deg: 120 found, expected a number > 0 and <= 90",
+            "rudder_limit_deg: expected a number > 0 and <= 90",
         ),
-        ({"rudder_rate_deg_s": 0}, "rudder_rate_deg_s: 0 found, expected a number > 0"),
-        ({"time_constant": -1}, "time_constant: -1 found, expected a number >= 0"),
-        ({"time_constant": math.nan}, "time_constant: nan found"),
-        ({"time_constant": True}, "time_constant: True found"),
+        ({"rudder_rate_deg_s": 0}, "rudder_rate_deg_s: expected a number > 0"),
+        ({"time_constant": -1}, "time_constant: expected a number >= 0"),
+        ({"time_constant": math.nan}, "time_constant: expected"),
+        ({"time_constant": True}, "time_constant: expected"),
         ({"rudder_rate_deg_s": "2.5"}, "write the number without quotes"),
         (
             {"rudder_limit": 35},

@@ -11,18 +11,19 @@ from hypothesis import strategies as st
 import shipgym
 from shipgym import InputError, Particulars, ShipModel, SteeringGear
 from shipgym.engine.motion import Motion, Ship
+from shipgym.ships import structures
 from shipgym.ships.linear import nomoto
-from shipgym.ships.structures import STRUCTURES, get_structure
-from shipgym.ships.term_functions import accelerations_function
+from shipgym.ships.structures import get_structure, list_structures
 from shipgym.ships.term_table import Structure
-from shipgym.ships.terms import read_terms
+from shipgym.ships.terms import Term, read_terms
 
 pytestmark = pytest.mark.interpreted
 
 ABKOWITZ = get_structure("abkowitz")
 
 speeds = st.floats(2.0, 10.0)
-FREE = [name for name, table in STRUCTURES.items() if not table.captive]
+PRINTED = [name for name in list_structures() if name not in ("grey-box", "mmg")]
+FREE = [name for name in PRINTED if not get_structure(name).captive]
 
 
 @settings(max_examples=50, deadline=None)
@@ -76,7 +77,9 @@ def test_an_unknown_structure_is_refused():
 
 def test_inertia_that_cannot_be_is_refused():
     p = replace(shipgym.load_model("mariner").particulars, N_vdot=0.9, Y_rdot=0.9)
-    with pytest.raises(InputError, match="inertia of the ship is not positive"):
+    with pytest.raises(
+        InputError, match="inertia of the ship: expected a positive one"
+    ):
         ABKOWITZ.acceleration_matrix(p)
 
 
@@ -240,7 +243,7 @@ def test_printed_structures_have_the_terms_of_their_papers():
         *("n2", "nu", "u2", "v2", "vr", "r2", "n2d2")
     ]
     assert "v2r/U" in [term.name for term in get_structure("cubic").terms("r")]
-    assert sum(name.startswith("zhu-") for name in STRUCTURES) == 10
+    assert sum(name.startswith("zhu-") for name in PRINTED) == 10
     assert get_structure("cubic").required_channels == ("u", "v", "r", "delta", "n")
 
 
@@ -271,7 +274,7 @@ def test_forces_in_units_of_service_speed_meet_the_inertia_of_their_axis():
 def test_a_table_is_registered_in_a_line_and_saved_with_its_models(
     tmp_path, monkeypatch
 ):
-    monkeypatch.setattr("shipgym.ships.structures.STRUCTURES", dict(STRUCTURES))
+    monkeypatch.setattr(structures, "REGISTERED_STRUCTURES", {})
     table = shipgym.register_structure(
         "mine", {"v": "v, |v| v, delta", "r": "v, r, r^2 v/U, delta"}
     )
@@ -286,7 +289,7 @@ def test_a_table_is_registered_in_a_line_and_saved_with_its_models(
     )
     ship.save(tmp_path / "mine.json")
     monkeypatch.undo()
-    with pytest.raises(InputError, match="structure: 'mine' found"):
+    with pytest.raises(InputError, match=r"structure: .* got 'mine'"):
         get_structure("mine")
     for elsewhere in (
         shipgym.load_model(tmp_path / "mine.json"),
@@ -300,22 +303,25 @@ def test_a_table_is_registered_in_a_line_and_saved_with_its_models(
     [
         (
             {"equations": {"r": "r, delat"}},
-            "'delat' found in 'delat'.*Did you mean 'delta'",
+            "got 'delat' in 'delat'.*Did you mean 'delta'",
         ),
-        ({"equations": {"r": "r,, delta"}}, "nothing found between two commas"),
-        ({"equations": {"r": "r^10"}}, "'r\\^10' found"),
-        ({"equations": {"r": "1/v"}}, "equations.r: term '1/v': power -1 of 'v'"),
+        ({"equations": {"r": "r,, delta"}}, "between two commas, got nothing"),
+        ({"equations": {"r": "r^10"}}, "got 'r\\^10'"),
+        (
+            {"equations": {"r": "1/v"}},
+            "equations.r: term '1/v': power of 'v': expected",
+        ),
         (
             {"equations": {"w": "u"}},
-            "equations 'w' found, expected some of 'u', 'v', 'r', 'p', 'q'",
+            "some of 'u', 'v', 'r', 'p', 'q' in this order, got 'w'",
         ),
         (
             {"equations": {"r": "r, phi"}},
-            "symbol 'phi' found, expected an equation of roll 'p'",
+            "expected an equation of roll 'p' where terms have roll",
         ),
         (
             {"equations": {"q": "r, delta"}},
-            "expected the memory 'q' of yaw beside an equation 'r'",
+            "expected the memory 'q' of yaw with an equation 'r'",
         ),
         ({"equations": {"r": "r", "p": "p", "q": "r"}}, "without one of roll 'p'"),
         (
@@ -324,36 +330,45 @@ def test_a_table_is_registered_in_a_line_and_saved_with_its_models(
                 "normalisation": "prime",
                 "quantity": "force",
             },
-            "forces found, expected accelerations in a table with roll",
+            "expected accelerations in a table with roll",
         ),
-        ({"equations": {"r": "v r, r v"}}, "appears twice in one equation: 'rv'"),
-        ({"equations": {"r": ()}}, "no terms found"),
+        ({"equations": {"r": "v r, r v"}}, "expected each term once, got 'rv' twice"),
+        ({"equations": {"r": ()}}, "expected 1 to 200 terms, got none"),
         (
             {"equations": {"r": ["v", "r"]}},
-            "equations.r: 'v' found, expected a formula",
+            "equations.r: expected a formula in one text, or Terms, got 'v'",
         ),
-        ({"equations": {"r": 3}}, "equations.r: 3 found, expected formulas"),
+        ({"equations": {"r": 3}}, "equations.r: expected formulas .* got 3"),
         ({"equations": "r, delta"}, "expected a table of keys and values"),
         (
             {"equations": {"r": "U r"}, "normalisation": "prime"},
-            "'U' found, which is 1 in the prime system",
+            "expected no 'U', which is 1 in the prime system",
         ),
         ({"equations": {"r": "r"}, "normalisation": "prim"}, "Did you mean 'prime'"),
-        ({"equations": {"r": "r"}, "quantity": "force"}, "forces in 'si' found"),
+        (
+            {"equations": {"r": "r"}, "quantity": "force"},
+            "expected forces in the 'prime' or 'service' norm",
+        ),
         (
             {
                 "equations": {"v": "v", "r": "r"},
                 "quantity": "force",
                 "normalisation": "prime",
             },
-            "'v' and 'r' differ, expected the same terms",
+            "expected the same terms in the same order in 'v' and 'r'",
         ),
-        ({"equations": {"r": "r"}, "source": ""}, "source: '' found"),
+        (
+            {"equations": {"r": "r"}, "source": ""},
+            "source: expected a non-empty string",
+        ),
         (
             {"equations": {"r": "r"}, "name": "nomoto"},
-            "name 'nomoto' found, which is another structure's",
+            "expected a new one, got 'nomoto', which is another",
         ),
-        ({"equations": {"r": "r"}, "name": "container"}, "name 'container' found"),
+        (
+            {"equations": {"r": "r"}, "name": "container"},
+            "got 'container', which is another",
+        ),
     ],
 )
 def test_a_table_that_cannot_be_is_refused(arguments, message):
@@ -362,9 +377,9 @@ def test_a_table_that_cannot_be_is_refused(arguments, message):
 
 
 def test_a_shaft_speed_is_asked_for_where_the_terms_have_one():
-    with pytest.raises(InputError, match="service_shaft_speed of 'virtual': 0 found"):
+    with pytest.raises(InputError, match=r"service_shaft_speed of 'virtual': .* got 0"):
         replace(virtual_ship("cubic"), service_shaft_speed=0.0)
-    with pytest.raises(InputError, match="service_shaft_speed: 0 found"):
+    with pytest.raises(InputError, match=r"service_shaft_speed: .* got 0"):
         get_structure("surge-perturbed").acceleration_matrix(
             Particulars(length=100.0, speed=5.0)
         )
@@ -393,36 +408,36 @@ def test_the_terms_of_a_memory_belong_to_the_regression_of_yaw():
         (
             "nomoto",
             {"r": "r, delta"},
-            "name 'nomoto' found, which is another structure's",
+            "expected a new one, got 'nomoto', which is another",
         ),
         (
             "kvlcc2",
             {"r": "r, delta"},
-            "name 'kvlcc2' found, which is another structure's",
+            "expected a new one, got 'kvlcc2', which is another",
         ),
         (
             "grey-box",
             {"r": "r, delta"},
-            "name 'grey-box' found, which is another structure's",
+            "expected a new one, got 'grey-box', which is another",
         ),
-        ("mine", {"r": 3}, "equations.r: 3 found, expected formulas such as"),
+        ("mine", {"r": 3}, "equations.r: expected formulas such as"),
         (
             "mine",
             {"r": ["r", "delta"]},
-            "equations.r: 'r' found, expected a formula in one text, or Terms",
+            "equations.r: expected a formula in one text, or Terms, got 'r'",
         ),
     ],
 )
 def test_names_of_others_and_what_is_no_formula_are_refused(name, equations, message):
     with pytest.raises(InputError, match=message):
         shipgym.register_structure(name, equations)
-    assert "mine" not in STRUCTURES
+    assert "mine" not in list_structures()
 
 
 def test_a_grey_box_is_no_structure_by_itself():
     with pytest.raises(
         InputError,
-        match="'grey-box' found, which is a reference ship and a table of terms",
+        match="got 'grey-box', which is a reference ship and a table",
     ):
         get_structure("grey-box")
 
@@ -444,9 +459,42 @@ def test_structures_are_listed_by_the_names_of_their_sources():
     assert "zhu-11" not in names
 
 
-def test_a_source_that_nobody_wrote_is_refused_with_its_beginning():
-    with pytest.raises(
-        ValueError,
-        match=f"accelerations: '{'x' * 200}' found, expected sums of products",
-    ):
-        accelerations_function("x" * 300)
+def test_a_table_of_unknown_symbols_becomes_no_program():
+    """The symbols of a table are looked up, whatever the names of its terms are."""
+    named = Term("__import__('os')", (("r", 1),))
+    table = Structure("mine", "own", {"r": (named,)}, "si", "acceleration")
+    ship = ShipModel(
+        "mine",
+        "mine",
+        Particulars(length=100.0, speed=5.0),
+        SteeringGear(),
+        {f"c_{named.name}": -0.1},
+        dynamics=table,
+    )
+    rates = ship.derivatives([0.0, 0.0, 0.0, 5.0, 0.0, 0.2, 0.0], [0.0])
+    assert rates[5] == pytest.approx(-0.02)
+    with pytest.raises(InputError, match="expected symbols of 'u'"):
+        replace(table, equations={"r": (Term("r", (("__class__", 1),)),)})
+
+
+@pytest.mark.parametrize("name", shipgym.list_models())
+def test_accelerations_in_numpy_are_those_that_are_compiled(name):
+    """At a few states of a hard turn, for every shipped ship."""
+    ship = shipgym.load_model(name)
+    U0, length = ship.particulars["speed"], ship.particulars["length"]
+    channels = {
+        "u": U0 * np.array([0.9, 0.6, 0.4]),
+        "v": U0 * np.array([-0.1, 0.2, 0.05]),
+        "r": U0 / length * np.array([0.3, -0.6, 0.1]),
+        "p": U0 / length * np.array([0.1, 0.0, -0.1]),
+        "phi": np.array([0.05, -0.1, 0.0]),
+        "q": (U0 / length) ** 2 * np.array([0.1, -0.2, 0.0]),
+        "delta": np.array([0.3, -0.5, 0.1]),
+        "n": np.full(3, ship.service_shaft_speed),
+    }
+    plain, compiled = ship.accelerations(channels), ship.rates(channels)
+    assert {"u", "v", "r"} <= set(plain) <= set(compiled)
+    for quantity, found in plain.items():
+        np.testing.assert_allclose(
+            found, compiled[quantity], rtol=1e-9, atol=1e-12 * U0**2 / length
+        )

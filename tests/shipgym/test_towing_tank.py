@@ -229,7 +229,10 @@ def test_a_balance_at_the_centre_of_gravity_is_moved_to_midship(mariner, tmp_pat
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda m: towing_tank.static_drift(m, []), "drift_deg: no angle found"),
+        (
+            lambda m: towing_tank.static_drift(m, []),
+            "drift_deg: expected at least one angle",
+        ),
         (lambda m: towing_tank.static_drift(m, [200.0]), r"drift_deg\[0\]: 200 found"),
         (lambda m: towing_tank.pure_surge(m, 20.0), "amplitude: 20 found"),
         (lambda m: towing_tank.pure_sway(m, 0.5, period_s=-1.0), "period_s: -1 found"),
@@ -292,7 +295,7 @@ def test_motions_that_cannot_be_towed_are_refused(mariner):
         towing_tank.static_drift(mariner, [5.0], hold_s=0.0)
     with pytest.raises(InputError, match=r"drift_deg\[1\]: 181 found"):
         towing_tank.static_drift(mariner, [5.0, 181.0])
-    with pytest.raises(InputError, match="drift_deg: no angle found"):
+    with pytest.raises(InputError, match="drift_deg: expected at least one angle"):
         towing_tank.static_drift(mariner, [])
     for motion in (towing_tank.pure_surge, towing_tank.pure_sway, towing_tank.pure_yaw):
         with pytest.raises(InputError, match=r"amplitude.*: 0 found"):

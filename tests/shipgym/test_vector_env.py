@@ -30,7 +30,7 @@ def vector(name, num_envs=3, **options):
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("name", [COURSE, PATH, "shipgym/PathFollowing-v1"])
+@pytest.mark.parametrize("name", [COURSE, PATH])
 def test_conformance_and_rows_that_are_single_environments(name, mode):
     check_vector_env(
         lambda: vector(name, 3, autoreset_mode=mode, **SHORT),
@@ -135,18 +135,18 @@ def test_gymnasiums_vector_wrappers_work_on_it():
 
 def test_a_vector_environment_says_what_is_wrong(mariner):
     for options, message in (
-        ({"num_envs": 0}, "num_envs: 0 found"),
+        ({"num_envs": 0}, "num_envs: expected"),
         ({"sae": "calm"}, "Did you mean 'sea'"),
         ({"autoreset_mode": "later"}, "autoreset_mode: 'later' found"),
-        ({"threads": 0}, "threads: 0 found"),
+        ({"threads": 0}, "threads: expected"),
         (
             {"render_mode": "human"},
-            "render_mode: 'human' found, expected one of 'rgb_array', or None",
+            "render_mode: expected one of 'rgb_array', or None, got 'human'",
         ),
         ({"ensemble": ["container"]}, "ensemble: 'container' has other equations"),
-        ({"model_uncertainty": "posterior"}, "'mariner' has no covariance"),
+        ({"model_uncertainty": "posterior"}, "model 'mariner': expected a covariance"),
         ({"speed_range": 0.5}, "speed_range: 0.5 found"),
-        ({"speed_range": (0.9, 0.5)}, "speed_range: the largest: 0.5"),
+        ({"speed_range": (0.9, 0.5)}, "speed_range: the largest: expected"),
     ):
         with pytest.raises(InputError, match=message):
             vector(COURSE, **{"num_envs": 2, **options})
@@ -239,7 +239,7 @@ def test_a_mask_that_says_nothing_is_refused(options, message):
 
 def test_an_unknown_mode_is_refused():
     for name, value in (("autoreset_mode", "Never"), ("render_mode", "human")):
-        with pytest.raises(InputError, match=f"{name}: '{value}' found, expected"):
+        with pytest.raises(InputError, match=f"{name}: .*expected"):
             gymnasium.make_vec(
                 "shipgym/CourseKeeping-v0", num_envs=2, model="mariner", **{name: value}
             )

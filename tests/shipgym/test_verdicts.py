@@ -8,16 +8,20 @@ import pytest
 
 from shipgym import Trial, UnstableModelError, load_model
 from shipgym.manoeuvres import (
-    imo,
     imo_assessment,
-    registry,
     standard_manoeuvres,
     turning_circle,
     turning_indices,
     zigzag,
 )
-from shipgym.manoeuvres.imo import with_measured
 from shipgym.manoeuvres.intervals import IndexInterval
+from shipgym.manoeuvres.registry import check_physical
+from shipgym.manoeuvres.verdicts import (
+    decided_by_model,
+    measured_indices,
+    outside_envelope,
+    with_measured,
+)
 
 
 @pytest.fixture(scope="module")
@@ -54,11 +58,9 @@ def test_within_the_trials_the_interval_decides(of_zigzags):
 
 
 def test_an_interval_on_both_sides_of_the_limit_decides_nothing(of_zigzags):
-    from shipgym.manoeuvres.imo import _decided
-
     one = of_zigzags["overshoot_1_20_20"]
     middle = replace(one, limit=sum(one.interval) / 2.0)
-    found = _decided(middle, "20/20 zigzag", outside=False)
+    found = decided_by_model(middle, "20/20 zigzag", outside=False)
     assert not found.decided
     assert "both sides of the limit; run a 20/20 zigzag" in found.note
 
@@ -111,7 +113,7 @@ def test_draws_decide_where_97_and_a_half_per_cent_are_on_one_side(
     one = replace(
         of_zigzags["overshoot_1_20_20"], drawn=index, limit=2.0, passed=share > 0.5
     )
-    assert imo._decided(one, "20/20 zigzag", outside=False).passed == passed
+    assert decided_by_model(one, "20/20 zigzag", outside=False).passed == passed
 
 
 @pytest.mark.parametrize(("distance", "outside"), [(1.14, False), (1.16, True)])
@@ -129,7 +131,7 @@ def test_a_manoeuvre_is_outside_beyond_115_per_cent_of_the_envelope_up_to_half_a
     trial = Trial(np.arange(5.0), channels)
     model = SimpleNamespace(envelope=SimpleNamespace(distance=of))
     assert (
-        imo._outside(model, SimpleNamespace(outcome=None, sail=lambda _: trial))
+        outside_envelope(model, SimpleNamespace(outcome=None, sail=lambda _: trial))
         == outside
     )
     assert seen == [(3, [0.0, 0.0, 0.0], 2.0)]
@@ -148,7 +150,9 @@ def test_a_measured_turn_has_the_rudder_within_a_degree_and_a_tenth_of_the_speed
         changed |= {
             name: rudder / 35.0 * turn[name] for name in ("delta", "delta_command")
         }
-        assert ("advance" in imo._measured(ship, turn.with_channels(changed))) == counts
+        assert (
+            "advance" in measured_indices(ship, turn.with_channels(changed))
+        ) == counts
 
 
 @pytest.mark.parametrize(
@@ -162,12 +166,12 @@ def test_no_ship_is_half_as_fast_again_or_as_fast_sideways_or_turns_three_radian
     for share, wild in ((0.99, False), (-1.01, True)):
         trial = Trial([0.0, 1.0, 2.0], {channel: [0.0, share * most, 0.0]})
         if not wild:
-            registry._check_physical(ship, trial)
+            check_physical(ship, trial)
             continue
         with pytest.raises(
             UnstableModelError, match=rf"runs away after 1\.0 s \({channel} = -"
         ) as away:
-            registry._check_physical(ship, trial)
+            check_physical(ship, trial)
         assert (away.value.time_s, away.value.state) == (1.0, {channel: share * most})
 
 

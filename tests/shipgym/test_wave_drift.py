@@ -8,10 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipgym import InputError, Particulars, Waves, load_model, sea_states
+from shipgym.constants import GRAVITY
 from shipgym.sea import slow_drift, wave_drift, wave_motion, wave_spectrum
 from shipgym.sea.added_resistance import added_resistance, end_angle, speed_factor
 from shipgym.sea.drift import reflection_coefficients
-from shipgym.sea.estimates import GRAVITY, weather_particulars
+from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.mobility import mobility_matrix, roll_inertia
 from shipgym.sea.waves import draught_attenuation
 from shipgym.ships import get_structure

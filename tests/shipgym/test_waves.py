@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from shipgym import InputError, Particulars, Waves, load_model
+from shipgym.constants import GRAVITY
 from shipgym.sea import (
     encounter_frequency,
     jonswap,
@@ -13,7 +14,7 @@ from shipgym.sea import (
     wave_motion,
 )
 from shipgym.sea.drift import wave_drift
-from shipgym.sea.estimates import GRAVITY, weather_particulars
+from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.harmonics import circle
 from shipgym.sea.motions import heading_response, roll_response
 from shipgym.sea.waves import over_directions
@@ -175,7 +176,7 @@ def test_estimated_roll_period_is_that_of_the_container_ships_equations():
     inertia = (
         (numbers.PUBLISHED.Ix + numbers.PUBLISHED.Jx) * 0.5 * 1025.0 * numbers.LENGTH**5
     )
-    stiffness = 1025.0 * 9.81 * numbers.VOLUME * numbers.GM
+    stiffness = 1025.0 * numbers.WEIGHT * numbers.GM
     own = 2.0 * np.pi * np.sqrt(inertia / stiffness)
     estimated = weather_particulars(load_model("container").particulars)
     assert estimated.roll_period == pytest.approx(own, rel=0.05)

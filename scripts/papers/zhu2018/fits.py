@@ -219,7 +219,7 @@ def spline_fit(
         ship.particulars,
         ship.steering,
         dict.fromkeys(WITH_SPEED.coefficient_names, 0.0),
-        own_table=WITH_SPEED,
+        dynamics=WITH_SPEED,
         service_shaft_speed=ship.service_shaft_speed,
     )
     samples = spline_samples(trial, ship)

@@ -1,0 +1,228 @@
+"""Entries of a benchmark: how a controller is named, and how it is made for a task.
+
+A controller is named, on the command line and in Python, as
+
+    pid                   a classical controller, designed for the model of each task
+    tuned-pid             the same with the settings that direct search found for the task
+    tuned-best            of these, the one with the lowest cost in each task
+    best-known            the lowest cost ever reached in each episode, kept with the suite
+    ppo                   the pretrained agents of agents/pretrained
+    runs/agent.json       a file of an agent or controller
+    runs/model.zip        an agent as stable-baselines3 saves it
+    runs/{task}-*.json    one file for each task; several that match are training runs
+    a.json+b.json         training runs, file by file
+    my_module:factory     a function that returns a controller for a `BenchmarkTask`
+    my_module:Mine        a subclass of `agents.Controller`
+    name=...              any of these under another name
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from agents.benchmarking.sources import (
+    check_object,
+    file_hash,
+    import_code,
+    known_names,
+    load_source,
+    make_policies,
+    make_policy,
+    matching_files,
+    names_code,
+    source_files,
+)
+from agents.controllers.controller import Policy, model_hash
+from agents.rollouts.rollout import check_fits
+from agents.suites.suite import BenchmarkTask
+from shipgym.checks import did_you_mean, quoted
+from shipgym.errors import InputError
+
+NOT_IN_NAMES = ",=/{}*"
+#: Attributes of a policy that may be policies themselves, and how many are looked at.
+INNER_POLICIES = ("policy", "fallback", "base", "autopilot")
+MOST_INNER_POLICIES = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """A controller that takes part in a benchmark.
+
+    Attributes
+    ----------
+    name : str
+        Its name in tables and files.
+    source : str, controller, callable or sequence
+        A text as in the module's docstring, a controller, a function that returns one
+        for a `BenchmarkTask`, or several of the latter two, each a training run.
+    """
+
+    name: str
+    source: Any
+
+    @property
+    def is_text(self) -> bool:
+        """Tell whether another process can make it too."""
+        return isinstance(self.source, str)
+
+    def policies(self, task: BenchmarkTask) -> tuple[Policy, ...]:
+        """Make its controllers for a task, one for each training run.
+
+        Raises InputError if it cannot be made for this task, observes other quantities,
+        or was designed on the ship that it should not know.
+        """
+        where = f"'{self.name}' on task '{task.name}'"
+        design_task = task.design_task
+        policies = make_policies(self.source, design_task)
+        for policy in policies:
+            check_fits(policy, design_task.task, design_task.ship, where)
+            if task.true_ship:
+                _check_design(policy, task, where)
+        return tuple(policies)
+
+    def fingerprint(self, task: BenchmarkTask) -> dict[str, str]:
+        """Return the SHA-256 of each file that it is made from for a task, by path."""
+        if not self.is_text:
+            return {}
+        return {str(path): file_hash(path) for path in source_files(self.source, task)}
+
+
+def _check_design(policy: Policy, task: BenchmarkTask, where: str) -> None:
+    """Refuse a policy that was designed on the ship behind a task's model."""
+    if model_hash(task.evaluation.ship) in _design_hashes(policy):
+        raise InputError(
+            f"{where}: expected a design on the model '{task.model}', got one on the"
+            f" ship '{task.true_ship}'"
+        )
+
+
+def _design_hashes(policy: Policy) -> set[str]:
+    """Hashes of the models that a policy and the policies within it were made for."""
+    found: list[Any] = [policy]
+    known = {id(policy)}
+    for one in found:  # grows in the loop
+        for name in INNER_POLICIES:
+            inner = getattr(one, name, None)
+            if inner is None or id(inner) in known:
+                continue
+            known.add(id(inner))
+            found.append(inner)
+        if len(found) > MOST_INNER_POLICIES:
+            raise InputError(
+                f"{type(policy).__name__}: expected a policy made of at most"
+                f" {MOST_INNER_POLICIES} policies, got more"
+            )
+    return {getattr(one, "model_sha256", "") for one in found}
+
+
+def read_entries(controllers: Any) -> tuple[Entry, ...]:
+    """Read what a user gave as controllers.
+
+    Raises InputError for an unknown one, with the nearest known, or two of one name.
+
+    Parameters
+    ----------
+    controllers : str, sequence or mapping
+        Texts, several in one separated by commas; entries; controllers; functions; or
+        any of these by name.
+    """
+    if isinstance(controllers, Mapping):
+        entries = [_named(str(name), one) for name, one in controllers.items()]
+    elif isinstance(controllers, str):
+        entries = [_read_entry(text) for text in controllers.split(",")]
+    elif hasattr(controllers, "predict") or not isinstance(controllers, Iterable):
+        entries = [_read_entry(controllers)]
+    else:
+        entries = [_read_entry(one) for one in controllers]
+
+    if not entries:
+        raise InputError("controllers: expected at least one, got none")
+    names = [entry.name for entry in entries]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(
+                f"controllers: expected different names, got '{name}' twice; name one"
+                f" of them: other={name}"
+            )
+    return tuple(entries)
+
+
+def _read_entry(given: Any) -> Entry:
+    if isinstance(given, Entry):
+        return given
+    if isinstance(given, str):
+        name, equals, source = given.partition("=")
+        if equals:
+            return _named(name.strip(), source.strip())
+        text = given.strip()
+        return Entry(_short_name(text), _checked_text(text))
+    own_name = getattr(given, "name", None) or getattr(given, "__name__", None)
+    return _named(str(own_name or type(given).__name__), given)
+
+
+def _named(name: str, source: Any) -> Entry:
+    if not name or set(name) & set(NOT_IN_NAMES):
+        raise InputError(
+            f"controllers: expected a name without any of {' '.join(NOT_IN_NAMES)}, got"
+            f" '{name}'"
+        )
+    if isinstance(source, str):
+        return Entry(name, _checked_text(source))
+    for run in source if isinstance(source, Sequence) else [source]:
+        check_object(run, name)
+    return Entry(name, source)
+
+
+def _short_name(text: str) -> str:
+    """Name of an entry that was given without one."""
+    if names_code(text):
+        return text.rpartition(":")[2]
+    if not text.endswith((".json", ".zip")):
+        return text
+    stem = Path(text.split("+")[0]).stem
+    return stem.replace("{task}", "").replace("*", "").strip("-_.") or "agent"
+
+
+def _checked_text(text: str) -> str:
+    """Return a text that names a known controller, a function, or files."""
+    known = known_names()
+    if text in known or "{task}" in text:
+        return text
+    if names_code(text):
+        import_code(text)
+        return text
+    if not all(matching_files(pattern) for pattern in text.split("+")):
+        raise InputError(
+            f"controllers: expected one of {quoted(known)}, an existing file of an"
+            f" agent, or module:function, got '{text}'.{did_you_mean(text, known)}"
+        )
+    return text
+
+
+def check_agents(entry: Entry, tasks: Sequence[BenchmarkTask]) -> None:
+    """Refuse files of agents that cannot be read or fit none of the tasks.
+
+    Called before anything is run. Raises InputError naming the file.
+    """
+    if not entry.is_text or names_code(entry.source):
+        return
+    pairs = [
+        (path, task) for task in tasks for path in source_files(entry.source, task)
+    ]
+    sources = {
+        path: load_source(path) for path in dict.fromkeys(path for path, _ in pairs)
+    }
+
+    refusals = []
+    for path, task in pairs:
+        where = f"'{path}' on task '{task.name}'"
+        try:
+            policy = make_policy(sources[path], task)
+            check_fits(policy, task.task, task.ship, where)
+        except InputError as error:
+            refusals.append(str(error))
+    if pairs and len(refusals) == len(pairs):
+        raise InputError(
+            f"controllers: '{entry.name}' fits none of the tasks: {refusals[0]}"
+        )

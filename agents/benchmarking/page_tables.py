@@ -1,0 +1,302 @@
+"""Tables of a benchmark's page, which sort by a click on a head."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from agents.benchmarking.page_replays import best_controllers
+from agents.benchmarking.results import BenchmarkResult
+from agents.benchmarking.sources import BEST_KNOWN
+from shipgym.pages.numbers import fixed, number, percent
+
+BETTER, WORSE = "#1d70b8", "#d9822b"  # tints of probabilities of improvement
+MOST_TINT = 42.0  # per cent of the colour
+
+#: Further figures of a task: head of the column, and how its numbers are written.
+METRICS = {
+    "heading_rmse_deg": ("heading RMSE, deg", "number"),
+    "cross_track_rmse_m": ("cross-track RMSE, m", "number"),
+    "rudder_travel_deg_min": ("rudder travel, deg/min", "number"),
+    "rudder_reversals_min": ("rudder reversals, 1/min", "number"),
+    "overshoot_percent": ("overshoot, %", "number"),
+    "settling_s": ("settling, s", "number"),
+    "unsettled": ("not settled", "share"),
+    "outside_corridor": ("time outside corridor", "share"),
+    "left_corridor": ("left corridor", "share"),
+    "grounded": ("aground", "share"),
+    "success": ("success", "share"),
+    "fuel": ("fuel, straight run = 1", "fixed"),
+    "extrapolating": ("outside model", "share"),
+}
+RARE_METRICS = ("extrapolating",)  # shown only if not 0 throughout
+
+
+@dataclass(frozen=True)
+class TableHead:
+    """Head of a column.
+
+    Attributes
+    ----------
+    text : str
+        Title of the column.
+    kind : str
+        CSS class; "num" for columns of numbers.
+    descending : bool
+        A first click puts the largest number first.
+    sorted : str
+        Order of the rows as they are: "none" or "ascending".
+    """
+
+    text: str
+    kind: str = "num"
+    descending: bool = False
+    sorted: str = "none"
+
+
+@dataclass(frozen=True)
+class TableCell:
+    """Cell of a table.
+
+    Attributes
+    ----------
+    text : str or None
+        What it shows; None for a dash.
+    key : float or None
+        What it is sorted by; cells without one come last.
+    kind : str
+        CSS class.
+    below : str
+        Small print.
+    star : bool
+        Marked as the best.
+    tint : str
+        Background colour, CSS.
+    """
+
+    text: str | None = None
+    key: float | None = None
+    kind: str = ""
+    below: str = ""
+    star: bool = False
+    tint: str = ""
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """Row of a table: its name, a link or a badge beside it, and its cells."""
+
+    name: str
+    cells: Sequence[TableCell]
+    link: str = ""
+    badge: str = ""
+
+
+@dataclass(frozen=True)
+class SortableTable:
+    """Table of a page; `name` is its id, unique in the page."""
+
+    name: str
+    caption: str
+    heads: Sequence[TableHead]
+    rows: Sequence[TableRow]
+
+
+def ranking_table(result: BenchmarkResult) -> SortableTable:
+    """Return scores, relative costs, lost ships, and who is best in how many tasks."""
+    caption = "No score: no best known costs are kept of these episodes."
+    if result.summary["reference"]:
+        caption = (
+            "Score: share of the way from wheel-over designed on the model (0) to the"
+            " best known cost (1), interquartile mean over tasks, with bootstrap 95 %"
+            " interval."
+        )
+    caption += (
+        " Relative cost: geometric mean over tasks of the cost over the lowest one. Best"
+        " in tasks: has the lowest cost, or the same. Lost: episodes in which control"
+        " was lost. Failed: the controller gave no command."
+    )
+    heads = [
+        TableHead("controller", kind=""),
+        TableHead("place", sorted="ascending"),
+        TableHead("score", descending=True),
+        TableHead("relative cost"),
+        TableHead("best in tasks", descending=True),
+        TableHead("tasks", descending=True),
+        TableHead("lost"),
+        TableHead("failed"),
+    ]
+    best = [name for task in result.tasks for name in best_controllers(result, task)]
+    rows = []
+    for place, ranked in enumerate(result.summary["ranking"], start=1):
+        name, relative = ranked["name"], ranked["relative_cost"]
+        wins = _count_cell(best.count(name))
+        cells = [
+            _count_cell(place),
+            _interval_cell(ranked["score"], fixed),
+            TableCell(fixed(relative), relative),
+            TableCell(key=0) if name == BEST_KNOWN else wins,
+            _count_cell(ranked["tasks"]),
+            _failure_cell(ranked["lost"]),
+            _failure_cell(ranked["failed"]),
+        ]
+        rows.append(_controller_row(name, cells))
+    return SortableTable("ranking-table", caption, heads, rows)
+
+
+def costs_table(result: BenchmarkResult) -> SortableTable:
+    """Return the cost of each controller in each task; the lowest is marked."""
+    caption = (
+        "Mean cost of an episode (minus the sum of its rewards; less is better) and its"
+        " bootstrap 95 % interval. ★ marks the lowest, among those usable at sea."
+    )
+    names = result.ranking
+    heads = [TableHead("task", kind=""), *(TableHead(name) for name in names)]
+    rows = []
+    for task, cells in result.summary["tasks"].items():
+        best = best_controllers(result, task)
+        row = [
+            _interval_cell(cells.get(name, {}).get("cost"), number, star=name in best)
+            for name in names
+        ]
+        rows.append(_task_row(task, row))
+    return SortableTable("costs-table", caption, heads, rows)
+
+
+def scores_table(result: BenchmarkResult) -> SortableTable:
+    """Return the score of each controller in each task with reference costs."""
+    caption = (
+        "Scores: 0 is the cost of wheel-over designed on the model, 1 the best known,"
+        " with 95 % interval."
+    )
+    names = result.ranking
+    heads = [
+        TableHead("task", kind=""),
+        TableHead("cost of 0"),
+        TableHead("cost of 1"),
+        *(TableHead(name, descending=True) for name in names),
+    ]
+    rows = []
+    for task, reference in result.summary["reference"].items():
+        cells = result.summary["tasks"][task]
+        row = [
+            TableCell(number(reference["zero"]), reference["zero"]),
+            TableCell(number(reference["best"]), reference["best"]),
+        ]
+        for name in names:
+            row.append(_interval_cell(cells.get(name, {}).get("score"), fixed))
+        rows.append(_task_row(task, row))
+    return SortableTable("scores-table", caption, heads, rows)
+
+
+def improvement_table(result: BenchmarkResult) -> SortableTable:
+    """Return the probability that the row's controller costs less than the column's."""
+    caption = (
+        "Probability that the controller of the row costs less than the one of the"
+        " column in the same episode, ties by half, mean over tasks, in per cent with"
+        " 95 % interval. Blue: the row is better; orange: the column."
+    )
+    names = result.ranking
+    heads = [
+        TableHead("", kind=""),
+        *(TableHead(name, descending=True) for name in names),
+    ]
+    improvement = result.summary["improvement"]
+    rows = [
+        _controller_row(
+            name, [_improvement_cell(improvement[name].get(other)) for other in names]
+        )
+        for name in names
+    ]
+    return SortableTable("improvement-table", caption, heads, rows)
+
+
+def _improvement_cell(interval: Mapping[str, Any] | None) -> TableCell:
+    if interval is None or interval["value"] is None:
+        return TableCell()
+    value, low, high = (100.0 * interval[name] for name in ("value", "low", "high"))
+    colour = BETTER if value >= 50.0 else WORSE
+    share = MOST_TINT * abs(value - 50.0) / 50.0
+    return TableCell(
+        text=f"{value:.0f}",
+        key=interval["value"],
+        kind="tinted",
+        below=f"{low:.0f} to {high:.0f}",
+        tint=f"color-mix(in srgb,{colour} {share:.0f}%,white)",
+    )
+
+
+def metrics_table(result: BenchmarkResult, task: str, name: str) -> SortableTable:
+    """Return the further figures of a task: means, and below the 95th percentiles."""
+    caption = (
+        "Means over the episodes, and below them the 95th percentile. Time per action:"
+        " in a batch."
+    )
+    cells = result.summary["tasks"][task]
+    metrics = [metric for metric in METRICS if _is_shown(metric, cells)]
+    titles = ["cost", *(METRICS[metric][0] for metric in metrics)]
+    titles += ["lost", "failed", "µs per action"]
+    heads = [TableHead("controller", kind=""), *(TableHead(title) for title in titles)]
+    rows = []
+    for controller in result.ranking:
+        if controller in cells:
+            row = _metrics_row(cells[controller], metrics)
+            rows.append(_controller_row(controller, row))
+    return SortableTable(name, caption, heads, rows)
+
+
+def _is_shown(metric: str, cells: Mapping[str, Any]) -> bool:
+    """Tell whether a controller has a metric, not 0 if it is a rare one."""
+    means = [cell["metrics"].get(metric, {}).get("mean") for cell in cells.values()]
+    if metric in RARE_METRICS:
+        return any(means)
+    return any(mean is not None for mean in means)
+
+
+def _metrics_row(cell: Mapping[str, Any], metrics: Sequence[str]) -> list[TableCell]:
+    cost, time = cell["cost"]["value"], cell["microseconds_per_action"]
+    return [
+        TableCell(number(cost), cost),
+        *(_metric_cell(metric, cell["metrics"].get(metric)) for metric in metrics),
+        _failure_cell(cell["lost"]),
+        _failure_cell(cell["failed"]),
+        TableCell(number(time, 2), time),
+    ]
+
+
+def _metric_cell(metric: str, figures: Mapping[str, Any] | None) -> TableCell:
+    if figures is None or figures["mean"] is None:
+        return TableCell()
+    mean, kind = figures["mean"], METRICS[metric][1]
+    if kind == "share":
+        return TableCell(percent(mean), mean)
+    write = fixed if kind == "fixed" else number
+    return TableCell(write(mean), mean, below=write(figures["p95"]))
+
+
+def _interval_cell(
+    interval: Mapping[str, Any] | None, write: Any, star: bool = False
+) -> TableCell:
+    """Return a cell with a number and its 95 % interval."""
+    kind = "best" if star else ""
+    if interval is None or interval["value"] is None:
+        return TableCell(kind=kind)
+    low, high = write(interval["low"]), write(interval["high"])
+    value = interval["value"]
+    return TableCell(write(value), value, kind, f"{low} to {high}", star)
+
+
+def _count_cell(count: int) -> TableCell:
+    return TableCell(str(count), count)
+
+
+def _failure_cell(count: int) -> TableCell:
+    return TableCell(str(count), count, "bad" if count else "")
+
+
+def _controller_row(name: str, cells: Sequence[TableCell]) -> TableRow:
+    badge = "not one autopilot" if name == BEST_KNOWN else ""
+    return TableRow(name, cells, badge=badge)
+
+
+def _task_row(name: str, cells: Sequence[TableCell]) -> TableRow:
+    return TableRow(name, cells, link=f"#task-{name}")

@@ -1,0 +1,162 @@
+"""Where controllers come from: what a text names, and how it is made for a task."""
+
+import glob
+import hashlib
+import json
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+from importlib import import_module
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from agents.agent_file import load_agent
+from agents.controllers.controller import Controller, Policy
+from agents.controllers.designs import CLASSICAL, design, tuned
+from agents.controllers.registry import (
+    controller_class,
+    controller_kinds,
+    register_controller,
+)
+from agents.policies.sb3_zip import read_sb3
+from agents.suites.suite import BenchmarkTask
+from shipgym.errors import InputError
+from shipgym.files import LARGEST_TENSORS, read_bytes
+from shipgym.python_files import working_folder
+
+LEARNED = ("ppo", "sac", "td3", "tqc")
+TUNED = "tuned-"
+BEST_KNOWN = "best-known"
+
+#: A policy, or a function that makes one for a task.
+Source = Policy | Callable[[BenchmarkTask], Any]
+
+
+def known_names() -> tuple[str, ...]:
+    """Names that stand for a controller, other than files and functions."""
+    tuned_names = [TUNED + kind for kind in ("best", *CLASSICAL)]
+    return (*controller_kinds(), *LEARNED, BEST_KNOWN, *tuned_names)
+
+
+def names_code(text: str) -> bool:
+    """Tell whether a text names a function, `module:function`."""
+    module, colon, function = text.rpartition(":")
+    parts = [*module.split("."), function]
+    return bool(colon) and all(part.isidentifier() for part in parts)
+
+
+def import_code(text: str) -> Any:
+    """Import the function that a text names, or make one of a subclass of Controller."""
+    module, _, name = text.rpartition(":")
+    try:
+        with working_folder():
+            function = getattr(import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise InputError(
+            f"controllers: expected module:function, got '{text}', which cannot be"
+            f" imported ({error})"
+        ) from None
+    if isinstance(function, type) and issubclass(function, Controller):
+        return partial(design, register_controller(function).kind)
+    check_object(function, text)
+    return function
+
+
+def check_object(source: Any, name: str) -> None:
+    """Refuse an object that is neither a controller nor a function."""
+    if not callable(getattr(source, "predict", None)) and not callable(source):
+        raise InputError(
+            f"controllers: '{name}': expected a controller (with `predict`), a function"
+            f" that makes one for a task, or a text such as 'pid', got {source!r}"
+        )
+
+
+def make_policies(source: Any, task: BenchmarkTask) -> list[Policy]:
+    """Make the controllers of a source for a design task."""
+    if isinstance(source, Sequence) and not isinstance(source, str):
+        return [make_policy(run, task) for run in source]
+    if not isinstance(source, str):
+        return [make_policy(source, task)]
+
+    if source in controller_kinds():
+        needs_path = controller_class(source).has_autopilot
+        kind = "lq" if needs_path and not task.task.follows_path else source
+        return [design(kind, task)]
+    if source.startswith(TUNED):
+        return [tuned(source.removeprefix(TUNED), task, task.suite)]
+    if names_code(source):
+        with working_folder():
+            return [make_policy(import_code(source), task)]
+
+    paths = source_files(source, task)
+    if not paths:
+        what = f"pretrained {source} agent" if source in LEARNED else f"file '{source}'"
+        raise InputError(f"there is no {what} for task '{task.name}'")
+    return [make_policy(load_source(path), task) for path in paths]
+
+
+def make_policy(source: Source, task: BenchmarkTask) -> Policy:
+    """Return a policy itself, or what a function makes for a task."""
+    policy: Any = source if hasattr(source, "predict") else source(task)
+    if not callable(getattr(policy, "predict", None)):
+        raise InputError(
+            f"{getattr(source, '__name__', source)}: expected a controller with"
+            f" `predict` for task '{task.name}', got {policy!r}"
+        )
+    return policy  # type: ignore[no-any-return]
+
+
+def load_source(path: Path) -> Source:
+    """Read a policy; of a zip, a function that makes one for a task."""
+    if path.suffix != ".zip":
+        return load_agent(path)
+    agent = read_sb3(path)
+    return lambda task: agent.policy(task.task, task.ship)
+
+
+def source_files(text: str, task: BenchmarkTask) -> list[Path]:
+    """Files from which a text's controllers are made for a task."""
+    name = task.design_task.name
+    if text in LEARNED:
+        return pretrained(name, text)
+    if names_code(text):
+        module = sys.modules.get(text.rpartition(":")[0])
+        source = getattr(module, "__file__", None)
+        return [Path(source)] if source else []
+    if text in known_names():
+        return []
+    patterns = [pattern.replace("{task}", name) for pattern in text.split("+")]
+    return [path for pattern in patterns for path in matching_files(pattern)]
+
+
+def matching_files(pattern: str) -> list[Path]:
+    """Return the files that a pattern matches, in order."""
+    paths = [Path(path) for path in sorted(glob.glob(pattern))]  # noqa: PTH207 - whole paths
+    return [path for path in paths if path.is_file()]
+
+
+def pretrained(task: str, algorithm: str) -> list[Path]:
+    """Return the files of the agents trained for a task.
+
+    TASK-ALGORITHM.json, or one for each training run, TASK-ALGORITHM-RUN.json.
+    """
+    folder = Path(str(files("agents").joinpath("pretrained")))
+    name = f"{glob.escape(str(folder / task))}-{algorithm}"
+    return [*matching_files(f"{name}.json"), *matching_files(f"{name}-*.json")]
+
+
+def file_hash(path: str | Path) -> str:
+    """Return the SHA-256 of a file; raises InputError if it cannot be read."""
+    return hashlib.sha256(read_bytes(Path(path), "file", LARGEST_TENSORS)).hexdigest()
+
+
+def policy_hash(policy: Policy) -> str | None:
+    """Return the SHA-256 of a controller's file; None for one that has no file."""
+    if not isinstance(policy, Controller):
+        return None
+    try:
+        content = policy.to_dict()
+    except (AttributeError, InputError):  # guidance over a user's own autopilot
+        return None
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -1,0 +1,147 @@
+"""`shipgym autopilot`: the whole chain, from trials to tested autopilots."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from typer import Option
+
+from agents.cli.command import (
+    FAILED,
+    Address,
+    EngineName,
+    IdentifyOptions,
+    ShipFileArgument,
+    Workers,
+    fail,
+)
+
+if TYPE_CHECKING:
+    from agents.verification.result import AutopilotResult, Verification
+
+
+def autopilot_command(
+    ship: ShipFileArgument,
+    out: Annotated[
+        Path,
+        Option(metavar="FOLDER", help="Folder for the report, model and autopilots."),
+    ],
+    draws: Annotated[
+        int, Option(min=2, help="Models drawn from the coefficient covariance.")
+    ] = 200,
+    seed: Annotated[int, Option(min=0, help="Random seed of draws and episodes.")] = 0,
+    *,
+    options: IdentifyOptions,
+    agents: Annotated[
+        list[str] | None,
+        Option(
+            "--agent",
+            metavar="AGENT",
+            help="Also run this autopilot, a file or a name; repeatable.",
+        ),
+    ] = None,
+    autopilots: Annotated[
+        str | None,
+        Option(
+            metavar="NAMES",
+            help=(
+                "Autopilots to design; default: pid,lq,turn-rate,wheel-over. "
+                "Others: lqg, mpc."
+            ),
+        ),
+    ] = None,
+    standards: Annotated[
+        bool,
+        Option(
+            "--standards",
+            help="Simulate topics of ISO 11674 and IEC 62065, with our own limits.",
+        ),
+    ] = False,
+    engine: EngineName = "local",
+    workers: Workers = 1,
+    address: Address = None,
+) -> None:
+    """Go from trials to a report on autopilots. Identifies, predicts, designs, runs them on drawn models.
+
+    Options not given here are taken from the ship file's table [identify]. Exits with 1
+    if the identified model is unstable, or no autopilot designed on it can be trusted;
+    the report then says why.
+    """
+    from agents.cli.terminal import progress_bars
+    from agents.jobs import JobEngine
+    from agents.verification.chain import build_autopilot
+    from agents.verification.verify import DESIGNS
+
+    designs = list(DESIGNS)
+    if autopilots is not None:
+        designs = [name.strip() for name in autopilots.split(",")]
+    with progress_bars() as on_progress:
+        result = build_autopilot(
+            ship,
+            out,
+            draws=draws,
+            seed=seed,
+            options=options,
+            agents=agents or (),
+            designs=designs,
+            standards=standards,
+            progress=on_progress,
+            where=JobEngine(engine, workers, address),
+        )
+    print_autopilot(result, out / "report.html", draws)
+
+
+def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
+    """Print the result of the chain; fail for an unstable model, and if every design is refused."""
+    from agents.cli.terminal import answer, say, warn
+    from identification.validation.warnings import model_warnings
+
+    answer({**result.metrics, "report": str(report)})
+    if result.verification is not None:
+        _print_verification(result, result.verification, draws)
+    if not result.stable:
+        fail(
+            f"the identified model is unstable: {result.instability}; see {report}",
+            FAILED,
+        )
+    if result.refusal is not None:
+        fail(f"no autopilot is given: {result.refusal}; see {report}", FAILED)
+
+    for warning in model_warnings(result.identification):
+        warn(warning)
+    if result.verification is not None:
+        for name, reason in result.verification.refused.items():
+            warn(f"no {name.upper()} autopilot: {reason}")
+    say(f"report: {report}")
+
+
+def _print_verification(
+    result: AutopilotResult, verification: Verification, draws: int
+) -> None:
+    """Print predictions, criteria, ranking and tracks."""
+    from agents.cli import tables
+    from agents.cli.terminal import console, say, warn
+    from identification.validation.warnings import held_out_error
+
+    manoeuvres = verification.manoeuvres
+    say(held_out_error(result.identification))
+    console.print(tables.prediction_table(result.identification))
+    console.print()
+    console.print(tables.criteria_table(manoeuvres.criteria))
+    say(*tables.criteria_notes(manoeuvres.criteria))
+    console.print(f"\nunstable draws: {int(manoeuvres.unstable.sum())} of {draws}\n")
+    console.print(tables.ranking_table(result))
+    console.print()
+    for row in verification.standards:
+        if not row.passed:
+            warn(
+                f"{row.standard}, {row.topic.lower()}: {row.value} {row.unit}, limit"
+                f" {row.limit:g}"
+            )
+    for name, track in result.metrics["tracks"].items():
+        console.print(
+            f"{name.upper()} on the track: largest cross-track error"
+            f" {track['cross_track_largest_m']:.1f} m, rms"
+            f" {track['cross_track_rmse_m']:.1f} m\n"
+        )

@@ -1,0 +1,240 @@
+"""Tables that several commands print."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from agents.verification.result import AutopilotResult
+    from identification import IdentificationResult
+    from shipgym.manoeuvres import Criterion, IndexInterval
+
+
+def plain_table(title: str, *headings: str) -> Table:
+    """A table without lines, its title to the left; headings that begin with > are aligned right."""
+    table = Table(
+        title=title,
+        title_style="bold",
+        title_justify="left",
+        header_style="dim",
+        box=None,
+        pad_edge=False,
+        padding=(0, 2, 0, 0),
+    )
+    for column, heading in enumerate(headings):
+        table.add_column(
+            heading.removeprefix(">"),
+            justify="right" if heading.startswith(">") else "left",
+            no_wrap=column == 0,
+        )
+    return table
+
+
+def number(value: float | None, decimals: int) -> str:
+    """A number with decimals, a dash for None."""
+    return "-" if value is None else f"{value:.{decimals}f}"
+
+
+def between(ends: tuple[float | None, float | None] | None, decimals: int) -> str:
+    """An interval with decimals, a dash for None."""
+    if ends is None or None in ends:
+        return "-"
+    low, high = ends
+    return f"{low:.{decimals}f} to {high:.{decimals}f}"
+
+
+def prediction_table(result: IdentificationResult, note: str = "") -> Table:
+    """Errors of the open-loop simulation of each trial, and its indices."""
+    title = "Open-loop simulation of the trials: root mean square errors"
+    table = plain_table(f"{title}, {note}" if note else title)
+    table.add_column("trial", overflow="fold")
+    table.add_column("use")
+    for heading in ("heading\ndeg", "yaw rate\ndeg/s", "surge\nm/s", "sway\nm/s"):
+        table.add_column(heading, justify="right")
+    table.add_column(
+        "measured -> predicted\n(rudder reversed at headings)", no_wrap=True
+    )
+
+    for file, metrics in result.metrics["trials"].items():
+        errors = []
+        for channel, scale in (
+            ("psi", 180.0 / np.pi),
+            ("r", 180.0 / np.pi),
+            ("u", 1.0),
+            ("v", 1.0),
+        ):
+            error = metrics["rmse"][channel]
+            errors.append(number(None if error is None else scale * error, 3))
+        indices: str | Text = _indices(metrics)
+        if metrics["diverged"]:
+            indices = Text("ran away", "bold red")
+        table.add_row(PurePath(file).name, metrics["use"], *errors, indices)
+    return table
+
+
+def _indices(metrics: Mapping[str, Any]) -> str:
+    """Indices of a trial, measured and predicted, a line each."""
+    labels = {
+        "overshoot_1_deg": "1st",
+        "overshoot_2_deg": "2nd",
+        "advance_lengths": "advance",
+        "tactical_diameter_lengths": "diameter",
+    }
+    lines = []
+    for name, label in labels.items():
+        index = metrics.get(name)
+        if index is None:
+            continue
+        line = f"{label} {number(index['measured'], 2)}"
+        line += f" -> {number(index['predicted'], 2)}"
+        if "closed_loop" in index:
+            line += f" ({number(index['closed_loop'], 2)})"
+        lines.append(line)
+    return "\n".join(lines)
+
+
+def selection_table(ranking: Mapping[str, Any]) -> Table:
+    """Structures and methods by how well they predict the held-out trials, the best first."""
+    table = plain_table(
+        f"Structures and methods by how they predict {ranking['held_out']}",
+        "method",
+        "structure",
+        ">coeffi-\ncients",
+        "model",
+        ">error by\nstd. dev.",
+        ">heading\ndeg",
+        ">yaw rate\ndeg/s",
+        ">ran away\ntrials",
+    )
+    for entry in ranking["ranking"]:
+        table.add_row(
+            entry["method"],
+            entry["structure"],
+            str(entry["coefficients"]),
+            "stable" if entry["stable"] else Text("unstable", "bold red"),
+            number(entry["error"], 4),
+            number(entry["heading_deg"], 2),
+            number(entry["yaw_rate_deg_s"], 4),
+            number(entry["ran_away"], 0),
+        )
+    return table
+
+
+def manoeuvre_table(
+    rows: Mapping[str, Mapping[str, IndexInterval]], water: str = "deep water"
+) -> Table:
+    """Indices of manoeuvres, one line each, with intervals if models were drawn."""
+    has_draws = any(
+        len(index.values) for indices in rows.values() for index in indices.values()
+    )
+    headings = ["manoeuvre", "index", ">value"]
+    if has_draws:
+        headings += [">95 % interval", ">draws without value"]
+    table = plain_table(f"Manoeuvres from service speed in {water}", *headings)
+
+    for manoeuvre, indices in rows.items():
+        label = manoeuvre
+        for name, index in indices.items():
+            cells = [label, name, number(index.value, 2)]
+            if has_draws:
+                without_value = index.n_ran_away + index.n_never_reached
+                cells += [between(index.interval, 2), str(without_value)]
+            table.add_row(*cells)
+            label = ""
+    return table
+
+
+def criteria_table(criteria: Mapping[str, Criterion]) -> Table:
+    """IMO criteria, with interval and probability of passing if models were drawn."""
+    has_draws = any(one.share_passed is not None for one in criteria.values())
+    is_measured = any(one.measured is not None for one in criteria.values())
+    hidden = set()
+    if not has_draws:
+        hidden |= {">95 % interval", ">probability"}
+    if not is_measured:
+        hidden.add(">measured")
+
+    rows = [_criterion_cells(name, one) for name, one in criteria.items()]
+    headings = [heading for heading in rows[0] if heading not in hidden] if rows else []
+    table = plain_table("IMO criteria, resolution MSC.137(76)", *headings)
+    for row in rows:
+        table.add_row(*(row[heading] for heading in headings))
+    return table
+
+
+def _criterion_cells(name: str, criterion: Criterion) -> dict[str, str | Text]:
+    """Cells of a criterion by heading."""
+    probability = criterion.probability
+    return {
+        "criterion": name,
+        ">measured": number(criterion.measured, 2),
+        ">value": number(criterion.value, 2),
+        ">95 % interval": between(criterion.interval, 2),
+        ">limit": number(criterion.limit, 2),
+        "unit": criterion.unit,
+        "verdict": _verdict(criterion),
+        ">probability": "-" if probability is None else f"{100 * probability:.1f} %",
+        "manoeuvre": criterion.manoeuvre,
+        "paragraph": criterion.source.rpartition(" ")[2],
+    }
+
+
+def _verdict(criterion: Criterion) -> str | Text:
+    if criterion.passed is None and criterion.manoeuvre:
+        return Text("not decided", "yellow")
+    if criterion.passed is None:
+        return "not assessable"
+    return Text("passes", "green") if criterion.passed else Text("fails", "red")
+
+
+def criteria_notes(criteria: Mapping[str, Criterion]) -> list[str]:
+    """Notes below the table of criteria: why one is not decided, and draws without a value."""
+    notes = [f"{name}: {one.note}" for name, one in criteria.items() if one.note]
+    for name, criterion in criteria.items():
+        lost = "" if criterion.drawn is None else criterion.drawn.lost_in_words
+        if lost:
+            notes.append(f"{name}: {lost}, which are not in its interval")
+    return notes
+
+
+def ranking_table(result: AutopilotResult) -> Table:
+    """Autopilots over the models drawn, the best first."""
+    metrics = result.metrics
+    table = plain_table(
+        f"Autopilots over {metrics['draws']['count']} models drawn, best first",
+        "autopilot",
+        ">cost, mean",
+        ">cost, 95 %",
+        ">heading rmse, deg",
+        ">rudder, deg/min",
+        ">gain margin",
+        ">phase margin, deg",
+        ">lost control",
+    )
+    for name in metrics["ranking"]:
+        figures = metrics["controllers"][name]
+        margins = figures["margins"] or {}
+        table.add_row(
+            name.upper(),
+            number(figures["cost_mean"], 2),
+            number(figures["cost_quantile_95"], 2),
+            number(figures["heading_rmse_deg_mean"], 2),
+            number(figures["rudder_travel_deg_min_mean"], 1),
+            _margin(margins, "gain_margin", 2),
+            _margin(margins, "phase_margin_deg", 1),
+            str(figures["lost_control"]),
+        )
+    return table
+
+
+def _margin(margins: Mapping[str, Any], name: str, decimals: int) -> str:
+    """A margin of an autopilot: inf where it is unbounded, a dash for a learned one."""
+    if name not in margins:
+        return "-"
+    return "inf" if margins[name] is None else number(margins[name], decimals)

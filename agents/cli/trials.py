@@ -1,0 +1,80 @@
+"""`shipgym trials`: the standard manoeuvres of a model."""
+
+from __future__ import annotations
+
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from typer import Argument, Option
+
+if TYPE_CHECKING:
+    from agents.cli.standard_trials import StandardTrials
+
+
+def trials_command(
+    model: Annotated[
+        str,
+        Argument(metavar="MODEL", help="A model file, or the name of a shipped model."),
+    ],
+    out: Annotated[
+        Path | None, Option(metavar="PLOTS.HTML", help="Write figures to this file.")
+    ] = None,
+    draws: Annotated[
+        int, Option(min=0, help="Models drawn from an identified model's covariance.")
+    ] = 100,
+    seed: Annotated[int, Option(min=0, help="Random seed of the draws.")] = 0,
+    depth: Annotated[
+        float | None, Option(metavar="M", help="Water depth, m; default: deep.")
+    ] = None,
+) -> None:
+    """Simulate the standard manoeuvres of a model. Assesses them by the IMO criteria.
+
+    Zigzags, turning circles, spirals, pull-outs, and, with a shaft, stops and an
+    acceleration. The indices of an identified model come with their 95 % intervals.
+    """
+    from agents.cli.standard_trials import standard_trials
+    from agents.cli.terminal import answer, progress_bars
+    from agents.cli.trials_page import write_page
+    from agents.output import check_page
+    from shipgym.ships import load_model
+
+    ship = load_model(model)
+    water_depth = inf if depth is None else depth
+    ship.check_depth(water_depth)
+    if out is not None:
+        check_page(out, plots=True)
+
+    with progress_bars() as bars:
+
+        def on_progress(done: int) -> None:
+            if bars is not None:
+                bars("models drawn", done, draws)
+
+        trials = standard_trials(ship, draws, seed, on_progress, water_depth)
+
+    if out is not None:
+        write_page(ship, trials, out)
+    answer({"model": ship.name, "seed": seed, **trials.to_dict()})
+    _print_trials(trials, out)
+
+
+def _print_trials(trials: StandardTrials, page: Path | None) -> None:
+    """Print tables of the standard manoeuvres, and where the page was written."""
+    from agents.cli.tables import criteria_notes, criteria_table, manoeuvre_table
+    from agents.cli.terminal import console, say, warn
+
+    console.print(manoeuvre_table(trials.indices, trials.water))
+    console.print()
+    if trials.criteria:
+        console.print(criteria_table(trials.criteria))
+    else:
+        say(
+            "The IMO criteria are made for deep water: leave --depth out to assess"
+            " them."
+        )
+    say(*criteria_notes(trials.criteria))
+    for name, reason in trials.refused.items():
+        warn(f"no {name}: {reason}")
+    if page is not None:
+        say(f"\nwritten: {page}")

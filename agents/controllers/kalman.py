@@ -1,0 +1,162 @@
+"""Models that a Kalman filter for the course is designed on, and its stationary gain.
+
+Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 8.2.6
+(wave model) and 11.3 (Kalman filter).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from agents.controllers.linear_loop import ERROR, RUDDER, YAW_RATE, sampled
+from shipgym import ShipModel
+from shipgym.arrays import Floats
+from shipgym.ships.linear import StraightRunning, linearise
+from shipgym.trials.sensors import SEA_TRIAL
+
+# how much the course to steer may move between two measurements, rad
+COURSE_NOISE = np.radians(0.02)
+WAVE_DAMPING = 0.1  # of the model of first-order motion
+
+
+@dataclass(frozen=True, eq=False)
+class KalmanFilter:
+    """What a Kalman filter takes the ship for, from one measurement to the next.
+
+    Attributes
+    ----------
+    transition : array of shape (n, n)
+    effect : array of shape (n,)
+        Of the mean rudder in between, per rad.
+    process : array of shape (n, n)
+        Covariance of what disturbs the states in an interval.
+    output : array of shape (2, n)
+        Yaw rate and heading error as they are measured of the states.
+    """
+
+    transition: Floats
+    effect: Floats
+    process: Floats
+    output: Floats
+
+    def gain(self, noise: float) -> tuple[Floats, Floats]:
+        """Stationary gain, and standard deviations of the innovations, for noise in sea trials' sensors."""
+        deviations = noise * np.array([SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise])
+        return kalman_gain(
+            self.transition, self.process, self.output, np.diag(deviations**2)
+        )
+
+
+def course_filter(
+    model: ShipModel, about: StraightRunning, dt: float, disturbance: float
+) -> KalmanFilter:
+    """Filter of sway, yaw rate and heading error.
+
+    Parameters
+    ----------
+    model : ShipModel
+    about : StraightRunning
+        The state about which motions are small.
+    dt : float
+        Between two measurements, s.
+    disturbance : float
+        By the sea: standard deviation of a rudder angle that would do the same, rad.
+    """
+    transition, effect = rudder_response(model, about, dt)
+    pushed = disturbance * effect
+    pushed[ERROR] = np.hypot(pushed[ERROR], COURSE_NOISE)
+    output = np.eye(len(effect))[[YAW_RATE, ERROR]]
+    return KalmanFilter(transition, effect, np.diag(pushed**2), output)
+
+
+def with_waves(
+    course: KalmanFilter, period: float, deviation: float, dt: float
+) -> KalmanFilter:
+    """Filter with heading and yaw rate of the first-order motion as further states.
+
+    `period`: s; `deviation`: standard deviation of the heading, rad; `dt`: s.
+    """
+    from scipy.linalg import block_diag
+
+    motion, drive = wave_model(period, deviation, dt)
+    # the yaw rate is measured with that of the wave, the heading error less its heading
+    of_wave = np.array([[0.0, 1.0], [-1.0, 0.0]])
+    return KalmanFilter(
+        transition=block_diag(course.transition, motion),
+        effect=np.append(course.effect, [0.0, 0.0]),
+        process=block_diag(course.process, drive),
+        output=np.hstack([course.output, of_wave]),
+    )
+
+
+def rudder_response(
+    model: ShipModel, about: StraightRunning, dt: float
+) -> tuple[Floats, Floats]:
+    """Sway, yaw rate and heading error with the rudder held over an interval of `dt`, s.
+
+    Returns their transition, shape (3, 3), and the effect of the rudder angle, per rad,
+    shape (3,).
+    """
+    linear = np.column_stack(linearise(model, about))
+    A, B = sampled(linear, 0.0, dt)
+    return A[:RUDDER, :RUDDER], B[:RUDDER]
+
+
+def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floats]:
+    """First-order heading in waves as a lightly damped oscillator driven by noise (Fossen 2011, 8.2.6).
+
+    Parameters
+    ----------
+    period : float
+        s.
+    deviation : float
+        Standard deviation of the heading, rad.
+    dt : float
+        Interval, s.
+
+    Returns
+    -------
+    transition : array of shape (2, 2)
+        Of heading and its rate.
+    covariance : array of shape (2, 2)
+        Of what drives them in an interval, which keeps the deviation as it is.
+    """
+    from scipy.linalg import expm
+
+    frequency = 2.0 * np.pi / period
+    flow = np.array([[0.0, 1.0], [-(frequency**2), -2.0 * WAVE_DAMPING * frequency]])
+    transition: Floats = np.asarray(expm(flow * dt), dtype=np.float64)
+
+    steady = deviation**2 * np.diag([1.0, frequency**2])
+    left = transition @ steady @ transition.T
+    return transition, steady - left
+
+
+def kalman_gain(
+    transition: Floats, process: Floats, output: Floats, noise: Floats
+) -> tuple[Floats, Floats]:
+    """Stationary Kalman gain on the innovation, for the estimate at the time of the measurement.
+
+    Parameters
+    ----------
+    transition : array of shape (n, n)
+    process : array of shape (n, n)
+        Covariance of what disturbs the states in an interval.
+    output : array of shape (m, n)
+    noise : array of shape (m, m)
+        Covariance of the measurements' noise.
+
+    Returns
+    -------
+    gain : array of shape (n, m)
+        That of `control.dlqe` times the inverse transition.
+    deviations : array of shape (m,)
+        Standard deviations of the innovations.
+    """
+    import control
+
+    n = len(transition)
+    _, covariance, _ = control.dlqe(transition, np.eye(n), output, process, noise)
+    innovation = output @ covariance @ output.T + noise
+    gain: Floats = np.linalg.solve(innovation, output @ covariance).T
+    return gain, np.sqrt(np.diag(innovation))

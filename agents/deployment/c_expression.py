@@ -1,0 +1,263 @@
+"""Expressions of a plain Python function, written as C99."""
+
+import ast
+import builtins
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import FunctionType, ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from agents.deployment.c_library import FUNCTIONS, library_call, table_entry
+from agents.deployment.c_structures import Structures
+from agents.deployment.c_syntax import (
+    NUMBERS,
+    OPERATORS,
+    Expression,
+    Kind,
+    Level,
+    binary,
+    c_name,
+    choice,
+    literal,
+    members,
+    prefixed,
+    stored_kind,
+)
+from agents.deployment.pruning import Constants
+from shipgym import InputError
+from shipgym.engine.records import is_record
+from shipgym.engine.specialise import Part
+
+
+class Translated(NamedTuple):
+    """A function that was written as C."""
+
+    name: str
+    returns: Kind
+
+
+@dataclass
+class ExpressionWriter:
+    """Writes expressions in the order in which Python evaluates them.
+
+    Attributes
+    ----------
+    place : str
+        Module and function, for messages.
+    names : mapping
+        Values of the globals that the function names, parts filled.
+    kinds : dict
+        Kinds of arguments and variables so far, by name.
+    structures : Structures
+    translate : callable
+        Writes a function that is called, for kinds of arguments; None if it is being
+        written already.
+    """
+
+    place: str
+    names: Mapping[str, Any]
+    kinds: dict[str, Kind]
+    structures: Structures
+    translate: Callable[..., Translated | None]
+
+    def refusal(self, node: ast.AST) -> InputError:
+        """Message for what cannot be written."""
+        line = getattr(node, "lineno", 0)
+        return InputError(
+            f"{self.place}, line {line}: expected arithmetic, comparisons, records and"
+            f" functions made of these, got {ast.unparse(node)[:80]!r}, which cannot be"
+            " written as C"
+        )
+
+    def expression(self, node: ast.expr) -> Expression:
+        """An expression in C; InputError with its line if it cannot be written."""
+        known = Constants(self.names).value(node)
+        if isinstance(known, bool | int | float | np.number):
+            kind = type(known) if type(known) in NUMBERS else float
+            return Expression(literal(known.real), kind)
+
+        match node:
+            case ast.Name():
+                return self._variable(node)
+            case ast.Attribute():
+                return self._member(node)
+            case ast.BinOp(op=ast.BitAnd() | ast.BitOr()):
+                return self._logic(node, node.op, [node.left, node.right])
+            case ast.BoolOp():
+                return self._logic(node, node.op, node.values)
+            case ast.BinOp(op=ast.Pow()):
+                return self._power(node)
+            case ast.BinOp():
+                return self._arithmetic(node)
+            case ast.UnaryOp():
+                return self._signed(node)
+            case ast.Compare():
+                return self._comparison(node)
+            case ast.IfExp():
+                test = self.expression(node.test)
+                return choice(
+                    test, self.expression(node.body), self.expression(node.orelse)
+                )
+            case ast.Tuple():
+                return self._structure([self.expression(one) for one in node.elts])
+            case ast.Call():
+                return self._call(node)
+        raise self.refusal(node)
+
+    def _variable(self, node: ast.Name) -> Expression:
+        if node.id not in self.kinds:
+            raise self.refusal(node)
+        return Expression(c_name(node.id), self.kinds[node.id])
+
+    def _member(self, node: ast.Attribute) -> Expression:
+        owner = self.expression(node.value)
+        kinds = members(owner.kind) if is_record(owner.kind) else {}
+        name = c_name(node.attr)
+        if name not in kinds:
+            raise self.refusal(node)
+        return Expression(f"{owner.within(Level.ATOM)}.{name}", kinds[name])
+
+    def _arithmetic(self, node: ast.BinOp) -> Expression:
+        operator = OPERATORS.get(type(node.op))
+        if operator is None:
+            raise self.refusal(node)
+        left = self.expression(node.left)
+        right = self.expression(node.right)
+        if isinstance(node.op, ast.Div) and left.kind is int:
+            left = Expression(f"(double)({left.text})", float)
+        both_integers = left.kind is int and right.kind is int
+        return binary(left, operator, right, int if both_integers else float)
+
+    def _power(self, node: ast.BinOp) -> Expression:
+        base = self.expression(node.left)
+        power = self.expression(node.right)
+        exponent = Constants(self.names).value(node.right)
+        is_whole = isinstance(exponent, int) and exponent > 0
+        name = "whole_power" if is_whole else "pow"
+        return Expression(f"{name}({base.text}, {power.text})", float)
+
+    def _signed(self, node: ast.UnaryOp) -> Expression:
+        operand = self.expression(node.operand)
+        match node.op:
+            case ast.USub():
+                return prefixed("-", operand, operand.kind)
+            case ast.Not():
+                return prefixed("!", operand, bool)
+        raise self.refusal(node)
+
+    def _comparison(self, node: ast.Compare) -> Expression:
+        operands = [self.expression(one) for one in (node.left, *node.comparators)]
+        pairs = []
+        for k, op in enumerate(node.ops):
+            operator = OPERATORS.get(type(op))
+            if operator is None:
+                raise self.refusal(node)
+            pairs.append(binary(operands[k], operator, operands[k + 1], bool))
+        if len(pairs) == 1:
+            return pairs[0]
+        return Expression(" && ".join(one.text for one in pairs), bool, Level.LOGIC)
+
+    def _logic(
+        self, node: ast.expr, op: ast.AST, values: Sequence[ast.expr]
+    ) -> Expression:
+        """`and`, `or`, and `&`, `|` of booleans."""
+        operands = [self.expression(one) for one in values]
+        if not all(one.kind is bool for one in operands):
+            raise self.refusal(node)
+        operator = OPERATORS[type(op)]
+        texts = [one.within(Level.COMPARISON) for one in operands]
+        return Expression(f" {operator.sign} ".join(texts), bool, operator.level)
+
+    def _structure(
+        self, values: Sequence[Expression], record: Kind = None
+    ) -> Expression:
+        """A structure of given values, a tuple where no record is named."""
+        kind = record or tuple(stored_kind(one.kind) for one in values)
+        fields = []
+        for name, value in zip(members(kind), values, strict=True):
+            fields.append(f".{name} = {value.text}")
+        inside = ", ".join(fields or ["0"])
+        return Expression(f"({self.structures.type(kind)}){{{inside}}}", kind)
+
+    # Calls.
+
+    def _call(self, node: ast.Call) -> Expression:
+        if isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
+            return self._replaced(node, self.expression(node.func.value))
+
+        function = self._callee(node.func)
+        if is_record(function):
+            return self._structure(self._arguments(node, function), function)
+        if isinstance(function, FunctionType) and function not in FUNCTIONS:
+            return self._function_call(node, function)
+
+        arguments = [self.expression(one) for one in node.args]
+        call = library_call(function, arguments)
+        if call is None:
+            raise self.refusal(node)
+        return call
+
+    def _callee(self, node: ast.expr) -> Any:
+        """What is called, found where Python would find it; of a part its function."""
+        callee = None
+        match node:
+            case ast.Name(id=name) if isinstance(self.kinds.get(name), FunctionType):
+                callee = self.kinds[name]
+            case ast.Name(id=name):
+                callee = self.names.get(name, getattr(builtins, name, None))
+            case ast.Attribute(value=owner, attr=name):
+                module = Constants(self.names).value(owner)
+                if isinstance(module, ModuleType):
+                    callee = getattr(module, name, None)
+        return callee.function if isinstance(callee, Part) else callee
+
+    def _arguments(self, node: ast.Call, function: Any) -> list[Expression]:
+        """Arguments of a call in the order of the parameters, defaults among them."""
+        named = {str(one.arg): one.value for one in node.keywords}
+        try:
+            bound = inspect.signature(function).bind(*node.args, **named)
+        except TypeError:
+            raise self.refusal(node) from None
+        bound.apply_defaults()
+
+        arguments = []
+        for value in bound.arguments.values():
+            given = value if isinstance(value, ast.expr) else ast.Constant(value)
+            arguments.append(self._argument(given))
+        return arguments
+
+    def _argument(self, node: ast.expr) -> Expression:
+        """An argument; a function has no text."""
+        if isinstance(node, ast.Name):
+            function = self.kinds.get(node.id, self.names.get(node.id))
+            if isinstance(function, FunctionType):
+                return Expression("", function)
+        return self.expression(node)
+
+    def _function_call(self, node: ast.Call, function: FunctionType) -> Expression:
+        arguments = self._arguments(node, function)
+        if function.__name__ == "row_of":  # for which Numba has instructions
+            return table_entry(*arguments)
+        called = self.translate(function, *(one.kind for one in arguments))
+        if called is None:  # it calls itself
+            raise self.refusal(node)
+        texts = ", ".join(one.text for one in arguments if one.text)
+        return Expression(f"{called.name}({texts})", called.returns)
+
+    def _replaced(self, node: ast.Call, record: Expression) -> Expression:
+        """`record._replace(name=value)`, of a variable."""
+        kinds = members(record.kind) if is_record(record.kind) else {}
+        new = {}
+        for keyword in node.keywords:
+            new[c_name(str(keyword.arg))] = self.expression(keyword.value)
+        if not kinds or node.args or not new.keys() <= kinds.keys():
+            raise self.refusal(node)
+
+        owner = record.within(Level.ATOM)
+        values = []
+        for name, kind in kinds.items():
+            values.append(new.get(name, Expression(f"{owner}.{name}", kind)))
+        return self._structure(values, record.kind)

@@ -1,0 +1,183 @@
+"""One plain Python function on numbers and records, written as C99 for arguments of given kinds."""
+
+import ast
+import inspect
+import re
+import textwrap
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import FunctionType
+from typing import Any
+
+from agents.deployment.c_expression import ExpressionWriter, Translated
+from agents.deployment.c_structures import Structures
+from agents.deployment.c_syntax import (
+    Expression,
+    Kind,
+    Level,
+    c_name,
+    members,
+    stored_kind,
+)
+from agents.deployment.pruning import Constants, names_in, reachable, used_statements
+from shipgym.engine.specialise import named_globals
+
+
+class FunctionWriter:
+    """Writes the statements of one function.
+
+    Parameters
+    ----------
+    function : callable
+    kinds : sequence
+        Kinds of its arguments; a function is its own kind.
+    parts : mapping
+        What takes the place of globals of the engine's functions.
+    structures : Structures
+    translate : callable
+        Writes a function that is called; see `ExpressionWriter`.
+    """
+
+    def __init__(
+        self,
+        function: Any,
+        kinds: Sequence[Kind],
+        parts: Mapping[str, Any],
+        structures: Structures,
+        translate: Callable[..., Translated | None],
+    ) -> None:
+        names = dict(named_globals(function, parts))
+        self.kinds: dict[str, Kind] = {}
+        self.expressions = ExpressionWriter(
+            f"{function.__module__}.{function.__name__}",
+            names,
+            self.kinds,
+            structures,
+            translate,
+        )
+        tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
+        if not isinstance(tree, ast.FunctionDef):
+            raise self.expressions.refusal(tree)
+
+        self.docstring = function.__doc__ or ""
+        self.arguments = [argument.arg for argument in tree.args.args]
+        self.kinds |= zip(self.arguments, kinds, strict=True)
+        body = reachable(tree.body, Constants(names).value)
+        self.body, self.used = used_statements(body)
+        self.returns: Kind = None
+        self.n_tuples = 0
+
+    def written(self, name: str) -> tuple[str, Kind]:
+        """Text of the function under a name in C, and the kind that it returns."""
+        lines = self._statements(self.body)
+        passed = [
+            one
+            for one in self.arguments
+            if not isinstance(self.kinds[one], FunctionType)
+        ]
+        parameters = ", ".join(self._declaration(one) for one in passed)
+        type_of = self.expressions.structures.type
+        text = [
+            f"/* {self._summary()} */",
+            f"static {type_of(self.returns)} {name}({parameters or 'void'}) {{",
+        ]
+
+        for variable in self.kinds:
+            if variable not in self.arguments:
+                text.append(f"    {self._declaration(variable)};")
+        for one in passed:
+            if one not in self.used:
+                text.append(f"    (void){c_name(one)};")
+        return "\n".join([*text, *lines, "}\n"]), self.returns
+
+    def _declaration(self, variable: str) -> str:
+        type_name = self.expressions.structures.type(self.kinds[variable])
+        return f"{type_name} {c_name(variable)}"
+
+    def _summary(self) -> str:
+        """First line of the docstring, as a comment of C may have it."""
+        first = self.docstring.strip().partition("\n")[0]
+        return re.sub(r"[^\w .,:;()+-]", "", first, flags=re.ASCII)
+
+    def _statements(self, body: Iterable[ast.stmt]) -> list[str]:
+        return [f"    {line}" for node in body for line in self._statement(node)]
+
+    def _statement(self, node: ast.stmt) -> list[str]:
+        match node:
+            case ast.Return(value=ast.expr() as value):
+                return self._return(value)
+            case ast.If():
+                return self._if(node)
+            case ast.For(
+                target=ast.Name(id=name),
+                iter=ast.Call(func=ast.Name(id="range"), args=[end]),
+                orelse=[],
+            ):
+                return self._for(name, end, node.body)
+            case ast.Assign(targets=[target], value=value):
+                return self._assignment(target, value)
+            case ast.AnnAssign(target=target, value=ast.expr() as value):
+                return self._assignment(target, value)
+        raise self.expressions.refusal(node)
+
+    def _return(self, value: ast.expr) -> list[str]:
+        result = self.expressions.expression(value)
+        self.returns = stored_kind(result.kind)
+        return [f"return {result.text};"]
+
+    def _if(self, node: ast.If) -> list[str]:
+        test = self.expressions.expression(node.test)
+        lines = [f"if ({test.text}) {{", *self._statements(node.body)]
+        if node.orelse:
+            lines += ["} else {", *self._statements(node.orelse)]
+        return [*lines, "}"]
+
+    def _for(self, name: str, end: ast.expr, body: Iterable[ast.stmt]) -> list[str]:
+        """A loop over `range(end)`."""
+        self.kinds[name] = int
+        i = c_name(name)
+        last = self.expressions.expression(end).within(Level.SUM)
+        head = f"for ({i} = 0; {i} < {last}; ++{i}) {{"
+        return [head, *self._statements(body), "}"]
+
+    def _assignment(self, target: ast.expr, value: ast.expr) -> list[str]:
+        match target, value:
+            case ast.Name(id=name), _:
+                return [self._stored(name, self.expressions.expression(value))]
+            case ast.Tuple(elts=targets), ast.Tuple(elts=values):
+                written = names_in(targets, ast.Store)
+                if names_in(values, ast.Load) & written:
+                    return self._unpacked(targets, value)
+                return self._each_assigned(targets, values)
+            case ast.Tuple(elts=targets), _:
+                return self._unpacked(targets, value)
+        raise self.expressions.refusal(target)
+
+    def _each_assigned(
+        self, targets: list[ast.expr], values: list[ast.expr]
+    ) -> list[str]:
+        """`a, b = x, y` as two assignments."""
+        lines: list[str] = []
+        for target, value in zip(targets, values, strict=True):
+            if names_in([target], ast.Store) & self.used:
+                lines += self._assignment(target, value)
+        return lines
+
+    def _unpacked(self, targets: list[ast.expr], value: ast.expr) -> list[str]:
+        """`a, b = f(x)` by a structure."""
+        whole = self.expressions.expression(value)
+        self.n_tuples += 1
+        name = f"tuple_{self.n_tuples}"
+        lines = [self._stored(name, whole)]
+
+        parts = members(whole.kind).items()
+        for target, (part, kind) in zip(targets, parts, strict=True):
+            if not isinstance(target, ast.Name):
+                raise self.expressions.refusal(target)
+            if target.id in self.used:
+                value_of_part = Expression(f"{name}.{part}", kind)
+                lines.append(self._stored(target.id, value_of_part))
+        return lines
+
+    def _stored(self, name: str, value: Expression) -> str:
+        self.kinds[name] = stored_kind(value.kind)
+        return f"{c_name(name)} = {value.text};"

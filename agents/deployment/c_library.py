@@ -1,0 +1,85 @@
+"""Functions of Python and NumPy that C has, or `templates/prelude.c.j2` gives it."""
+
+import math
+from collections.abc import Hashable, Sequence
+from typing import Any
+
+import numpy as np
+
+from agents.deployment.c_syntax import NUMBERS, Expression, Level, choice
+from shipgym.engine.mathematics import power_of_bits
+from shipgym.engine.records import is_table
+
+SAME_NAME = (
+    "sqrt",
+    "copysign",
+    "sin",
+    "cos",
+    "tan",
+    "tanh",
+    "exp",
+    "log",
+    "hypot",
+    "floor",
+    "ceil",
+    "radians",
+)
+
+#: Name in C of functions of numbers.
+FUNCTIONS: dict[Any, str] = {
+    abs: "fabs",
+    math.fabs: "fabs",
+    np.abs: "fabs",
+    min: "least",
+    np.minimum: "least",
+    max: "largest",
+    np.maximum: "largest",
+    math.asin: "asin",
+    np.arcsin: "asin",
+    math.acos: "acos",
+    np.arccos: "acos",
+    math.atan: "atan",
+    np.arctan: "atan",
+    math.atan2: "atan2",
+    np.arctan2: "atan2",
+    np.clip: "clip",
+    np.sign: "sign",
+    np.mod: "modulo",
+    math.pow: "pow",
+    power_of_bits: "power_of_bits",
+}
+FUNCTIONS |= {getattr(math, name): name for name in SAME_NAME}
+FUNCTIONS |= {getattr(np, name): name for name in SAME_NAME}
+
+
+def library_call(function: Any, arguments: Sequence[Expression]) -> Expression | None:
+    """Call of a function of Python's or NumPy's; None if C has no such function."""
+    texts = [one.text for one in arguments]
+    if isinstance(function, Hashable) and function in FUNCTIONS:
+        return Expression(f"{FUNCTIONS[function]}({', '.join(texts)})", float)
+
+    match function, arguments:
+        case np.where, [test, yes, no]:
+            return choice(test, yes, no)
+        case np.interp, [x, points, values]:
+            return interpolation(x, points, values)
+        case _, [number] if function in (float, int):
+            return Expression(f"(({NUMBERS[function]})({number.text}))", function)
+    return None
+
+
+def interpolation(
+    x: Expression, points: Expression, values: Expression
+) -> Expression | None:
+    """Straight lines between the points of two tables of one length; None for others."""
+    if not is_table(points.kind) or points.kind is not values.kind:
+        return None
+    rows = points.kind.rows
+    return Expression(
+        f"interpolated({x.text}, {rows}, {points.text}, {values.text})", float
+    )
+
+
+def table_entry(table: Expression, row: Expression) -> Expression:
+    """A number of a table."""
+    return Expression(f"{table.within(Level.ATOM)}[(int)({row.text})]", float)

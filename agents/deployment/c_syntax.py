@@ -1,0 +1,156 @@
+"""Words of C99: types, operators, expressions, numbers and names."""
+
+import ast
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, NamedTuple, TypeAlias
+
+from shipgym import InputError
+from shipgym.engine.records import field_types, is_record
+
+#: float, int, bool, a record, a table, a tuple of kinds, or a function.
+Kind: TypeAlias = Any
+NUMBERS: dict[Kind, str] = {float: "double", int: "int", bool: "int"}
+
+KEYWORDS = frozenset(
+    [
+        "auto",
+        "break",
+        "case",
+        "char",
+        "const",
+        "continue",
+        "default",
+        "do",
+        "double",
+        "else",
+        "enum",
+        "extern",
+        "float",
+        "for",
+        "goto",
+        "if",
+        "inline",
+        "int",
+        "long",
+        "register",
+        "restrict",
+        "return",
+        "short",
+        "signed",
+        "sizeof",
+        "static",
+        "struct",
+        "switch",
+        "typedef",
+        "union",
+        "unsigned",
+        "void",
+        "volatile",
+        "while",
+    ]
+)
+
+
+class Level(IntEnum):
+    """How tightly an expression of C holds together."""
+
+    CHOICE = 0
+    LOGIC = 1
+    COMPARISON = 2
+    SUM = 3
+    PRODUCT = 4
+    SIGN = 5
+    ATOM = 6
+
+
+class Operator(NamedTuple):
+    """An operator of C between two operands."""
+
+    sign: str
+    level: Level
+
+
+OPERATORS: dict[type[ast.AST], Operator] = {
+    ast.Add: Operator("+", Level.SUM),
+    ast.Sub: Operator("-", Level.SUM),
+    ast.Mult: Operator("*", Level.PRODUCT),
+    ast.Div: Operator("/", Level.PRODUCT),
+    ast.Lt: Operator("<", Level.COMPARISON),
+    ast.LtE: Operator("<=", Level.COMPARISON),
+    ast.Gt: Operator(">", Level.COMPARISON),
+    ast.GtE: Operator(">=", Level.COMPARISON),
+    ast.Eq: Operator("==", Level.COMPARISON),
+    ast.NotEq: Operator("!=", Level.COMPARISON),
+    ast.And: Operator("&&", Level.LOGIC),
+    ast.Or: Operator("||", Level.LOGIC),
+    ast.BitAnd: Operator("&&", Level.LOGIC),
+    ast.BitOr: Operator("||", Level.LOGIC),
+}
+
+
+@dataclass(frozen=True)
+class Expression:
+    """An expression of C."""
+
+    text: str
+    kind: Kind
+    level: Level = Level.ATOM
+
+    def within(self, level: Level) -> str:
+        """Its text where at least this level is needed, in brackets if it has less."""
+        return self.text if self.level >= level else f"({self.text})"
+
+
+def binary(
+    left: Expression, operator: Operator, right: Expression, kind: Kind
+) -> Expression:
+    """Two operands with an operator between them, which groups from the left."""
+    first = left.within(operator.level)
+    second = right.within(Level(operator.level + 1))
+    return Expression(f"{first} {operator.sign} {second}", kind, operator.level)
+
+
+def prefixed(sign: str, operand: Expression, kind: Kind) -> Expression:
+    """An operand with a sign before it."""
+    return Expression(f"{sign}{operand.within(Level.ATOM)}", kind, Level.SIGN)
+
+
+def choice(test: Expression, yes: Expression, no: Expression) -> Expression:
+    """One of two expressions, as a condition says."""
+    kind = no.kind if yes.kind is int else yes.kind
+    texts = [one.within(Level.LOGIC) for one in (test, yes, no)]
+    return Expression(f"{texts[0]} ? {texts[1]} : {texts[2]}", kind, Level.CHOICE)
+
+
+def stored_kind(kind: Kind) -> Kind:
+    """Kind of a variable that holds a value; an integer may become any other number."""
+    return float if kind is int else kind
+
+
+def literal(value: float) -> str:
+    """A number as C writes it, with all its digits."""
+    if math.isnan(value):
+        return "NAN"
+    if math.isinf(value):
+        return "HUGE_VAL" if value > 0 else "(-HUGE_VAL)"
+    exact = int(value) if isinstance(value, bool | int) else float(value)
+    text = repr(exact)
+    return f"({text})" if text.startswith("-") else text
+
+
+def c_name(name: str) -> str:
+    """A name of Python as one of C."""
+    if not name.isascii():
+        raise InputError(f"name: expected ASCII letters, as C has them, got {name!r}")
+    return f"{name}_" if name in KEYWORDS else name
+
+
+def members(kind: Kind) -> dict[str, Kind]:
+    """Names and kinds in a record or a tuple; what may be anything is a float."""
+    if is_record(kind):
+        kinds = {c_name(name): one for name, one in field_types(kind).items()}
+    else:
+        kinds = {f"v{k}": one for k, one in enumerate(kind)}
+    return {name: float if one is Any else one for name, one in kinds.items()}

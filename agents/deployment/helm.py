@@ -1,0 +1,255 @@
+"""An autopilot between a ship's instruments and her rudder, which hands over when it cannot trust them."""
+
+from dataclasses import replace
+from math import inf, radians
+from typing import Any
+
+from agents.controllers.guided import TURNS, Guided
+from agents.controllers.turn_rate import TurnRate
+from agents.deployment.autopilot import Autopilot
+from agents.deployment.c99 import render
+from agents.deployment.nmea import readings, sentences
+from agents.deployment.route import Route
+from agents.deployment.sensors import HelmSensors, Limits
+from shipgym import InputError
+from shipgym.checks import check_number
+from shipgym.tasks.guidance import wrapped
+from shipgym.trials.nmea import NMEA_QUANTITIES
+
+STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
+POSITION = ("latitude", "longitude")
+
+
+class Helm:
+    """An autopilot that waits for its sensors, steers, and after a fault hands over for good.
+
+    Its state is `standby`, `steering` or `manual`. Raises InputError for an autopilot
+    that reads what no sentence of NMEA 0183 has, and for one that cannot follow the
+    route or the rate of turn.
+
+    Parameters
+    ----------
+    agent : Controller or LearnedPolicy
+        The autopilot.
+    heading : float or None
+        Set-point, rad; for path following the direction of the leg. None: the chart
+        plotter's (APB, BWC, BWR).
+    limits : Limits
+        When it hands over, and when it warns.
+    route : Route, optional
+        Track to keep, for an autopilot that sees the turn ahead.
+    rate : float, optional
+        Rate of turn, rad/s, of an autopilot that steers one; with a heading the largest.
+    """
+
+    def __init__(
+        self,
+        agent: Any,
+        heading: float | None,
+        limits: Limits,
+        route: Route | None = None,
+        rate: float | None = None,
+    ) -> None:
+        if rate is not None and heading is not None and isinstance(agent, TurnRate):
+            agent = _with_largest_rate(agent, rate)
+        self.pilot = Autopilot(agent)
+        self.pilot.largest = min(self.pilot.largest, radians(limits.order_deg))
+        self.limits = limits
+        self.sensors = HelmSensors(limits)
+        self.heading = heading
+        self.route = route
+        self.rate = rate
+        self.follows_path = isinstance(agent, Guided)
+        self.needed = self._needed()
+        self._check(agent)
+
+        self.state = STANDBY
+        self.alarm = ""
+        self.warnings: list[str] = []
+        self.silent = ["sensors"]  # what it waits for
+        self.order = 0.0  # rudder, rad
+        self.counts = {"sentences": 0, "damaged": 0}
+
+    def _needed(self) -> list[str]:
+        """Quantities that the instruments have to measure."""
+        provided = {"set_point", "rate_of_turn"}
+        if self.route is not None:
+            provided |= {*Route.GIVES}
+        needed = [
+            name for name in (*self.pilot.inputs, "rudder") if name not in provided
+        ]
+        if self.route is not None:
+            needed += POSITION
+        return needed
+
+    def _check(self, agent: Any) -> None:
+        name = getattr(agent, "name", type(agent).__name__)
+        turns = {*TURNS} & {*self.pilot.inputs} if self.follows_path else set()
+        if self.rate is not None and not isinstance(agent, TurnRate):
+            raise InputError(
+                f"rate of turn: expected autopilot 'turn-rate', got '{name}'"
+            )
+        has_route = self.route is not None
+        if has_route != bool(turns) or not turns <= {*Route.GIVES}:
+            raise InputError(
+                "route: expected 'wheel-over' or 'mpc' of shipgym autopilot with a"
+                f" route, or another without, got '{name}'"
+                f" {'with' if has_route else 'without'} a route"
+            )
+        unknown = set(self.needed) - NMEA_QUANTITIES.keys()
+        if unknown:
+            raise InputError(
+                "autopilot: expected one that reads what sentences of NMEA 0183 have,"
+                f" got '{name}', which reads {', '.join(sorted(unknown))}"
+            )
+        if "cross_track" in self.pilot.inputs and not self.follows_path:
+            raise InputError(
+                f"autopilot: expected one for course keeping, got '{name}', which"
+                " learned to follow paths"
+            )
+
+    def hear(self, line: str, now: float) -> None:
+        """Take in a line that was received at a time, s."""
+        found = readings(line)
+        if found is None:
+            self.counts["damaged"] += 1
+            return
+        self.counts["sentences"] += 1
+        for reading in found:
+            self.sensors.take(reading, now)
+
+    def watch(self, step: float, now: float, fault: str | None = None) -> None:
+        """Begin when all sensors are there; hand over for good at a fault of theirs, or another one.
+
+        `step`: time since the last call, s.
+        """
+        inputs = self.inputs(now)
+        self.silent = [
+            name.replace("_", " ") for name, value in inputs.items() if value is None
+        ]
+        if self.state == STANDBY and not self.silent:
+            self.state = STEERING
+        elif self.state == STEERING and not fault:
+            fault = self._fault(step, now)
+        if fault and self.state == STEERING:
+            self.state = MANUAL
+            self.alarm = fault
+        self.warnings = []
+        if self.state == STEERING:
+            self.warnings = self.warnings_of(inputs, now)
+
+    def _fault(self, step: float, now: float) -> str:
+        if self.silent:
+            silent = " and no ".join(self.silent)
+            return f"no {silent} for {self.limits.silence_s:g} s"
+        fault = self.sensors.fault(self.order, step, now)
+        if not fault and self.route is not None and self.route.ended:
+            fault = "the end of the route is reached"
+        return fault
+
+    def steer(self, now: float) -> None:
+        """One control interval."""
+        if self.state == STEERING:
+            self.order = self.pilot.step(_known(self.inputs(now)))
+
+    def inputs(self, now: float) -> dict[str, float | None]:
+        """Inputs of the autopilot by name; None for what is not known."""
+        inputs = self.sensors.numbers(self.needed, now)
+        turns_at_rate = self.rate is not None and self.heading is None
+        inputs["rate_of_turn"] = self.rate if turns_at_rate else 0.0
+        if self.route is None:
+            inputs["set_point"] = self._set_point(now)
+            return inputs
+        latitude, longitude = (inputs[name] for name in POSITION)
+        if latitude is not None and longitude is not None:
+            inputs |= self.route.given(latitude, longitude)
+        return inputs
+
+    def _set_point(self, now: float) -> float | None:
+        """Heading to steer; without one of its own the plotter's quantity that was heard first."""
+        if self.heading is not None:
+            return self.heading
+        if self.rate is not None:
+            return 0.0
+        plotted = ("leg",) if self.follows_path else ("to_steer", "waypoint_bearing")
+        for quantity in self.sensors.newest:
+            if quantity in plotted:
+                return self.sensors.value(quantity, now)
+        return None
+
+    def warnings_of(self, inputs: dict[str, float | None], now: float) -> list[str]:
+        """Warnings for the helmsman although the autopilot steers."""
+        known = _known(inputs)
+        warnings = []
+
+        keeps_heading = not self.follows_path and not known["rate_of_turn"]
+        set_point = known.get("set_point", 0.0)
+        error = abs(wrapped(set_point - known["heading"]))
+        if keeps_heading and error > radians(self.limits.off_heading_deg):
+            warnings.append("off heading")
+
+        cross_track = known.get("cross_track", 0.0)
+        if abs(cross_track) > self.limits.off_track_m:
+            warnings.append("off track")
+
+        if self.seconds_to_turn(known, now) <= self.limits.early_s:
+            warnings.append("course change ahead")
+        return warnings
+
+    def seconds_to_turn(self, inputs: dict[str, float], now: float) -> float:
+        """Time to where the next turn begins, or to the plotter's waypoint, s."""
+        speed = self.sensors.value("speed", now)
+        if not speed:
+            return inf
+        if self.route is None:
+            distance = self.sensors.value("waypoint_distance", now)
+            return inf if distance is None else distance / speed
+
+        reach = self.pilot.agent.gains["turn_reach"]
+        times = [inf]
+        for turn in ("next", "second"):
+            distance = inputs[f"{turn}_turn_distance"]
+            if inputs[f"{turn}_turn_angle"] and distance > reach:
+                times.append(float((distance - reach) / speed))
+        return min(times)
+
+    @property
+    def status(self) -> str:
+        """The state, what it waits for, or why it has handed over."""
+        if self.state == STANDBY:
+            return f"{STANDBY}, waits for {', '.join(self.silent)}"
+        if self.alarm:
+            return f"{MANUAL}: ALARM, {self.alarm}: take the wheel"
+        return ", ".join([self.state, *self.warnings])
+
+    def sentences(self) -> str:
+        """Rudder order and status, and the alarm if there is one."""
+        text = render(
+            "helm.nmea.j2",
+            order=self.order,
+            valid=self.state == STEERING,
+            limit=self.pilot.largest,
+            set_point=self.heading,
+            alarm=self.alarm,
+            track=self.route is not None,
+            rate=self.rate,
+            warnings=self.warnings,
+        )
+        return sentences(text)
+
+
+def _known(inputs: dict[str, float | None]) -> dict[str, float]:
+    """Inputs, with 0 for what is not known."""
+    return {name: value or 0.0 for name, value in inputs.items()}
+
+
+def _with_largest_rate(agent: TurnRate, rate: float) -> TurnRate:
+    """The autopilot with a largest rate of turn, rad/s."""
+    check_number(
+        rate,
+        "rate of turn",
+        above=0.0,
+        at_most=float(agent.rates[-1]),
+        hint="rad/s, to a heading",
+    )
+    return replace(agent, gains={**agent.gains, "rate": rate})

@@ -1,0 +1,351 @@
+"""Many independent jobs: in this process, in several of this computer, or on a Ray cluster.
+
+Results do not depend, bit for bit, on where jobs run or how many run at once: each job
+has one thread, and jobs and results pass through JSON in every case.
+"""
+
+import logging
+import os
+import socket
+import sys
+import threading
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import chdir, closing, contextmanager
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from joblib import Parallel, cpu_count, delayed, parallel_config
+from joblib.externals.loky import get_reusable_executor
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+from agents.controllers.registry import registered_modules
+from agents.job_results import (
+    JobFunction,
+    KeptResults,
+    job_from_json,
+    job_to_json,
+    result_from_json,
+    result_to_json,
+)
+from shipgym.checks import check_choice, check_whole
+from shipgym.errors import InputError
+from shipgym.extras import library
+from shipgym.python_files import working_folder
+
+__all__ = ["HERE", "EngineError", "JobEngine", "JobError", "run_jobs"]
+
+#: Called with the number of jobs done and their total.
+JobProgress = Callable[[int, int], None]
+
+
+class JobError(RuntimeError):
+    """A job that failed for another reason than wrong input, or whose worker was killed."""
+
+
+class EngineError(InputError):
+    """Ray is not installed or does not answer, so that no job can run."""
+
+
+@dataclass(frozen=True)
+class JobEngine:
+    """Where jobs run, and where results are kept.
+
+    Raises InputError, naming the field, for a wrong one. Whether a cluster answers is
+    found out when it is needed.
+
+    Attributes
+    ----------
+    engine : {"local", "ray"}
+        Processes of this computer, or Ray (`pip install 'shipgym[ray]'`).
+    workers : int or None
+        Jobs at a time; None for as many as there are cores. One local worker is this
+        process itself.
+    address : str, optional
+        Address of a Ray cluster, such as ``"10.0.0.1:6379"``,
+        ``"ray://10.0.0.1:10001"`` or ``"auto"``; by default Ray is started on this
+        computer. shipgym must be installed on the computers of the cluster.
+    keep : str or Path, optional
+        Folder in which each result is kept as soon as it is available. A job whose
+        result is there already does not run again.
+    """
+
+    engine: str = "local"
+    workers: int | None = 1
+    address: str | None = None
+    keep: str | Path | None = None
+
+    def __post_init__(self) -> None:
+        check_choice(self.engine, ("local", "ray"), "engine")
+        if self.workers is not None:
+            hint = "or None for as many as there are cores"
+            check_whole(self.workers, "workers", at_least=1, hint=hint)
+        if self.address is not None and self.engine != "ray":
+            raise InputError(
+                f"address: expected none with engine '{self.engine}', got"
+                f" '{self.address}'; it is for engine 'ray'"
+            )
+
+
+#: One job after the other, in this process.
+HERE = JobEngine()
+
+
+class JobOutcome(NamedTuple):
+    """The result of a job as JSON, or the error that it raised."""
+
+    job: str  # as JSON
+    result: str = ""
+    error: str = ""
+    is_wrong_input: bool = False
+    traceback: str = ""
+
+
+def run_jobs(
+    function: JobFunction,
+    jobs: Sequence[Mapping[str, Any]],
+    where: JobEngine = HERE,
+    progress: JobProgress | None = None,
+) -> list[Any]:
+    """Run independent jobs and return their results in the order of the jobs.
+
+    Raises InputError for wrong arguments, a cluster that does not answer, or wrong
+    input that a job reports. Raises JobError, naming the job, if a job raises anything
+    else, or if a worker is killed.
+
+    Parameters
+    ----------
+    function : callable
+        Function at the top level of a module. It takes a job and returns what JSON
+        holds, with arrays of numbers or texts. Tuples become lists.
+    jobs : sequence of dict
+        What JSON holds. Equal jobs run once.
+    where : JobEngine
+        Where the jobs run; by default one after the other, in this process.
+    progress : callable, optional
+        Called with the number of jobs done and their total.
+    """
+    if "<" in getattr(function, "__qualname__", "<unnamed>"):
+        raise InputError(
+            "function: expected a function at the top level of a module, so that"
+            f" workers find it, got {function!r}"
+        )
+    texts = [job_to_json(job, f"jobs[{number}]") for number, job in enumerate(jobs)]
+    kept = None if where.keep is None else KeptResults(where.keep, function)
+    results = {} if kept is None else kept.load_all(texts)
+    pending = [text for text in dict.fromkeys(texts) if text not in results]
+
+    def report() -> None:
+        if progress is not None:
+            progress(sum(text in results for text in texts), len(texts))
+
+    report()
+    for outcome in _outcomes(function, pending, where):
+        _check_outcome(outcome, f"job {texts.index(outcome.job)}")
+        results[outcome.job] = outcome.result
+        if kept is not None:
+            kept.save(outcome.job, outcome.result)
+        report()
+    return [result_from_json(results[text]) for text in texts]
+
+
+def _check_outcome(outcome: JobOutcome, name: str) -> None:
+    """Raise the error of a job, if any, with a name and the beginning of the job."""
+    if not outcome.error:
+        return
+    longest = 200  # characters of a job in a message
+    begin = outcome.job[:longest]
+    if len(outcome.job) > longest:
+        begin += " ..."
+    message = f"{name} {begin}: {outcome.error}"
+    if outcome.is_wrong_input:
+        raise InputError(message)
+    error = JobError(message)
+    error.add_note(outcome.traceback)
+    raise error
+
+
+def _outcomes(
+    function: JobFunction, texts: list[str], where: JobEngine
+) -> Iterator[JobOutcome]:
+    """Outcomes of jobs in the order in which they finish."""
+    if not texts:
+        return iter(())
+    if where.engine == "ray":
+        return _on_ray(function, texts, where)
+    workers = where.workers or cpu_count()
+    if workers == 1:
+        return (_do_job(function, text) for text in texts)
+    return _in_processes(function, texts, workers)
+
+
+def _do_job(function: JobFunction, text: str) -> JobOutcome:
+    """Do a job on one thread; exceptions become text, since some cannot be pickled."""
+    variables = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    one_thread = dict.fromkeys(variables, "1")  # for libraries loaded by the job
+    try:
+        with _environment(one_thread), threadpool_limits(1):
+            result = function(job_from_json(text))
+            return JobOutcome(text, result_to_json(result))
+    except InputError as error:
+        return JobOutcome(text, error=str(error), is_wrong_input=True)
+    except Exception as error:
+        message = f"{type(error).__name__}: {error}"
+        return JobOutcome(text, error=message, traceback=traceback.format_exc())
+
+
+def _do_in_worker(
+    function: JobFunction, modules: Sequence[str], folder: Path, text: str
+) -> JobOutcome:
+    """Do a job in another process, in a folder, after importing users' controllers."""
+    _end_with_parent()
+    if folder.is_dir():  # another computer may lack it
+        os.chdir(folder)
+    with working_folder():
+        for module in modules:
+            import_module(module)
+    return _do_job(function, text)
+
+
+@cache
+def _end_with_parent() -> None:
+    """Let this process end when its parent does, even if the parent is killed."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def _calls(function: JobFunction, texts: Sequence[str]) -> Iterator[Any]:
+    call = delayed(_do_in_worker)
+    modules, folder = registered_modules(), Path.cwd()
+    return (call(function, modules, folder, text) for text in texts)
+
+
+def _killed_worker() -> JobError:
+    return JobError(
+        "a worker process was killed, perhaps because memory ran out; try fewer"
+        " workers, and run again to resume if results are kept"
+    )
+
+
+def _in_processes(
+    function: JobFunction, texts: list[str], workers: int
+) -> Iterator[JobOutcome]:
+    """Do jobs in processes of joblib's loky backend, which end with the last job."""
+    run = Parallel(
+        workers, return_as="generator_unordered", batch_size=1, pre_dispatch=workers
+    )
+    try:
+        with (
+            _environment({"PYTHONSAFEPATH": "1"}),
+            parallel_config("loky", inner_max_num_threads=1),
+            warnings.catch_warnings(),
+            closing(run(_calls(function, texts))) as outcomes,
+        ):
+            warnings.filterwarnings(
+                "ignore", ".*tasks which were still being processed"
+            )
+            yield from outcomes
+    except BrokenProcessPool:
+        raise _killed_worker() from None
+    finally:
+        get_reusable_executor().shutdown(wait=True, kill_workers=True)
+
+
+def _on_ray(
+    function: JobFunction, texts: list[str], where: JobEngine
+) -> Iterator[JobOutcome]:
+    """Do jobs by joblib's Ray backend, in rounds, since it returns a round as a whole."""
+    with _connected_ray(where) as ray, parallel_config("ray"):
+        cores = int(ray.cluster_resources().get("CPU", 1))
+        workers = min(where.workers or cores, cores)
+        jobs_a_round = 2 * workers
+        with Parallel(workers, batch_size=1) as run:
+            for first in range(0, len(texts), jobs_a_round):
+                jobs = texts[first : first + jobs_a_round]
+                try:
+                    yield from run(_calls(function, jobs))
+                except ray.exceptions.RayError:
+                    raise _killed_worker() from None
+
+
+@contextmanager
+def _connected_ray(where: JobEngine) -> Iterator[Any]:
+    """Ray, connected, as a backend of joblib; what is started here ends here."""
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            ray = library("ray", "ray", "engine 'ray' needs it")
+        except InputError as error:
+            raise EngineError(str(error)) from None
+        import_module("ray.util.joblib").register_ray()
+        pool = logging.getLogger("ray.util.multiprocessing.pool")
+        pool.setLevel(logging.ERROR)  # it warns of an argument that joblib gives it
+    if ray.is_initialized():
+        yield ray
+        return
+
+    options: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
+    if where.address is None:
+        options |= {"address": "local", "num_cpus": where.workers}
+        options["include_dashboard"] = False
+    else:
+        _check_address(where.address)
+        options["address"] = where.address
+    paths = os.pathsep.join(filter(None, sys.path))
+    root = Path.cwd().anchor  # Ray lets its workers import from the working folder
+    try:
+        with _environment({"PYTHONPATH": paths}), chdir(root):
+            ray.init(**options)
+    except Exception as error:
+        raise EngineError(f"engine: 'ray' does not start: {error}") from None
+    try:
+        yield ray
+    finally:
+        ray.shutdown()
+
+
+def _check_address(address: str) -> None:
+    """Refuse an address at which nothing listens, for which Ray would wait for minutes."""
+    if address == "auto":
+        return
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not host or not port.isdigit() or not 0 < int(port) < 65536:
+        raise EngineError(
+            "address: expected 'HOST:PORT', 'ray://HOST:PORT' or 'auto', got"
+            f" '{address}'; the port of a cluster is 6379 unless it was started with"
+            " another, that of its client server 10001"
+        )
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=10.0).close()
+    except OSError as error:
+        raise EngineError(
+            f"address: expected a Ray cluster at '{address}', got no answer"
+            f" ({error.strerror or error}); start one by `ray start --head`, or leave"
+            " the address out to run on this computer"
+        ) from None
+
+
+@contextmanager
+def _environment(values: Mapping[str, str]) -> Iterator[None]:
+    """Set environment variables while the block lasts."""
+    before = {name: os.environ[name] for name in values if name in os.environ}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name in values:
+            os.environ.pop(name, None)
+        os.environ.update(before)

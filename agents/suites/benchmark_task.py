@@ -1,0 +1,179 @@
+"""Tasks of a suite: what a controller is made for, and the episodes it is evaluated in."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from agents.suites.environments import SHORT_NAMES
+from shipgym import InputError, ShipModel, SteeringGear, Weather
+from shipgym.arrays import Integers
+from shipgym.checks import check_choice
+from shipgym.envs.engine import Engine
+from shipgym.envs.environment import DEFAULT_TASK, read_options
+from shipgym.envs.randomisation import Randomisation
+from shipgym.envs.registration import env_id
+from shipgym.tasks.task import Task
+
+#: Seeds of the episodes that are scored; training and tuning use smaller ones.
+FIRST_SEED = 1_000_000
+N_EPISODES = 100
+#: Sets of episodes of a task with a true ship, and what their names end in.
+SETS: Mapping[str, str] = {"ship": "", "model": "-on-model", "far": "-far"}
+
+
+class Scenario(NamedTuple):
+    """Ship, task and domain randomisation of episodes."""
+
+    ship: ShipModel
+    task: Task
+    randomisation: Randomisation
+
+
+@dataclass(frozen=True)
+class BenchmarkTask:
+    """One task of a suite.
+
+    Attributes
+    ----------
+    name : str
+        Unique in its suite.
+    environment : str
+        "course-keeping", "path-following", or the path of a task's file.
+    model : str
+        Shipped model or model file that controllers are made for.
+    why : str
+        Purpose of the task.
+    options : mapping
+        Keywords of the environment, `sea` among them.
+    true_ship : str
+        Model of the ship that is steered, if not `model`; controllers do not know it.
+    far : mapping
+        Keywords that differ in the episodes far from the design, and `gear`.
+    on : str
+        Which of `SETS` the episodes are of.
+    design_name : str
+        Name of the task that controllers are made for, if another.
+    suite : str
+        `Suite.source` of its suite.
+    """
+
+    name: str
+    environment: str
+    model: str
+    why: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
+    true_ship: str = ""
+    far: Mapping[str, Any] = field(default_factory=dict)
+    on: str = "ship"
+    design_name: str = ""
+    suite: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.environment.endswith(".py"):
+            where = f"task '{self.name}': environment"
+            check_choice(self.environment, SHORT_NAMES, where)
+        designed = self.design.task.observed(self.design.ship)
+        steered = self.evaluation.task.observed(self.evaluation.ship)
+        for one, other in zip(designed, steered, strict=True):
+            if (one.name, one.scale) != (other.name, other.scale):
+                raise InputError(
+                    f"task '{self.name}': ship: expected the particulars of"
+                    f" '{self.model}', got '{self.true_ship}', whose '{other.name}' is"
+                    f" shown in units of {other.scale:g} instead of {one.scale:g}"
+                )
+
+    @property
+    def env_id(self) -> str:
+        """Id for `gymnasium.make`, with the keywords `model` and `arguments`."""
+        return env_id(SHORT_NAMES.get(self.environment, DEFAULT_TASK))
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Keywords of the environment of `env_id`, except for `model`."""
+        if self.environment in SHORT_NAMES:
+            return dict(self.options)
+        return {"task": self.environment, **self.options}
+
+    @cached_property
+    def design(self) -> Scenario:
+        """What controllers are made for."""
+        return self._scenario(self.model, self.options)
+
+    @cached_property
+    def evaluation(self) -> Scenario:
+        """What controllers are evaluated in."""
+        if not self.true_ship and not self.far:
+            return self.design
+        options = {**self.options, **self.far}
+        changes = options.pop("gear", {})
+        scenario = self._scenario(self.true_ship or self.model, options)
+        gear = {**asdict(scenario.ship.steering), **changes}
+        steering = SteeringGear.from_mapping(gear, "far.gear")
+        return scenario._replace(ship=replace(scenario.ship, steering=steering))
+
+    def _scenario(self, model: str, options: Mapping[str, Any]) -> Scenario:
+        task = SHORT_NAMES.get(self.environment, self.environment)
+        return Scenario(*read_options(task, model, options))
+
+    @property
+    def design_task(self) -> Self:
+        """The task as controllers are given it: without the ship behind the model."""
+        name = self.design_name or self.name
+        return replace(self, name=name, true_ship="", far={}, on="ship", design_name="")
+
+    @property
+    def ship(self) -> ShipModel:
+        """Model that controllers are made for."""
+        return self.design.ship
+
+    @property
+    def task(self) -> Task:
+        """What is asked of the autopilot."""
+        return self.design.task
+
+    @property
+    def seeds(self) -> Integers:
+        """Seeds of the episodes that are scored, shape (100,)."""
+        return FIRST_SEED + np.arange(N_EPISODES)
+
+    def engine(
+        self, num_envs: int, model: ShipModel | None = None, threads: int = 1
+    ) -> Engine:
+        """Return many ships at once in its episodes, by default its own ship."""
+        ship, task, randomisation = self.evaluation
+        steered = ship if model is None else model
+        return Engine(steered, num_envs, task, randomisation, threads=threads)
+
+    @property
+    def files(self) -> list[Path]:
+        """Files of the user's own that it names: tasks, models, rewards, sensors."""
+        options = [*self.options.values(), *self.far.values()]
+        named = [self.environment, self.model, self.true_ship, *options]
+        endings = (".py", ".json")
+        texts = [one for one in named if isinstance(one, str) and one.endswith(endings)]
+        return [Path(text) for text in texts if Path(text).is_file()]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `from_dict` reads, ready for JSON."""
+        content = {one.name: getattr(self, one.name) for one in fields(self)}
+        for name in ("options", "far"):
+            content[name] = {
+                key: one.to_dict() if isinstance(one, Weather) else one
+                for key, one in content[name].items()
+            }
+        return content
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """Read what `to_dict` returned."""
+        values = dict(content)
+        for name in ("options", "far"):
+            options = dict(values[name])
+            if isinstance(options.get("sea"), Mapping):
+                options["sea"] = Weather.from_dict(options["sea"], "sea")
+            values[name] = options
+        return cls(**values)

@@ -1,0 +1,101 @@
+"""Environments as users name them: by a short name, by an id, or by the file of a task."""
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium
+
+from shipgym import InputError
+from shipgym.checks import did_you_mean, quoted
+from shipgym.python_files import working_folder
+
+#: Tasks of the shipped environments by their short names.
+SHORT_NAMES = {"course-keeping": "CourseKeeping", "path-following": "PathFollowing"}
+ENTRY_POINT = "shipgym.envs.ship_env:ShipEnv"  # of every environment of shipgym
+
+
+class Environment(NamedTuple):
+    """Environment that a user has named.
+
+    Attributes
+    ----------
+    name : str
+        "course-keeping", "path-following", or the absolute path of a task's file.
+    options : dict
+        Keywords that its id sets, `model` perhaps among them.
+    """
+
+    name: str
+    options: dict[str, Any]
+
+
+def read_environment(
+    text: str, folder: Path = Path(), where: str = "env"
+) -> Environment:
+    """Return the environment of a short name, an id, or the file of a task.
+
+    Raises InputError for an unknown one, naming the nearest, and for an id that was
+    registered without the path of its task's file.
+
+    Parameters
+    ----------
+    text : str
+        "course-keeping", "path-following"; the path of a Python file; or an id that is
+        registered with Gymnasium. Of ``module:id`` the module is imported first.
+    folder : Path
+        Where relative paths begin.
+    where : str
+        Option or field, for messages.
+    """
+    if text in SHORT_NAMES:
+        return Environment(text, {})
+    if text.endswith(".py"):
+        path = (folder / text).resolve()
+        if not path.is_file():
+            raise InputError(
+                f"{where}: expected the file of a task, got no file {path}"
+            )
+        return Environment(str(path), {})
+
+    module, colon, name = text.rpartition(":")
+    if colon:
+        _import(module, text, where)
+    options = dict(_registered(name, where))
+    task = options.pop("task")
+    for short_name, shipped in SHORT_NAMES.items():
+        if task == shipped:
+            return Environment(short_name, options)
+    if isinstance(task, str) and task.endswith(".py"):
+        return Environment(task, options)
+    raise InputError(
+        f"{where}: expected an id registered with the path of its task, got '{name}'"
+        f" with a {type(task).__name__}"
+    )
+
+
+def _import(module: str, text: str, where: str) -> None:
+    try:
+        with working_folder():
+            import_module(module)
+    except Exception as error:  # whatever the module does
+        raise InputError(
+            f"{where}: expected module:id, got '{text}', which cannot be imported"
+            f" ({type(error).__name__}: {error})"
+        ) from None
+
+
+def _registered(name: str, where: str) -> dict[str, Any]:
+    """Keywords of an environment of shipgym by its id."""
+    registered = {
+        env_id: spec.kwargs
+        for env_id, spec in gymnasium.registry.items()
+        if spec.entry_point == ENTRY_POINT and "task" in spec.kwargs
+    }
+    if name in registered:
+        return registered[name]
+    known = [*SHORT_NAMES, *registered]
+    raise InputError(
+        f"{where}: expected one of {quoted(known)}, the file of a task, or module:id,"
+        f" got '{name}'.{did_you_mean(name, known)}"
+    )

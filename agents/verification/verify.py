@@ -1,0 +1,143 @@
+"""Autopilots designed on a model, and what becomes of them over models drawn from its covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from agents.controllers.controller import Controller
+from agents.controllers.registry import controller_class
+from agents.jobs import HERE, JobEngine
+from agents.rollouts.course_keeping import sail, step_response
+from agents.verification.monte_carlo import monte_carlo
+from agents.verification.result import STEP_DEG, Pilot, Verification
+from agents.verification.tracks import Track, keep_track, track_task
+from identification.progress import Progress
+from shipgym.checks import quoted
+from shipgym.errors import InputError
+from shipgym.ships import ShipModel
+from shipgym.ships.linear import nomoto
+
+if TYPE_CHECKING:
+    from agents.agent_file import Agent
+
+DESIGNS = ("pid", "lq", "turn-rate", "wheel-over")
+
+
+def verify(
+    model: ShipModel,
+    draws: int,
+    seed: int,
+    tell: Progress = lambda *_: None,
+    where: JobEngine = HERE,
+    guests: Sequence[Agent] = (),
+    designs: Sequence[str] = DESIGNS,
+) -> Verification:
+    """Design autopilots on a model and run them, and guests, over models drawn from its covariance.
+
+    `model`: with a covariance; `draws`, `seed`, `where`, `designs`: see
+    `build_autopilot`; `tell`: called with the progress; `guests`: further autopilots.
+    Raises UnstableModelError if the model itself runs away; InputError if no autopilot
+    can be designed on it.
+    """
+    tell("models drawn", 0, draws)
+    designed = design_autopilots(model, designs)
+    found = monte_carlo(
+        designed.controllers,
+        model,
+        draws,
+        seed,
+        where=where,
+        progress=lambda done: tell("models drawn", done, draws),
+    )
+    episodes = list(found.episodes)
+    for guest in guests:
+        episodes.append(sail(guest, found.draws, seeds=seed + np.arange(draws)))
+
+    unstable = found.manoeuvres.unstable
+    stable = [
+        draw for draw, lost in zip(found.draws, unstable, strict=True) if not lost
+    ]
+    ships = [model, *stable]
+    autopilots = [*designed.controllers, *guests]
+    keys = unique_keys([str(autopilot.name) for autopilot in autopilots])
+    pilots = []
+    for done, (key, autopilot) in enumerate(zip(keys, autopilots, strict=True)):
+        tell("step responses", done, len(autopilots))
+        step = step_response(autopilot, ships, STEP_DEG)
+        pilots.append(Pilot(key, autopilot, episodes[done], step))
+    tell("step responses", len(autopilots), len(autopilots))
+
+    tracks, late = kept_tracks(designed.guides, ships)
+    return Verification(
+        draws=draws,
+        seed=seed,
+        manoeuvres=found.manoeuvres,
+        course_unstable=found.course_unstable,
+        nomoto=nomoto(model),
+        pilots=tuple(sorted(pilots, key=_mean_cost)),
+        refused={**designed.refused, **late},
+        tracks=tracks,
+    )
+
+
+def _mean_cost(pilot: Pilot) -> float:
+    return float(np.mean(pilot.episodes.cost))
+
+
+@dataclass(frozen=True, eq=False)
+class Designed:
+    """Autopilots designed on a model."""
+
+    controllers: list[Controller] = field(default_factory=list)  # keep a heading
+    guides: list[Controller] = field(default_factory=list)  # keep a track
+    #: why others could not be designed, by their kind
+    refused: dict[str, str] = field(default_factory=dict)
+
+
+def design_autopilots(model: ShipModel, designs: Sequence[str]) -> Designed:
+    """Autopilots of some kinds; InputError if none that keeps a heading can be designed."""
+    found = Designed()
+    for kind in dict.fromkeys(designs):
+        made: Any = controller_class(kind)
+        try:
+            if made.has_autopilot:
+                guide = made.from_model(model, task=track_task(model))
+                found.guides.append(guide)
+            else:
+                found.controllers.append(made.from_model(model))
+        except InputError as error:  # this design does not suit the ship; another may
+            found.refused[kind] = str(error)
+    if not found.controllers:
+        why = "; ".join(found.refused.values())
+        if not why:
+            why = f"expected a design such as 'lq', got {quoted(designs)}"
+        raise InputError(
+            f"no autopilot that keeps a heading could be designed on it: {why}"
+        )
+    return found
+
+
+def kept_tracks(
+    guides: Sequence[Controller], ships: Sequence[ShipModel]
+) -> tuple[tuple[Track, ...], dict[str, str]]:
+    """The track of each path autopilot, and why one is refused that does not arrive on the first ship."""
+    tracks = tuple(keep_track(guide, ships) for guide in guides)
+    late = {
+        track.key: "it does not reach the end of the track on the identified model"
+        for track in tracks
+        if not track.arrived[0]
+    }
+    return tracks, late
+
+
+def unique_keys(names: Sequence[str]) -> list[str]:
+    """Names, those that were there before with a number."""
+    keys = []
+    for place, name in enumerate(names):
+        number = names[: place + 1].count(name)
+        keys.append(name if number == 1 else f"{name}-{number}")
+    return keys

@@ -1,0 +1,323 @@
+"""What the report's template shows of a verification: sentences, cards and rows of tables."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from agents.controllers.controller import Controller
+from agents.verification.figures import criterion_name
+from agents.verification.result import (
+    Verification,
+    pilot_metrics,
+    track_metrics,
+)
+from identification.report.view import Card
+from shipgym.manoeuvres import Criterion
+from shipgym.pages import NONE, fixed, number, percent
+
+if TYPE_CHECKING:
+    from agents.verification.standards import Requirement
+
+#: What a controller feeds back: name, and unit of the gain on it.
+SIGNALS = {
+    "heading_error": ("heading error", "rad/rad"),
+    "yaw_rate": ("yaw rate", "s"),
+    "heading_error_integral": ("integral of heading error", "1/s"),
+    "sway": ("sway speed", "rad s/m"),
+    "rudder": ("rudder", "rad/rad"),
+}
+#: Name and unit of each margin.
+MARGINS = {
+    "gain_margin": ("gain margin, upwards", "factor"),
+    "lowest_gain": ("gain margin, downwards", "factor"),
+    "phase_margin_deg": ("phase margin", "deg"),
+    "delay_margin_s": ("delay margin", "s"),
+    "bandwidth_rad_s": ("bandwidth", "rad/s"),
+}
+
+
+@dataclass(frozen=True)
+class GainRow:
+    """Gains on one signal: the name and value of each design's, None where it has none.
+
+    With the sign that they have in the file.
+    """
+
+    signal: str
+    unit: str
+    gains: list[tuple[str, float] | None]
+
+
+@dataclass(frozen=True)
+class MarginRow:
+    """One margin of each design."""
+
+    name: str
+    unit: str
+    values: list[str]
+
+
+@dataclass(frozen=True)
+class CriterionRow:
+    """A criterion and its verdict."""
+
+    name: str
+    notes: str  # paragraph, and remarks
+    passed: bool | None  # None where it is not decided
+    measured: float | None
+    value: float | None
+    interval: str
+    lost: str  # draws without a value, in words
+    limit: float
+    unit: str
+    probability: float | None  # of passing
+
+
+@dataclass(frozen=True, eq=False)
+class VerificationView:
+    """What the template shows of a verification but for its figures."""
+
+    draws: int
+    seed: int
+    length: float  # of the ship, m
+    headline: str
+    certain: bool  # nothing missed or open, no model drawn lost
+    cards: list[Card]
+    unstable: int  # draws that run away in a manoeuvre
+    unstable_note: str
+    course_unstable: int  # draws that keep no straight course
+    criteria: list[CriterionRow]
+    introduction: str  # of the autopilots
+    designs: list[str]  # names of those with margins
+    linear: list[str]  # names of those with gains on signals
+    gains: list[GainRow]
+    neutral_rudders: list[float]  # of the latter, rad
+    design_notes: list[str]
+    margins: list[MarginRow]
+    best: str
+    pilots: dict[str, dict[str, Any]]  # metrics by name, the best first
+    cheaper: dict[str, float]  # share of the models on which the best costs less
+    refused: dict[str, str]
+    tracks: dict[str, dict[str, Any]]
+    standards: Sequence[Requirement]
+
+
+def verification_view(found: Verification, length: float) -> VerificationView:
+    """What the template shows of a verification of a ship of some length, m."""
+    criteria = found.manoeuvres.criteria
+    designed = {
+        pilot.name: pilot.design for pilot in found.by_name if pilot.design is not None
+    }
+    linear = {name: design for name, design in designed.items() if design.feedback}
+    pilots = {pilot.name: pilot_metrics(pilot) for pilot in found.pilots}
+    return VerificationView(
+        draws=found.draws,
+        seed=found.seed,
+        length=length,
+        headline=headline(found),
+        certain=is_certain(found),
+        cards=[_criteria_card(criteria), _best_card(found, pilots)],
+        unstable=int(found.manoeuvres.unstable.sum()),
+        unstable_note=_unstable_note(found),
+        course_unstable=int(found.course_unstable.sum()),
+        criteria=[_criterion_row(name, one) for name, one in criteria.items()],
+        introduction=_introduction(found, designed),
+        designs=list(designed),
+        linear=list(linear),
+        gains=_gain_rows(list(linear.values())),
+        neutral_rudders=[design.neutral_rudder for design in linear.values()],
+        design_notes=_design_notes(designed),
+        margins=_margin_rows(list(designed.values())),
+        best=found.pilots[0].name,
+        pilots=pilots,
+        cheaper=_cheaper(found),
+        refused=found.refused,
+        tracks={track.key.upper(): track_metrics(track) for track in found.tracks},
+        standards=found.standards,
+    )
+
+
+def is_certain(found: Verification) -> bool:
+    """Whether all criteria are met and no model drawn runs away or is lost by the best autopilot."""
+    passed = [criterion.passed for criterion in found.manoeuvres.criteria.values()]
+    lost = found.pilots[0].episodes.terminated.any()
+    return bool(all(passed) and not found.manoeuvres.unstable.any() and not lost)
+
+
+def headline(found: Verification) -> str:
+    """The verdict in two or three sentences."""
+    missed, undecided = list[str](), list[str]()
+    for name, criterion in found.manoeuvres.criteria.items():
+        words = criterion_name(name, criterion).lower()
+        if criterion.passed is False:
+            missed.append(words)
+        if not criterion.decided:
+            undecided.append(words)
+
+    if missed:
+        verdict = f"but misses the IMO criterion of {', '.join(missed)}"
+    elif undecided:
+        verdict = "and misses no IMO criterion that these trials decide"
+    else:
+        verdict = "and meets all IMO criteria"
+    sentences = [f"The model is stable {verdict}."]
+    if undecided:
+        sentences.append(f"Not decided by these trials: {', '.join(undecided)}.")
+    unstable = int(found.manoeuvres.unstable.sum())
+    if unstable:
+        sentences.append(
+            f"{unstable} of {found.draws} models drawn run away in a manoeuvre."
+        )
+    best = found.pilots[0]
+    lost = int(np.sum(best.episodes.terminated))
+    control = f"loses control of {lost} of" if lost else "keeps control of all"
+    sentences.append(
+        f"{best.name} steers best and {control} {found.draws} models drawn."
+    )
+    return " ".join(sentences)
+
+
+def _unstable_note(found: Verification) -> str:
+    unstable = int(found.manoeuvres.unstable.sum())
+    off_course = int(found.course_unstable.sum())
+    note = f"Unstable draws: {unstable} of {found.draws} run away in a manoeuvre"
+    if unstable:
+        note += "; draws that run away are not included in the intervals"
+    return (
+        f"{note}. {off_course} of {found.draws} do not stay on a straight course with"
+        " the rudder fixed."
+    )
+
+
+def _criteria_card(criteria: Mapping[str, Criterion]) -> Card:
+    verdicts = Counter(criterion.passed for criterion in criteria.values())
+    met, missed, undecided = verdicts[True], verdicts[False], verdicts[None]
+    detail = f"met; {missed} missed, {undecided} not decided by these trials"
+    return Card("IMO criteria", f"{met} of {len(criteria)}", detail)
+
+
+def _best_card(found: Verification, metrics: Mapping[str, dict[str, Any]]) -> Card:
+    best = found.pilots[0]
+    own = metrics[best.name]
+    parts = [f"mean cost {number(own['cost_mean'])}"]
+    rmse = f"heading rmse {number(own['heading_rmse_deg_mean'], 2)}°"
+    if best.design is not None:
+        margin = number(best.design.margins.phase_margin_deg, 2)
+        rmse = f"phase margin {margin}°, {rmse}"
+    parts.append(rmse)
+    return Card("Best autopilot", best.name, "; ".join(parts))
+
+
+def _criterion_row(name: str, criterion: Criterion) -> CriterionRow:
+    drawn = criterion.drawn
+    interval = NONE
+    if criterion.interval is not None:
+        low, high = criterion.interval
+        interval = f"{fixed(low)} to {fixed(high)}"
+    notes = criterion.source
+    if criterion.note:
+        notes += f"; {criterion.note}"
+    return CriterionRow(
+        name=criterion_name(name, criterion),
+        notes=notes,
+        passed=criterion.passed,
+        measured=criterion.measured,
+        value=criterion.value,
+        interval=interval,
+        lost="" if drawn is None else drawn.lost_in_words,
+        limit=criterion.limit,
+        unit=criterion.unit,
+        probability=criterion.probability,
+    )
+
+
+def _introduction(found: Verification, designed: Mapping[str, Controller]) -> str:
+    """How the autopilots were made, and the model in its first-order form."""
+    learned = [pilot.name for pilot in found.by_name if pilot.design is None]
+    sentences = [
+        f"{', '.join(designed)} are designed on the identified model, linearised about"
+        " straight running."
+    ]
+    if learned:
+        verb = "was" if len(learned) == 1 else "were"
+        sentences.append(
+            f"{' and '.join(learned)} {verb} trained earlier, on another model, and used"
+            " unchanged."
+        )
+    K, T = found.nomoto.K, found.nomoto.T
+    sentences.append(
+        f"First-order form (Nomoto): K = {number(K)} 1/s, T = {number(T)} s."
+    )
+    return " ".join(sentences)
+
+
+def _gain_rows(designs: Sequence[Controller]) -> list[GainRow]:
+    """A row for each signal that a design feeds back."""
+    by_signal = []
+    for design in designs:
+        own = {}
+        for gain, (signal, _) in design.feedback.items():
+            own[signal] = gain, design.gains[gain]
+        by_signal.append(own)
+    rows = []
+    for signal, (name, unit) in SIGNALS.items():
+        gains = [own.get(signal) for own in by_signal]
+        if any(gains):
+            rows.append(GainRow(name, unit, gains))
+    return rows
+
+
+def _design_notes(designed: Mapping[str, Controller]) -> list[str]:
+    """Remarks on the gains of designs that are more than gains on signals."""
+    notes = []
+    for name, design in designed.items():
+        if design.kind == "lq-scheduled":
+            speeds = design.speeds  # type: ignore[attr-defined]
+            notes.append(
+                f"{name}: gains at service speed; the file has those from"
+                f" {number(speeds[0])} to {number(speeds[-1])} m/s."
+            )
+    for name, design in designed.items():
+        if design.kind == "turn-rate":
+            gains = design.gains
+            per_minute = np.degrees(60 * gains["rate"])
+            notes.append(
+                f"{name} steers a rate of turn: {number(gains['proportional'])} rad per"
+                f" rad/s of its error, {number(gains['integral'])} per rad of its"
+                " integral, and the rudder of the steady turn; it changes courses at"
+                f" {fixed(per_minute, 1)}°/min."
+            )
+    return notes
+
+
+def _margin_rows(designs: Sequence[Controller]) -> list[MarginRow]:
+    rows = []
+    for field, (name, unit) in MARGINS.items():
+        values = [getattr(design.margins, field) for design in designs]
+        shown = ["∞" if value == np.inf else number(value) for value in values]
+        rows.append(MarginRow(name, unit, shown))
+    return rows
+
+
+def _cheaper(found: Verification) -> dict[str, float]:
+    """Share of the models on which the best autopilot costs less than each other one."""
+    best, *others = found.pilots
+    shares = {}
+    for other in others:
+        less = best.episodes.cost < other.episodes.cost
+        shares[other.name] = float(np.mean(less))
+    return shares
+
+
+def cheaper_sentence(view: VerificationView) -> str:
+    """How often the best autopilot costs less than each other one; empty without others."""
+    parts = [
+        f"{view.best} costs less than {other} on {percent(share)} of the models"
+        for other, share in view.cheaper.items()
+    ]
+    return f"{'; '.join(parts)}." if parts else ""

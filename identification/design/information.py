@@ -1,0 +1,135 @@
+"""What trials say about each coefficient of a model.
+
+The Fisher information of a linear regression with white errors, X'X / sigma^2, adds up
+over trials. Its inverse is the least covariance of the coefficients.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import by_name, mean_square
+from identification.design.sensitivity import table_of
+from identification.regression.samples import Samples, build_samples
+from identification.validation.diagnostics import (
+    JITTER,
+    scaled_features,
+    variance_inflation,
+)
+from shipgym import ShipModel, Trial
+from shipgym.arrays import Floats
+
+WINDOW = 0.2  # over which velocities are integrated, of the time to sail a ship length
+
+
+@dataclass(frozen=True, eq=False)
+class TrialInformation:
+    """What one trial says about the coefficients."""
+
+    name: str  # of the trial
+    #: by equation, of the features scaled to a root mean square of 1
+    condition_number: dict[str, float]
+    #: by coefficient of the accelerations' terms: how much the other terms increase its
+    #: variance
+    inflation: dict[str, float]
+    #: Fisher information of the model's coefficients, shape (n_coefficients,
+    #: n_coefficients)
+    information: Floats
+
+
+def trial_regression(model: ShipModel, trial: Trial) -> Samples:
+    """Regression of a trial over windows of the same time, whatever the sampling."""
+    sampling = float(np.median(np.diff(trial.t)))
+    window = max(round(WINDOW * model.travel_time / sampling), 1)
+    tenth = max(len(trial) // 10, 1)
+    return build_samples(
+        [trial],
+        table_of(model),
+        model.particulars,
+        "integral",
+        min(window, tenth),
+        shaft_speed=model.service_shaft_speed,
+    )
+
+
+def noise_variance(
+    model: ShipModel, regressions: Sequence[Samples]
+) -> dict[str, float]:
+    """Variance of what the model leaves of the targets, by equation."""
+    accelerations = model.acceleration_matrix @ coefficient_values(model)
+    noise = {}
+    for q, rows in table_of(model).regression_rows.items():
+        targets = np.concatenate([samples.targets[q] for samples in regressions])
+        features = np.concatenate([samples.features[q] for samples in regressions])
+        errors = targets - features @ accelerations[rows]
+        # data without noise leave rounding errors only
+        rounding = JITTER * mean_square(targets)
+        noise[q] = max(mean_square(errors), rounding, np.finfo(float).tiny)
+    return noise
+
+
+def fisher_information(
+    model: ShipModel, samples: Samples, noise: Mapping[str, float]
+) -> Floats:
+    """Information on the model's coefficients, for exact features and white errors; it adds up over samples.
+
+    `noise` is the variance of the targets' errors, by equation. Shape (n_coefficients,
+    n_coefficients).
+    """
+    matrix = model.acceleration_matrix
+    moments = np.zeros(matrix.shape)
+    for q, rows in table_of(model).regression_rows.items():
+        X = samples.features[q]
+        moments[rows, rows] = X.T @ X / noise[q]
+    return np.asarray(matrix.T @ moments @ matrix)
+
+
+def trial_information(
+    model: ShipModel, name: str, samples: Samples, noise: Mapping[str, float]
+) -> TrialInformation:
+    """What a trial of a name and a regression says."""
+    condition, inflation = dict[str, float](), dict[str, float]()
+    for q, X in samples.features.items():
+        scaled, condition[q] = scaled_features(X)
+        terms = model.table.regression_names(q)
+        inflation |= by_name(terms, variance_inflation(scaled))
+    information = fisher_information(model, samples, noise)
+    return TrialInformation(name, condition, inflation, information)
+
+
+def coefficient_values(model: ShipModel) -> Floats:
+    """Coefficients of a model in their order, shape (n_coefficients,)."""
+    return np.array(list(model.coefficients.values()))
+
+
+def relative_covariance(information: Floats, size: Floats) -> Floats:
+    """Covariance of the relative errors of coefficients of some sizes.
+
+    What is not excited gets a large one instead of an infinite.
+    """
+    values, vectors = np.linalg.eigh(information * np.outer(size, size))
+    least = 1e-14 * max(values[-1], np.finfo(float).tiny)
+    values = np.maximum(values, least)
+    return np.asarray((vectors / values) @ vectors.T)
+
+
+def relative_errors(information: Floats, size: Floats) -> Floats:
+    """Relative standard errors of coefficients of some sizes, shape (n_coefficients,)."""
+    return np.sqrt(np.diag(relative_covariance(information, size)))
+
+
+def uncertainty(information: Floats, size: Floats, criterion: str, place: int) -> float:
+    """What a criterion shrinks, in the units of a relative standard error.
+
+    The standard error of the coefficient at a place ("c"), the mean axis ("D") or the
+    longest axis ("E") of the ellipsoid of the relative errors.
+    """
+    covariance = relative_covariance(information, size)
+    if criterion == "c":
+        return float(np.sqrt(covariance[place, place]))
+    variances = np.linalg.eigvalsh(covariance)
+    axes = np.sqrt(np.maximum(variances, np.finfo(float).tiny))
+    if criterion == "D":
+        return float(np.exp(np.mean(np.log(axes))))
+    return float(axes[-1])

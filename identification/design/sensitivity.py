@@ -1,0 +1,93 @@
+"""How much a manoeuvre depends on each coefficient of a model."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from identification.arrays import mean_square
+from shipgym import InputError, ShipModel, Trial, UnstableModelError
+from shipgym.arrays import finite
+from shipgym.checks import check_number
+from shipgym.manoeuvres import zigzag
+from shipgym.ships import Structure
+
+SENSED = ("u", "v", "r", "psi")
+
+
+def table_of(model: ShipModel) -> Structure:
+    """The table of terms of a model; InputError for a ship with equations written by hand."""
+    if not isinstance(model.dynamics, Structure):
+        raise InputError(
+            "structure: expected a table of terms, such as 'abkowitz', got"
+            f" {model.structure!r}"
+        )
+    return model.table
+
+
+def sensitivity(
+    model: ShipModel, manoeuvre: Callable[[ShipModel], Trial], change: float = 0.01
+) -> dict[str, float]:
+    """Change of a simulated manoeuvre per per cent of each coefficient (Cao 2015).
+
+    Raises InputError for a ship with equations written by hand.
+
+    Parameters
+    ----------
+    model : ShipModel
+        With a table of terms.
+    manoeuvre : callable
+        Simulates it with a model, such as ``zigzag``.
+    change : float
+        Relative step to either side.
+
+    Returns
+    -------
+    dict of str to float
+        By coefficient, the largest first: root mean square change of u, v, r and psi,
+        each by its span, in per cent per per cent. Infinite where the changed ship runs
+        away.
+    """
+    check_number(change, "change", above=0.0, below=1.0)
+    table_of(model)
+    base = manoeuvre(model)
+    spans = {name: float(np.ptp(base[name])) for name in SENSED}
+    moving = {name: span for name, span in spans.items() if span > 0.0}
+
+    effects = {}
+    for name in model.coefficients:
+        try:
+            up = manoeuvre(_scaled(model, name, 1.0 + change))
+            down = manoeuvre(_scaled(model, name, 1.0 - change))
+        except UnstableModelError:
+            effects[name] = np.inf
+        else:
+            effects[name] = _difference(up, down, moving) / (2.0 * change)
+    return dict(sorted(effects.items(), key=lambda effect: effect[1], reverse=True))
+
+
+def _scaled(model: ShipModel, name: str, factor: float) -> ShipModel:
+    """The model with one coefficient times a factor."""
+    changed = {name: model.coefficients[name] * factor}
+    return replace(model, coefficients={**model.coefficients, **changed})
+
+
+def _difference(up: Trial, down: Trial, spans: dict[str, float]) -> float:
+    """Root mean square difference of two runs over the channels, each by its span."""
+    common = slice(min(len(up), len(down)))
+    squares = []
+    for name, span in spans.items():
+        apart = up[name][common] - down[name][common]
+        squares.append(mean_square(apart) / span**2)
+    return float(np.sqrt(np.mean(squares)))
+
+
+def zigzag_sensitivity(model: ShipModel) -> dict[str, float | None]:
+    """`sensitivity` of the 20/20 zigzag; None where the changed ship runs away; empty where the ship does."""
+    run = partial(zigzag, rudder_deg=20.0, heading_deg=20.0, must_reverse=False)
+    try:
+        effects = sensitivity(model, run)
+    except UnstableModelError:
+        return {}
+    return {name: finite(effect) for name, effect in effects.items()}

@@ -1,0 +1,221 @@
+"""Coefficients by the errors of what the model simulates in segments, pulled toward a start.
+
+The output-error method of Maine & Iliff 1985, NASA RP-1138: noise is only in what is
+compared, while equation-error methods regress on noisy velocities, which biases them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from identification.simulation_error.least_squares import (
+    Linearised,
+    fit_least_squares,
+)
+from identification.simulation_error.segments import BLOCK, Segment
+from identification.simulation_error.shooting import Shooter, Shooting
+from identification.uncertainty.covariance import newey_west
+from shipgym.arrays import Floats
+
+# of fits, between which scales of the residuals and starts of the segments are renewed
+ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Parameters of least cost, and where the last round of the fit ended."""
+
+    parameters: Floats  # as `Shooter.shoot` takes them
+    scales: Floats  # of the residuals by channel, shape (n_channels,)
+    shooting: Shooting
+    cost_before: float  # mean squared residual at the start, in these scales
+    cost_after: float
+    evaluations: int
+
+
+@dataclass(frozen=True, eq=False)
+class OutputError:
+    """A fit by the errors of simulated segments: what is compared, and from where."""
+
+    shooter: Shooter
+    fitted: Sequence[Segment]  # of the trials to fit
+    further: Sequence[Segment]  # of further trials, which have no part in the scatter
+    start: Floats  # parameters to begin with, toward which the coefficients are pulled
+    staggered: bool  # whether a second set of segments has each sample once more
+
+    @property
+    def n_rows(self) -> int:
+        """Residuals of the trials to fit, which come first."""
+        blocks = sum(len(segment.blocks) for segment in self.fitted)
+        return len(self.shooter.channels) * blocks
+
+    @property
+    def bin_width(self) -> float:
+        """Bins of time in which residuals are added up, s: a block, or a sampling step."""
+        steps = [
+            float(np.median(np.diff(segment.times)))
+            for segment in self.fitted
+            if len(segment.times) > 1
+        ]
+        block = float(BLOCK * self.shooter.model.travel_time)
+        return max([block, *steps])
+
+    def start_scales(self) -> Floats:
+        """Scales of the residuals at the start; not finite where a ship runs away."""
+        units = self.shooter.units
+        segments = [*self.fitted, *self.further]
+        return self.scales(self.shooter.shoot(self.start, segments, units), units)
+
+    def scales(self, shooting: Shooting, scales: Floats) -> Floats:
+        """Root mean square of the residuals of each channel in the trials to fit, per sample.
+
+        `scales`: those in which the residuals are given.
+        """
+        fitted = shooting.residuals[: self.n_rows]
+        errors = fitted.reshape(-1, len(scales)) * scales
+        squares = np.sum(errors**2, axis=0)
+        n_samples = sum(len(segment.measured) for segment in self.fitted)
+        rms = np.sqrt(squares / n_samples)
+        smallest = 1e-9 * self.shooter.units
+        return np.asarray(np.maximum(rms, smallest))
+
+    def pull_weights(self, pull: float) -> Floats:
+        """Weight of each parameter's distance from the start, shape (n_parameters,).
+
+        `pull`: cost of a coefficient by that of all samples being off by their scales.
+        The zero of a rudder is known to a degree.
+        """
+        compared = sum(segment.measured.size for segment in self.fitted)
+        weights = np.full(len(self.start), np.sqrt(pull * compared))
+        weights[len(self.shooter.term_sizes) :] = 1.0 / np.radians(1.0)
+        return weights
+
+    def solve(self, scales: Floats, pull: float) -> Solution:
+        """Fit, renew scales and starts of the segments, and fit again; `scales`: to begin with."""
+        weights = self.pull_weights(pull)
+        parameters = self.start
+        segments = [*self.fitted, *self.further]
+        evaluations = 0
+        for _ in range(ROUNDS):
+            last_scales, last_segments = scales, segments
+            fit = self._fit(parameters, segments, scales, weights)
+            parameters = fit.x
+            evaluations += fit.nfev
+            shooting = self.shooter.shoot(parameters, segments, scales)
+            segments = self.shooter.moved(segments, shooting.moves)
+            scales = self.scales(shooting, scales)
+
+        before = self.shooter.shoot(self.start, last_segments, last_scales)
+        return Solution(
+            parameters,
+            last_scales,
+            shooting,
+            cost_before=self._mean_square(before),
+            cost_after=self._mean_square(shooting),
+            evaluations=evaluations,
+        )
+
+    def _fit(
+        self,
+        start: Floats,
+        segments: Sequence[Segment],
+        scales: Floats,
+        weights: Floats,
+    ) -> Any:
+        """Parameters of least cost between two renewals of scales and starts."""
+
+        def linearised(parameters: Floats) -> Linearised:
+            shooting = self.shooter.shoot(parameters, segments, scales)
+            pulled = weights * (parameters - self.start)
+            return Linearised(
+                np.concatenate([shooting.residuals, pulled]),
+                np.vstack([shooting.jacobian, np.diag(weights)]),
+            )
+
+        return fit_least_squares(
+            linearised, start, x_scale="jac", ftol=1e-6, xtol=1e-6, max_nfev=30
+        )
+
+    def _mean_square(self, shooting: Shooting) -> float:
+        return float(np.mean(shooting.residuals[: self.n_rows] ** 2))
+
+    def covariance(
+        self, solution: Solution, pull: float, memory: float
+    ) -> tuple[Floats, list[Floats]]:
+        """Sandwich covariance of the coefficients of the accelerations, and influences.
+
+        Scores are added up over the samples of the same time, which the staggered set
+        has twice, and over time as by Newey & West 1987. Further trials and the pull
+        count as known. The influences, by trial, are what each bin of time added to the
+        coefficients, shape (n_bins, n_coefficients).
+        """
+        jacobian = solution.shooting.jacobian
+        precision = np.diag(self.pull_weights(pull) ** 2)
+        information = jacobian.T @ jacobian + precision
+        inverse = np.asarray(
+            np.linalg.pinv(information, rcond=1e-14, hermitian=True), dtype=float
+        )
+
+        scores = self._scores(solution.shooting)
+        total = np.zeros_like(inverse)
+        for trial_scores in scores:
+            total += newey_west(trial_scores, round(memory / self.bin_width))
+
+        sizes = self.shooter.term_sizes
+        terms = slice(len(sizes))
+        factor = self._freedom_factor(solution.shooting, inverse)
+        sandwich = factor * inverse @ total @ inverse
+        covariance = sandwich[terms, terms] * np.outer(sizes, sizes)
+        influences = [
+            -np.sqrt(factor) * (trial_scores @ inverse)[:, terms] * sizes
+            for trial_scores in scores
+        ]
+        return 0.5 * (covariance + covariance.T), influences
+
+    def _scores(self, shooting: Shooting) -> list[Floats]:
+        """Slopes times residuals, by trial in bins of time, shape (n_bins, n_parameters)."""
+        residuals = shooting.residuals[: self.n_rows]
+        jacobian = shooting.jacobian[: self.n_rows]
+        rows = jacobian * residuals[:, None]
+
+        # the channels of a block stand together
+        n_channels = len(self.shooter.channels)
+        blocks = rows.reshape(-1, n_channels, rows.shape[1])
+        return in_bins(blocks.sum(axis=1), self.fitted, self.bin_width)
+
+    def _freedom_factor(self, shooting: Shooting, inverse: Floats) -> float:
+        """Samples by samples less the parameters and starts that were fitted to them."""
+        repeats = 2.0 if self.staggered else 1.0
+        n_samples = self.n_rows / repeats
+
+        jacobian = shooting.jacobian[: self.n_rows]
+        leverage = (jacobian @ inverse) * jacobian
+        parameters = float(leverage.sum())
+        moves = shooting.moves[: len(self.fitted)]
+        starts = sum(len(move) for move in moves) / repeats
+        return n_samples / max(n_samples - parameters - starts, 1.0)
+
+
+def in_bins(scores: Floats, segments: Sequence[Segment], width: float) -> list[Floats]:
+    """Scores of blocks, shape (n_blocks, n_parameters), added up by trial in bins of time.
+
+    Bins are `width` wide, s, from the first block of each trial on. Shapes (n_bins,
+    n_parameters).
+    """
+    counts = [len(segment.times) for segment in segments]
+    trial = np.repeat([segment.trial for segment in segments], counts)
+    times = np.concatenate([segment.times for segment in segments])
+    bins = np.floor(times / width).astype(int)
+
+    found = []
+    for index in np.unique(trial):
+        rows = trial == index
+        own_bins = bins[rows]
+        own_bins -= own_bins.min()
+        n_bins = own_bins.max() + 1
+        sums = np.zeros((n_bins, scores.shape[1]))
+        np.add.at(sums, own_bins, scores[rows])
+        found.append(sums)
+    return found

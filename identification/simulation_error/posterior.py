@@ -1,0 +1,270 @@
+"""How probable coefficients of the MMG form are, given segments of trials and a prior.
+
+The cost is that of the simulated states in segments back to back, each started from the
+smoothed measurement, by their own scatter, plus the squared distance from the prior
+(Maine & Iliff 1985, NASA RP-1138, 2.5, output error with prior).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.simulation_error.least_squares import (
+    Linearised,
+    fit_least_squares,
+)
+from identification.simulation_error.mmg_prior import MMGPrior
+from identification.simulation_error.segments import Segment, compared_channels, cut
+from identification.simulation_error.shooting import channel_units, sail_lanes
+from shipgym import ShipModel, Trial
+from shipgym.arrays import Floats, Integers
+from shipgym.engine.motion import Ship
+from shipgym.engine.records import LANES
+from shipgym.ships.mmg import IDENTIFIED
+
+SEGMENT_LENGTHS = 1.7  # of a segment, ship lengths at service speed
+SAMPLE_LENGTHS = 0.067  # between the samples that are compared
+CORRELATED_LENGTHS = 1.0  # over which errors are one error
+#: Least scales of the errors: velocities by service speed U0, yaw rate by U0 / L, heading
+#: in rad.
+FLOORS = {"u": 0.0017, "v": 0.0017, "r": 0.0021, "psi": np.radians(0.1)}
+LARGEST = 1e3  # residual of a ship that runs away, in scales
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Coefficients of greatest probability."""
+
+    # in standard deviations of the prior from its mean, shape (41,)
+    z: Floats
+    scales: Floats  # of the residuals by channel
+    strength: float  # of the prior
+    covariance: Floats  # of z, Gauss-Newton
+    evaluations: int
+
+
+class HeldOutError(NamedTuple):
+    """How segments are predicted by fits without them."""
+
+    error: float  # root mean square, in scales
+    factor: float  # on the standard errors, at which errors are of size one
+
+
+class Posterior:
+    """Segments of trials and a prior, and the errors of ships of given coefficients.
+
+    Coefficients are `z`, in standard deviations of the prior from its mean, shape (41,).
+    `which` are indices of segments.
+    """
+
+    def __init__(
+        self, blank: ShipModel, trials: Sequence[Trial], prior: MMGPrior
+    ) -> None:
+        self.blank = replace(blank, coefficients=prior.mean)
+        self.prior = prior
+        self.mean = np.array([prior.mean[name] for name in IDENTIFIED])
+        self.channels = compared_channels(blank, trials)
+        floors = np.array([FLOORS[name] for name in self.channels])
+        self.floors = floors * channel_units(blank, self.channels)
+        self.segments = cut(
+            trials,
+            self.blank,
+            self.channels,
+            SEGMENT_LENGTHS,
+            staggered=False,
+            interval=SAMPLE_LENGTHS,
+        )
+        self._last: tuple[bytes, tuple[Floats, Floats]] | None = None
+
+    @property
+    def all_segments(self) -> Integers:
+        """Indices of all segments."""
+        return np.arange(len(self.segments))
+
+    def model(self, z: Floats) -> ShipModel:
+        """The model of some coefficients."""
+        values = (self.mean + z * self.prior.deviation).tolist()
+        identified = dict(zip(IDENTIFIED, values, strict=True))
+        return replace(self.blank, coefficients=self.prior.mean | identified)
+
+    def errors(self, z: Floats, which: Integers) -> tuple[Floats, Floats]:
+        """Errors of the simulated channels, and their slopes by z, of some segments.
+
+        Each times the root of the share that its step has of the time over which errors
+        are one error; shapes (n_samples, n_channels) and (n_samples, n_channels, 41).
+        """
+        key = z.tobytes() + which.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = key, self._simulated(z, which)
+        return self._last[1]
+
+    def _simulated(self, z: Floats, which: Integers) -> tuple[Floats, Floats]:
+        """Errors and their slopes by forward differences."""
+        step = 1e-4  # standard deviations of the prior
+        ships = self._lanes(z, step)
+        blank = self.blank
+        columns = [blank.state_names.index(name) for name in self.channels]
+        used = 1 + len(IDENTIFIED)
+        no_offset = np.zeros(LANES)
+        parts = []
+        for index in which:
+            segment = self.segments[index]
+            starts = np.repeat(segment.start, LANES)
+            states = sail_lanes(blank, segment, ships, starts, no_offset)
+            # at the first sample the ships have not moved yet
+            off = states[1:, columns, :used] - segment.measured[1:, :, None]
+            share = self.independent_errors(segment) / len(off)
+            parts.append(off * np.sqrt(share))
+        lanes = np.concatenate(parts)
+
+        errors = lanes[:, :, 0]
+        with np.errstate(invalid="ignore", over="ignore"):  # of ships that run away
+            slopes = (lanes[:, :, 1:] - errors[:, :, None]) / step
+        return errors, slopes
+
+    def _lanes(self, z: Floats, step: float) -> Floats:
+        """Numbers of ships; in each but the first one coefficient is larger by a step."""
+        varied = np.arange(len(IDENTIFIED))
+        coefficients = len(Ship._fields) + varied  # their rows
+        deviation = self.prior.deviation
+        values = self.mean + z * deviation
+
+        ships = np.repeat(self.blank.ship_numbers(), LANES).reshape(-1, LANES)
+        ships[coefficients] = values[:, None]
+        ships[coefficients, 1 + varied] += step * deviation
+        return ships
+
+    def independent_errors(self, segment: Segment) -> float:
+        """Times over which errors are one error that a segment has."""
+        return segment.duration / (CORRELATED_LENGTHS * self.blank.travel_time)
+
+    def scales(self, errors: Floats, which: Integers) -> Floats:
+        """Root mean square of the errors by channel, not below the floors."""
+        count = self.count_errors(which)
+        with np.errstate(invalid="ignore", over="ignore"):
+            squares = np.sum(errors**2, axis=0)
+            rms = np.sqrt(squares / count)
+
+        ran_away = ~np.isfinite(rms)
+        rms[ran_away] = 1e2 * self.floors[ran_away]
+        return np.asarray(np.maximum(rms, self.floors))
+
+    def count_errors(self, which: Integers) -> float:
+        """Independent errors of a channel in some segments."""
+        return sum(self.independent_errors(self.segments[index]) for index in which)
+
+    def scaled_errors(self, z: Floats, which: Integers, scales: Floats) -> Linearised:
+        """Errors of some segments in their scales, in a row, and their slopes by z.
+
+        Those of a ship that runs away are large, and have no slope.
+        """
+        errors, slopes = self.errors(z, which)
+        with np.errstate(invalid="ignore"):
+            errors = errors / scales
+            slopes = slopes / scales[:, None]
+
+        errors = np.nan_to_num(errors, nan=LARGEST)
+        residuals = np.clip(errors, -LARGEST, LARGEST).ravel()
+        slopes = np.nan_to_num(slopes, posinf=0.0, neginf=0.0)
+        return Linearised(residuals, slopes.reshape(len(residuals), -1))
+
+    def residuals(
+        self, z: Floats, which: Integers, scales: Floats, strength: float
+    ) -> Linearised:
+        """Errors of some segments in their scales, then the distance from the prior.
+
+        By `strength` the standard deviations of the prior are divided.
+        """
+        data = self.scaled_errors(z, which, scales)
+        prior_slopes = strength * np.eye(len(z))
+        return Linearised(
+            np.append(data.residuals, strength * z),
+            np.vstack([data.jacobian, prior_slopes]),
+        )
+
+    def most_probable(self, start: Floats, strength: float) -> Estimate:
+        """Fit all segments, the scales of the residuals renewed between rounds.
+
+        From the mean of the prior, of which z is 0, there is a round more.
+        """
+        tolerances = (1e-2, 1e-4) if start.any() else (1e-2, 1e-2, 1e-4)
+        which = self.all_segments
+        z, evaluations = start, 0
+        for tolerance in tolerances:
+            scales = self.scales(self.errors(z, which)[0], which)
+
+            def cost(point: Floats, scales: Floats = scales) -> Linearised:
+                return self.residuals(point, which, scales, strength)
+
+            fit = fit_least_squares(
+                cost, z, ftol=tolerance, xtol=tolerance, max_nfev=30
+            )
+            z = fit.x
+            evaluations += fit.nfev
+
+        slopes = self.scaled_errors(z, which, scales).jacobian
+        return Estimate(z, scales, strength, covariance_of(slopes), evaluations)
+
+    def held_out(self, whole: Estimate, scales: Floats) -> HeldOutError:
+        """Error of each group of segments by a fit of the others.
+
+        The error is in the scales given; the factor makes the errors held out, by those
+        that the covariance of the others' fit and the scatter of the residuals lead to
+        expect, one on average; at least 1.
+        """
+        groups = held_out_groups(self.segments)
+        mean_squares = []
+        excess = expected = 0.0
+        for group in np.unique(groups):
+            others = np.flatnonzero(groups != group)
+            held = np.flatnonzero(groups == group)
+            z, covariance = self._without(others, whole)
+
+            errors, slopes = self.scaled_errors(z, held, whole.scales)
+            count = self.count_errors(held) * len(scales)
+            by_channel = errors.reshape(-1, len(scales))
+            in_scales = by_channel * (whole.scales / scales)
+            mean_squares.append(np.sum(in_scales**2) / count)
+
+            excess += float(errors @ errors) - count
+            variances = (slopes @ covariance) * slopes
+            expected += float(variances.sum())
+
+        error = np.sqrt(np.mean(mean_squares))
+        factor = np.sqrt(max(excess / expected, 1.0))
+        return HeldOutError(float(error), float(factor))
+
+    def _without(self, others: Integers, whole: Estimate) -> tuple[Floats, Floats]:
+        """Coefficients fitted to some segments, and their covariance.
+
+        From those of all segments two Gauss-Newton steps come near enough.
+        """
+        z = whole.z
+        scales, strength = whole.scales, whole.strength
+        for _ in range(2):
+            residuals, jacobian = self.residuals(z, others, scales, strength)
+            moment = jacobian.T @ jacobian
+            gradient = jacobian.T @ residuals
+            z = z - np.linalg.solve(moment, gradient)
+
+        data = jacobian[: -len(z)]  # the rows of the prior come last
+        return z, covariance_of(data)
+
+
+def covariance_of(slopes: Floats) -> Floats:
+    """Gauss-Newton covariance with the prior as it is: a stronger one chosen for the fit is no knowledge."""
+    inverse = np.linalg.inv(slopes.T @ slopes + np.eye(slopes.shape[1]))
+    return 0.5 * (inverse + inverse.T)
+
+
+def held_out_groups(segments: Sequence[Segment]) -> Integers:
+    """Group of each segment, held out together: a trial, of many every fifth one.
+
+    Of a single trial a third.
+    """
+    trial = np.array([segment.trial for segment in segments])
+    if trial.max() == trial.min():
+        return np.arange(len(trial)) * 3 // len(trial)
+    return trial % 5

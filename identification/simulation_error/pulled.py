@@ -1,0 +1,201 @@
+"""Coefficients pulled toward what is known of similar ships: what holds in hard turns.
+
+Generalised ridge regression: |y - X w|^2 + (w - w0)' S (w - w0) is made small by
+fitting w - w0 to the samples and to the root of S as further samples (Hoerl & Kennard
+1970; Tikhonov 1963). w0 and S are those of a `Prior`.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from identification.arrays import by_name, mean_square
+from identification.estimators.estimator import Estimator, Estimators, FitTask
+from identification.estimators.methods import Method
+from identification.regression.samples import Samples
+from identification.simulation_error.formulas import FORMULAS
+from identification.simulation_error.prior import Prior, formula_prior, reference_prior
+from identification.validation.folds import FOLDS, TRIALS, sample_folds
+from identification.validation.guard import reasons_unstable, with_coefficients
+from shipgym import InputError, ShipModel
+from shipgym.arrays import Flags, Floats
+from shipgym.checks import check_choice, check_number
+from shipgym.ships import GreyBox
+
+STRENGTHS = (0.0, *np.geomspace(1e-4, 10.0, 11).tolist(), np.inf)
+
+
+def with_prior(
+    method: Method,
+    prior: str | ShipModel,
+    strength: float | None,
+    blank: ShipModel,
+    folds: str = TRIALS,
+) -> Method:
+    """The method, with its coefficients pulled toward a prior.
+
+    The method fits what the prior leaves: where it drops a direction, the prior's
+    coefficients stay. `method`: as asked for; `prior`: "auto", "clarke", "kijima", or a
+    reference ship; `strength`: 0 leaves the method as it is, infinity gives the prior;
+    None chooses by cross-validation; `blank`: the target but for its coefficients;
+    `folds`: what the strength is chosen by (`Pulled.chosen_strength`), one of `trials`,
+    `largest-rudder`. Raises InputError for a grey box, which has a reference ship, and
+    for a prior without coefficients for the structure.
+    """
+    if isinstance(blank.table, GreyBox):
+        raise InputError(
+            "prior: expected none with structure 'grey-box', which has a reference"
+            f" ship already, got {prior!r}; leave the prior out, or choose another"
+            " structure"
+        )
+    if strength is not None and strength != np.inf:
+        hint = "0 for no prior, inf for the prior itself"
+        check_number(strength, "prior_strength", at_least=0.0, hint=hint)
+    check_choice(folds, FOLDS, "prior_folds")
+    if isinstance(prior, str) and prior in FORMULAS:
+        known = formula_prior(prior, blank)
+    else:
+        known = reference_prior(prior, blank)
+
+    def fit(make: Callable[[], Estimator], task: FitTask) -> Estimators:
+        return Pulled(method, make, known, task).fitted(strength, folds)
+
+    return replace(method, fit=fit)
+
+
+@dataclass(frozen=True, eq=False)
+class Pulled:
+    """A method whose coefficients are pulled toward a prior."""
+
+    method: Method  # fits where there is no pull
+    make: Callable[[], Estimator]  # makes an unfitted estimator
+    prior: Prior
+    task: FitTask  # with the regression
+
+    def at(self, strength: float, samples: Samples | None = None) -> Estimators:
+        """Estimators fitted with a strength: 0 is the method as it is, infinity the prior."""
+        samples = self.task.samples if samples is None else samples
+        if strength == 0.0:
+            return self.method.fit(self.make, replace(self.task, samples=samples))
+        return {
+            q: pulled_estimator(self.make(), samples, q, self.prior, strength)
+            for q in samples.features
+        }
+
+    def fitted(self, strength: float | None, folds: str) -> Estimators:
+        """Estimators fitted with the strength given, or chosen, with a report as `prior_`."""
+        report: dict[str, Any] = {"prior_source": self.prior.name}
+        if strength is None:
+            best, report["prior_scores"] = self.chosen_strength(folds)
+            strength = self.steady_strength(best)
+            if strength > best:
+                report["prior_raised_from"] = best
+        # JSON knows no infinity
+        report["prior_strength"] = None if np.isinf(strength) else strength
+
+        estimators = self.at(strength)
+        for estimator in estimators.values():
+            estimator.prior_ = report  # type: ignore[attr-defined]
+        return estimators
+
+    def steady_strength(self, least: float) -> float:
+        """The least strength, from a given one on, with which the model does not run away, else that one."""
+        for strength in STRENGTHS[STRENGTHS.index(least) :]:
+            model = with_coefficients(self.task.blank, self.at(strength))
+            if not reasons_unstable(model, self.task.trials):
+                return float(strength)
+        return least
+
+    def chosen_strength(self, folds: str = TRIALS) -> tuple[float, dict[str, float]]:
+        """The strongest pull that is as good as the best on samples held out.
+
+        Held out are the trials one by one, or blocks of time of a single trial, or each
+        of those with the largest rudder by a fit to all that have less. Returns the
+        error of each strength too, a mean square by that of no change at all.
+        """
+        splits = sample_folds(self.task.trials, self.task.samples, folds)
+        errors = np.empty((len(STRENGTHS), len(splits)))
+        for row, strength in enumerate(STRENGTHS):
+            for column, split in enumerate(splits):
+                estimators = self.at(strength, split.fit)
+                errors[row, column] = relative_error(estimators, split.held)
+        names = [f"{strength:.3g}" for strength in STRENGTHS]
+        scores = by_name(names, errors.mean(axis=1))
+        chosen = strongest_as_good(errors)
+        return float(STRENGTHS[chosen]), scores
+
+
+def strongest_as_good(errors: Floats) -> int:
+    """The last row of errors, shape (n_strengths, n_folds), that is as good as the best.
+
+    Within one standard error of the best (Breiman et al. 1984), because what the prior
+    is for, hard turns, is in none of the folds.
+    """
+    mean = errors.mean(axis=1)
+    best = int(np.argmin(mean))
+    excess = errors - errors[best]
+
+    n_folds = errors.shape[1]
+    deviation = excess.std(axis=1)
+    standard_error = deviation / np.sqrt(max(n_folds - 1, 1))
+    as_good = excess.mean(axis=1) <= standard_error
+    return int(np.flatnonzero(as_good)[-1])
+
+
+def pulled_estimator(
+    estimator: Estimator, samples: Samples, q: str, prior: Prior, strength: float
+) -> Estimator:
+    """An estimator fitted to the samples of an equation, and to the prior as further ones."""
+    X, centre = samples.features[q], prior.centre[q]
+    rest = samples.targets[q] - X @ centre
+    if np.isinf(strength):
+        return _prior_itself(estimator, X, rest, centre, prior.known[q])
+
+    window = float(np.mean(samples.duration))
+    pull = strength * np.sqrt(len(X)) * window * prior.roots[q]
+    rows = np.vstack([X, pull])
+    targets = np.concatenate([rest, np.zeros(len(pull))])
+    estimator.fit(rows, targets)
+    estimator.coef_ = estimator.coef_ + centre
+    if hasattr(estimator, "weights_"):
+        estimator.weights_ = estimator.weights_[: len(X)]
+    return estimator
+
+
+def _prior_itself(
+    estimator: Estimator, X: Floats, rest: Floats, centre: Floats, known: Flags
+) -> Estimator:
+    """The prior's own coefficients; those it leaves open are fitted."""
+    n_terms = len(known)
+    free = np.flatnonzero(~known)
+    coefficients = centre.copy()
+    moment = np.zeros((n_terms, n_terms))
+    covariance = np.zeros((n_terms, n_terms))
+    if free.size:
+        estimator.fit(X[:, free], rest)
+        among_free = np.ix_(free, free)
+        coefficients[free] = estimator.coef_
+        moment[among_free] = estimator.inverse_moment_
+        covariance[among_free] = estimator.covariance_
+    else:
+        estimator.fit(X, rest)  # for its attributes alone
+
+    estimator.coef_ = coefficients
+    estimator.inverse_moment_ = moment
+    estimator.covariance_ = covariance
+    estimator.n_features_in_ = n_terms  # type: ignore[attr-defined]
+    return estimator
+
+
+def relative_error(estimators: Mapping[str, Estimator], held: Samples) -> float:
+    """Mean square error of the targets by their mean square, mean over the equations."""
+    smallest = np.finfo(float).tiny
+    ratios = []
+    for q, targets in held.targets.items():
+        predicted = held.features[q] @ estimators[q].coef_
+        errors = targets - predicted
+        size = max(mean_square(targets), smallest)
+        ratios.append(mean_square(errors) / size)
+    return float(np.mean(ratios))

@@ -1,0 +1,221 @@
+"""Errors of what a model simulates in segments of trials, and how they depend on its coefficients.
+
+Multiple shooting (Bock 1983): whole trials would let a drift of heading leak into the
+coefficients.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.simulation_error.segments import Segment
+from shipgym import ShipModel
+from shipgym.arrays import Floats, Integers
+from shipgym.engine.loops import ship_loop
+from shipgym.engine.records import LANES
+
+
+@dataclass(frozen=True, eq=False)
+class Shooting:
+    """Errors of all segments at a set of parameters."""
+
+    #: simulated less measured, by the scale of the channel, blocks averaged: those of
+    #: all segments one after the other, the channels of a block together, shape
+    #: (n_rows,)
+    residuals: Floats
+    jacobian: Floats  # shape (n_rows, n_parameters)
+    moves: list[Floats]  # by segment: how its start would move, shape (n_free,)
+
+
+class Shooter:
+    """Sails all segments with a model and with its neighbours, a lane each.
+
+    The model gives the compiled accelerations and all but their coefficients;
+    `channels` are compared; `term_sizes`, shape (n_coefficients,), are coefficients of
+    the accelerations (SI) that stand for a parameter of 1; `free`: whether each
+    segment's start is fitted with it, else the smoothed measurement.
+    """
+
+    def __init__(
+        self, model: ShipModel, channels: Sequence[str], term_sizes: Floats, free: bool
+    ) -> None:
+        self.model = model
+        self.channels = tuple(channels)
+        self.term_sizes = term_sizes
+        self.columns = [model.state_names.index(name) for name in channels]
+        self.free = self.columns if free else []
+        self.numbers = model.ship_numbers()
+        self.units = channel_units(model, channels)
+
+    def shoot(
+        self, parameters: Floats, segments: Sequence[Segment], scales: Floats
+    ) -> Shooting:
+        """Residuals and Jacobian at some parameters, the starts of the segments projected out.
+
+        The residual of a segment that may choose its start is what a linear step of the
+        start leaves (variable projection, Golub & Pereyra 1973, SIAM J. Numer. Anal.
+        10(2), with the Jacobian of Kaufman 1975). `parameters`: coefficients by
+        `term_sizes`, then offsets of the rudder, rad, of the first trials or of none,
+        of which only the differences from their mean matter, shape (n_coefficients +
+        n_offsets,); `scales`: residuals that count as 1, shape (n_channels,). Not
+        finite where a ship ran away.
+        """
+        n_terms = len(self.term_sizes)
+        coefficients = parameters[:n_terms] * self.term_sizes
+        offsets = about_mean(parameters[n_terms:])
+        offset_slopes = about_mean(np.eye(len(offsets)))
+
+        residuals, jacobians, moves = [], [], []
+        for segment in segments:
+            has_offset = segment.trial < len(offsets)
+            offset = float(offsets[segment.trial]) if has_offset else 0.0
+            residual, slopes = self._block_errors(coefficients, offset, segment, scales)
+            residual, slopes, move = without_start(residual, slopes, len(self.free))
+
+            jacobian = np.zeros((len(residual), len(parameters)))
+            jacobian[:, :n_terms] = slopes[:, :n_terms]
+            if has_offset:
+                by_offset = slopes[:, n_terms]
+                jacobian[:, n_terms:] = np.outer(
+                    by_offset, offset_slopes[segment.trial]
+                )
+            residuals.append(residual)
+            jacobians.append(jacobian)
+            moves.append(move)
+        return Shooting(np.concatenate(residuals), np.concatenate(jacobians), moves)
+
+    def moved(
+        self, segments: Sequence[Segment], moves: Sequence[Floats]
+    ) -> list[Segment]:
+        """The segments with their starts moved."""
+        found = []
+        for segment, move in zip(segments, moves, strict=True):
+            start = segment.start.copy()
+            start[self.free] += move * self.units[: len(self.free)]
+            found.append(replace(segment, start=start))
+        return found
+
+    def _block_errors(
+        self, coefficients: Floats, offset: float, segment: Segment, scales: Floats
+    ) -> tuple[Floats, Floats]:
+        """Errors of a segment averaged over blocks, and their slopes, in scales.
+
+        Shapes (n_rows,) and (n_rows, n_coefficients + 1 + n_free).
+        """
+        blocks, counts = segment.blocks, segment.block_sizes
+        weights = np.sqrt(segment.weight * counts)
+        factors = weights[:, None] / scales
+
+        channels, slopes = self._channels(coefficients, offset, segment)
+        errors = averaged(channels - segment.measured, blocks, counts)
+        slopes = averaged(slopes, blocks, counts)
+        errors = errors * factors
+        slopes = slopes * factors[:, :, None]
+        return errors.ravel(), slopes.reshape(errors.size, -1)
+
+    def _channels(
+        self, coefficients: Floats, offset: float, segment: Segment
+    ) -> tuple[Floats, Floats]:
+        """Simulated channels, and their slopes by parameter, rudder offset and start.
+
+        Forward differences of parameters that are about 1: in each lane but the first
+        one number of the ship, the offset or the start is larger by a step.
+        """
+        step = 1e-5
+        n_numbers = len(self.numbers)
+        first_term = n_numbers - len(coefficients)  # the terms' numbers come last
+        nominal = np.concatenate([self.numbers, [offset], segment.start])
+        nominal[first_term:n_numbers] = coefficients
+
+        starts = [n_numbers + 1 + column for column in self.free]
+        varied = [*range(first_term, n_numbers + 1), *starts]
+        start_units = self.units[: len(self.free)]
+        steps = step * np.concatenate([self.term_sizes, [1.0], start_units])
+
+        shape = (len(segment.measured), len(self.channels))
+        channels = np.empty(shape)
+        slopes = np.empty((*shape, len(varied)))
+        for begin in range(0, len(varied), LANES - 1):
+            batch = slice(begin, begin + LANES - 1)
+            rows = varied[batch]
+            lane = 1 + np.arange(len(rows))
+            lanes = np.repeat(nominal, LANES).reshape(-1, LANES)
+            lanes[rows, lane] += steps[batch]
+
+            states = sail_lanes(
+                self.model,
+                segment,
+                ships=lanes[:n_numbers],
+                starts=lanes[n_numbers + 1 :],
+                offsets=lanes[n_numbers],
+            )
+            sailed = states[:, self.columns]
+            channels = sailed[:, :, 0]
+            with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
+                slopes[:, :, batch] = (sailed[:, :, lane] - channels[:, :, None]) / step
+        return channels, slopes
+
+
+def channel_units(model: ShipModel, channels: Sequence[str]) -> Floats:
+    """Units in which channels are compared, shape (n_channels,).
+
+    Service speed, that by ship length, and 1 rad.
+    """
+    speed = model.particulars["speed"]
+    rate = speed / model.particulars["length"]
+    units = {"u": speed, "v": speed, "r": rate, "p": rate, "psi": 1.0}
+    return np.array([units[name] for name in channels])
+
+
+def sail_lanes(
+    model: ShipModel, segment: Segment, ships: Floats, starts: Floats, offsets: Floats
+) -> Floats:
+    """States of the ships of all lanes at the samples of a segment, shape (n_samples, n_state, LANES).
+
+    Numbers of the ships and states at the start, a column for each lane, and offsets of
+    their rudders, rad.
+    """
+    loop = ship_loop(model.vessel, "segments", segment.has_wind)
+    states = np.empty((len(segment.measured), starts.size))
+    loop(
+        starts.ravel(), ships.ravel(), offsets, segment.inputs, segment.samples, states
+    )
+    return states.reshape(len(states), -1, LANES)
+
+
+def about_mean(values: Floats) -> Floats:
+    """Values less their mean along the first axis."""
+    return values - values.mean(axis=0) if len(values) else values
+
+
+def averaged(values: Floats, blocks: Integers, counts: Integers) -> Floats:
+    """Means over blocks along the first axis, from their first samples and their sizes."""
+    sums = np.add.reduceat(values, blocks)
+    others = (1,) * (values.ndim - 1)
+    return np.asarray(sums / counts.reshape(-1, *others))
+
+
+def without_start(
+    residual: Floats, slopes: Floats, n_free: int
+) -> tuple[Floats, Floats, Floats]:
+    """Residuals and slopes without what a move of the start accounts for, and that move.
+
+    The last `n_free` columns of the slopes are those by the start. Of a ship that ran
+    away nothing is taken out.
+    """
+    if not n_free:
+        return residual, slopes, np.zeros(0)
+
+    others = slopes[:, :-n_free]
+    by_start = slopes[:, -n_free:]
+    finite = np.isfinite(slopes).all() and np.isfinite(residual).all()
+    if not finite:
+        return residual, others, np.zeros(n_free)
+
+    q, r = np.linalg.qr(by_start)
+    explained = q.T @ residual
+    move, *_ = np.linalg.lstsq(r, -explained, rcond=1e-10)
+    residual = residual - q @ explained
+    others = others - q @ (q.T @ others)
+    return residual, others, move

@@ -1,0 +1,106 @@
+"""Refusals of trials that cannot identify a structure: channels, samples, excitation."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.regression import preprocess
+from identification.regression.samples import Samples
+from shipgym import InputError, Trial
+from shipgym.ships import Structure
+
+MOTIONS = {"u": "surge speed", "v": "sway speed", "r": "yaw rate", "p": "roll rate"}
+
+
+def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
+    """Refuse no trial, a missing channel, times that nearly coincide, and rudders that never move."""
+    if structure.captive:
+        raise InputError(
+            "structure: expected one for free-running trials, got"
+            f" '{structure.name}', which is identified from captive tests with the"
+            " channels X, Y, N; use identification.identify_forces"
+        )
+    if not trials:
+        raise InputError(
+            'trials: expected at least one that is marked use = "fit", got none; mark'
+            " the trials to identify from"
+        )
+    for trial in trials:
+        _check_channels(trial, structure)
+        _check_steps(trial)
+    if structure.has_rudder and all(is_still(trial) for trial in trials):
+        _refuse_still(trials[0])
+
+
+def _check_channels(trial: Trial, structure: Structure) -> None:
+    needed = structure.required_channels
+    for channel in needed:
+        if channel not in trial:
+            hint = ""
+            if channel == "u":
+                hint = "; nomoto, norrbin and nomoto2 take the speed of [ship]"
+            raise InputError(
+                f"trial {trial.name!r}: channel {channel!r} is missing, structure"
+                f" {structure.name!r} needs {', '.join(needed)}; name its column, or"
+                f' leave the trial out (use = "skip"){hint}'
+            )
+
+
+def _check_steps(trial: Trial) -> None:
+    """Refuse a row that was written twice: a step of less than 1e-4 of the usual one."""
+    steps = np.diff(trial.t)
+    k = int(np.argmin(steps))
+    usual = float(np.median(steps))
+    if steps[k] < 1e-4 * usual:
+        raise InputError(
+            f"trial {trial.name!r}: expected samples about {usual:.3g} s apart, got"
+            f" {steps[k]:.2g} s from {trial.t[k]:.12g} to {trial.t[k + 1]:.12g} s;"
+            " remove the repeated row"
+        )
+
+
+def is_still(trial: Trial) -> bool:
+    """Whether a rudder does nothing but scatter.
+
+    Its running median over five samples, in which shorter excursions are outliers,
+    moves by less than half a degree, or six times the noise up to 3 degrees.
+    """
+    delta = trial["delta"]
+    width = min(5, len(delta))
+    windows = np.lib.stride_tricks.sliding_window_view(delta, width)
+    moves = np.ptp(np.median(windows, axis=1))
+
+    noise = preprocess.noise_level(trial.t, delta)
+    scatter = min(6.0 * noise, np.radians(3.0))
+    return bool(moves < max(np.radians(0.5), scatter))
+
+
+def _refuse_still(trial: Trial) -> None:
+    angle = np.degrees(np.median(trial["delta"]))
+    raise InputError(
+        f"trial {trial.name!r}: expected a rudder that moves, got one that stays at"
+        f" {angle:.2f} deg throughout; nothing is excited and these coefficients cannot"
+        " be identified: add a trial in which the rudder moves, such as a zigzag"
+    )
+
+
+def check_samples(
+    samples: Samples, trials: Sequence[Trial], structure: Structure
+) -> None:
+    """Refuse a regression with fewer rows than terms, or of a motion that never changes."""
+    for q, change in samples.targets.items():
+        if not np.any(change):
+            raise InputError(
+                f"trial {trials[0].name!r}: expected the {MOTIONS.get(q, q)} to be"
+                f" excited and measured, got a channel {q!r} that never changes, in"
+                f" none of the {len(trials)} trials to fit; leave the column out if it"
+                " was not measured, or choose a structure without that equation"
+            )
+    terms = max(len(structure.regression_names(q)) for q in structure.regressed)
+    if len(samples) <= terms:
+        shortest = min(trials, key=len)
+        raise InputError(
+            f"trial {shortest.name!r}: expected several times as many samples as the"
+            f" {terms} coefficients of an equation, got {len(shortest)}, in all"
+            f" {len(samples)} rows; add trials, longer or sampled more often"
+        )

@@ -1,0 +1,114 @@
+"""Files and folders written under a draft's name and renamed when complete."""
+
+import os
+import re
+import shutil
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from errno import EBUSY, ENOENT, EXDEV
+from functools import cache
+from pathlib import Path
+from zlib import crc32
+
+from shipgym.errors import InputError
+
+#: Names of drafts: a checksum of the computer's name, and the number of the process.
+DRAFT = re.compile(r"\..+\.([0-9a-f]{8})-(\d+)\.draft", re.DOTALL)
+ABANDONED_S = 7 * 86400.0  # age of a draft whose process may be alive
+
+
+@contextmanager
+def atomic_path(path: Path) -> Iterator[Path]:
+    """Temporary name beside a file, renamed to it if the block ends without error.
+
+    InputError if the folder does not exist or cannot be written, or what is there is no
+    file, as a device.
+    """
+    draft = draft_name(path)
+    try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path}: is not a file; choose another name")
+        remove_drafts(path.parent)
+        yield draft
+        try:
+            draft.replace(path)
+        except OSError as error:
+            mount_point = error.errno in (EXDEV, EBUSY)
+            if not mount_point:
+                raise
+            shutil.copyfile(draft, path)
+    except OSError as error:
+        remedy = "; choose a folder that exists" if error.errno == ENOENT else ""
+        raise InputError(
+            f"{path}: cannot be written ({error.strerror or error}){remedy}"
+        ) from error
+    finally:
+        with suppress(OSError):
+            draft.unlink()
+
+
+@contextmanager
+def draft_folder(path: Path) -> Iterator[Path]:
+    """Temporary folder beside a path, removed when the block ends unless renamed."""
+    remove_drafts(path.parent)
+    draft = draft_name(path)
+    shutil.rmtree(draft, ignore_errors=True)  # of a killed process of the same number
+    try:
+        draft.mkdir()
+        yield draft
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def draft_name(path: Path) -> Path:
+    """Hidden name beside a file or folder under which this process writes it."""
+    return path.parent / f".{path.name}.{_host()}-{os.getpid()}.draft"
+
+
+def abandoned_drafts(folder: Path) -> list[Path]:
+    """Drafts in a folder whose process is dead.
+
+    Those of other computers, and of a process whose number is in use again, count after
+    a week.
+    """
+    found = []
+    with suppress(OSError):
+        for path in folder.iterdir():
+            name = DRAFT.fullmatch(path.name)
+            if name is None:
+                continue
+            age = time.time() - path.lstat().st_mtime
+            if _is_dead(*name.groups()) or age > ABANDONED_S:
+                found.append(path)
+    return found
+
+
+@cache
+def remove_drafts(folder: Path) -> None:
+    """Remove half-written files of killed processes; once per process and folder."""
+    for path in abandoned_drafts(folder):
+        with suppress(OSError):
+            if path.is_dir():
+                shutil.rmtree(path)
+            else:
+                path.unlink()
+
+
+def _is_dead(host: str, process: str) -> bool:
+    """True for a process of this computer that is no more."""
+    if host != _host() or os.name != "posix":  # elsewhere the signal 0 would end it
+        return False
+    try:
+        os.kill(int(process), 0)
+    except (ProcessLookupError, OverflowError):
+        return True
+    except PermissionError:  # another user's
+        return False
+    return False
+
+
+@cache
+def _host() -> str:
+    return f"{crc32(socket.gethostname().encode()):08x}"

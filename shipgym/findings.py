@@ -1,0 +1,30 @@
+"""Result of a battery of checks, as of a model or a task."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Problems and remarks that a battery of checks found."""
+
+    name: str  # of what was checked
+    # what makes it unfit to be used, each with a remedy or its place
+    problems: tuple[str, ...]
+    remarks: tuple[str, ...] = ()  # what is unusual, and may be right
+
+    @property
+    def ok(self) -> bool:
+        """True where there are no problems."""
+        return not self.problems
+
+    @property
+    def verdict(self) -> str:
+        """Soundness in words."""
+        return "sound" if self.ok else f"{len(self.problems)} problem(s)"
+
+    def __str__(self) -> str:
+        """Verdict, then a line for each problem and remark."""
+        lines = [f"{self.name}: {self.verdict}"]
+        lines += [f"  problem: {problem}" for problem in self.problems]
+        lines += [f"  remark: {remark}" for remark in self.remarks]
+        return "\n".join(lines)

@@ -1,5 +1,0 @@
-"""To pandas, xarray, Minari, MSS and shipmmg, and back; the public names stand in `__init__.pyi`."""
-
-from lazy_loader import attach_stub
-
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -1,0 +1,29 @@
+"""Intervals of 95 %: their quantiles, of values drawn and of the normal distribution."""
+
+import numpy as np
+
+from shipgym.arrays import Floats
+
+#: Shares of the draws below the lower and the upper end of the interval.
+LEVELS_95 = (0.025, 0.975)
+#: Standard deviations from the mean of a normal distribution to either end.
+NORMAL_95 = 1.96
+
+
+def quantiles(values: Floats, *levels: float) -> tuple[float | None, ...]:
+    """Quantiles of the values that are finite; None for each where none is."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return (None,) * len(levels)
+    return tuple(float(value) for value in np.quantile(known, levels))
+
+
+def upper_95(values: Floats) -> float:
+    """The value that 95 % of the draws do not exceed."""
+    return float(np.quantile(values, 0.95))
+
+
+def band_95(values: Floats) -> tuple[Floats, Floats]:
+    """Both ends of the interval over the first axis, each of the shape of the others."""
+    low, high = np.quantile(values, LEVELS_95, axis=0)
+    return low, high

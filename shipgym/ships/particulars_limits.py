@@ -1,0 +1,116 @@
+"""Limits of a ship's particulars; a value beyond them is mostly in a wrong unit."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from shipgym.checks import check_number
+from shipgym.constants import SEA_WATER
+from shipgym.errors import InputError
+
+#: Added masses, in the prime system; in a ship file under ``[ship.added_mass]``.
+ADDED_MASSES = ("X_udot", "Y_vdot", "Y_rdot", "N_vdot", "N_rdot")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of one value, and how it changes from a ship to a similar one."""
+
+    above: float | None = None
+    below: float | None = None
+    hint: str = ""  # unit or meaning, for messages
+    growth: float = 0.0  # power of the length with which the value grows
+    share: float | None = None  # largest part of that power of the length
+
+
+_IN_PRIME_SYSTEM = (
+    "in the prime system (mass by rho L^3 / 2), as a derivative: Y_vdot is minus the"
+    " added mass"
+)
+_ADDED_MASS = Limits(-1.0, 0.0, _IN_PRIME_SYSTEM)
+_COUPLING = Limits(-1.0, 1.0, _IN_PRIME_SYSTEM)
+
+LIMITS = {
+    "length": Limits(0.01, 2000.0, "between perpendiculars, in m"),
+    "beam": Limits(above=0.0, growth=1.0, share=1.0),
+    "draught": Limits(above=0.0, growth=1.0, share=0.5),
+    "mass": Limits(above=0.0),
+    "xg": Limits(growth=1.0, share=0.5),
+    "yaw_gyradius": Limits(above=0.0, growth=1.0, share=0.7),
+    "block_coefficient": Limits(above=0.0, below=1.0),
+    "speed": Limits(0.0, 50.0, "in m/s; a knot is 0.514 m/s"),
+    "rudder_area": Limits(above=0.0, growth=2.0),
+    "propeller_diameter": Limits(above=0.0, growth=1.0, share=0.5),
+    "rudder_aspect_ratio": Limits(above=0.0, below=10.0),
+    "propeller_pitch_ratio": Limits(above=0.0, below=3.0),
+    "rudders": Limits(above=0.0, below=9.0),
+    "propellers": Limits(above=0.0, below=9.0),
+    "length_overall": Limits(above=0.0, growth=1.0, share=2.0),
+    "frontal_area": Limits(above=0.0, growth=2.0, share=0.5),
+    "lateral_area": Limits(above=0.0, growth=2.0, share=0.5),
+    "lateral_centroid": Limits(growth=1.0, share=0.5),
+    "lateral_centroid_height": Limits(above=0.0, growth=1.0, share=0.5),
+    "metacentric_height": Limits(above=0.0, growth=1.0, share=0.2),
+    "roll_period": Limits(above=0.0, below=200.0, growth=0.5),
+    "water_density": Limits(
+        500.0, 1500.0, "in kg/m3; fresh water has 1000, sea water 1025"
+    ),
+    "X_udot": _ADDED_MASS,
+    "Y_vdot": _ADDED_MASS,
+    "Y_rdot": _COUPLING,
+    "N_vdot": _COUPLING,
+    "N_rdot": _ADDED_MASS,
+}
+
+
+def check_value(name: str, value: Any) -> float:
+    """Return one value as float; InputError, naming it, for what no ship has."""
+    limits = LIMITS[name]
+    place = f"added_mass {name}" if name in ADDED_MASSES else name
+    return check_number(
+        value, place, above=limits.above, below=limits.below, hint=limits.hint
+    )
+
+
+def check_together(values: Mapping[str, float]) -> None:
+    """Refuse values, the length among them, that do not fit each other."""
+    length = values["length"]
+    for name, value in values.items():
+        limits = LIMITS[name]
+        if limits.share is None:
+            continue
+        largest = limits.share * length**limits.growth
+        if abs(value) > largest:
+            squared, unit = ("", "m") if limits.growth == 1.0 else (" squared", "m2")
+            raise InputError(
+                f"{name}: expected at most {limits.share:g} of the length{squared}, got"
+                f" {value:g} with length {length:g}; check the units ({unit})"
+            )
+    if "mass" in values:
+        _check_mass(values)
+
+
+def _check_mass(values: Mapping[str, float]) -> None:
+    """Refuse a mass, kg, that does not fit the dimensions."""
+    mass, length = values["mass"], values["length"]
+    density = values.get("water_density", SEA_WATER)
+    if "beam" not in values or "draught" not in values:
+        whole = density * length**3
+        least, most = 2e-4, 0.2
+        reason = "0.0002 to 0.2 times water_density * length^3"
+    elif "block_coefficient" not in values:
+        whole = density * length * values["beam"] * values["draught"]
+        least, most = 0.2, 1.0
+        reason = "a block coefficient of 0.2 to 1"
+    else:
+        box = density * length * values["beam"] * values["draught"]
+        whole = box * values["block_coefficient"]
+        least, most = 0.5, 2.0
+        reason = "half to twice what block_coefficient gives"
+
+    low, high = least * whole, most * whole
+    if not low <= mass <= high:
+        raise InputError(
+            f"mass: expected {low:.4g} to {high:.4g} kg ({reason}), got {mass:g};"
+            " check the units (kg, not tonnes)"
+        )

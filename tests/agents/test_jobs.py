@@ -1,0 +1,305 @@
+"""Jobs give the same results wherever they run, are kept, and fail with one message."""
+
+import json
+import math
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.job_results import KeptResults, result_from_json, result_to_json
+from agents.jobs import EngineError, JobEngine, JobError, run_jobs
+from shipgym.errors import InputError
+
+JOBS = """
+import os, signal, sys, time
+from pathlib import Path
+import numpy as np
+from shipgym.errors import InputError
+
+
+def spectrum(job):
+    x = np.random.default_rng(job["seed"]).normal(size=(60, 40))
+    return {"seed": job["seed"], "values": np.linalg.svd(x, compute_uv=False), "pair": (1, float("inf"))}
+
+
+def dies(job):
+    if job["k"] == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return job["k"]
+
+
+def logged(job):
+    with Path(job["log"]).open("a") as log:
+        log.write(f"{job['k']}\\n")
+    if job["k"] == job["wrong"]:
+        raise InputError("k: expected another number, got 2")
+    return job["k"]
+
+
+def divides(job):
+    return 1 / job["k"]
+
+
+def threads(job):
+    from threadpoolctl import threadpool_info
+
+    np.ones((2, 2)) @ np.ones((2, 2))
+    return [[pool["num_threads"] for pool in threadpool_info()], os.environ["OMP_NUM_THREADS"]]
+
+
+def loaded(job):
+    import joblib
+
+    return ["lz4" in sys.modules, os.getcwd()]
+
+
+def sleeps(job):
+    Path(job["pids"], str(os.getpid())).touch()
+    time.sleep(600)
+"""
+needs_ray = pytest.mark.skipif(find_spec("ray") is None, reason="ray is not installed")
+
+
+@pytest.fixture
+def functions(tmp_path, monkeypatch):
+    """A module of job functions that workers find too."""
+    home = tmp_path / "home"
+    home.mkdir()
+    (home / "job_functions.py").write_text(JOBS)
+    monkeypatch.syspath_prepend(home)
+    import job_functions
+
+    yield job_functions
+    del sys.modules["job_functions"]
+
+
+def test_results_are_the_same_wherever_they_are_computed(functions, tmp_path):
+    jobs = [{"seed": seed} for seed in (3, 1, 3, 2)]
+    here = run_jobs(functions.spectrum, jobs)
+    assert [result["seed"] for result in here] == [3, 1, 3, 2]
+    values = np.random.default_rng(1).normal(size=(60, 40))
+    expected = np.linalg.svd(values, compute_uv=False)
+    np.testing.assert_allclose(here[1]["values"], expected, rtol=1e-12)
+
+    kept = JobEngine(workers=2, keep=tmp_path / "kept")
+    assert result_to_json(run_jobs(functions.spectrum, jobs, kept)) == (
+        result_to_json(here)
+    )
+    resumed = run_jobs(functions.spectrum, jobs, JobEngine(keep=tmp_path / "kept"))
+    assert result_to_json(resumed) == result_to_json(here)
+
+
+@needs_ray
+def test_ray_gives_the_same_results(functions):
+    jobs = [{"seed": seed} for seed in range(5)]
+    on_ray = run_jobs(functions.spectrum, jobs, JobEngine("ray", workers=2))
+    assert result_to_json(on_ray) == result_to_json(run_jobs(functions.spectrum, jobs))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_job_has_one_thread_and_the_environment_stays(
+    workers, functions, monkeypatch
+):
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    before = dict(os.environ)
+    ((numbers, variable),) = run_jobs(
+        functions.threads, [{}], JobEngine(workers=workers)
+    )
+    assert set(numbers) == {1}
+    assert variable == "1"
+    assert dict(os.environ) == before
+
+
+@pytest.mark.parametrize("engine", ["local", pytest.param("ray", marks=needs_ray)])
+def test_workers_import_nothing_from_the_working_folder(
+    engine, functions, tmp_path, monkeypatch
+):
+    """joblib imports lz4 where it is installed; a file of that name is somebody's results."""
+    (tmp_path / "lz4.py").touch()
+    monkeypatch.chdir(tmp_path)
+    ((is_loaded, folder),) = run_jobs(functions.loaded, [{}], JobEngine(engine, 2))
+    assert not is_loaded
+    assert folder == str(tmp_path)
+
+
+def test_progress_counts_equal_jobs_each(functions):
+    calls = []
+    run_jobs(
+        functions.spectrum, [{"seed": 1}] * 3, progress=lambda *call: calls.append(call)
+    )
+    assert calls == [(0, 3), (3, 3)]
+
+
+def test_a_killed_worker_is_one_message_and_finished_jobs_are_kept(functions, tmp_path):
+    jobs = [{"k": k} for k in range(3)]
+    engine = JobEngine(workers=2, keep=tmp_path / "kept")
+    run_jobs(functions.dies, jobs[:1], engine)
+    with pytest.raises(JobError, match=r"worker process was killed.*try fewer workers"):
+        run_jobs(functions.dies, jobs, engine)
+    calls = []
+    run_jobs(
+        functions.dies,
+        [jobs[0], jobs[0]],
+        engine,
+        progress=lambda *call: calls.append(call),
+    )
+    assert calls == [(2, 2)]
+
+
+def test_a_kept_result_is_not_computed_again_unless_its_file_is_broken(
+    functions, tmp_path
+):
+    log, kept = tmp_path / "log", tmp_path / "kept"
+    jobs = [{"k": k, "log": str(log), "wrong": -1} for k in range(4)]
+    run_jobs(functions.logged, jobs[:3], JobEngine(keep=kept))
+    min(kept.iterdir()).write_text('{"cut short')
+    calls = []
+    run_jobs(
+        functions.logged,
+        jobs,
+        JobEngine(keep=kept),
+        lambda *call: calls.append(call),
+    )
+    assert calls == [(2, 4), (3, 4), (4, 4)]
+    assert len(log.read_text().split()) == 5
+    assert len(list(kept.iterdir())) == 4
+
+
+def test_a_kept_result_belongs_to_its_function_and_version(functions, tmp_path):
+    job = json.dumps({"k": 2})
+    KeptResults(tmp_path / "kept", functions.divides).save(job, "0.5")
+    assert KeptResults(tmp_path / "kept", functions.divides).load(job) == "0.5"
+    assert KeptResults(tmp_path / "kept", functions.logged).load(job) is None
+    (file,) = (tmp_path / "kept").iterdir()
+    content = json.loads(file.read_text())
+    for change in ({"shipgym": "0.0.1"}, {"result": '{"__array__": 1, "dtype": "O"}'}):
+        file.write_text(json.dumps(content | change))
+        assert KeptResults(tmp_path / "kept", functions.divides).load(job) is None
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="file: expected a folder for results"):
+        KeptResults(tmp_path / "file", functions.divides)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_the_error_of_a_job_names_it(workers, functions, tmp_path):
+    engine = JobEngine(workers=workers)
+    jobs = [{"k": k, "log": str(tmp_path / "log"), "wrong": 2} for k in range(4)]
+    with pytest.raises(InputError, match=r'job 2 \{"k": 2, .*\}: k: expected another'):
+        run_jobs(functions.logged, jobs, engine)
+    with pytest.raises(JobError, match=r'job 1 \{"k": 0\}: ZeroDivision') as caught:
+        run_jobs(functions.divides, [{"k": 1}, {"k": 0}], engine)
+    assert "return 1 / job" in caught.value.__notes__[0]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_workers_end_with_the_process_that_started_them(functions, tmp_path, number):
+    pids = tmp_path / "pids"
+    pids.mkdir()
+    script = tmp_path / "home" / "script.py"
+    script.write_text(
+        "import job_functions, signal, sys\n"
+        "from agents.jobs import JobEngine, run_jobs\n"
+        "if __name__ == '__main__':\n"
+        "    signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "    jobs = [{'k': k, 'pids': sys.argv[1]} for k in range(2)]\n"
+        "    try:\n"
+        "        run_jobs(job_functions.sleeps, jobs, JobEngine(workers=2))\n"
+        "    except KeyboardInterrupt:\n"
+        "        sys.exit(130)\n"
+    )
+    expected = {signal.SIGINT: 130, signal.SIGKILL: -signal.SIGKILL}
+    environment = {**os.environ, "PYTHONPATH": str(Path.cwd())}
+    with subprocess.Popen([sys.executable, script, pids], env=environment) as parent:
+        end = time.monotonic() + 60
+        while len(list(pids.iterdir())) < 2 and time.monotonic() < end:
+            time.sleep(0.05)
+        parent.send_signal(number)
+        try:
+            assert parent.wait(timeout=30) == expected[number]
+        finally:
+            parent.kill()
+    end = time.monotonic() + 10
+    while any(Path("/proc", entry.name).exists() for entry in pids.iterdir()):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"engine": "rai"}, "engine: .*Did you mean 'ray'"),
+        ({"workers": 0}, "workers: 0"),
+        ({"address": "10.0.0.1:6379"}, "it is for engine 'ray'"),
+    ],
+)
+def test_wrong_fields_of_an_engine_are_refused(fields, message):
+    with pytest.raises(InputError, match=message):
+        JobEngine(**fields)
+
+
+@pytest.mark.parametrize(
+    ("function", "job", "message"),
+    [
+        (lambda job: job, {}, "function: expected a function at the top level"),
+        (os.path.join, {"k": object()}, r"jobs\[0\]: expected a dict of finite"),
+        (os.path.join, {"k": math.nan}, r"jobs\[0\]: expected a dict of finite"),
+        (os.path.join, 3, r"jobs\[0\]: expected a dict, got 3"),
+    ],
+)
+def test_wrong_jobs_are_refused(function, job, message):
+    with pytest.raises(InputError, match=message):
+        run_jobs(function, [job])
+
+
+@needs_ray
+@pytest.mark.parametrize(
+    "address", ["10.0.0.1", "10.0.0.1:65536", "10.0.0.1:0", ":6379", "10.0.0.1:ray"]
+)
+def test_an_address_without_host_and_port_is_refused(address):
+    with pytest.raises(EngineError, match="expected 'HOST:PORT'"):
+        run_jobs(os.path.join, [{}], JobEngine("ray", address=address))
+
+
+@needs_ray
+def test_an_address_that_does_not_answer_is_refused_and_nothing_is_left(
+    functions, tmp_path
+):
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{silent.getsockname()[1]}"
+        engine = JobEngine("ray", address=address, keep=tmp_path / "kept")
+        with pytest.raises(EngineError, match="got no answer"):
+            run_jobs(functions.spectrum, [{"n": 1}], engine)
+    assert not (tmp_path / "kept").exists()
+
+
+def test_without_ray_its_engine_says_how_to_install_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(EngineError, match=r"pip install 'shipgym\[ray\]'"):
+        run_jobs(os.path.join, [{}], JobEngine("ray"))
+
+
+def test_json_keeps_types_shapes_and_bits():
+    value = {
+        "integers": np.arange(6, dtype=np.int32).reshape(2, 3)[:, ::2],
+        "floats": np.array([0.1 + 0.2, -0.0, math.nan, math.inf]),
+        "texts": np.array(["a", "bc"]),
+        "list": [0.1 + 0.2, np.float32(0.1), np.True_, None],
+    }
+    back = result_from_json(result_to_json(value))
+    for name in ("integers", "floats", "texts"):
+        np.testing.assert_array_equal(back[name], value[name])
+        assert back[name].dtype == value[name].dtype
+    assert np.signbit(back["floats"][1])
+    assert back["list"] == [0.1 + 0.2, float(np.float32(0.1)), True, None]
+    for wrong in (object(), {1, 2}, np.array([None]), np.array([1j])):
+        with pytest.raises(TypeError, match="result: expected numbers"):
+            result_to_json(wrong)
