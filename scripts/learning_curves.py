@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from agents.controllers.designs import design
-from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, Given, make_plan
-from agents.training.training import HeldOut, train
+from agents.training.evaluation import HeldOut
+from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS
+from agents.training.request import TrainingRequest, make_plan
+from agents.training.training import train
 from shipgym.files import make_folder, read_json, write_json
 
 ROOT = Path(__file__).parents[1]
@@ -39,7 +41,7 @@ def curves() -> dict[str, Any]:
         dict(read_json(FOUND, "results", "remove it")) if FOUND.exists() else {}
     )
     for env_id, classical in CLASSICAL.items():
-        task = make_plan(Given("ppo", environment=env_id)).task
+        task = make_plan(TrainingRequest("ppo", environment=env_id)).task
         held_out = HeldOut(task, EVALUATION_SEED, N_EVALUATIONS)
         lines = {name: held_out.cost(design(name, task)) for name in classical}
         runs = found.setdefault(
@@ -49,7 +51,9 @@ def curves() -> dict[str, Any]:
             before = time.process_time()
             result = train(
                 make_plan(
-                    Given("ppo", environment=env_id, settings=SETTINGS, seed=seed)
+                    TrainingRequest(
+                        "ppo", environment=env_id, settings=SETTINGS, seed=seed
+                    )
                 )
             )
             seconds = time.process_time() - before

@@ -22,6 +22,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 from typing import Any
@@ -117,7 +118,7 @@ def command(words: list[str], home: Path) -> None:
     import agents.training.training as training
     from agents.cli import main
 
-    training.CHECKPOINT_SECONDS = 0.0
+    training.train = partial(training.train, checkpoint_seconds=0.0)
     main()
 
 

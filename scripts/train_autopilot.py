@@ -14,13 +14,13 @@ import typer
 from agents import load_agent
 from agents.controllers.designs import design
 from agents.rollouts.rollout import episode_costs
-from agents.training.plan import Given, make_plan
-from agents.training.training import Progress, train
+from agents.training.request import TrainingRequest, make_plan
+from agents.training.training import TrainingProgress, train
 
 NEW_SEEDS = np.arange(1_000_000, 1_000_100)
 
 
-def tell(now: Progress) -> None:
+def on_progress(now: TrainingProgress) -> None:
     """Print each evaluation."""
     if now.evaluated:
         print(f"step {now.steps:,}: cost {now.cost:.2f}, LQ's {now.lq_cost:.2f}")
@@ -31,9 +31,9 @@ def main(
 ) -> None:
     """Train, or go on with a training that was stopped, then compare on new episodes."""
     plan = make_plan(
-        Given("ppo", environment="path-following", model="mariner", threads=2)
+        TrainingRequest("ppo", environment="path-following", model="mariner", threads=2)
     )
-    train(plan, folder, resume=folder.exists(), tell=tell)
+    train(plan, folder, resume=folder.exists(), on_progress=on_progress)
     task = plan.task
     for controller in (
         load_agent(folder, task.ship),

@@ -34,8 +34,8 @@ from agents.benchmarking.statistics import Draws, Interval, interval
 from agents.policies.policy import LearnedPolicy
 from agents.suites.suite import N_EPISODES, SETS, BenchmarkTask, load_suite
 from agents.training import run_folder
-from agents.training.plan import Given, make_plan
-from agents.training.training import Progress, train
+from agents.training.request import TrainingRequest, make_plan
+from agents.training.training import TrainingProgress, train
 from shipgym.files import read_json, write_json
 
 PRETRAINED = Path(__file__).parents[1] / "agents" / "pretrained"
@@ -103,7 +103,7 @@ def learn(algorithm: str, task: BenchmarkTask, seed: int, runs: Path) -> None:
     runs.mkdir(parents=True, exist_ok=True)
     began, shown = time.process_time(), time.monotonic()
 
-    def tell(progress: Progress) -> None:
+    def on_progress(progress: TrainingProgress) -> None:
         nonlocal shown
         if progress.evaluated and time.monotonic() - shown > 10.0:
             shown = time.monotonic()
@@ -114,13 +114,13 @@ def learn(algorithm: str, task: BenchmarkTask, seed: int, runs: Path) -> None:
                 flush=True,
             )
 
-    plan = make_plan(Given(algorithm, task=task.name, seed=seed))
+    plan = make_plan(TrainingRequest(algorithm, task=task.name, seed=seed))
     resume = (folder / run_folder.RUN).is_file()
     result = train(
         plan,
         folder,
         resume=resume,
-        tell=tell,
+        on_progress=on_progress,
         command=command_of(algorithm, task, seed),
     )
     write_json(result.to_dict(), folder / RESULT)

@@ -41,7 +41,7 @@ from agents.rollouts.metrics import evaluate
 from agents.suites.reference import load_tuned
 from agents.suites.suite import SETS, BenchmarkTask, load_suite, suite_file
 from agents.training import run_folder
-from agents.training.plan import Plan
+from agents.training.plan import TrainingPlan
 from agents.training.settings import load_settings
 from agents.training.training import train
 from shipgym.files import read_json, write_json
@@ -136,7 +136,7 @@ def tuned_on(task: BenchmarkTask, kind: str) -> Controller:
 def learned_on(task: BenchmarkTask, base: Path, seed: int, out: Path) -> Policy:
     """One training run, begun, gone on with, or read where it has ended."""
     folder, settings = out / f"{task.name}-{seed}", {"base": str(base)}
-    plan = Plan(
+    plan = TrainingPlan(
         "ppo",
         task,
         load_settings("ppo", task.environment, task.name, settings),

@@ -14,7 +14,7 @@ from rich.segment import Segment
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from agents.training.training import Progress as TrainingProgress
+    from agents.training.training import TrainingProgress
     from identification.progress import Progress
 
 WIDTH_WITHOUT_TERMINAL = 110

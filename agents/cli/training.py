@@ -20,9 +20,10 @@ from agents.cli.command import (
 )
 
 if TYPE_CHECKING:
-    from agents.training.plan import Given, Plan
+    from agents.training.plan import TrainingPlan
+    from agents.training.request import TrainingRequest
     from agents.training.training import TrainingResult
-    from agents.training.tuning import Tuning
+    from agents.training.tuning import TuningResult
 
 Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
 Environment = Annotated[
@@ -116,17 +117,17 @@ def train_command(
     """Train an autopilot by reinforcement learning. Writes policy, learning curve and checkpoints.
 
     A run killed at any moment resumes with --resume from its last checkpoint, at most a
-    minute old, and ends as if it had never stopped. With --resume, options not given
+    minute old, and ends as if it had never stopped. With --resume, options not request
     keep their values; others must be the same.
     """
-    from agents.training.plan import Given
+    from agents.training.request import TrainingRequest
 
     overrides = _named(set_, "--set")
     if total_steps is not None:
         overrides["total_steps"] = total_steps
     if from_nothing:
         overrides["base"] = "none"
-    given = Given(
+    request = TrainingRequest(
         algorithm,
         environment=env,
         model=model,
@@ -141,7 +142,7 @@ def train_command(
         suite=suite,
         allow_code=allow_code or (),
     )
-    _print_result(_train(given, out, resume, max_seconds), out)
+    _print_result(_train(request, out, resume, max_seconds), out)
 
 
 def _named(texts: list[str] | None, option: str) -> dict[str, Any]:
@@ -152,12 +153,12 @@ def _named(texts: list[str] | None, option: str) -> dict[str, Any]:
 
 
 def _train(
-    given: Given, out: Path, resume: bool, max_seconds: float | None
+    request: TrainingRequest, out: Path, resume: bool, max_seconds: float | None
 ) -> TrainingResult:
-    """Check what is given before torch is imported or anything is written, then train."""
+    """Check what is request before torch is imported or anything is written, then train."""
     from agents.cli.terminal import training_bar
 
-    plan = _checked_plan(given, out, resume)
+    plan = _checked_plan(request, out, resume)
 
     from agents.training.run_folder import CHECKPOINT
     from agents.training.training import train
@@ -169,7 +170,7 @@ def _train(
                 out,
                 resume=resume,
                 max_seconds=max_seconds,
-                tell=on_progress,
+                on_progress=on_progress,
                 command=shlex.join(["shipgym", *sys.argv[1:]]),
             )
     except KeyboardInterrupt:
@@ -179,14 +180,14 @@ def _train(
         fail(message, INTERRUPTED)
 
 
-def _checked_plan(given: Given, out: Path, resume: bool) -> Plan:
+def _checked_plan(request: TrainingRequest, out: Path, resume: bool) -> TrainingPlan:
     """The plan of a new run, or of one that is resumed, with warnings of what differs."""
     from agents.cli.terminal import warn
     from agents.training import run_folder
-    from agents.training.plan import make_plan
+    from agents.training.request import make_plan
 
     if resume:
-        plan = make_plan(given, run_folder.read_plan(out, given))
+        plan = make_plan(request, run_folder.read_plan(out, request))
         run_folder.check_resumable(out, plan)
         for line in run_folder.other_versions(out):
             warn(
@@ -195,9 +196,9 @@ def _checked_plan(given: Given, out: Path, resume: bool) -> Plan:
             )
     else:
         run_folder.check_new(out)
-        plan = make_plan(given)
+        plan = make_plan(request)
 
-    steps = given.settings.get("total_steps", 0)
+    steps = request.settings.get("total_steps", 0)
     rollout = plan.settings.rollout
     if steps % rollout:
         rounded = -(-steps // rollout) * rollout
@@ -269,14 +270,14 @@ def tune_command(
     """
     from agents.cli.terminal import progress_bars
     from agents.jobs import JobEngine
-    from agents.training.plan import Given, make_plan
+    from agents.training.request import TrainingRequest, make_plan
     from agents.training.tuning import evaluated_evenly, tune
 
     fixed = _named(set_, "--set")
     overrides = dict(fixed)
     if total_steps is not None:
         overrides["total_steps"] = total_steps
-    given = Given(
+    request = TrainingRequest(
         algorithm,
         environment=env,
         model=model,
@@ -292,7 +293,7 @@ def tune_command(
         allow_code=allow_code or (),
     )
     where = JobEngine(engine, workers, address)
-    plan = make_plan(given)
+    plan = make_plan(request)
     if "evaluate_every" not in fixed:
         plan = evaluated_evenly(plan)
 
@@ -304,7 +305,12 @@ def tune_command(
                     bars("trials", done, total)
 
             tuning = tune(
-                plan, out, trials, fixed=tuple(fixed), where=where, progress=on_progress
+                plan,
+                out,
+                trials,
+                fixed=tuple(fixed),
+                where=where,
+                on_progress=on_progress,
             )
     except KeyboardInterrupt:
         fail(
@@ -314,7 +320,7 @@ def tune_command(
     print_tuning(tuning, out)
 
 
-def print_tuning(tuning: Tuning, out: Path) -> None:
+def print_tuning(tuning: TuningResult, out: Path) -> None:
     """Print trials and where the best settings are."""
     from agents.cli.tables import plain_table
     from agents.cli.terminal import answer, console, say

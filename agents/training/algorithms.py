@@ -1,7 +1,6 @@
 """Agents of stable-baselines3 and sb3-contrib by our settings, and the ships that they learn from."""
 
 from collections.abc import Callable
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -13,29 +12,18 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from agents.controllers.controller import Controller
 from agents.policies.policy import NO_LIMIT
-from agents.training.plan import Plan, training_options
+from agents.training.plan import TrainingPlan, training_options
 from agents.training.residual import ResidualVecEnv
 from agents.training.settings import (
+    LearningSettings,
     OffPolicySettings,
     PPOSettings,
-    Settings,
+    SACSettings,
     TD3Settings,
     TQCSettings,
 )
 from shipgym.envs.sb3 import ShipVecEnv
 from shipgym.extras import library
-
-ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
-#: Settings that do not go to the algorithms' classes as keywords of the same name.
-_ELSEWHERE = {item.name for item in fields(Settings)} - {"batch_size", "gamma"} | {
-    "log_std_init",
-    "log_std_end",
-    "critic_arch",
-    "action_noise",
-    "n_critics",
-    "n_quantiles",
-    "top_quantiles_to_drop",
-}
 
 
 class StaggeredShips(ShipVecEnv):
@@ -49,53 +37,58 @@ class StaggeredShips(ShipVecEnv):
         """Begin an episode in each row, each of them of another age."""
         observations: NDArray[np.float32] = super().reset()
         longest = self.vector_env.task.episode_steps
-        self.vector_env.write(
-            "steps", np.arange(self.num_envs) * longest // self.num_envs
-        )
+        ages = np.arange(self.num_envs) * longest // self.num_envs
+        self.vector_env.write("steps", ages)
         return observations
 
 
-def make_ships(plan: Plan, base: Controller | None) -> VecEnv:
-    """The ships that a plan's agent learns from, as it sees and steers them."""
-    settings, options = plan.settings, training_options(plan)
+def make_ships(plan: TrainingPlan, base: Controller | None) -> VecEnv:
+    """Make the ships that a plan's agent learns from, as it sees and steers them."""
+    settings = plan.settings
     ships: VecEnv = StaggeredShips(
         plan.task.env_id,
         settings.ships,
         model=plan.task.ship,
         threads=plan.threads,
-        **options,
+        **training_options(plan),
     )
-    part = {
-        name: getattr(settings, name)
-        for name in ("frame_stack", "action_repeat", "rate_limit")
-    }
-    if base is not None or part != {
-        "frame_stack": 1,
-        "action_repeat": 1,
-        "rate_limit": NO_LIMIT,
-    }:
-        ships = ResidualVecEnv(ships, base, authority=settings.authority, **part)
+    wrapped = (
+        base is not None
+        or settings.frame_stack != 1
+        or settings.action_repeat != 1
+        or settings.rate_limit != NO_LIMIT
+    )
+    if wrapped:
+        ships = ResidualVecEnv(
+            ships,
+            base,
+            authority=settings.authority,
+            frame_stack=settings.frame_stack,
+            action_repeat=settings.action_repeat,
+            rate_limit=settings.rate_limit,
+        )
     return scaled_rewards(ships, settings)
 
 
-def scaled_rewards(ships: VecEnv, settings: Settings) -> VecEnv:
-    """Ships whose rewards are scaled as the settings say; observations are scaled as they are."""
+def scaled_rewards(ships: VecEnv, settings: LearningSettings) -> VecEnv:
+    """Scale rewards as the settings say; observations are scaled as they are."""
     scaled = VecNormalize(ships, norm_obs=False, gamma=settings.gamma)
     if settings.reward_scale != "running":
         scaled.training = False
-        scaled.ret_rms.var, scaled.epsilon = np.float64(settings.reward_scale) ** 2, 0.0
+        scaled.ret_rms.var = np.float64(settings.reward_scale) ** 2
+        scaled.epsilon = 0.0
     return scaled
 
 
-def make_agent(plan: Plan, base: Controller | None) -> Any:
-    """An agent that has learned nothing yet, with its ships.
+def make_agent(plan: TrainingPlan, base: Controller | None) -> Any:
+    """Make an agent that has learned nothing yet, with its ships.
 
-    `base`: what it adds to. The agent's seed is also that of the ships; the random
-    numbers start again.
+    `base` is the controller that it adds to. The agent's seed is also that of the
+    ships; the random numbers start again.
     """
-    kind = algorithm_class(plan.algorithm)
     ships = make_ships(plan, base)
     arguments = sb3_arguments(plan.settings, ships.action_space.shape)
+    kind = algorithm_class(plan.algorithm)
     agent = kind("MlpPolicy", ships, seed=plan.training_seed, **arguments)
     if base is not None and isinstance(plan.settings, OffPolicySettings):
         begin_as_base(agent)
@@ -108,81 +101,91 @@ def begin_as_base(agent: Any) -> None:
     Source: Silver et al. 2018, arXiv:1812.06298. PPO's last layer is next to zero
     anyway.
     """
-    for actor in (
-        agent.actor,
-        getattr(agent, "actor_target", agent.actor),
-    ):  # SAC and TQC have no target
-        last = [
-            layer for layer in actor.mu.modules() if isinstance(layer, torch.nn.Linear)
-        ][-1]
-        torch.nn.init.zeros_(last.weight)
-        torch.nn.init.zeros_(last.bias)
+    # SAC and TQC have no target
+    for actor in (agent.actor, getattr(agent, "actor_target", agent.actor)):
+        layers = [one for one in actor.mu.modules() if isinstance(one, torch.nn.Linear)]
+        torch.nn.init.zeros_(layers[-1].weight)
+        torch.nn.init.zeros_(layers[-1].bias)
 
 
 def sb3_arguments(
-    settings: Settings, action_shape: tuple[int, ...] = (1,)
+    settings: LearningSettings, action_shape: tuple[int, ...] = (1,)
 ) -> dict[str, Any]:
-    """Keywords of the algorithm's class in stable-baselines3 or sb3-contrib for our settings.
+    """Keywords of the algorithm's class in stable-baselines3 or sb3-contrib.
 
-    `action_shape`: of one ship's actions.
+    `action_shape` is that of one ship's actions.
     """
-    arguments = {
-        one.name: getattr(settings, one.name)
-        for one in fields(settings)
-        if one.name not in _ELSEWHERE
-    }
-    network: dict[str, Any] = {
-        "net_arch": list(settings.net_arch),
-        "activation_fn": ACTIVATIONS[settings.activation],
-        "optimizer_kwargs": {
-            "fused": True
-        },  # half of the time of small networks is Adam's otherwise
-    }
-    if isinstance(settings, OffPolicySettings):
-        network["net_arch"] = {
-            "pi": list(settings.net_arch),
-            "qf": list(settings.critic_arch),
-        }
+    names = ["batch_size", "gamma"]
+    renamed: dict[str, Any] = {}
     if isinstance(settings, PPOSettings):
-        network["log_std_init"] = settings.log_std_init
+        names += ["n_steps", "n_epochs", "gae_lambda", "clip_range", "ent_coef"]
+        names += ["vf_coef", "max_grad_norm"]
+    if isinstance(settings, OffPolicySettings):
+        names += ["buffer_size", "learning_starts", "train_freq", "gradient_steps"]
+        names += ["tau"]
+    if isinstance(settings, SACSettings):
+        names += ["ent_coef", "target_entropy"]
     if isinstance(settings, TD3Settings):
+        names += ["policy_delay", "target_policy_noise", "target_noise_clip"]
         deviation = np.full(action_shape, settings.action_noise)
-        arguments["action_noise"] = NormalActionNoise(np.zeros(action_shape), deviation)
+        noise = NormalActionNoise(np.zeros(action_shape), deviation)
+        renamed["action_noise"] = noise
     if isinstance(settings, TQCSettings):
-        network |= {
-            "n_critics": settings.n_critics,
-            "n_quantiles": settings.n_quantiles,
-        }
-        arguments["top_quantiles_to_drop_per_net"] = settings.top_quantiles_to_drop
+        renamed["top_quantiles_to_drop_per_net"] = settings.top_quantiles_to_drop
     return {
-        **arguments,
+        **{name: getattr(settings, name) for name in names},
+        **renamed,
         "learning_rate": _rate(settings),
-        "policy_kwargs": network,
+        "policy_kwargs": _network(settings),
         "device": "cpu",
     }
 
 
-def _rate(settings: Settings) -> float | Callable[[float], float]:
+def _network(settings: LearningSettings) -> dict[str, Any]:
+    """Keywords of the policy's class."""
+    activations = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
+    network: dict[str, Any] = {
+        "net_arch": list(settings.net_arch),
+        "activation_fn": activations[settings.activation],
+        # half of the time of small networks is Adam's otherwise
+        "optimizer_kwargs": {"fused": True},
+    }
+    if isinstance(settings, PPOSettings):
+        network["log_std_init"] = settings.log_std_init
+    if isinstance(settings, OffPolicySettings):
+        critics = list(settings.critic_arch)
+        network["net_arch"] = {"pi": list(settings.net_arch), "qf": critics}
+    if isinstance(settings, TQCSettings):
+        network["n_critics"] = settings.n_critics
+        network["n_quantiles"] = settings.n_quantiles
+    return network
+
+
+def _rate(settings: LearningSettings) -> float | Callable[[float], float]:
     """Learning rate by the part of the training that is left."""
     if settings.schedule == "constant":
         return settings.learning_rate
-    return lambda left: (
-        settings.learning_rate * max(left, 0.0)
-    )  # the last rollout ends after the last step
+
+    def falling(left: float) -> float:
+        # the last rollout ends after the last step
+        return settings.learning_rate * max(left, 0.0)
+
+    return falling
 
 
-def set_deviation(agent: Any, settings: Settings) -> None:
+def set_deviation(agent: Any, settings: LearningSettings) -> None:
     """Set PPO's exploration for this stage of the training, unless it is learned."""
     if not isinstance(settings, PPOSettings) or settings.log_std_end == "learned":
         return
     if hasattr(agent.policy, "log_std"):  # discrete orders have none
         done = min(agent.num_timesteps / settings.total_steps, 1.0)
-        begin, end = settings.log_std_init, float(settings.log_std_end)
+        begin = settings.log_std_init
+        end = float(settings.log_std_end)
         agent.policy.log_std.data.fill_(begin + done * (end - begin))
 
 
 def algorithm_class(name: str) -> Any:
-    """The class of an algorithm by its name; InputError if its package is not installed."""
-    if name != "tqc":
-        return {"ppo": PPO, "sac": SAC, "td3": TD3}[name]
-    return library("sb3_contrib", "rl", "tqc needs it").TQC
+    """Class of an algorithm by its name; InputError if its package is not installed."""
+    if name == "tqc":
+        return library("sb3_contrib", "rl", "tqc needs it").TQC
+    return {"ppo": PPO, "sac": SAC, "td3": TD3}[name]

@@ -1,4 +1,4 @@
-"""What a policy sees and does while it learns: the same as when it steers (`agents.policies.policy`)."""
+"""Ships as a policy that learns sees and steers them: the same as when it steers alone."""
 
 import copy
 from collections.abc import Mapping
@@ -22,13 +22,13 @@ VecEnvWrapper: Any = library(
 class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
     """Ships steered by a base controller to which an agent adds, with a frame stack of observations.
 
-    What it sees, and what becomes of its output, stands in `agents.policies.policy`. A
-    step has `action_repeat` control intervals, its reward is their sum. Where an
-    episode ends among them, the rest of the step is not counted: the next episode
-    begins with the base alone (without base: the output).
+    Observations, and the way from an agent's output to the ships, are those of
+    `agents.policies.policy`. A step has `action_repeat` control intervals, its reward
+    is their sum. Where an episode ends among them, the rest of the step is not counted:
+    the next episode begins with the base alone (without base: the output).
 
-    Raises InputError for commands that are not continuous beside a base, a base that
-    does not fit the ship, or a value out of its range.
+    Raises InputError for commands that are not continuous together with a base, a base
+    that does not fit the ship, or a value out of its range.
 
     Parameters
     ----------
@@ -49,39 +49,27 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         action_repeat: int = 1,
         rate_limit: float = NO_LIMIT,
     ) -> None:
-        self.base, self.authority, self.frame_stack = base, authority, frame_stack
-        self.action_repeat, self.rate_limit = action_repeat, rate_limit
+        self.base = base
+        self.authority = authority
+        self.frame_stack = frame_stack
+        self.action_repeat = action_repeat
+        self.rate_limit = rate_limit
         check_part(self)
-        space = venv.observation_space
-        if not isinstance(space, spaces.Box) or len(space.shape) != 1:
-            raise InputError(
-                f"venv: observations in {space} found, expected a flat Box of numbers"
-            )
-        low, high = (np.tile(bound, frame_stack) for bound in (space.low, space.high))
-        if base is not None:
-            _check_base(venv, base)
-            low, high = (
-                np.append(low, venv.action_space.low),
-                np.append(high, venv.action_space.high),
-            )
-        super().__init__(
-            venv,
-            observation_space=spaces.Box(
-                low.astype(np.float32), high.astype(np.float32)
-            ),
-        )
-        self._past = np.zeros(
-            (venv.num_envs, self.frame_stack, *venv.observation_space.shape), np.float32
-        )
-        self._proposed: Numbers = np.zeros((venv.num_envs, 0), np.float32)
-        self._in_force = np.zeros(
-            (venv.num_envs, *(venv.action_space.shape or (1,))), np.float32
-        )
+        space = _stacked_space(venv, frame_stack, base)
+        super().__init__(venv, observation_space=space)
+
+        ships = venv.num_envs
+        past = (ships, frame_stack, *venv.observation_space.shape)
+        self._past = np.zeros(past, np.float32)
+        self._proposed: Numbers = np.zeros((ships, 0), np.float32)
+        self._base_state: Any = None
+        actions = (ships, *(venv.action_space.shape or (1,)))
+        self._in_force = np.zeros(actions, np.float32)
 
     def reset(self) -> Numbers:
         """Begin an episode in each row; shape (num_envs, frame_stack * n_observations + n_commands)."""
         observations = self.venv.reset()
-        self._state: Any = None
+        self._base_state = None
         self._in_force[:] = 0.0
         return self._begin(observations, np.ones(self.num_envs, dtype=np.bool_))
 
@@ -90,10 +78,11 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         self._outputs = np.array(actions)
 
     def step_wait(self) -> tuple[Numbers, Numbers, Flags, list[dict[str, Any]]]:
-        """`action_repeat` control intervals; `terminal_observation` is what the agent would have seen next.
+        """Sail `action_repeat` control intervals.
 
         Returns what the ships inside return, rewards summed up to the end of an
-        episode, infos of that end.
+        episode, infos of that end; `terminal_observation` is what the agent would have
+        seen next.
         """
         observations, rewards, dones, infos = self._interval()
         infos = list(infos)  # the ships overwrite theirs
@@ -102,15 +91,13 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
                 self._outputs[dones] = 0
             observations, more, ends, latest = self._interval()
             rewards = rewards + np.where(dones, np.float32(0.0), more)
-            infos = [
-                old if over else new
-                for old, over, new in zip(infos, dones, latest, strict=True)
-            ]
+            for row in np.flatnonzero(~dones):
+                infos[row] = latest[row]
             dones = dones | ends
         return observations, rewards, dones, infos
 
     def _interval(self) -> tuple[Numbers, Numbers, Flags, list[dict[str, Any]]]:
-        """One control interval of the ships with the agent's outputs."""
+        """Sail one control interval with the agent's outputs."""
         self.venv.step_async(self._commands())
         observations, rewards, dones, infos = self.venv.step_wait()
         self._in_force[dones] = 0.0
@@ -118,85 +105,104 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         self._past[:, -1] = observations
         ended = np.flatnonzero(dones)
         if len(ended) == 0:
-            return self._shown(None), rewards, dones, infos
+            return self._observed(self._no_starts()), rewards, dones, infos
+
         for row in ended:
             self._past[row, -1] = infos[row]["terminal_observation"]
-        kept = copy.deepcopy(self._state)  # a base may write into its state
-        last = self._shown(None)
-        self._state = kept
+        before = copy.deepcopy(self._base_state)  # a base may write into its state
+        last = self._observed(self._no_starts())
+        self._base_state = before
         for row in ended:
             infos[row]["terminal_observation"] = last[row]
-        return (
-            self._begin(observations, np.asarray(dones, dtype=np.bool_)),
-            rewards,
-            dones,
-            infos,
-        )
+        first = self._begin(observations, np.asarray(dones, dtype=np.bool_))
+        return first, rewards, dones, infos
 
     def memory(self) -> dict[str, Any]:
-        """What further steps depend on here: past observations, the base's state and its proposals."""
-        own = {"past": self._past, "state": self._state, "proposed": self._proposed}
-        limited = {} if self.rate_limit == NO_LIMIT else {"in_force": self._in_force}
-        return copy.deepcopy({**own, **limited})
+        """Return what further steps depend on here, for `remember`.
+
+        These are past observations, the base's state and its proposals, and with a
+        limit of the rate what is in force.
+        """
+        memory = {
+            "past": self._past,
+            "state": self._base_state,
+            "proposed": self._proposed,
+        }
+        if self.rate_limit != NO_LIMIT:
+            memory["in_force"] = self._in_force
+        return copy.deepcopy(memory)
 
     def remember(self, memory: Mapping[str, Any]) -> None:
-        """Go on from what `memory` gave, in place of a `reset`."""
-        self._past[:], self._state, self._proposed = (
-            memory["past"],
-            memory["state"],
-            memory["proposed"],
-        )
+        """Go on from what `memory` returned, in place of a `reset`."""
+        self._past[:] = memory["past"]
+        self._base_state = memory["state"]
+        self._proposed = memory["proposed"]
         self._in_force = memory.get("in_force", self._in_force)
 
     def _commands(self) -> Any:
-        """What the ships do."""
+        """Return what the ships do."""
         if self.base is None and self.rate_limit == NO_LIMIT:
             return self._outputs
-        self._in_force = toward(
-            np.asarray(self._outputs, dtype=np.float32), self._in_force, self.rate_limit
-        )
+        outputs = np.asarray(self._outputs, dtype=np.float32)
+        self._in_force = toward(outputs, self._in_force, self.rate_limit)
         if self.base is None:
             return self._in_force
-        return np.clip(
-            self._proposed + np.float32(self.authority) * self._in_force, -1.0, 1.0
-        )
+        added = np.float32(self.authority) * self._in_force
+        return np.clip(self._proposed + added, -1.0, 1.0)
+
+    def _no_starts(self) -> Flags:
+        return np.zeros(self.num_envs, dtype=np.bool_)
 
     def _begin(self, observations: Numbers, starts: Flags) -> Numbers:
-        """What the agent sees where some rows begin an episode."""
+        """Return what the agent sees where some rows begin an episode."""
         self._past[starts] = observations[starts, None]
-        return self._shown(starts)
+        return self._observed(starts)
 
-    def _shown(self, starts: Flags | None) -> Numbers:
-        """Histories and the base's proposals, which are kept for the step that follows."""
-        seen = self._past.reshape(self.num_envs, -1)
+    def _observed(self, starts: Flags) -> Numbers:
+        """Return histories and the base's proposals, which are kept for the step that follows."""
+        histories = self._past.reshape(self.num_envs, -1)
         if self.base is None:
-            return seen.copy()
-        flags = np.zeros(self.num_envs, dtype=np.bool_) if starts is None else starts
-        proposed, self._state = self.base.predict(
-            self._past[:, -1].copy(), self._state, flags, True
+            return histories.copy()
+        newest = self._past[:, -1].copy()
+        proposed, self._base_state = self.base.predict(
+            newest, self._base_state, starts, True
         )
         self._proposed = np.asarray(proposed, dtype=np.float32)
-        return np.concatenate([seen, self._proposed], axis=1)
+        return np.concatenate([histories, self._proposed], axis=1)
+
+
+def _stacked_space(venv: Any, frame_stack: int, base: Policy | None) -> spaces.Box:
+    """Space of stacked observations, with the commands of a base."""
+    space = venv.observation_space
+    if not isinstance(space, spaces.Box) or len(space.shape) != 1:
+        raise InputError(f"venv: expected observations in a flat Box, got {space}")
+    low = np.tile(space.low, frame_stack)
+    high = np.tile(space.high, frame_stack)
+    if base is not None:
+        _check_base(venv, base)
+        low = np.append(low, venv.action_space.low)
+        high = np.append(high, venv.action_space.high)
+    return spaces.Box(low.astype(np.float32), high.astype(np.float32))
 
 
 def _check_base(venv: Any, base: Policy) -> None:
     """Refuse commands that cannot be added to, and a controller of another ship."""
     space = venv.action_space
-    if not isinstance(space, spaces.Box) or not (
+    bounded = isinstance(space, spaces.Box) and bool(
         np.all(space.low >= -1.0) and np.all(space.high <= 1.0)
-    ):
+    )
+    if not bounded:
         raise InputError(
-            f"venv: actions in {space} found, expected a Box within [-1, 1]: a base"
-            " needs the action 'rudder'"
+            f"venv: expected actions in a Box within [-1, 1], got {space}; a base needs"
+            " the action 'rudder'"
         )
     if not callable(getattr(base, "predict", None)):
         raise InputError(
-            f"base: {type(base).__name__} found, expected a controller, such as"
-            " LQ.from_model(model)"
+            "base: expected a controller, such as LQ.from_model(model), got"
+            f" {type(base).__name__}"
         )
-    if (check_fits := getattr(base, "check_fits", None)) is not None:
-        names, scales = (
-            venv.get_attr("observation_names", 0)[0],
-            venv.get_attr("observation_scales", 0)[0],
-        )
+    check_fits = getattr(base, "check_fits", None)
+    if check_fits is not None:
+        names = venv.get_attr("observation_names", 0)[0]
+        scales = venv.get_attr("observation_scales", 0)[0]
         check_fits(names, scales, "base")

@@ -1,13 +1,14 @@
-"""The folder of a run of training; its files are listed in docs/training.md."""
+"""Folder of a run of training; its files are listed in docs/training.md."""
 
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from agents.output import check_writable, present
-from agents.training.plan import Given, Plan, check_same, code_given
+from agents.training.plan import TrainingPlan, check_same
+from agents.training.request import TrainingRequest, code_in
 from shipgym.checks import (
     Shape,
     check_fields,
@@ -21,9 +22,22 @@ from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
 
 FORMAT = 1
-RUN, CHECKPOINT, PROGRESS = "run.json", "checkpoint.safetensors", "progress.json"
-AGENT, LAST, TENSORBOARD = "agent.json", "last.json", "tensorboard"
-FIELDS = ("format", "configuration", "threads", "command", "versions")
+RUN = "run.json"
+CHECKPOINT = "checkpoint.safetensors"
+PROGRESS = "progress.json"
+AGENT = "agent.json"  # the best policy
+LAST = "last.json"
+TENSORBOARD = "tensorboard"
+#: Packages that decide what is learned.
+PACKAGES = (
+    "shipgym",
+    "numpy",
+    "numba",
+    "gymnasium",
+    "torch",
+    "stable-baselines3",
+    "sb3-contrib",
+)
 CONFIGURATION: Shape = {
     "algorithm": (str,),
     "task": (str,),
@@ -35,22 +49,12 @@ CONFIGURATION: Shape = {
     "seed": (int,),
     "randomise": (bool,),
 }
-PACKAGES = (
-    "shipgym",
-    "numpy",
-    "numba",
-    "gymnasium",
-    "torch",
-    "stable-baselines3",
-    "sb3-contrib",
-)
-REMEDY = "start a new run in another folder"
 
 
-def versions() -> dict[str, str]:
-    """Versions of Python and of the packages that decide what is learned."""
+def versions(packages: Iterable[str] = PACKAGES) -> dict[str, str]:
+    """Return the installed versions of Python and of packages."""
     found = {"python": platform.python_version()}
-    for name in PACKAGES:
+    for name in packages:
         try:
             found[name] = version(name)
         except PackageNotFoundError:
@@ -59,10 +63,7 @@ def versions() -> dict[str, str]:
 
 
 def check_new(folder: Path) -> None:
-    """Refuse a folder in which there is something already.
-
-    Raises InputError which says how to go on with a run that is there.
-    """
+    """Raise InputError for a folder that is not empty, and say how to resume a run."""
     if (folder / RUN).is_file():
         raise InputError(
             f"{folder}: contains a run already; resume it with --resume, or name"
@@ -75,7 +76,7 @@ def check_new(folder: Path) -> None:
     check_writable(folder)
 
 
-def begin_folder(folder: Path, plan: Plan, command: str) -> None:
+def begin_folder(folder: Path, plan: TrainingPlan, command: str) -> None:
     """Make the folder of a new run; raises InputError if it cannot be written."""
     content = {
         "format": FORMAT,
@@ -88,38 +89,36 @@ def begin_folder(folder: Path, plan: Plan, command: str) -> None:
     write_json(content, folder / RUN)
 
 
-def read_plan(folder: Path, given: Given | None = None) -> Plan:
-    """The run that a folder is of.
+def read_plan(folder: Path, request: TrainingRequest | None = None) -> TrainingPlan:
+    """Read the plan of the run in a folder.
 
     Raises InputError if there is none, its file is broken or names code that the user
-    has not given, or its model has changed since.
+    has not asked for, or its model has changed since.
     """
     content = _content(folder)
-    where, configuration = f"{folder / RUN}", content["configuration"]
-    named = {
+    configuration = content["configuration"]
+    where = f"{folder / RUN}"
+    code = {
         name: configuration.get(name) for name in ("environment", "model", "options")
     }
-    data_only(named, f"{where}: configuration", given and code_given(given))
+    own_code = None if request is None else code_in(request)
+    data_only(code, f"{where}: configuration", own_code)
     with placed(where):
         check_shape(configuration, CONFIGURATION, "configuration")
-        plan = Plan.from_configuration(configuration, content["threads"])
+        plan = TrainingPlan.from_configuration(configuration, content["threads"])
     check_same(plan.configuration(), configuration, str(folder))
     return plan
 
 
-def check_resumable(folder: Path, plan: Plan) -> None:
-    """Refuse to go on with a run of another configuration, naming the first difference.
-
-    Raises InputError as `read_plan`, or for a difference.
-    """
+def check_resumable(folder: Path, plan: TrainingPlan) -> None:
+    """Raise InputError unless the run in a folder is of this plan."""
     check_same(plan.configuration(), _content(folder)["configuration"], str(folder))
 
 
 def other_versions(folder: Path) -> list[str]:
-    """What was installed in another version when the run began, a line each."""
-    found: Mapping[str, str] = check_table(
-        _content(folder)["versions"], f"{folder / RUN}: versions"
-    )
+    """Say what was installed in another version when the run began, a line each."""
+    where = f"{folder / RUN}: versions"
+    found: Mapping[str, str] = check_table(_content(folder)["versions"], where)
     return [
         f"{name} {now} in place of {found[name]}"
         for name, now in versions().items()
@@ -133,8 +132,10 @@ def _content(folder: Path) -> Mapping[str, Any]:
         raise InputError(
             f"{folder}: no run of training is there; leave --resume out to begin one"
         )
-    content = read_json(path, "run file", REMEDY)
-    check_fields(content, FIELDS, str(path), REMEDY)
+    remedy = "start a new run in another folder"
+    content = read_json(path, "run file", remedy)
+    fields = ("format", "configuration", "threads", "command", "versions")
+    check_fields(content, fields, str(path), remedy)
     check_format(content, FORMAT, str(path))
     check_table(content["configuration"], f"{path}: configuration")
     return content

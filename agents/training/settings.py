@@ -45,7 +45,7 @@ def setting(
 
 
 @dataclass(frozen=True)
-class Settings:
+class LearningSettings:
     """Settings of all algorithms; a decision lasts `action_repeat` control intervals."""
 
     total_steps: int = setting(
@@ -131,7 +131,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class PPOSettings(Settings):
+class PPOSettings(LearningSettings):
     """Proximal policy optimisation (Schulman et al. 2017, arXiv:1707.06347)."""
 
     n_steps: int = setting("decisions of each ship in a rollout", at_least=1)
@@ -173,7 +173,7 @@ class PPOSettings(Settings):
 
 
 @dataclass(frozen=True)
-class OffPolicySettings(Settings):
+class OffPolicySettings(LearningSettings):
     """Settings of the algorithms that learn from a replay buffer."""
 
     buffer_size: int = setting("decisions that are remembered", at_least=1)
@@ -259,7 +259,7 @@ class TQCSettings(SACSettings):
 
 
 #: Settings by algorithm.
-ALGORITHMS: Mapping[str, type[Settings]] = {
+ALGORITHMS: Mapping[str, type[LearningSettings]] = {
     "ppo": PPOSettings,
     "sac": SACSettings,
     "td3": TD3Settings,
@@ -314,7 +314,7 @@ def load_settings(
     given: Mapping[str, Any] | None = None,
     action: str = "rudder",
     suite: str = "",
-) -> Settings:
+) -> LearningSettings:
     """Return the tuned settings of an algorithm, with those given by name replaced.
 
     Returns settings of the algorithm's class in `ALGORITHMS`. Raises InputError for an
@@ -332,7 +332,7 @@ def load_settings(
     suite : str
         Its suite (`BenchmarkTask.suite`).
     given : mapping of str to Any, optional
-        Settings by name that go before the tuned ones.
+        LearningSettings by name that go before the tuned ones.
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
         What is commanded. With others than the rudder, or `base` given as "none", a
         policy learns from scratch.
@@ -352,12 +352,12 @@ def load_settings(
     return make_settings(algorithm, {**chosen, **given})
 
 
-def settings_of(algorithm: str) -> type[Settings]:
+def settings_of(algorithm: str) -> type[LearningSettings]:
     """Class of an algorithm's settings; InputError for an unknown one names the nearest."""
     return ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
 
 
-def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
+def make_settings(algorithm: str, values: Mapping[str, Any]) -> LearningSettings:
     """Make settings of values by name, all of them.
 
     Raises InputError for one unknown or missing, or a value out of its range.
@@ -369,7 +369,7 @@ def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
     return kind(**table)
 
 
-def changed(settings: Settings, given: Mapping[str, Any]) -> Settings:
+def changed(settings: LearningSettings, given: Mapping[str, Any]) -> LearningSettings:
     """Replace some settings; InputError for an unknown one, or a value out of its range."""
     return replace(settings, **_known_settings(given, type(settings), "settings"))
 
@@ -380,7 +380,9 @@ def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
     return _known_settings(content, settings_of(algorithm), str(path))
 
 
-def _known_settings(value: Any, kind: type[Settings], where: str) -> dict[str, Any]:
+def _known_settings(
+    value: Any, kind: type[LearningSettings], where: str
+) -> dict[str, Any]:
     """Return a table that names settings only, with integers as decimal numbers."""
     table = check_table(value, where)
     types = {one.name: one.type for one in fields(kind)}

@@ -7,7 +7,7 @@ happened (same machine, same versions).
 
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,15 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from agents.agent_file import load_agent
-from agents.controllers.controller import Policy
-from agents.controllers.designs import design, design_base
+from agents.controllers.designs import design_base
 from agents.output import in_use
 from agents.policies.policy import LearnedPolicy
-from agents.rollouts.rollout import check_fits, episode_costs
-from agents.suites.suite import BenchmarkTask
 from agents.training import run_folder
-from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, Plan
-from agents.training.safe_file import read_values, write_values
+from agents.training.evaluation import Evaluations, HeldOut
+from agents.training.nested_values import read_values, write_values
+from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, TrainingPlan
 from shipgym.errors import InputError
 from shipgym.files import write_json
 
@@ -39,60 +37,27 @@ except ModuleNotFoundError as error:
         f"{error.name} is not installed, training needs it: pip install 'shipgym[rl]'"
     ) from None
 
-REACHED = (
-    1.001  # of LQ's cost: a network that has learned nothing yet adds nearly nothing
-)
-CHECKPOINT_SECONDS = 45.0  # with a rollout on top a checkpoint is at most a minute old
 
-
-class HeldOut:
-    """Episodes of a task that are not learned from, with seeds from `first` on, and what LQ costs on them.
-
-    LQ follows paths by the course that the task shows.
-    """
-
-    def __init__(
-        self, task: BenchmarkTask, first: int, number: int, threads: int = 1
-    ) -> None:
-        self.engine, self.seeds = (
-            task.engine(number, threads=threads),
-            first + np.arange(number),
-        )
-        lq = None
-        if task.task.action == "rudder":
-            with suppress(InputError):
-                designed = design("lq", task)
-                check_fits(designed, task.task, task.ship, "lq")
-                lq = designed
-        #: Mean cost of LQ designed on the task's ship; None where there is none for
-        #: her.
-        self.lq_cost = None if lq is None else self.cost(lq)
-
-    def cost(self, policy: Policy) -> float:
-        """Mean cost of a policy."""
-        return float(episode_costs(policy, self.engine, self.seeds).mean())
-
-
-class Progress(NamedTuple):
+class TrainingProgress(NamedTuple):
     """How far a training is."""
 
     #: decisions learned from, and to learn from
     steps: int
     total: int
-    seconds: float  # spent so far, those before it was resumed among them
+    seconds: float  # spent so far, also before it was resumed
     #: mean cost of the episodes held out, at the last evaluation, at the best one, and
     #: of LQ
     cost: float | None
     best_cost: float | None
     lq_cost: float | None
-    evaluated: bool = False  # whether there is a new evaluation
+    evaluated: bool = False  # there is a new evaluation
 
 
 @dataclass(frozen=True)
 class TrainingResult:
     """The result of a training."""
 
-    plan: Plan  # the run
+    plan: TrainingPlan
     policy: LearnedPolicy  # the best one
     #: evaluations: steps, seconds, cost on the episodes held out, mean return of those
     #: learned from
@@ -103,18 +68,25 @@ class TrainingResult:
     best_steps: int
     steps: int
     lq_cost: float | None  # of LQ on the same episodes
-    seconds: float  # of training and evaluation, those before it was resumed among them
+    seconds: float  # of training and evaluation, also before it was resumed
     finished: bool  # false where the time was up before
     resumed_from: int | None  # steps of the checkpoint that it went on from
 
     @property
     def lq_reached(self) -> Mapping[str, Any] | None:
-        """The first evaluation that cost no more than LQ, to a thousandth; None if there was none."""
-        limit = -np.inf if self.lq_cost is None else REACHED * self.lq_cost
-        return next((row for row in self.curve if row["cost"] <= limit), None)
+        """First evaluation that cost no more than LQ, to a thousandth; None if there was none.
+
+        A network that has learned nothing yet adds nearly nothing to its base.
+        """
+        if self.lq_cost is None:
+            return None
+        for evaluation in self.curve:
+            if evaluation["cost"] <= 1.001 * self.lq_cost:
+                return evaluation
+        return None
 
     def to_dict(self) -> dict[str, Any]:
-        """For programs."""
+        """Return the result for programs."""
         return {
             "configuration": self.plan.configuration(),
             "steps": self.steps,
@@ -130,13 +102,15 @@ class TrainingResult:
 
 
 def train(
-    plan: Plan,
+    plan: TrainingPlan,
     out: str | Path | None = None,
     *,
     resume: bool = False,
     max_seconds: float | None = None,
-    tell: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[TrainingProgress], None] | None = None,
     command: str | None = None,
+    evaluation_episodes: int = N_EVALUATIONS,
+    checkpoint_seconds: float = 45.0,
 ) -> TrainingResult:
     """Train an agent.
 
@@ -146,93 +120,103 @@ def train(
 
     Parameters
     ----------
-    plan : Plan
-        What is learned; `make_plan` reads it.
+    plan : TrainingPlan
+        What is learned; `make_plan` makes it.
     out : str or Path, optional
         Folder of the run (`run_folder`); by default nothing is written.
     resume : bool
         Continue the run in the folder.
     max_seconds : float, optional
         Time after which the training stops at the next boundary; it can be resumed.
-    tell : callable, optional
-        Called with the progress at each boundary. What it raises ends the training.
+    on_progress : callable, optional
+        Called with the progress at each boundary. An exception of it ends the training.
     command : str, optional
         Command line that is written into the run's folder.
+    evaluation_episodes : int
+        Episodes held out, on which the policy is chosen.
+    checkpoint_seconds : float
+        Least time between checkpoints. With a rollout on top, one is at most a minute
+        old by default.
     """
+    if resume and out is None:
+        raise InputError("resume: expected the folder of the run, got none")
     folder = None if out is None else Path(out)
-    if resume and folder is None:
-        raise InputError("resume: found without a folder, expected the one of the run")
-    with (
-        _torch_threads(plan.threads),
-        nullcontext() if folder is None else in_use(folder),
-    ):
-        if folder is None:
-            return _Training(plan, None, tell, max_seconds).run()
-        (
-            run_folder.check_resumable(folder, plan)
-            if resume
-            else run_folder.check_new(folder)
-        )
-        training = _Training(plan, folder, tell, max_seconds)
-        if resume:
-            training.restore(folder / run_folder.CHECKPOINT)
-        else:
-            run_folder.begin_folder(
-                folder, plan, command or f"train({plan.algorithm!r})"
-            )
-        return training.run()
+    with ExitStack() as stack:
+        stack.enter_context(_torch_threads(plan.threads))
+        if folder is not None:
+            stack.enter_context(in_use(folder))
+            if resume:
+                run_folder.check_resumable(folder, plan)
+            else:
+                run_folder.check_new(folder)
+
+        run = TrainingRun(plan, folder, evaluation_episodes, checkpoint_seconds)
+        if folder is not None:
+            if resume:
+                run.restore(folder / run_folder.CHECKPOINT)
+            else:
+                words = command or f"train({plan.algorithm!r})"
+                run_folder.begin_folder(folder, plan, words)
+        return run.learn(max_seconds, on_progress)
 
 
 class _TimeIsUpError(Exception):
     """Ends the training at a boundary."""
 
 
-class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
+class TrainingRun(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
     """A training under way, which is called at each boundary between an update and the next rollout."""
 
     def __init__(
         self,
-        plan: Plan,
+        plan: TrainingPlan,
         folder: Path | None,
-        tell: Callable[[Progress], None] | None,
-        max_seconds: float | None,
+        evaluation_episodes: int,
+        checkpoint_seconds: float,
     ) -> None:
         super().__init__()
-        self.plan, self.folder, self.tell, self.max_seconds = (
-            plan,
-            folder,
-            tell,
-            max_seconds,
-        )
         self.started = time.monotonic()
+        self.plan = plan
+        self.folder = folder
+        self.evaluation_episodes = evaluation_episodes
+        self.checkpoint_seconds = checkpoint_seconds
+        self.max_seconds: float | None = None
+        self.on_progress: Callable[[TrainingProgress], None] | None = None
+
         base = design_base(plan.settings.base, plan.task)
-        self.held_out = HeldOut(plan.task, EVALUATION_SEED, N_EVALUATIONS, plan.threads)
+        self.held_out = HeldOut(
+            plan.task, EVALUATION_SEED, evaluation_episodes, plan.threads
+        )
         self.agent = make_agent(plan, base)
         self.policy: LearnedPolicy | None = None
-        #: What evaluations found so far.
-        self.found: dict[str, Any] = {"best_cost": None, "best_steps": 0, "curve": []}
+        self.evaluations = Evaluations()
         self.seconds_before = 0.0
         self.kept_at = -np.inf
         self.resumed_from: int | None = None
 
-    def run(self) -> TrainingResult:
+    def learn(
+        self,
+        max_seconds: float | None,
+        on_progress: Callable[[TrainingProgress], None] | None,
+    ) -> TrainingResult:
         """Learn to the end, or until the time is up."""
+        self.max_seconds = max_seconds
+        self.on_progress = on_progress
         self.agent.set_logger(_logger(self.folder))
         left = self.plan.settings.total_steps - self.agent.num_timesteps
         try:
             if left > 0:
                 self.agent.learn(left, self, reset_num_timesteps=False)
-        except (
-            _TimeIsUpError
-        ):  # kept, and no evaluation that a run without an end would not have
+        except _TimeIsUpError:
+            # kept, and no evaluation that a run without an end would not have
             return self._result(finished=False)
-        except (
-            ValueError
-        ) as error:  # torch refuses to draw from a distribution that is not one
+        except ValueError as error:
+            # torch refuses to draw from a distribution that is not one
             if "invalid values" not in str(error):
                 raise
             raise self._diverged() from error
-        if self._evaluated("steps", -1) < self.agent.num_timesteps:
+
+        if self.evaluations.last_steps != self.agent.num_timesteps:
             self.evaluate()
         self.keep()
         return self._result(finished=True)
@@ -247,29 +231,26 @@ class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not
     def _result(self, finished: bool) -> TrainingResult:
         self.agent.logger.close()
         policy: Any = self.policy
-        if (
-            policy is None and self.folder is not None
-        ):  # found before the run was resumed
+        if policy is None and self.folder is not None:
+            # found before the run was resumed
             policy = load_agent(self.folder / run_folder.AGENT)
-        found = self.found | {"curve": tuple(self.found["curve"])}
+        best_cost: Any = self.evaluations.best_cost
         return TrainingResult(
             self.plan,
             policy,
+            curve=tuple(self.evaluations.curve),
+            best_cost=best_cost,
+            best_steps=self.evaluations.best_steps,
             steps=self.agent.num_timesteps,
             lq_cost=self.held_out.lq_cost,
             seconds=self.seconds,
             finished=finished,
             resumed_from=self.resumed_from,
-            **found,
         )
-
-    def _evaluated(self, name: str, otherwise: Any) -> Any:
-        """A figure of the last evaluation."""
-        return self.found["curve"][-1][name] if self.found["curve"] else otherwise
 
     @property
     def seconds(self) -> float:
-        """Spent so far, those before it was resumed among them."""
+        """Time spent so far, also before the run was resumed."""
         return self.seconds_before + time.monotonic() - self.started
 
     def _on_step(self) -> bool:
@@ -277,70 +258,71 @@ class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not
 
     def _on_rollout_start(self) -> None:
         """Evaluate and keep the run when it is time to; stop when the time is up."""
-        steps, every = self.agent.num_timesteps, self.plan.settings.evaluate_every
-        due = steps // every > self._evaluated("steps", -every) // every
+        settings = self.plan.settings
+        due = self.evaluations.due(self.agent.num_timesteps, settings.evaluate_every)
         if due:
             self.evaluate()
-        if self.tell is not None:
-            cost, best = self._evaluated("cost", None), self.found["best_cost"]
-            total, lq = self.plan.settings.total_steps, self.held_out.lq_cost
-            self.tell(Progress(steps, total, self.seconds, cost, best, lq, due))
-        if time.monotonic() - self.kept_at >= CHECKPOINT_SECONDS:
+        if self.on_progress is not None:
+            self.on_progress(self.progress(due))
+        if time.monotonic() - self.kept_at >= self.checkpoint_seconds:
             self.keep()
-        set_deviation(self.agent, self.plan.settings)
-        if (
-            self.max_seconds is not None
-            and time.monotonic() - self.started >= self.max_seconds
-        ):
+        set_deviation(self.agent, settings)
+
+        spent = time.monotonic() - self.started
+        if self.max_seconds is not None and spent >= self.max_seconds:
             self.keep()
             raise _TimeIsUpError
 
+    def progress(self, evaluated: bool) -> TrainingProgress:
+        """Return how far the training is, with a new evaluation or without."""
+        return TrainingProgress(
+            steps=self.agent.num_timesteps,
+            total=self.plan.settings.total_steps,
+            seconds=self.seconds,
+            cost=self.evaluations.last_cost,
+            best_cost=self.evaluations.best_cost,
+            lq_cost=self.held_out.lq_cost,
+            evaluated=evaluated,
+        )
+
     def evaluate(self) -> None:
         """Run the held-out episodes; keep the policy if it is the best."""
-        steps = self.agent.num_timesteps
-        if not all(
-            bool(weight.isfinite().all()) for weight in self.agent.policy.parameters()
-        ):
-            raise self._diverged()
+        for weight in self.agent.policy.parameters():
+            if not bool(weight.isfinite().all()):
+                raise self._diverged()
         policy = LearnedPolicy.from_sb3(self.agent)
         cost = self.held_out.cost(policy)
         returns = [episode["r"] for episode in self.agent.ep_info_buffer]
-        mean = sum(returns) / len(returns) if returns else None
-        row = {
-            "steps": steps,
-            "seconds": round(self.seconds, 3),
-            "cost": cost,
-            "mean_return": mean,
-        }
-        self.found["curve"].append(row)
+        best = self.evaluations.add(
+            self.agent.num_timesteps,
+            round(self.seconds, 3),
+            cost,
+            mean_return=sum(returns) / len(returns) if returns else None,
+        )
         self.agent.logger.record("evaluation/cost", cost)
+
         policy = replace(policy, training=self._record())
-        best = self.found["best_cost"] is None or cost < self.found["best_cost"]
         if best:
             self.policy = policy
-            self.found |= {"best_cost": cost, "best_steps": steps}
         if self.folder is not None:
-            for name in [run_folder.LAST] + [run_folder.AGENT] * best:
-                policy.save(self.folder / name)
-            write_json(
-                {"lq_cost": self.held_out.lq_cost, **self.found},
-                self.folder / run_folder.PROGRESS,
-            )
+            policy.save(self.folder / run_folder.LAST)
+            if best:
+                policy.save(self.folder / run_folder.AGENT)
+            progress = {"lq_cost": self.held_out.lq_cost, **self.evaluations.to_dict()}
+            write_json(progress, self.folder / run_folder.PROGRESS)
 
     def _record(self) -> dict[str, Any]:
-        """How a policy was made; without times, so that the same run writes the same file."""
-        plan = self.plan
+        """Return how a policy was made; without times, so that the same run writes the same file."""
+        first = self.plan.training_seed
+        last_evaluated = EVALUATION_SEED + self.evaluation_episodes - 1
         return {
-            **plan.configuration(),
-            "training_seeds": [
-                plan.training_seed,
-                plan.training_seed + plan.settings.ships - 1,
-            ],
-            "evaluation_seeds": [EVALUATION_SEED, EVALUATION_SEED + N_EVALUATIONS - 1],
+            **self.plan.configuration(),
+            "training_seeds": [first, first + self.plan.settings.ships - 1],
+            "evaluation_seeds": [EVALUATION_SEED, last_evaluated],
             "steps": self.agent.num_timesteps,
-            "cost": self._evaluated("cost", None),
+            "cost": self.evaluations.last_cost,
             "lq_cost": self.held_out.lq_cost,
-            "curve": [[row["steps"], row["cost"]] for row in self.found["curve"]],
+            "curve": [[row["steps"], row["cost"]] for row in self.evaluations.curve],
             "versions": run_folder.versions(),
         }
 
@@ -349,11 +331,9 @@ class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not
         self.kept_at = time.monotonic()
         if self.folder is None:
             return
-        own = {**self.found, "seconds": self.seconds}
-        write_values(
-            {"run": own, "agent": checkpoints.take(self.agent)},
-            self.folder / run_folder.CHECKPOINT,
-        )
+        run = {**self.evaluations.to_dict(), "seconds": self.seconds}
+        content = {"run": run, "agent": checkpoints.agent_state(self.agent)}
+        write_values(content, self.folder / run_folder.CHECKPOINT)
 
     def restore(self, checkpoint: Path) -> None:
         """Resume from a checkpoint; a run that was killed before its first one starts again."""
@@ -362,18 +342,17 @@ class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not
             return
         content = read_values(checkpoint, "checkpoint of a training")
         try:
-            own = content["run"]
-            checkpoints.check_record(own)
-            checkpoints.put_back(self.agent, content["agent"])
-            self.found = {name: own[name] for name in self.found}
-            self.seconds_before = own["seconds"]
+            run = dict(content["run"])
+            checkpoints.check_run(run)
+            checkpoints.restore_agent(self.agent, content["agent"])
         except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
-            why = (
-                str(error).partition("\n")[0].rstrip(" :")
-            )  # torch lists every network's layer after it
+            # torch lists every network's layer after it
+            why = str(error).partition("\n")[0].rstrip(" :")
             raise InputError(
                 f"{checkpoint}: does not fit this run ({why}); start a new run"
             ) from None
+        self.seconds_before = run.pop("seconds")
+        self.evaluations = Evaluations(**run)
         self.resumed_from = self.agent.num_timesteps
 
 
@@ -388,11 +367,10 @@ def _torch_threads(number: int) -> Iterator[None]:
 
 
 def _logger(folder: Path | None) -> Logger:
-    """TensorBoard's log, where there is a folder and TensorBoard is installed."""
+    """Log for TensorBoard, where there is a folder and TensorBoard is installed."""
     formats: list[Any] = []
     if folder is not None:
         with suppress(ImportError, AssertionError):
-            formats.append(
-                TensorBoardOutputFormat(str(folder / run_folder.TENSORBOARD))
-            )
+            log = TensorBoardOutputFormat(str(folder / run_folder.TENSORBOARD))
+            formats.append(log)
     return Logger(None, formats)

@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from agents.benchmarking.contestants import Contestant
 from rich.console import Console
 
 from agents import load_agent, load_results
+from agents.benchmarking.contestants import Contestant
 from agents.benchmarking.results import gathered
 from agents.benchmarking.run import checked_part, job_of, run_job
 from agents.cli.benchmark_tables import costs_table, ranking_table
@@ -35,7 +35,7 @@ from agents.job_results import (
 from agents.jobs import JobEngine, run_jobs
 from agents.policies.sb3_zip import read_sb3
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, parse_suite
-from agents.training.plan import Plan, training_options
+from agents.training.plan import TrainingPlan, training_options
 from agents.training.run_folder import other_versions, read_plan
 from agents.training.settings import load_settings, read_settings_file
 from fuzzing.reading import CORPUS, Kind
@@ -99,7 +99,7 @@ def use_episode(episode: Episode) -> None:
         episode.to_trial()
 
 
-def use_plan(plan: Plan) -> None:
+def use_plan(plan: TrainingPlan) -> None:
     """What it is written as, and the environment that is learned in."""
     written(plan.configuration())
     training_options(plan)
@@ -114,7 +114,7 @@ def use_ship(trials: list[Trial]) -> None:
             raise AssertionError(f"{trial.name}: not finite")
 
 
-def read_run(path: Path) -> Plan:
+def read_run(path: Path) -> TrainingPlan:
     """The folder of a training."""
     other_versions(path.parent)
     return read_plan(path.parent)
@@ -154,14 +154,13 @@ def training() -> Any:
     """A run into which checkpoints are put back, the one that the corpus's is of."""
     import torch
 
-    from agents.training import training as trainings
+    from agents.training.training import TrainingRun
 
     torch.set_num_threads(1)
-    vars(trainings)["N_EVALUATIONS"] = 1
     with warnings.catch_warnings(
         action="ignore"
     ):  # random numbers in plain Python overflow, as they should
-        return trainings._Training(read_plan(CORPUS / "run" / "ppo"), None, None, None)
+        return TrainingRun(read_plan(CORPUS / "run" / "ppo"), None, 1, 0.0)
 
 
 def restored(path: Path) -> Any:
@@ -176,22 +175,22 @@ def use_training(run: Any) -> None:
     from agents.training import checkpoints
 
     run.agent.predict(run.agent._last_obs)
-    checkpoints.take(run.agent)
-    written(run.found)
+    checkpoints.agent_state(run.agent)
+    written(run.evaluations.to_dict())
 
 
 def keep_study(folder: Path) -> None:
     """A study before its first trial."""
-    from agents.training.tuning import _opened
+    from agents.training.tuning import open_study
 
-    _opened(folder / "ppo", read_plan(CORPUS / "run" / "ppo"), ())
+    open_study(folder / "ppo", read_plan(CORPUS / "run" / "ppo"), ())
 
 
 def read_study(path: Path) -> Any:
     """The trials that a study has on record."""
-    from agents.training.tuning import _opened
+    from agents.training.tuning import open_study
 
-    return _opened(path.parent, read_plan(CORPUS / "run" / "ppo"), ()).trials
+    return open_study(path.parent, read_plan(CORPUS / "run" / "ppo"), ()).trials
 
 
 @cache

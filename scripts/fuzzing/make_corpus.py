@@ -23,8 +23,7 @@ from agents.controllers.registry import BUILT_IN, controller_class
 from agents.policies.network import Network
 from agents.policies.policy import LearnedPolicy
 from agents.suites.suite import FOLDER
-from agents.training import training
-from agents.training.plan import Given, make_plan
+from agents.training.request import TrainingRequest, make_plan
 from agents.training.training import train
 from shipgym import Episode, Particulars, ShipFile, ShipModel
 from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
@@ -248,10 +247,10 @@ def run(folder: Path) -> None:
         "evaluate_every": 16,
     }
     options = {"episode_steps": 20, "change_interval_steps": 10, "sea": "slight"}
-    vars(training)["N_EVALUATIONS"] = 2
     target = folder / "run" / "ppo"
     target.parent.mkdir()
-    train(make_plan(Given("ppo", options=options, settings=settings)), target)
+    request = TrainingRequest("ppo", options=options, settings=settings)
+    train(make_plan(request), target, evaluation_episodes=2)
     for entry in target.iterdir():
         if entry.name not in ("run.json", "checkpoint.safetensors"):
             shutil.rmtree(entry) if entry.is_dir() else entry.unlink()

@@ -12,7 +12,7 @@ from agents import load_agent
 from agents.cli import app
 from agents.identifying import identification_settings
 from agents.suites.suite import parse_suite
-from agents.training.plan import Given, make_plan
+from agents.training.request import TrainingRequest, make_plan
 from agents.training.run_folder import RUN, begin_folder, read_plan
 from identification.regression.grey_box import chosen_box
 from shipgym import InputError, ShipFile, ShipModel, load_model
@@ -381,7 +381,7 @@ def test_a_ship_file_names_models_and_no_code(evil, option):
     ],
 )
 def test_a_run_is_not_resumed_with_code_that_its_file_names(evil, place, value):
-    plan = make_plan(Given("ppo", settings={"total_steps": 1}))
+    plan = make_plan(TrainingRequest("ppo", settings={"total_steps": 1}))
     folder = evil.with_name("run")
     begin_folder(folder, plan, "shipgym train")
     content = json.loads((folder / RUN).read_text())
@@ -406,7 +406,9 @@ def test_a_run_goes_on_with_the_code_that_its_user_names_again(tmp_path):
         " float\n\n\ndef reward(motion, state, interval, ship, settings):\n    return"
         " Reward(-state.heading_error**2)\n"
     )
-    given = Given("ppo", options={"reward": str(reward)}, settings={"total_steps": 1})
+    given = TrainingRequest(
+        "ppo", options={"reward": str(reward)}, settings={"total_steps": 1}
+    )
     plan = make_plan(given)
     begin_folder(tmp_path / "run", plan, "shipgym train")
     assert read_plan(tmp_path / "run", given).configuration() == plan.configuration()

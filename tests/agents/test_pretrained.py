@@ -8,7 +8,7 @@ from agents.benchmarking.sources import pretrained
 from agents.controllers.controller import model_hash
 from agents.rollouts.rollout import check_fits, episode_costs
 from agents.suites.suite import load_suite
-from agents.training.plan import Given, make_plan
+from agents.training.request import TrainingRequest, make_plan
 
 TASKS = [task.design_task for task in load_suite().tasks if task.on == "ship"]
 SEEDS = 5  # of training, an agent each
@@ -25,7 +25,7 @@ def test_each_task_has_an_agent_of_every_training_seed(task):
         assert agent.model_sha256 == model_hash(task.ship)
         assert agent.rate_limit == 0.1
         record = agent.training
-        plan = make_plan(Given("ppo", task=task.name, seed=seed))
+        plan = make_plan(TrainingRequest("ppo", task=task.name, seed=seed))
         commanded = plan.configuration()
         assert {name: record[name] for name in commanded} == commanded
         lowest = min(cost for _, cost in record["curve"])

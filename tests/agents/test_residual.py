@@ -278,7 +278,7 @@ def test_a_base_needs_commands_within_the_whole_range(bound, fits):
         inner.action_space = Box(low, high, (1,))
         with pytest.raises(
             InputError,
-            match=r"^venv: actions in Box.* found, expected a Box within \[-1, 1\]",
+            match=r"^venv: expected actions in a Box within \[-1, 1\], got Box",
         ):
             ResidualVecEnv(inner, Steady())
 
@@ -288,7 +288,7 @@ def test_observations_are_a_flat_row_of_numbers():
     inner.observation_space = Box(-1.0, 1.0, (2, 2))
     with pytest.raises(
         InputError,
-        match=r"venv: observations in Box.* found, expected a flat Box of numbers",
+        match=r"venv: expected observations in a flat Box, got Box",
     ):
         ResidualVecEnv(inner)
 
@@ -354,7 +354,10 @@ def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(
             lambda: ResidualVecEnv(ships(COURSE), action_repeat=0),
             "action_repeat: expected .*got 0",
         ),
-        (lambda: ResidualVecEnv(ships(COURSE), "lq"), "base: str found"),
+        (
+            lambda: ResidualVecEnv(ships(COURSE), "lq"),
+            "base: expected a controller, .*got str",
+        ),
         (lambda: ResidualVecEnv(ships(COURSE), BASES["ilos-lqg"][1]), "cross_track"),
         (
             lambda: ResidualVecEnv(ships(COURSE), LQ.from_model(load_model("kvlcc2"))),
@@ -364,7 +367,7 @@ def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(
             lambda: ResidualVecEnv(
                 ShipVecEnv(COURSE, 2, action="rudder-discrete"), BASES["lq"][1]
             ),
-            "actions in Discrete",
+            "expected actions in a Box within .* got Discrete",
         ),
     ],
 )

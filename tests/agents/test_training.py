@@ -7,12 +7,11 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import torch
-from stable_baselines3.common.logger import KVWriter, Logger
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from typer.testing import CliRunner
 
 from agents import load_agent
@@ -27,11 +26,12 @@ from agents.training.algorithms import (
     sb3_arguments,
     set_deviation,
 )
-from agents.training.plan import EVALUATION_SEED, Given, make_plan, training_options
+from agents.training.evaluation import Evaluations
+from agents.training.nested_values import read_values, write_values
+from agents.training.plan import EVALUATION_SEED, training_options
+from agents.training.request import TrainingRequest, make_plan
 from agents.training.run_folder import begin_folder, other_versions
-from agents.training.safe_file import read_values, write_values
 from agents.training.settings import ALGORITHMS, load_settings
-from agents.training.training import train
 from shipgym.errors import InputError
 from shipgym.sea import Current, Weather
 from tests.golden.texts import flat, same_text
@@ -66,15 +66,15 @@ SETTINGS = [
 COMMAND = ["train", "ppo", *OPTIONS, *SETTINGS]
 
 
-@pytest.fixture(autouse=True)
-def few_episodes(monkeypatch):
-    monkeypatch.setattr(training, "N_EVALUATIONS", 10)
+def train(plan, out=None, **how):
+    """Train with few episodes held out."""
+    return training.train(plan, out, evaluation_episodes=10, **how)
 
 
 def tiny(algorithm="ppo", **settings):
     every = TINY[algorithm]["total_steps"] // 3
     own = {**TINY[algorithm], "net_arch": [8], "evaluate_every": every, **settings}
-    return make_plan(Given(algorithm, options=SHORT, settings=own))
+    return make_plan(TrainingRequest(algorithm, options=SHORT, settings=own))
 
 
 def learned(folder):
@@ -93,11 +93,11 @@ class StopError(Exception):
 
 
 def stopping_at(steps):
-    def tell(now):
+    def on_progress(now):
         if now.steps >= steps:
             raise StopError
 
-    return tell
+    return on_progress
 
 
 @pytest.mark.parametrize(
@@ -118,17 +118,15 @@ def stopping_at(steps):
         ("tqc", {"base": "lq", "ent_coef": 0.1}),
     ],
 )
-def test_a_killed_run_ends_as_one_that_was_not(
-    algorithm, settings, tmp_path, monkeypatch
-):
+def test_a_killed_run_ends_as_one_that_was_not(algorithm, settings, tmp_path):
     plan = tiny(algorithm, **settings)
     whole = train(plan, tmp_path / "whole")
-    monkeypatch.setattr(training, "CHECKPOINT_SECONDS", 0.0)
     with pytest.raises(StopError):
         train(
             plan,
             tmp_path / "killed",
-            tell=stopping_at(2 * plan.settings.total_steps // 3),
+            on_progress=stopping_at(2 * plan.settings.total_steps // 3),
+            checkpoint_seconds=0.0,
         )
     resumed = train(plan, tmp_path / "killed", resume=True)
     assert 0 < resumed.resumed_from < plan.settings.total_steps
@@ -206,7 +204,7 @@ def test_time_that_is_up_is_made_up_for(tmp_path):
 
 def test_randomised_ships_sail_all_seas_at_many_speeds():
     stream = Weather(name="stream", current=Current(speed=1.0, towards_deg=90.0))
-    given = Given("ppo", options={"sea": stream}, randomise=True)
+    given = TrainingRequest("ppo", options={"sea": stream}, randomise=True)
     plan = make_plan(given)
     options = training_options(plan)
     assert [sea.name for sea in options["sea"]] == [
@@ -224,7 +222,7 @@ def test_randomised_ships_sail_all_seas_at_many_speeds():
 
 
 def test_agents_of_a_suite_learn_over_drawn_models_and_never_see_the_true_ship():
-    plan = make_plan(Given("ppo", task="roll-limit"))
+    plan = make_plan(TrainingRequest("ppo", task="roll-limit"))
     assert (plan.task.true_ship, plan.task.far) == ("", {})
     assert plan.task.evaluation == plan.task.design
     assert training_options(plan) == {
@@ -337,98 +335,35 @@ def test_rewards_are_divided_by_their_scale():
     )
 
 
-def test_a_diverged_training_says_so(monkeypatch):
-    def broken(plan, base):
-        agent = make_agent(plan, base)
-        agent.policy.action_net.bias.data[:] = np.nan
-        return agent
-
-    monkeypatch.setattr(training, "make_agent", broken)
+def test_a_diverged_training_says_so():
+    run = training.TrainingRun(tiny(), None, 10, 45.0)
+    run.agent.policy.action_net.bias.data[:] = np.nan
     with pytest.raises(
         InputError, match=r"diverged after 0 steps.*lower learning_rate"
     ):
-        train(tiny())
+        run.learn(None, None)
 
 
 @pytest.mark.parametrize(
     ("said", "kind"), [("expected invalid values", InputError), ("mine", ValueError)]
 )
 def test_only_torch_s_refusal_to_draw_is_a_training_that_diverged(said, kind):
-    def tell(now):
+    def on_progress(now):
         raise ValueError(said)
 
-    with pytest.raises(
-        kind, match="diverged after 0 steps" if kind is InputError else "^mine$"
-    ):
-        train(tiny(), tell=tell)
+    message = "diverged after 0 steps" if kind is InputError else "^mine$"
+    with pytest.raises(kind, match=message):
+        train(tiny(), on_progress=on_progress)
 
 
-class Heard(KVWriter):
-    """Keeps what is logged."""
-
-    def __init__(self):
-        self.told, self.closed = [], False
-
-    def write(self, key_values, key_excluded, step=0):
-        self.told.append(key_values.get("evaluation/cost"))
-
-    def close(self):
-        self.closed = True
+def test_each_evaluation_is_in_the_log_of_the_run(tmp_path):
+    result = train(tiny(), tmp_path / "run")
+    log = EventAccumulator(str(tmp_path / "run" / run_folder.TENSORBOARD)).Reload()
+    logged = [event.value for event in log.Scalars("evaluation/cost")]
+    assert logged == pytest.approx([cost for _, cost in costs(result)][: len(logged)])
+    assert len(logged) == 3
 
 
-def test_each_evaluation_is_told_to_the_log_which_is_closed_at_the_end(monkeypatch):
-    heard = Heard()
-    monkeypatch.setattr(training, "_logger", lambda folder: Logger(None, [heard]))
-    result = train(tiny())
-    assert heard.told == [cost for _, cost in costs(result)][:3]
-    assert heard.closed
-
-
-def test_the_log_is_of_tensorboard_in_the_folder_of_the_run(monkeypatch, tmp_path):
-    monkeypatch.setattr(training, "TensorBoardOutputFormat", lambda folder: folder)
-    assert training._logger(tmp_path).output_formats == [str(tmp_path / "tensorboard")]
-    assert training._logger(None).output_formats == []
-
-
-def at_boundary(steps, *evaluated, kept_at=0.0, **more):
-    """What is done at a boundary after evaluations at these steps, on a clock that stands at 1000 s."""
-    done = []
-    own = {
-        "plan": SimpleNamespace(
-            settings=SimpleNamespace(evaluate_every=100, total_steps=500)
-        ),
-        "agent": SimpleNamespace(num_timesteps=steps),
-        "held_out": SimpleNamespace(lq_cost=7.0),
-        "found": {
-            "best_cost": 5.0,
-            "curve": [{"steps": one, "cost": 9.0} for one in evaluated],
-        },
-        "evaluate": lambda: done.append("evaluated"),
-        "keep": lambda: done.append("kept"),
-        "tell": lambda now: done.append(now),
-        "started": 900.0,
-        "seconds": 130.0,
-        "max_seconds": None,
-        "kept_at": 1000.0 - kept_at,
-    }
-    run = SimpleNamespace(**own | more)
-    run._evaluated = lambda name, otherwise: training._Training._evaluated(
-        run, name, otherwise
-    )
-    try:
-        training._Training._on_rollout_start(run)
-    except training._TimeIsUpError:
-        done.append("time is up")
-    return done
-
-
-@pytest.fixture
-def at_1000_s(monkeypatch):
-    monkeypatch.setattr(training, "time", SimpleNamespace(monotonic=lambda: 1000.0))
-    monkeypatch.setattr(training, "set_deviation", lambda agent, settings: None)
-
-
-@pytest.mark.usefixtures("at_1000_s")
 @pytest.mark.parametrize(
     ("steps", "evaluated", "due"),
     [
@@ -440,34 +375,46 @@ def at_1000_s(monkeypatch):
     ],
 )
 def test_an_evaluation_is_due_in_each_stretch_of_steps(steps, evaluated, due):
-    *first, now = at_boundary(steps, *evaluated)
-    assert first == ["evaluated"] * due
-    assert (now.steps, now.total, now.seconds, now.evaluated) == (
-        steps,
-        500,
-        130.0,
-        due,
-    )
-    assert (now.cost, now.best_cost, now.lq_cost) == (
-        9.0 if evaluated else None,
-        5.0,
-        7.0,
-    )
+    evaluations = Evaluations()
+    for number, one in enumerate(evaluated):
+        assert evaluations.add(one, 1.0, 5.0 + number, None) == (number == 0)
+    assert evaluations.due(steps, 100) == due
+    assert evaluations.last_steps == (evaluated[-1] if evaluated else None)
+    assert evaluations.best_cost == (5.0 if evaluated else None)
 
 
-@pytest.mark.usefixtures("at_1000_s")
-def test_a_run_is_kept_every_45_s_and_when_its_time_is_up():
-    assert at_boundary(50, 0, tell=None, kept_at=44.9) == []
-    assert at_boundary(50, 0, tell=None, kept_at=45.0) == ["kept"]
-    assert at_boundary(50, 0, tell=None, kept_at=np.inf) == ["kept"]  # never before
-    assert at_boundary(50, 0, tell=None, max_seconds=100.1) == []
-    assert at_boundary(50, 0, tell=None, max_seconds=100.0) == ["kept", "time is up"]
-    run = SimpleNamespace(folder=None, seconds_before=7.0, started=900.0)
-    training._Training.keep(run)
-    assert run.kept_at == 1000.0
-    assert (
-        training._Training.seconds.fget(run) == 107.0
-    )  # with those before it was resumed
+def test_progress_is_reported_at_each_boundary():
+    reports = []
+    result = train(tiny(), on_progress=reports.append)
+    assert [now.steps for now in reports] == [0, 256, 512]
+    assert {now.total for now in reports} == {768}
+    assert [now.evaluated for now in reports] == [True] * 3
+    assert [now.cost for now in reports] == [cost for _, cost in costs(result)][:3]
+    assert {now.lq_cost for now in reports} == {result.lq_cost}
+    rarely = []
+    train(tiny(evaluate_every=10_000), on_progress=rarely.append)
+    assert [now.evaluated for now in rarely] == [True, False, False]
+
+
+@pytest.mark.parametrize(("between", "kept"), [(0.0, [0, 256]), (np.inf, [0, 0])])
+def test_a_run_is_kept_at_the_first_boundary_and_after_some_time(
+    between, kept, tmp_path
+):
+    """As it was found at the second and the third boundary, before they were kept."""
+    checkpoint, found = tmp_path / "run" / run_folder.CHECKPOINT, []
+
+    def on_progress(now):
+        if now.steps:
+            counters = read_values(checkpoint, "checkpoint")["agent"]["counters"]
+            found.append(counters["num_timesteps"])
+
+    train(
+        tiny(),
+        tmp_path / "run",
+        on_progress=on_progress,
+        checkpoint_seconds=between,
+    )
+    assert found == kept
 
 
 def test_a_run_is_kept_at_its_first_boundary_and_resumed_from_it(tmp_path):
@@ -476,17 +423,13 @@ def test_a_run_is_kept_at_its_first_boundary_and_resumed_from_it(tmp_path):
     assert (
         train(plan, run, resume=True, max_seconds=0.0).resumed_from == 0
     )  # killed before the first one
-    again = train(plan, run, resume=True, tell=lambda now: None, max_seconds=0.0)
+    again = train(plan, run, resume=True, on_progress=lambda now: None, max_seconds=0.0)
     assert (again.resumed_from, again.steps, again.finished) == (0, 0, False)
     (run / "checkpoint.safetensors").unlink()
     with pytest.raises(StopError):
-        train(plan, run, resume=True, tell=stopping_at(1))
-    assert (
-        read_values(run / "checkpoint.safetensors", "checkpoint")["agent"]["counters"][
-            "num_timesteps"
-        ]
-        == 0
-    )
+        train(plan, run, resume=True, on_progress=stopping_at(1))
+    kept = read_values(run / "checkpoint.safetensors", "checkpoint")
+    assert kept["agent"]["counters"]["num_timesteps"] == 0
 
 
 def test_a_checkpoint_with_another_record_is_refused_with_the_place(tmp_path):
@@ -496,7 +439,7 @@ def test_a_checkpoint_with_another_record_is_refused_with_the_place(tmp_path):
     write_values({**values, "run": {**values["run"], "best_steps": "x"}}, kept)
     with pytest.raises(
         InputError,
-        match=r"does not fit this run \(run\.best_steps: 'x' found, expected int\);",
+        match=r"does not fit this run \(run\.best_steps: expected int, got 'x'\);",
     ):
         train(plan, tmp_path / "run", resume=True)
     write_values({"run": values["run"]}, kept)
@@ -510,7 +453,7 @@ def test_the_time_of_a_run_is_counted_from_its_beginning():
     before, over = time.monotonic(), []
     train(
         tiny(total_steps=1),
-        tell=lambda now: over.append(now.seconds - (time.monotonic() - before)),
+        on_progress=lambda now: over.append(now.seconds - (time.monotonic() - before)),
     )
     assert len(over) == 1
     assert -5.0 < over[0] <= 0.0
@@ -519,7 +462,7 @@ def test_the_time_of_a_run_is_counted_from_its_beginning():
 def test_folders_are_checked_before_anything_is_learned(tmp_path):
     plan, run = tiny(), tmp_path / "run"
     with pytest.raises(
-        InputError, match="resume: found without a folder, expected the one of the run"
+        InputError, match="resume: expected the folder of the run, got none"
     ):
         train(plan, resume=True)
     with pytest.raises(InputError, match="no run of training is there"):
@@ -527,7 +470,7 @@ def test_folders_are_checked_before_anything_is_learned(tmp_path):
     begin_folder(run, plan, "")
     with pytest.raises(InputError, match="contains a run already"):
         train(plan, run)
-    with pytest.raises(InputError, match=r"settings\.gamma is 0\.99 there, 0\.5 here"):
+    with pytest.raises(InputError, match=r"settings\.gamma: expected 0\.99, got 0\.5"):
         train(tiny(gamma=0.5), run, resume=True)
     assert [path.name for path in run.iterdir()] == [run_folder.RUN]
 
@@ -535,13 +478,12 @@ def test_folders_are_checked_before_anything_is_learned(tmp_path):
 def test_torch_has_the_threads_of_the_plan_and_afterwards_its_own():
     before, during = torch.get_num_threads(), []
 
-    def stopped():
-        with training._torch_threads(before + 1):
-            during.append(torch.get_num_threads())
-            raise StopError
+    def on_progress(now):
+        during.append(torch.get_num_threads())
+        raise StopError
 
     with pytest.raises(StopError):
-        stopped()
+        train(replace(tiny(), threads=before + 1), on_progress=on_progress)
     assert (during, torch.get_num_threads()) == ([before + 1], before)
 
 
@@ -591,40 +533,13 @@ def test_the_command_trains_and_resumes(tmp_path):
     assert "resumed at step 768" in printed
 
 
-@pytest.mark.parametrize(
-    ("algorithm", "steps", "said"),
-    [
-        (
-            "ppo",
-            100,
-            "total_steps: 100 is rounded up to 256: rollouts of 8 ships have 256 steps",
-        ),
-        ("ppo", 512, ""),
-        ("sac", 1001, "1,001 is rounded up to 1,008: rollouts of 8 ships have 8 steps"),
-    ],
-)
-def test_steps_that_are_no_whole_rollouts_are_told_before_the_training(
-    algorithm, steps, said, tmp_path, monkeypatch
-):
-    def stand_in(plan, *_, **__):
-        raise InputError("begins")
-
-    monkeypatch.setattr(training, "train", stand_in)
-    sizes = ["--set", "ships=8"] + ["--set", "n_steps=32", "--set", "batch_size=64"] * (
-        algorithm == "ppo"
-    )
-    words = [
-        "train",
-        algorithm,
-        "--total-steps",
-        steps,
-        *sizes,
-        "--out",
-        tmp_path / "run",
-    ]
-    code, printed = shipgym(*words)
-    assert (code, printed.count("\n")) == (2, 2 if said else 1)
-    assert f"{said}\n" * bool(said) + "error: begins\n" in printed
+def test_steps_that_are_no_whole_rollouts_are_told_before_the_training(tmp_path):
+    for steps, expected in ((255, "total_steps: 255 is rounded up to 256"), (256, "")):
+        words = [*COMMAND, "--total-steps", steps, "--max-seconds", 0]
+        code, printed = shipgym(*words, "--out", tmp_path / str(steps))
+        assert code == 0
+        assert expected in printed
+        assert ("is rounded up" in printed) == bool(expected)
 
 
 def test_a_training_learns_whole_rollouts():
@@ -659,7 +574,7 @@ def test_a_training_learns_whole_rollouts():
         ),
         (
             ["train", "ppo", "--set", "batch_size=1000"],
-            "a divisor above 1 of ships x n_steps, 32768",
+            "a divisor above 1 of ships x n_steps = 32768, got 1000",
         ),
         (["train", "ppo", "--set", "base=lqq"], "Did you mean 'lq'?"),
         (
@@ -684,11 +599,11 @@ def test_a_training_learns_whole_rollouts():
         (["train", "ppo", "--option", "nois=1"], "Did you mean 'noise'?"),
         (
             ["train", "ppo", "--task", "sharp-turns", "--sea", "rough"],
-            "--task: found together with --sea",
+            "--task: expected alone, got --sea too",
         ),
         (
             ["train", "sac", "--env", "shipgym/CourseKeepingDiscrete-v0"],
-            "which sac does not learn",
+            "action: expected one that sac learns",
         ),
         (["train", "ppo", "--settings", "none.toml"], "there is no such settings file"),
         (["train", "ppo", "--resume"], "no run of training is there"),
@@ -707,15 +622,15 @@ def test_a_folder_in_use_is_not_written_over(tmp_path):
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
     for words, expected in (
         ([], "--resume, or name another folder"),
-        (["--resume", "--set", "gamma=0.5"], "settings.gamma is 0.99 there, 0.5 here"),
-        (["--resume", "--seed", "3"], "seed is 0 there, 3 here"),
-        (["--resume", "--model", "kvlcc2"], "model is 'mariner' there, 'kvlcc2' here"),
+        (["--resume", "--set", "gamma=0.5"], "settings.gamma: expected 0.99, got 0.5"),
+        (["--resume", "--seed", "3"], "seed: expected 0, got 3"),
+        (["--resume", "--model", "kvlcc2"], "model: expected 'mariner', got 'kvlcc2'"),
     ):
         code, printed = shipgym("train", "ppo", "--out", run, *words)
         assert code == 2
         assert expected in printed
     code, printed = shipgym("train", "sac", "--resume", "--out", run)
-    assert (code, "algorithm is 'ppo' there, 'sac' here" in printed) == (2, True)
+    assert (code, "algorithm: expected 'ppo', got 'sac'" in printed) == (2, True)
     assert before == {
         path: path.read_bytes() for path in run.rglob("*") if path.is_file()
     }

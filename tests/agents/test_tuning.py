@@ -1,12 +1,10 @@
 """Tuning proposes valid settings, goes on after any end as if nothing had happened, stops what is worse."""
 
-import inspect
 import json
 import random
 import sqlite3
 import sys
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
@@ -14,22 +12,20 @@ from typer.testing import CliRunner
 from agents.cli import app
 from agents.cli.training import print_tuning
 from agents.jobs import JobEngine
-from agents.training import tuning
-from agents.training.plan import Given, make_plan
+from agents.training.request import TrainingRequest, make_plan
+from agents.training.search_space import search_space, with_parameters
 from agents.training.settings import ALGORITHMS, load_settings
 from agents.training.tuning import (
-    Trial,
-    Tuning,
-    _best,
-    _proposed,
-    _write_best,
+    TuningResult,
+    TuningTrial,
+    best_trial,
     evaluated_evenly,
     limits,
     lowest,
-    search_space,
+    propose,
     train_trial,
     tune,
-    with_parameters,
+    write_best,
 )
 from shipgym.errors import InputError
 from tests.golden.texts import flat, same_text
@@ -79,7 +75,7 @@ def trainings(tmp_path, monkeypatch):
 
 def plan(**settings):
     return make_plan(
-        Given("ppo", settings={"base": "none", "total_steps": 10} | settings)
+        TrainingRequest("ppo", settings={"base": "none", "total_steps": 10} | settings)
     )
 
 
@@ -90,7 +86,7 @@ def test_better_settings_are_found_and_written_for_training(trainings, tmp_path)
         folder,
         10,
         training=trainings.bowl,
-        progress=lambda *now: told.append(now),
+        on_progress=lambda *now: told.append(now),
     )
     assert [trial.number for trial in found.trials] == list(range(10))
     assert [now[:2] for now in told] == [
@@ -109,7 +105,9 @@ def test_better_settings_are_found_and_written_for_training(trainings, tmp_path)
     assert found.best.cost == min(
         trial.cost for trial in found.trials if trial.cost is not None
     )
-    settings = make_plan(Given("ppo", settings_file=folder / "best.toml")).settings
+    settings = make_plan(
+        TrainingRequest("ppo", settings_file=folder / "best.toml")
+    ).settings
     assert settings.to_dict() == dict(found.best.settings)
     head, _, written = (folder / "best.toml").read_text().partition("\n")
     assert (
@@ -190,14 +188,14 @@ def test_what_is_varied_is_as_golden(algorithm):
 def test_trials_are_told_the_best_first(tmp_path, capsys):
     varied = {"learning_rate": 0.00123456, "n_epochs": 7}
     trials = (
-        Trial(0, {}, {}, 9.87654, ((100, 10.0),), "finished"),
-        Trial(1, varied, {}, None, (), "stopped early"),
-        Trial(
+        TuningTrial(0, {}, {}, 9.87654, ((100, 10.0),), "finished"),
+        TuningTrial(1, varied, {}, None, (), "stopped early"),
+        TuningTrial(
             2, varied | {"activation": "tanh"}, {}, 5.4321, ((100, 5.4321),), "finished"
         ),
-        Trial(3, varied, {}, None, (), "diverged"),
+        TuningTrial(3, varied, {}, None, (), "diverged"),
     )
-    print_tuning(Tuning(trials, trials[2]), tmp_path)
+    print_tuning(TuningResult(trials, trials[2]), tmp_path)
     assert same_text("tune", capsys.readouterr().out)
 
 
@@ -222,9 +220,10 @@ def test_whatever_is_proposed_are_valid_settings(algorithm):
 def test_a_trial_must_keep_up_with_the_median_of_finished_ones():
     curves = [((100, 9.0 - k), (200, 8.0 - k), (300, 8.5 - k)) for k in range(4)]
     trials = [
-        Trial(k, {}, {}, 8.0 - k, curve, "finished") for k, curve in enumerate(curves)
+        TuningTrial(k, {}, {}, 8.0 - k, curve, "finished")
+        for k, curve in enumerate(curves)
     ]
-    trials.append(Trial(4, {}, {}, None, ((100, 1.0),), "stopped early"))
+    trials.append(TuningTrial(4, {}, {}, None, ((100, 1.0),), "stopped early"))
     assert limits(trials[:3], 400) == []
     found = limits(trials, 400)
     assert found == [(100, 7.5), (200, 6.5), (300, 6.5)]
@@ -239,7 +238,7 @@ def test_a_trial_must_keep_up_with_the_median_of_finished_ones():
 def test_folder_of_something_else_is_refused(trainings, tmp_path):
     tune(plan(), tmp_path / "study", 1, training=trainings.bowl)
     with pytest.raises(
-        InputError, match=r"configuration\.settings\.gamma is 0\.99 there, 0\.9 here"
+        InputError, match=r"configuration\.settings\.gamma: expected 0\.99, got 0\.9"
     ):
         tune(plan(gamma=0.9), tmp_path / "study", 1, training=trainings.bowl)
     with pytest.raises(InputError, match="exists and is not a tuning study"):
@@ -291,15 +290,12 @@ def test_what_a_training_returns_has_to_be_a_result(trainings, tmp_path):
 def test_what_was_found_decides_what_is_proposed_next():
     """Of the same trials with the costs the other way round, and of another seed, others follow."""
     first = [
-        Trial(k, parameters, settings, 1.0 + k, ((10, 1.0 + k),), "finished")
-        for k, (parameters, settings) in enumerate(_proposed(plan(), [], 4, ()))
+        TuningTrial(k, parameters, settings, 1.0 + k, ((10, 1.0 + k),), "finished")
+        for k, (parameters, settings) in enumerate(propose(plan(), [], 4, ()))
     ]
     turned = [replace(trial, cost=10.0 - trial.cost) for trial in first]
     rates = [
-        [
-            parameters["learning_rate"]
-            for parameters, _ in _proposed(asked, found, 2, ())
-        ]
+        [parameters["learning_rate"] for parameters, _ in propose(asked, found, 2, ())]
         for asked, found in (
             (plan(), first),
             (plan(), turned),
@@ -307,7 +303,7 @@ def test_what_was_found_decides_what_is_proposed_next():
         )
     ]
     assert rates[0] == [
-        parameters["learning_rate"] for parameters, _ in _proposed(plan(), first, 2, ())
+        parameters["learning_rate"] for parameters, _ in propose(plan(), first, 2, ())
     ]
     assert rates[0] != rates[1]
     assert rates[0] != rates[2]
@@ -315,18 +311,18 @@ def test_what_was_found_decides_what_is_proposed_next():
 
 def test_one_that_was_stopped_early_is_the_best_only_where_none_has_finished(tmp_path):
     settings = plan().settings.to_dict()
-    diverged = Trial(0, {}, settings, None, (), "diverged")
+    diverged = TuningTrial(0, {}, settings, None, (), "diverged")
     stopped = [
-        Trial(k, {}, settings, None, ((5, 9.0 - k), (7, 12.0)), "stopped early")
+        TuningTrial(k, {}, settings, None, ((5, 9.0 - k), (7, 12.0)), "stopped early")
         for k in (1, 2)
     ]
-    finished = Trial(3, {}, settings, 20.0, ((10, 20.0),), "finished")
-    assert _best([diverged, *stopped]) is stopped[1]
-    assert _best([diverged, *stopped, finished]) is finished
+    finished = TuningTrial(3, {}, settings, 20.0, ((10, 20.0),), "finished")
+    assert best_trial([diverged, *stopped]) is stopped[1]
+    assert best_trial([diverged, *stopped, finished]) is finished
     on_task = make_plan(
-        Given("ppo", task="sharp-turns", seed=4, settings={"base": "none"})
+        TrainingRequest("ppo", task="sharp-turns", seed=4, settings={"base": "none"})
     )
-    _write_best(tmp_path, on_task, [diverged, *stopped])
+    write_best(tmp_path, on_task, [diverged, *stopped])
     lines = (tmp_path / "best.toml").read_text().splitlines()
     assert (
         lines[0] == "# Trial 2 of 3: no trial has finished, seed 4, ppo on sharp-turns"
@@ -343,67 +339,6 @@ def test_a_trial_is_evaluated_ten_times_on_the_way(total_steps, every):
     )
 
 
-def told_by(monkeypatch, *told, rows=()):
-    """What a trial with a limit of 6 at a hundred steps comes to if its training tells this, and its plan."""
-    training, plans = pytest.importorskip("agents.training.training"), []
-
-    def stand_in(asked, tell):
-        plans.append(asked)
-        for steps, cost, evaluated in told:
-            if cost == "not finite":
-                raise InputError("training diverged")
-            tell(training.Progress(steps, 300, 1.0, cost, cost, None, evaluated))
-        return SimpleNamespace(curve=rows)
-
-    monkeypatch.setattr(training, "train", stand_in)
-    return (
-        train_trial({"configuration": plan().configuration(), "limits": [(100, 6.0)]}),
-        plans,
-    )
-
-
-def test_a_trial_is_compared_at_its_evaluations_and_may_cost_as_much_as_the_limit(
-    monkeypatch,
-):
-    rows = [
-        {"steps": 0, "cost": 1.0},
-        {"steps": 1, "cost": 8.0},
-        {"steps": 2, "cost": 9.0},
-    ]
-    equal, (asked,) = told_by(
-        monkeypatch, (0, 1.0, True), (50, 9.0, True), (100, 6.0, True), rows=rows
-    )
-    assert equal == {"cost": 8.0, "curve": [(1, 8.0), (2, 9.0)], "ended": "finished"}
-    assert asked.threads == 1  # trials are trained side by side
-    once, _ = told_by(
-        monkeypatch, (1, 5.0, True), (100, 7.0, True), (200, 8.0, False), rows=rows
-    )
-    assert once == equal  # better at any time
-    stopped, _ = told_by(
-        monkeypatch,
-        (0, 1.0, True),
-        (50, 9.0, True),
-        (60, 2.0, False),
-        (100, 6.01, True),
-        (200, 3.0, True),
-    )
-    assert stopped == {
-        "cost": None,
-        "curve": [(50, 9.0), (100, 6.01)],
-        "ended": "stopped early",
-    }
-
-
-def test_a_trial_that_diverges_says_why(monkeypatch):
-    found, _ = told_by(monkeypatch, (10, 7.0, True), (20, "not finite", True))
-    assert found == {
-        "cost": None,
-        "curve": [(10, 7.0)],
-        "ended": "diverged",
-        "why": "training diverged",
-    }
-
-
 def test_trials_are_trainings_that_stop_when_they_fall_behind():
     pytest.importorskip("stable_baselines3")
     small = {
@@ -413,7 +348,9 @@ def test_trials_are_trainings_that_stop_when_they_fall_behind():
         "batch_size": 64,
         "n_epochs": 1,
     }
-    short = make_plan(Given("ppo", options={"episode_steps": 20}, settings=small))
+    short = make_plan(
+        TrainingRequest("ppo", options={"episode_steps": 20}, settings=small)
+    )
     job = {"configuration": evaluated_evenly(short).configuration(), "limits": []}
     finished = train_trial(job)
     assert finished["ended"] == "finished"
@@ -444,87 +381,37 @@ def test_wrong_arguments_of_the_command(arguments, message, tmp_path):
     assert not (tmp_path / "study").exists()
 
 
-def test_the_command_asks_for_what_it_was_told_and_shows_trials_best_first(
-    tmp_path, monkeypatch
-):
-    asked, drawn = [], {"learning_rate": 0.000312345, "batch_size": 64}
-    trials = (
-        Trial(0, {}, {}, 5.0, (), "finished"),
-        Trial(1, drawn, {}, None, (), "stopped early"),
-        Trial(2, drawn, {}, 4.25, (), "finished"),
-    )
-
-    def stand_in(plan, out, trials_asked, fixed, where, progress):
-        asked.append(
-            (
-                plan.settings.gamma,
-                plan.settings.evaluate_every,
-                plan.configuration()["seed"],
-            )
-        )
-        asked.append((out, trials_asked, fixed, where.workers))
-        progress(1, trials_asked, None)
-        assert (
-            plan.threads == 1
-        )  # of each of the trials that are done beside one another
-        return Tuning(trials, trials[2])
-
-    assert (
-        inspect.signature(tune).parameters["trials"].default == 20
-    )  # as the command has it
-    monkeypatch.setattr(tuning, "tune", stand_in)
-    words = [
-        "tune",
-        "ppo",
-        "--total-steps",
-        "100000",
-        "--set",
-        "gamma=0.9",
-        "--out",
-        str(tmp_path),
-    ]
+def test_the_command_tunes_and_goes_on_with_a_study(tmp_path):
+    small = {"ships": 2, "n_steps": 8, "batch_size": 16, "n_epochs": 1}
+    words = ["tune", "ppo", "--option", "episode_steps=20", "--total-steps", "32"]
+    for name, value in small.items():
+        words += ["--set", f"{name}={value}"]
+    words += ["--trials", "1", "--seed", "7", "--out", str(tmp_path / "study")]
     told = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
-    assert asked == [
-        (0.9, 10_000, 0),
-        (tmp_path, 20, ("gamma",), 1),
-    ]  # ten evaluations on the way
-    assert [trial["cost"] for trial in told["trials"]] == [5.0, None, 4.25]
-    assert (told["best"], told["settings"]) == (2, str(tmp_path / "best.toml"))
-    words += [
-        "--set",
-        "evaluate_every=50",
-        "--trials",
-        "3",
-        "--seed",
-        "7",
-        "--workers",
-        "2",
-    ]
+    (trial,) = told["trials"]
+    assert trial["ended"] == "finished"
+    assert (told["best"], told["settings"]) == (
+        0,
+        str(tmp_path / "study" / "best.toml"),
+    )
+    note = json.loads((tmp_path / "study" / "study.json").read_text())
+    assert note["fixed"] == sorted(small)
+    assert note["configuration"]["seed"] == 7
+    assert note["configuration"]["settings"]["evaluate_every"] == 3  # ten on the way
     lines = CliRunner().invoke(app, words).stdout.splitlines()
-    assert asked[2:] == [
-        (0.9, 50, 7),
-        (tmp_path, 3, ("gamma", "evaluate_every"), 2),
+    (row,) = [line.split() for line in lines if line.strip()[:1].isdigit()]
+    assert row == [
+        "0",
+        f"{trial['cost']:#.4g}",
+        "finished",
+        *["nothing:", "as", "it", "was"],
     ]
-    assert [line.split() for line in lines if line.strip()[:1].isdigit()] == [
-        ["2", "4.250", "finished", "learning_rate", "0.000312,", "batch_size", "64"],
-        ["0", "5.000", "finished", "nothing:", "as", "it", "was"],
-        [
-            "1",
-            "-",
-            "stopped",
-            "early",
-            "learning_rate",
-            "0.000312,",
-            "batch_size",
-            "64",
-        ],
-    ]
-    assert f"written: {tmp_path / 'best.toml'}" in lines
 
 
 def test_missing_optuna_is_reported_with_its_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "optuna", None)
-    monkeypatch.delitem(sys.modules, "agents.training.tuning")
+    for name in ("tuning", "search_space"):
+        monkeypatch.delitem(sys.modules, f"agents.training.{name}")
     answer = CliRunner().invoke(app, ["tune", "ppo", "--out", str(tmp_path / "study")])
     assert answer.exit_code == 2
     assert "pip install 'shipgym[tune]'" in answer.stderr.replace("\n", " ")
@@ -540,7 +427,9 @@ def test_what_a_base_does_before_anything_is_learned_does_not_count():
         "net_arch": [4],
     }
     plan = make_plan(
-        Given("ppo", settings=settings | {"evaluate_every": 16, "learning_rate": 1.0})
+        TrainingRequest(
+            "ppo", settings=settings | {"evaluate_every": 16, "learning_rate": 1.0}
+        )
     )
     told = train_trial({"configuration": plan.configuration(), "limits": []})
     assert [steps for steps, _ in told["curve"]] == [16, 32]

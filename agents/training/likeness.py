@@ -1,0 +1,87 @@
+"""Comparison of nested values by their structure: names, kinds, types and shapes."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from agents.training.nested_values import is_tensor, numbers_of
+
+
+def check_like(found: Any, own: Any, where: str) -> None:
+    """Raise ValueError, naming the first place, unless one value is like another.
+
+    The same names and strings, lists of one length, arrays and tensors of the same type
+    and shape, finite where `own` is finite, numbers of a kind: finite, integers not
+    negative. A function in `own` is called with what is found, and returns what is
+    expected there.
+    """
+    if callable(own):
+        own = own(found)
+    kind, expected = _kind(found), _kind(own)
+    if kind != expected:
+        raise ValueError(f"{where}: expected {expected}, got {kind}")
+    if isinstance(own, dict):
+        _check_entries(found, own, where)
+    elif isinstance(own, list | tuple):
+        for number, entry in enumerate(own):
+            check_like(found[number], entry, f"{where}[{number}]")
+    elif _has_axes(own):
+        _check_finite(found, own, where)
+
+
+def _check_entries(
+    found: Mapping[Any, Any], own: Mapping[Any, Any], where: str
+) -> None:
+    for name, entry in own.items():
+        place = f"{where}.{name}" if isinstance(name, str) else f"{where}[{name}]"
+        if name not in found:
+            others = ", ".join(map(str, found))
+            raise ValueError(f"{place}: expected, got only {others[:200]}")
+        check_like(found[name], entry, place)
+
+
+def _check_finite(found: Any, own: Any, where: str) -> None:
+    numbers = numbers_of(found)
+    wrong = np.argwhere(np.isfinite(numbers_of(own)) & ~np.isfinite(numbers))
+    if len(wrong):
+        place = wrong[0].tolist()
+        number = numbers[tuple(place)]
+        raise ValueError(f"{where}: expected a finite number at {place}, got {number}")
+
+
+def _has_axes(value: Any) -> bool:
+    return is_tensor(value) or np.ndim(value) > 0
+
+
+def _kind(value: Any) -> str:
+    """Say what a value is; of a table or a list also how long."""
+    if isinstance(value, dict):
+        return f"a table of {len(value)}"
+    if isinstance(value, list | tuple):
+        return f"{type(value).__name__} of {len(value)}"
+    if _has_axes(value):
+        return f"{type(value).__name__} of {value.dtype}, shape {tuple(value.shape)}"
+    number = value.item() if isinstance(value, np.ndarray | np.generic) else value
+    if _is_count(number) or (isinstance(number, float) and math.isfinite(number)):
+        return type(number).__name__
+    return repr(number)[:80]
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int) and value >= 0
+
+
+def optional_number(found: Any) -> float | None:
+    """Return what `check_like` expects where a number or None may stand."""
+    return None if found is None else 0.0
+
+
+def list_of(entry: Any) -> Callable[[Any], list[Any]]:
+    """Return what `check_like` expects of a list of any length with entries like one."""
+
+    def as_many(found: Any) -> list[Any]:
+        return [entry] * (len(found) if isinstance(found, list) else 0)
+
+    return as_many
