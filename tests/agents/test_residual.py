@@ -14,6 +14,7 @@ from shipgym.errors import InputError
 from shipgym.ships import load_model
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
+DISCRETE = "shipgym/CourseKeepingDiscrete-v0"
 MARINER = load_model("mariner")
 BASES = {
     "lq": (COURSE, LQ.from_model(MARINER)),
@@ -336,41 +337,18 @@ def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(
 
 
 @pytest.mark.parametrize(
-    ("made", "message"),
+    ("env", "base", "settings", "message"),
     [
-        (
-            lambda: ResidualVecEnv(ships(COURSE), authority=0.5),
-            "authority: 0.5 found without a base",
-        ),
-        (
-            lambda: ResidualVecEnv(ships(COURSE), BASES["lq"][1], authority=3.0),
-            "authority: expected .*got 3",
-        ),
-        (
-            lambda: ResidualVecEnv(ships(COURSE), frame_stack=0),
-            "frame_stack: expected .*got 0",
-        ),
-        (
-            lambda: ResidualVecEnv(ships(COURSE), action_repeat=0),
-            "action_repeat: expected .*got 0",
-        ),
-        (
-            lambda: ResidualVecEnv(ships(COURSE), "lq"),
-            "base: expected a controller, .*got str",
-        ),
-        (lambda: ResidualVecEnv(ships(COURSE), BASES["ilos-lqg"][1]), "cross_track"),
-        (
-            lambda: ResidualVecEnv(ships(COURSE), LQ.from_model(load_model("kvlcc2"))),
-            "base: scale of",
-        ),
-        (
-            lambda: ResidualVecEnv(
-                ShipVecEnv(COURSE, 2, action="rudder-discrete"), BASES["lq"][1]
-            ),
-            "expected actions in a Box within .* got Discrete",
-        ),
+        (COURSE, None, {"authority": 0.5}, "authority: .*0.5.* without a base"),
+        (COURSE, BASES["lq"][1], {"authority": 3.0}, "authority: expected .*got 3"),
+        (COURSE, None, {"frame_stack": 0}, "frame_stack: expected .*got 0"),
+        (COURSE, None, {"action_repeat": 0}, "action_repeat: expected .*got 0"),
+        (COURSE, "lq", {}, "base: expected a controller, .*got str"),
+        (COURSE, BASES["ilos-lqg"][1], {}, "cross_track"),
+        (COURSE, LQ.from_model(load_model("kvlcc2")), {}, "base: scale of"),
+        (DISCRETE, BASES["lq"][1], {}, "expected actions in a Box .* got Discrete"),
     ],
 )
-def test_what_does_not_fit_is_refused(made, message):
+def test_what_does_not_fit_is_refused(env, base, settings, message):
     with pytest.raises(InputError, match=message):
-        made()
+        ResidualVecEnv(ShipVecEnv(env, 2, model="mariner"), base, **settings)

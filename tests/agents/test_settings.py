@@ -271,46 +271,32 @@ def test_seas_and_lists_in_the_options_of_a_run_come_back_from_json():
     assert (again.seed, again.randomise, again.threads) == (2, True, 3)
 
 
-def test_what_is_not_given_is_as_it_was():
-    """A run that is resumed: seed, threads, model and options of the stored one where none are given."""
+def test_what_is_not_asked_for_is_as_it_was():
+    """A run that is resumed: seed, threads, model and options are those of the stored one."""
+    own = {"episode_steps": 50}
     first = make_plan(
         TrainingRequest(
             "ppo",
             model="kvlcc2",
-            options={"episode_steps": 50},
+            options=own,
             settings={"gamma": 0.8},
             seed=3,
             threads=2,
         )
     )
-    assert (first.seed, first.randomise, first.threads, first.training_seed) == (
-        3,
-        False,
-        2,
-        3000,
-    )
+    assert (first.seed, first.randomise, first.threads) == (3, False, 2)
+    assert first.training_seed == 3000
     assert TrainingPlan.from_configuration(first.configuration(), 2) == first
-    again = make_plan(TrainingRequest("ppo"), first)
-    assert again == first
-    other = make_plan(
-        TrainingRequest(
-            "ppo", model="mariner", seed=0, randomise=True, settings={"n_epochs": 1}
-        ),
-        first,
-    )
-    assert (other.task.model, other.seed, other.randomise, other.threads) == (
-        "mariner",
-        0,
-        True,
-        2,
-    )
-    assert other.task.options == first.task.options
+    assert make_plan(TrainingRequest("ppo"), first) == first
+    changes = {"model": "mariner", "seed": 0, "randomise": True}
+    request = TrainingRequest("ppo", settings={"n_epochs": 1}, **changes)
+    other = make_plan(request, first)
+    assert (other.task.model, other.task.options) == ("mariner", own)
+    assert (other.seed, other.randomise, other.threads) == (0, True, 2)
     assert (other.settings.gamma, other.settings.n_epochs) == (0.8, 1)
-    assert (
-        type(make_plan(TrainingRequest("sac", settings=FREE), first).settings)
-        is SACSettings
-    )
-    assert training_options(first) == first.task.options
+    another = make_plan(TrainingRequest("sac", settings=FREE), first)
+    assert type(another.settings) is SACSettings
+    assert training_options(first) == own
     assert training_options(other)["speed_range"] == (0.8, 1.1)
     assert make_plan(TrainingRequest("ppo")).configuration()["task"] == ""
 
@@ -351,47 +337,23 @@ def test_the_file_of_settings_goes_before_the_tuned_ones_and_the_command_before_
 def test_domain_randomisation_draws_ships_seas_and_speeds_and_leaves_what_was_asked(
     tmp_path,
 ):
-    plan = make_plan(
-        TrainingRequest("ppo", model="mariner-tls-svm", sea="moderate", randomise=True)
-    )
-    assert plan.task.options == {"sea": "moderate"}
-    options = training_options(plan)
-    assert [sea.name for sea in options["sea"]] == [
-        "moderate",
-        "calm",
-        "slight",
-        "rough",
-    ]  # each once
-    assert options["model_uncertainty"] == "covariance"
+    def options(model="mariner-tls-svm", **request):
+        plan = make_plan(TrainingRequest("ppo", model=str(model), **request))
+        return training_options(plan)
+
+    drawn = options(sea="moderate", randomise=True)
+    seas = [sea.name for sea in drawn["sea"]]
+    assert seas == ["moderate", "calm", "slight", "rough"]  # each once
+    assert drawn["model_uncertainty"] == "covariance"
     asked = {"speed_range": (0.5, 0.6)}
-    own = training_options(
-        make_plan(
-            TrainingRequest(
-                "ppo", model="mariner-tls-svm", options=asked, randomise=True
-            )
-        )
-    )
-    assert {name: own[name] for name in asked} == asked
+    assert asked.items() <= options(options=asked, randomise=True).items()
     alone = {"model_uncertainty": "covariance"}
-    drawn = training_options(
-        make_plan(TrainingRequest("ppo", model="mariner-tls-svm", settings=alone))
-    )
-    assert drawn == alone  # neither seas nor speeds
-    assert (
-        training_options(
-            make_plan(TrainingRequest("ppo", model="mariner", settings=alone))
-        )
-        == {}
-    )
-    nomoto1_ship(0.1, 20.0, {"length": 160.0, "speed": 7.0}).save(
-        tmp_path / "ship.json"
-    )
-    unknown = training_options(
-        make_plan(
-            TrainingRequest("ppo", model=str(tmp_path / "ship.json"), randomise=True)
-        )
-    )
-    assert [sea.name for sea in unknown["sea"]] == ["calm"]  # no beam, no weather
+    assert options(settings=alone) == alone  # neither seas nor speeds
+    assert options("mariner", settings=alone) == {}
+    bare = nomoto1_ship(0.1, 20.0, {"length": 160.0, "speed": 7.0})
+    bare.save(tmp_path / "ship.json")
+    found = options(tmp_path / "ship.json", randomise=True)
+    assert [sea.name for sea in found["sea"]] == ["calm"]  # no beam, no weather
 
 
 SHAFT = {"action": "rudder-shaft"}

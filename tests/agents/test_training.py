@@ -233,11 +233,6 @@ def test_agents_of_a_suite_learn_over_drawn_models_and_never_see_the_true_ship()
     assert plan.settings.rate_limit == 0.1
 
 
-def test_the_learning_rate_falls_to_nothing_and_no_lower():
-    agent = make_agent(tiny("ppo", schedule="linear"), None)
-    assert agent.lr_schedule(-0.1) == 0.0 < agent.lr_schedule(0.1)
-
-
 def test_what_the_algorithms_are_given_is_as_golden():
     """All keywords for two commands, the class of the activation by name, the rate at a third of the way."""
     told = {}
@@ -249,10 +244,6 @@ def test_what_the_algorithms_are_given_is_as_golden():
         ].__name__
         told[name] = found
     assert same_text("arguments of the algorithms", "\n".join(flat(told, "")))
-
-
-def test_noise_of_exploration_is_of_one_command_where_none_is_said():
-    assert sb3_arguments(load_settings("td3"))["action_noise"]().shape == (1,)
 
 
 def test_an_algorithm_that_is_not_installed_is_reported_with_its_extra(monkeypatch):
@@ -449,16 +440,6 @@ def test_a_checkpoint_with_another_record_is_refused_with_the_place(tmp_path):
         train(plan, tmp_path / "run", resume=True)
 
 
-def test_the_time_of_a_run_is_counted_from_its_beginning():
-    before, over = time.monotonic(), []
-    train(
-        tiny(total_steps=1),
-        on_progress=lambda now: over.append(now.seconds - (time.monotonic() - before)),
-    )
-    assert len(over) == 1
-    assert -5.0 < over[0] <= 0.0
-
-
 def test_folders_are_checked_before_anything_is_learned(tmp_path):
     plan, run = tiny(), tmp_path / "run"
     with pytest.raises(
@@ -556,61 +537,28 @@ def test_a_training_learns_whole_rollouts():
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["train", "pqo"], "Did you mean 'ppo'?"),
-        (["train", "ppo", "--task", "sharp-trns"], "Did you mean 'sharp-turns'?"),
-        (["train", "ppo", "--env", "curse-keeping"], "Did you mean 'course-keeping'?"),
-        (["train", "ppo", "--set", "gama=0.9"], "Did you mean 'gamma'?"),
-        (
-            ["train", "ppo", "--threads", "1025"],
-            "threads: expected an integer of at least 1 an",
-        ),
-        (
-            ["train", "ppo", "--set", "gamma=nan"],
-            "--set gamma: expected a number of magnitude",
-        ),
-        (
-            ["train", "ppo", "--set", "gamma=2"],
-            "gamma: expected a number >= 0 and <= 1",
-        ),
-        (
-            ["train", "ppo", "--set", "batch_size=1000"],
-            "a divisor above 1 of ships x n_steps = 32768, got 1000",
-        ),
-        (["train", "ppo", "--set", "base=lqq"], "Did you mean 'lq'?"),
-        (
-            ["train", "ppo", "--set", "base=los"],
-            "expected a path for 'los', got none in 'course-keeping'",
-        ),
-        (
-            ["train", "ppo", "--set", "base=none", "--set", "authority=0.5"],
-            "without a base",
-        ),
-        (
-            ["train", "ppo", "--set", "base=tuned"],
-            "base: expected a task of a suite for 'tuned', got none",
-        ),
-        (
-            ["train", "ppo", "--set", "action_repeat=1000"],
-            (
-                "action_repeat: expected an integer of at least 1 and"
-                " at most 600 (no longer"
-            ),
-        ),
-        (["train", "ppo", "--option", "nois=1"], "Did you mean 'noise'?"),
-        (
-            ["train", "ppo", "--task", "sharp-turns", "--sea", "rough"],
-            "--task: expected alone, got --sea too",
-        ),
-        (
-            ["train", "sac", "--env", "shipgym/CourseKeepingDiscrete-v0"],
-            "action: expected one that sac learns",
-        ),
-        (["train", "ppo", "--settings", "none.toml"], "there is no such settings file"),
-        (["train", "ppo", "--resume"], "no run of training is there"),
+        ("pqo", "Did you mean 'ppo'?"),
+        ("ppo --task sharp-trns", "Did you mean 'sharp-turns'?"),
+        ("ppo --env curse-keeping", "Did you mean 'course-keeping'?"),
+        ("ppo --set gama=0.9", "Did you mean 'gamma'?"),
+        ("ppo --threads 1025", "threads: expected an integer of at least 1 and"),
+        ("ppo --set gamma=nan", "--set gamma: expected a number of magnitude"),
+        ("ppo --set gamma=2", "gamma: expected a number >= 0 and <= 1"),
+        ("ppo --set batch_size=1000", "expected a divisor above 1 of ships x n_steps"),
+        ("ppo --set base=lqq", "Did you mean 'lq'?"),
+        ("ppo --set base=los", "expected a path for 'los', got none in"),
+        ("ppo --set base=none --set authority=0.5", "expected 1 without a base"),
+        ("ppo --set base=tuned", "base: expected a task of a suite for 'tuned'"),
+        ("ppo --set action_repeat=1000", "action_repeat: expected an integer of at"),
+        ("ppo --option nois=1", "Did you mean 'noise'?"),
+        ("ppo --task sharp-turns --sea rough", "--task: expected alone, got --sea"),
+        ("sac --env shipgym/CourseKeepingDiscrete-v0", "expected one that sac learns"),
+        ("ppo --settings none.toml", "there is no such settings file"),
+        ("ppo --resume", "no run of training is there"),
     ],
 )
 def test_wrong_input_is_one_message_and_nothing_written(words, expected, tmp_path):
-    code, printed = shipgym(*words, "--out", tmp_path / "run")
+    code, printed = shipgym("train", *words.split(), "--out", tmp_path / "run")
     assert code == 2
     assert expected in printed
     assert list(tmp_path.iterdir()) == []

@@ -48,6 +48,7 @@ GALE = Weather(
     name="gale",
 )
 STATE = ("x", "y", "psi", "u", "v", "r", "delta")
+OSCILLATOR = ("displacement", "velocity")
 
 
 @pytest.fixture(scope="module")
@@ -375,54 +376,45 @@ def test_an_oscillator_in_waves_steps_exactly(turn):
 @given(angle, angle, few, few, st.floats(0.0, 15.0), few)
 def test_wind_and_waves_push_by_where_they_come_from(psi, blows, u, v, speed, gust):
     """Worked with vectors north and east: the air that the ship meets, and the waves from the bow."""
-    coefficients = {
-        "wind_surge": series.Cosines(0.2, -0.5, *[0.0] * 5),
-        "wind_sway": series.Sines(0.9, *[0.0] * 5),
-        "wind_yaw": series.Sines(0.0, 0.3, *[0.0] * 4),
-        "drift_surge": series.Cosines(-0.4, 0.1, *[0.0] * 5),
-        "drift_sway": series.Sines(0.7, *[0.0] * 5),
-        "drift_yaw": series.Sines(0.0, 0.2, *[0.0] * 4),
-        "wind_roll": series.Sines(0.6, *[0.0] * 5),
-        "drift_roll": series.Sines(0.8, *[0.0] * 5),
-    }
+    nothing = [0.0] * 4
+    p = parameters(
+        wind_speed=speed,
+        still_air=0.01,
+        wind_surge=series.Cosines(0.2, -0.5, 0.0, *nothing),
+        wind_sway=series.Sines(0.9, 0.0, *nothing),
+        wind_yaw=series.Sines(0.0, 0.3, *nothing),
+        wind_roll=series.Sines(0.6, 0.0, *nothing),
+        drift_surge=series.Cosines(-0.4, 0.1, 0.0, *nothing),
+        drift_sway=series.Sines(0.7, 0.0, *nothing),
+        drift_yaw=series.Sines(0.0, 0.2, *nothing),
+        drift_roll=series.Sines(0.8, 0.0, *nothing),
+    )
     current, waves_from = 0.7 - 0.4j, blows + 0.5
-    sea = Sea(
-        **dict.fromkeys(Sea._fields, 0.0)
-        | {
-            "wind_north": np.cos(blows),
-            "wind_east": np.sin(blows),
-            "waves_north": np.cos(waves_from),
-            "waves_east": np.sin(waves_from),
-            "current_north": current.real,
-            "current_east": current.imag,
-            "gust": gust,
-            "drift": 0.25,
-        }
-    )
+    state = {
+        "wind_north": np.cos(blows),
+        "wind_east": np.sin(blows),
+        "waves_north": np.cos(waves_from),
+        "waves_east": np.sin(waves_from),
+        "current_north": current.real,
+        "current_east": current.imag,
+        "gust": gust,
+        "drift": 0.25,
+    }
+    sea = Sea(**dict.fromkeys(Sea._fields, 0.0) | state)
     motion = Motion(0.0, 0.0, psi, u, v, *[0.0] * 6)
-    p = parameters(wind_speed=speed, still_air=0.01, **coefficients)
-    found = open_sea.push(motion, sea, p)
-    met = (
-        (speed + gust) * np.exp(1j * blows) + current + (u + 1j * v) * np.exp(1j * psi)
-    )
+    true_wind = (speed + gust) * np.exp(1j * blows)
+    met = true_wind + current + (u + 1j * v) * np.exp(1j * psi)
     assume(abs(met) > 1e-3)
-    felt, size = np.angle(met) - psi, abs(met) ** 2
-    bow = waves_from - psi
-    assert found.u == pytest.approx(
-        size * (0.2 - 0.5 * np.cos(felt))
-        + 0.01 * u * abs(u)
-        + 1.25 * (-0.4 + 0.1 * np.cos(bow)),
-        abs=1e-6,
-    )
-    assert found.v == pytest.approx(
-        size * 0.9 * np.sin(felt) + 1.25 * 0.7 * np.sin(bow), abs=1e-6
-    )
-    assert found.r == pytest.approx(
-        size * 0.3 * np.sin(2.0 * felt) + 1.25 * 0.2 * np.sin(2.0 * bow), abs=1e-6
-    )
-    assert found.p == pytest.approx(
-        size * 0.6 * np.sin(felt) + 1.25 * 0.8 * np.sin(bow), abs=1e-6
-    )
+    felt, size, bow = np.angle(met) - psi, abs(met) ** 2, waves_from - psi
+
+    found = open_sea.push(motion, sea, p)
+    by_wind = size * (0.2 - 0.5 * np.cos(felt)) + 0.01 * u * abs(u)
+    by_waves = 1.25 * (-0.4 + 0.1 * np.cos(bow))
+    sway = size * 0.9 * np.sin(felt) + 1.25 * 0.7 * np.sin(bow)
+    yaw = size * 0.3 * np.sin(2.0 * felt) + 1.25 * 0.2 * np.sin(2.0 * bow)
+    roll = size * 0.6 * np.sin(felt) + 1.25 * 0.8 * np.sin(bow)
+    assert found.u == pytest.approx(by_wind + by_waves, abs=1e-6)
+    assert (found.v, found.r, found.p) == pytest.approx((sway, yaw, roll), abs=1e-6)
     assert (found.north, found.east) == (current.real, current.imag)
     ahead = u * np.cos(bow) + v * np.sin(bow)
     met_at = max(abs(0.628 + 0.628**2 / 9.81 * ahead), 0.0628)
@@ -462,50 +454,44 @@ def test_a_sea_begins_and_goes_on_as_it_always_was():
         for key in range(n):
             word = random.stream(np.uint64(key), np.uint64(0))
             begun.append(open_sea.begin_sea(motion, word, p))
-            later.append(
-                open_sea.evolve(motion, 2.0, begun[-1], word + random.BEGIN_WORDS, p)
-            )
-    first, second = np.array(begun), np.array(later)
-    expected = {
+            after = word + random.BEGIN_WORDS
+            later.append(open_sea.evolve(motion, 2.0, begun[-1], after, p))
+    first, second = Sea(*np.array(begun).T), Sea(*np.array(later).T)
+
+    unit = dict.fromkeys(
+        [f"{motion}_{part}" for motion in ("heading", "roll") for part in OSCILLATOR],
+        (0.0, 1.0),
+    )
+    independent = unit | {
         "current_north": (0.8 * np.cos(2.0), 0.3),
         "current_east": (0.8 * np.sin(2.0), 0.3),
         "gust": (0.0, 2.0),
         "drift": (0.0, 0.5),
-        "heading_displacement": (0.0, 1.0),
-        "heading_velocity": (0.0, 1.0),
-        "roll_displacement": (0.0, 1.0),
-        "roll_velocity": (0.0, 1.0),
+    }
+    others = {
         "psi_wave": (0.0, 0.2),
         "phi_wave": (0.0, 0.3),
         "wind_north": (0.0, np.sqrt(0.5)),
         "wind_east": (0.0, np.sqrt(0.5)),
     }
-    for name, (mean, deviation) in expected.items():
-        k = Sea._fields.index(name)
-        for values in (first[:, k], second[:, k]):
-            assert values.mean() == pytest.approx(
-                mean, abs=4.0 * deviation / np.sqrt(n)
-            ), name
-            assert values.std() == pytest.approx(deviation, rel=4.0 / np.sqrt(2 * n)), (
-                name
-            )
-    by_name = (
-        dict(zip(Sea._fields, first.T, strict=True)),
-        dict(zip(Sea._fields, second.T, strict=True)),
-    )
+    for name, (mean, deviation) in (independent | others).items():
+        error = 4.0 * deviation / np.sqrt(n)
+        for sea in (first, second):
+            values = getattr(sea, name)
+            assert values.mean() == pytest.approx(mean, abs=error), name
+            assert values.std() == pytest.approx(deviation, abs=error), name
     for name, kept in (("current_north", 0.9), ("gust", 0.8), ("drift", 0.6)):
-        found = np.corrcoef(by_name[0][name], by_name[1][name])[0, 1]
+        found = np.corrcoef(getattr(first, name), getattr(second, name))[0, 1]
         assert found == pytest.approx(kept, abs=4.0 / np.sqrt(n)), name
-    np.testing.assert_array_equal(by_name[0]["wind_north"], by_name[0]["waves_north"])
+    columns = [getattr(second, name) for name in independent]
+    assert np.abs(np.corrcoef(columns) - np.eye(8)).max() < 5.0 / np.sqrt(n)
+
+    np.testing.assert_array_equal(first.wind_north, first.waves_north)
     met = np.array([open_sea.encounter_frequency(motion, sea, p) for sea in later])
-    np.testing.assert_allclose(
-        by_name[1]["r_wave"], -0.2 * met * by_name[1]["heading_displacement"], rtol=1e-9
-    )
-    np.testing.assert_allclose(
-        by_name[1]["p_wave"], -0.3 * met * by_name[1]["roll_displacement"], rtol=1e-9
-    )
-    columns = second[:, [Sea._fields.index(name) for name in list(expected)[:8]]]
-    assert np.abs(np.corrcoef(columns.T) - np.eye(8)).max() < 5.0 / np.sqrt(n)
+    r_wave = -0.2 * met * second.heading_displacement
+    np.testing.assert_allclose(second.r_wave, r_wave, rtol=1e-9)
+    p_wave = -0.3 * met * second.roll_displacement
+    np.testing.assert_allclose(second.p_wave, p_wave, rtol=1e-9)
 
 
 def test_a_simulation_is_a_function_of_its_seed(mariner):
