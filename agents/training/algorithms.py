@@ -1,4 +1,4 @@
-"""Agents of stable-baselines3 and sb3-contrib by our settings, and the ships that they learn from."""
+"""Agents of stable-baselines3 and sb3-contrib, and the ships that they learn from."""
 
 from collections.abc import Callable
 from typing import Any
@@ -27,7 +27,7 @@ from shipgym.extras import library
 
 
 class StaggeredShips(ShipVecEnv):
-    """Ships whose first episodes are truncated one after another, evenly over the length of one.
+    """Ships whose first episodes are truncated one after another, evenly in time.
 
     Else all of them would begin at once, again and again, and a rollout show one part
     of episodes only.
@@ -96,7 +96,7 @@ def make_agent(plan: TrainingPlan, base: Controller | None) -> Any:
 
 
 def begin_as_base(agent: Any) -> None:
-    """Let a policy that adds to a controller add nothing at first: its last layer is zero.
+    """Make the last layer of a policy zero, which then adds nothing to its base.
 
     Source: Silver et al. 2018, arXiv:1812.06298. PPO's last layer is next to zero
     anyway.

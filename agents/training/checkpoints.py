@@ -1,4 +1,4 @@
-"""State of a training that the steps to come depend on: taken at a rollout's boundary, and restored.
+"""State of a training at a rollout's boundary: all that the steps to come depend on.
 
 Networks and optimisers, the replay buffer, counters, random numbers, scales of the
 rewards, and the ships where they are. A run that is restored goes on as if it had never
@@ -74,11 +74,11 @@ def agent_state(agent: Any) -> State:
 
 
 def restore_agent(agent: Any, state: State) -> None:
-    """Let an agent of the same plan go on from a state, by `learn(..., reset_num_timesteps=False)`.
+    """Restore the state of an agent of the same plan.
 
-    Raises ValueError, naming the first difference, if the state has other names, kinds
-    or shapes than the agent's own, or a number that is infinite or NaN where the
-    agent's own is finite.
+    It goes on by `learn(..., reset_num_timesteps=False)`. Raises ValueError, naming the
+    first difference, if the state has other names, kinds or shapes than the agent's
+    own, or a number that is infinite or NaN where the agent's own is finite.
     """
     state = _with_own_settings(agent, state)
     check_like(state, _expected_state(agent), "agent")
@@ -101,7 +101,7 @@ def restore_agent(agent: Any, state: State) -> None:
 
 
 def check_weights(parameters: State) -> None:
-    """Raise ValueError, naming the place, for weights with which a network's outputs overflow."""
+    """Raise ValueError for weights with which a network's outputs overflow."""
     for part, weights in parameters.items():
         for name, weight in weights.items():
             if not (isinstance(weight, torch.Tensor) and weight.is_floating_point()):
@@ -115,7 +115,7 @@ def check_weights(parameters: State) -> None:
 
 
 def check_run(run: Any) -> None:
-    """Raise ValueError, naming the place, unless this is a training's record of its evaluations."""
+    """Raise ValueError unless this is a training's record of its evaluations."""
     evaluation = {
         "steps": COUNT,
         "seconds": NUMBER,
@@ -157,7 +157,7 @@ def _with_own_settings(agent: Any, state: Any) -> Any:
 
 
 def _expected_state(agent: Any) -> State:
-    """Return what a state of this agent is like, for `check_like`; its ships begin an episode."""
+    """Return a state like those of this agent; its ships begin an episode."""
     agent._last_obs = agent._last_original_obs = agent.env.reset()
     agent._last_episode_starts = np.zeros(agent.n_envs, np.bool_)
     agent.ep_info_buffer = agent.ep_success_buffer = ()

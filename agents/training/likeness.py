@@ -79,7 +79,7 @@ def optional_number(found: Any) -> float | None:
 
 
 def list_of(entry: Any) -> Callable[[Any], list[Any]]:
-    """Return what `check_like` expects of a list of any length with entries like one."""
+    """Return what `check_like` expects of a list of entries like one."""
 
     def as_many(found: Any) -> list[Any]:
         return [entry] * (len(found) if isinstance(found, list) else 0)

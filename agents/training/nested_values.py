@@ -1,4 +1,4 @@
-"""Nested values with arrays in them as one safetensors file: numbers and names, no code."""
+"""Nested values with arrays as one safetensors file: numbers and names, no code."""
 
 import hashlib
 import json
@@ -82,7 +82,7 @@ def _read_arrays(path: Path) -> tuple[Mapping[str, str], Arrays]:
 
 
 def _hash(content: str, arrays: Arrays) -> str:
-    """SHA-256 of what is not an array, and of arrays with their names, types and shapes."""
+    """SHA-256 of the content and of arrays with their names, types and shapes."""
     digest = hashlib.sha256(content.encode())
     for name, array in sorted(arrays.items()):
         digest.update(f"{name} {array.dtype} {array.shape}".encode())

@@ -1,4 +1,4 @@
-"""Plan of a training: algorithm, task, settings and seed, and how two of them differ."""
+"""Plan of a training: algorithm, task, settings and seed."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -88,7 +88,7 @@ class TrainingPlan:
         return SEEDS_EACH * self.seed
 
     def configuration(self) -> dict[str, Any]:
-        """Return what decides what is learned, ready for JSON; threads are not in it."""
+        """Return all but the threads, ready for JSON."""
         return {
             "algorithm": self.algorithm,
             "task": self.task.name,

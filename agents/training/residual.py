@@ -1,4 +1,4 @@
-"""Ships as a policy that learns sees and steers them: the same as when it steers alone."""
+"""Ships as a policy that learns sees and steers them, the same as later alone."""
 
 import copy
 from collections.abc import Mapping
@@ -20,12 +20,13 @@ VecEnvWrapper: Any = library(
 
 
 class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
-    """Ships steered by a base controller to which an agent adds, with a frame stack of observations.
+    """Ships steered by a base controller to which an agent adds.
 
-    Observations, and the way from an agent's output to the ships, are those of
-    `agents.policies.policy`. A step has `action_repeat` control intervals, its reward
-    is their sum. Where an episode ends among them, the rest of the step is not counted:
-    the next episode begins with the base alone (without base: the output).
+    The agent sees a frame stack of observations. Observations, and the way from an
+    agent's output to the ships, are those of `agents.policies.policy`. A step has
+    `action_repeat` control intervals, its reward is their sum. Where an episode ends
+    among them, the rest of the step is not counted: the next episode begins with the
+    base alone (without base: the output).
 
     Raises InputError for commands that are not continuous together with a base, a base
     that does not fit the ship, or a value out of its range.
@@ -67,14 +68,18 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         self._in_force = np.zeros(actions, np.float32)
 
     def reset(self) -> Numbers:
-        """Begin an episode in each row; shape (num_envs, frame_stack * n_observations + n_commands)."""
+        """Begin an episode in each row.
+
+        Returns observations, shape (num_envs, frame_stack * n_observations +
+        n_commands).
+        """
         observations = self.venv.reset()
         self._base_state = None
         self._in_force[:] = 0.0
         return self._begin(observations, np.ones(self.num_envs, dtype=np.bool_))
 
     def step_async(self, actions: Any) -> None:
-        """Add the agent's outputs, shape (num_envs, n_commands), to what the base proposes."""
+        """Take the agent's outputs, shape (num_envs, n_commands)."""
         self._outputs = np.array(actions)
 
     def step_wait(self) -> tuple[Numbers, Numbers, Flags, list[dict[str, Any]]]:
@@ -159,7 +164,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         return self._observed(starts)
 
     def _observed(self, starts: Flags) -> Numbers:
-        """Return histories and the base's proposals, which are kept for the step that follows."""
+        """Return histories and the base's proposals; keep these for the next step."""
         histories = self._past.reshape(self.num_envs, -1)
         if self.base is None:
             return histories.copy()

@@ -1,4 +1,4 @@
-"""Settings of learning: one frozen dataclass an algorithm, read from TOML as docs/training.md says.
+"""Settings of learning: one frozen dataclass an algorithm, read from TOML.
 
 The files in `hyperparameters/` have the tuned ones, later tables before earlier ones:
 `defaults`, every setting of the algorithm to learn from scratch; those that differ
@@ -46,7 +46,10 @@ def setting(
 
 @dataclass(frozen=True)
 class LearningSettings:
-    """Settings of all algorithms; a decision lasts `action_repeat` control intervals."""
+    """Settings of all algorithms.
+
+    A decision lasts `action_repeat` control intervals.
+    """
 
     total_steps: int = setting(
         "decisions to learn from, of all ships together", at_least=1
@@ -223,7 +226,7 @@ class SACSettings(OffPolicySettings):
 
 @dataclass(frozen=True)
 class TD3Settings(OffPolicySettings):
-    """Twin delayed deep deterministic policy gradient (Fujimoto et al. 2018, arXiv:1802.09477)."""
+    """Twin delayed DDPG (Fujimoto et al. 2018, arXiv:1802.09477)."""
 
     action_noise: float = setting(
         "standard deviation of what is added to actions to explore", above=0.0
@@ -353,7 +356,7 @@ def load_settings(
 
 
 def settings_of(algorithm: str) -> type[LearningSettings]:
-    """Class of an algorithm's settings; InputError for an unknown one names the nearest."""
+    """Class of an algorithm's settings; InputError for an unknown algorithm."""
     return ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
 
 
@@ -370,12 +373,12 @@ def make_settings(algorithm: str, values: Mapping[str, Any]) -> LearningSettings
 
 
 def changed(settings: LearningSettings, given: Mapping[str, Any]) -> LearningSettings:
-    """Replace some settings; InputError for an unknown one, or a value out of its range."""
+    """Replace some settings; InputError for an unknown one or a value out of range."""
     return replace(settings, **_known_settings(given, type(settings), "settings"))
 
 
 def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
-    """Read a user's own TOML file; InputError if it cannot be read or names no setting."""
+    """Read a user's TOML file; InputError for a broken one or an unknown setting."""
     content = read_toml(path, "settings file")
     return _known_settings(content, settings_of(algorithm), str(path))
 

@@ -1,4 +1,4 @@
-"""Training: agents learn on many ships at once, are evaluated on episodes held out, and can be resumed.
+"""Training of agents on many ships at once, evaluated on episodes held out.
 
 A run can be killed at any moment. It goes on at the last boundary between a rollout and
 the next that was kept, and ends with the same policy, bit for bit, as if nothing had
@@ -74,7 +74,7 @@ class TrainingResult:
 
     @property
     def lq_reached(self) -> Mapping[str, Any] | None:
-        """First evaluation that cost no more than LQ, to a thousandth; None if there was none.
+        """First evaluation that cost no more than LQ, to a thousandth, if any.
 
         A network that has learned nothing yet adds nearly nothing to its base.
         """
@@ -165,7 +165,7 @@ class _TimeIsUpError(Exception):
 
 
 class TrainingRun(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
-    """A training under way, which is called at each boundary between an update and the next rollout."""
+    """A training under way; called at each boundary between update and rollout."""
 
     def __init__(
         self,
@@ -312,7 +312,7 @@ class TrainingRun(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is n
             write_json(progress, self.folder / run_folder.PROGRESS)
 
     def _record(self) -> dict[str, Any]:
-        """Return how a policy was made; without times, so that the same run writes the same file."""
+        """Return how a policy was made, without times: the same run writes the same."""
         first = self.plan.training_seed
         last_evaluated = EVALUATION_SEED + self.evaluation_episodes - 1
         return {
@@ -336,7 +336,7 @@ class TrainingRun(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is n
         write_values(content, self.folder / run_folder.CHECKPOINT)
 
     def restore(self, checkpoint: Path) -> None:
-        """Resume from a checkpoint; a run that was killed before its first one starts again."""
+        """Resume from a checkpoint; a run killed before its first one starts again."""
         self.resumed_from = 0
         if not checkpoint.exists():
             return

@@ -1,4 +1,4 @@
-"""Tuning: settings of an algorithm searched with Optuna, many trainings at once, resumable.
+"""Tuning: settings of an algorithm searched with Optuna; a study can be resumed.
 
 Trials are proposed in batches of four by a tree-structured Parzen estimator (Bergstra
 et al. 2011) that knows the batches before, so that what is found does not depend on how
@@ -90,7 +90,7 @@ def tune(
     on_progress: Callable[[int, int, float | None], None] | None = None,
     training: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
 ) -> TuningResult:
-    """Search the settings with which an agent learns a task best; a study that is there goes on.
+    """Search the settings with which an agent learns a task best, or go on with it.
 
     Raises InputError if Optuna is missing, another process uses the folder, it holds a
     study of something else or anything else, or every trial of the first batch
@@ -226,7 +226,7 @@ def limits(trials: Sequence[TuningTrial], total_steps: int) -> list[tuple[int, f
 
 
 def lowest(curve: Curve, steps: float) -> float:
-    """Lowest cost by some steps; of limits, the largest best cost with which a training goes on."""
+    """Lowest cost by some steps; of limits, the largest cost that is not stopped."""
     return min((cost for mark, cost in curve if mark <= steps), default=np.inf)
 
 
@@ -242,7 +242,7 @@ def _as_trial(number: int, proposal: Proposal, result: Any) -> TuningTrial:
 
 
 def best_trial(trials: Sequence[TuningTrial]) -> TuningTrial:
-    """Finished trial of the lowest cost; one that was stopped early only where none has finished."""
+    """Finished trial of the lowest cost; one stopped early where none has finished."""
 
     def rank(trial: TuningTrial) -> tuple[bool, float]:
         return trial.cost is None, lowest(trial.curve, np.inf)
@@ -326,7 +326,7 @@ def open_database(path: Path) -> Any:
 def _record(
     study: Any, done: Sequence[TuningTrial], plan: TrainingPlan, fixed: Sequence[str]
 ) -> None:
-    """Add to the study what it does not have yet: an interruption may have left it incomplete."""
+    """Add to the study what it lacks: an interruption may have left it incomplete."""
     recorded = {trial.user_attrs.get("number") for trial in study.trials}
     space = search_space(plan.algorithm, fixed)
     new = [trial for trial in done if trial.number not in recorded]
@@ -334,7 +334,7 @@ def _record(
 
 
 def write_best(folder: Path, plan: TrainingPlan, trials: Sequence[TuningTrial]) -> None:
-    """Write the settings of the best trial; how often it was evaluated was for tuning only."""
+    """Write the settings of the best trial; evaluations were for tuning only."""
     best = best_trial(trials)
     cost = "no trial has finished"
     if best.cost is not None:

@@ -1,4 +1,4 @@
-"""The weather that a user asks for: current, wind and waves together, or a sea state."""
+"""Weather that a user asks for: current, wind and waves together, or a sea state."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class WaveDrift:
     estimated: tuple[str, ...] = ()  # particulars that were estimated for it
 
     def harmonics(self, n: int = 8) -> Harmonics:
-        """Fourier series up to the n-th harmonic, for kernels; K, the heeling moment, is 0."""
+        """Fourier series up to the n-th harmonic, for kernels; K, which heels, is 0."""
         return Harmonics(
             X=cosine_coefficients(self.X, n),
             Y=sine_coefficients(self.Y, n),
@@ -116,13 +116,13 @@ def waterline(ship: Particulars) -> tuple[Floats, Floats]:
 
 
 def reflection_coefficients(chi: ArrayLike, ship: Particulars) -> tuple[Floats, Floats]:
-    """Sway force and yaw moment by short waves reflected at a vertical-sided ship at rest.
+    """Sway force and yaw moment by reflected short waves, on a ship at rest.
 
     Faltinsen 1990, Sea Loads, equation 5.27 (Faltinsen et al. 1980): each part of the
     waterline that the waves can see takes up rho g a^2 / 2 times the square of the sine
-    of the angle at which they meet it, along its inward normal. `chi`, rad, is where
-    they come from, seen from the bow. Returns Y by rho g a^2 L / 2 and N about midship
-    by rho g a^2 L^2 / 2.
+    of the angle at which they meet it, along its inward normal. Sides are vertical.
+    `chi`, rad, is where they come from, seen from the bow. Returns Y by rho g a^2 L / 2
+    and N about midship by rho g a^2 L^2 / 2.
     """
     x, y = waterline(ship)
     dx = np.diff(x)

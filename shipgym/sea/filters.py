@@ -48,7 +48,10 @@ def first_order_step(now: float, mean: float, filter: Filter, noise: float) -> f
 
 
 def decay(x: float) -> float:
-    """exp(-x) for x from 0 to 8, as at 8 above: its series in x / 4, to 1e-7 up to 1."""
+    """exp(-x) for x from 0 to 8, and above as at 8, to 1e-7 up to 1.
+
+    It is the fourth power of the series of exp(-x / 4).
+    """
     y = 0.25 * min(x, 8.0)
     series = 1.0 / 720.0 - y * (1.0 / 5040.0)
     series = 1.0 / 120.0 - y * series

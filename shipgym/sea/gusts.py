@@ -1,4 +1,4 @@
-"""Gust spectra of the wind over the sea, and the first-order filter that stands for them."""
+"""Gust spectra of the wind over the sea, and their first-order filter."""
 
 from math import gamma, pi, sqrt
 from typing import NamedTuple
@@ -88,7 +88,7 @@ def gust_variance(speed: float, spectrum: str = "harris") -> float:
 
 
 def gust_filter(wind: Wind) -> GaussMarkov:
-    """First-order process with the variance of the gusts and their most energetic frequency.
+    """First-order process with the gusts' variance and most energetic frequency.
 
     f S(f) of a Gauss-Markov process is largest at f = 1 / (2 pi T); Harris's at sqrt(3)
     V / 1800 m, Davenport's at sqrt(3) V / 1200 m, so T = 165.4 m / V and 110.3 m / V;

@@ -1,4 +1,4 @@
-"""Curves over an angle as short Fourier series, which kernels evaluate without the angle itself."""
+"""Curves over an angle, and their coefficients as short Fourier series (`series`)."""
 
 from typing import NamedTuple
 
@@ -25,20 +25,23 @@ def circle(points: int = 360) -> Floats:
 
 
 def half_circle() -> Floats:
-    """Angles of :func:`circle` from 0 to pi, of which :func:`mirrored` makes the rest."""
+    """Angles of :func:`circle` from 0 to pi; :func:`mirrored` completes them."""
     angles = circle()
     return angles[: len(angles) // 2 + 1]
 
 
 def mirrored(half: ArrayLike, sign: float = 1.0) -> Floats:
-    """Complete a curve from 0 to pi over :func:`circle`: even for a sign of 1, odd for -1."""
+    """Complete a curve from 0 to pi over :func:`circle`, even by default.
+
+    It is odd for a sign of -1.
+    """
     values = np.asarray(half, dtype=float)
     other_side = values[-2:0:-1]
     return np.concatenate([values, sign * other_side])
 
 
 def cosine_coefficients(curve: Floats, n: int) -> Floats:
-    """Coefficients of an even curve over :func:`circle`: the mean, then n of cosines."""
+    """Coefficients of an even curve over :func:`circle`: the mean, then n cosines."""
     series: Floats = np.fft.rfft(curve).real[: n + 1] * 2.0 / len(curve)
     series[0] *= 0.5
     return series

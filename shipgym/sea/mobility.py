@@ -12,16 +12,16 @@ from shipgym.ships.term_table import Structure
 
 
 def mobility_matrix(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
-    """Inverse of mass and added mass, from X, Y, N, K to accelerations, SI units, shape (4, 4).
+    """Inverse of mass and added mass, SI units, shape (4, 4).
 
-    The accelerations are those in surge, sway, yaw and roll. An identified model
-    divides by the inertia of its particulars, given or estimated, a reference ship by
-    that of its own equations (the tanker's depends on the depth, m). A structure
-    without an equation of surge keeps its speed, one without sway or yaw does not drift
-    or turn: their rows and columns are 0. So is roll where the model has none; a
-    structure with an equation of roll, or a ship of the user's that rolls, has the
-    inertia that follows from roll period and metacentric height. Raises InputError that
-    names what mass and added mass lack.
+    From X, Y, N, K it makes accelerations in surge, sway, yaw and roll. An identified
+    model divides by the inertia of its particulars, given or estimated, a reference
+    ship by that of its own equations (the tanker's depends on the depth, m). A
+    structure without an equation of surge keeps its speed, one without sway or yaw does
+    not drift or turn: their rows and columns are 0. So is roll where the model has
+    none; a structure with an equation of roll, or a ship of the user's that rolls, has
+    the inertia that follows from roll period and metacentric height. Raises InputError
+    that names what mass and added mass lack.
     """
     axes = _axes(model)
     mass = np.zeros((4, 4))
@@ -51,7 +51,7 @@ def _axes(model: ManoeuvringModel) -> list[int]:
 
 
 def roll_inertia(model: ManoeuvringModel) -> float:
-    """Inertia in roll of the ship and the water that rolls with it, kg m2: m g GM (T / 2 pi)^2."""
+    """Inertia in roll with that of the water, m g GM (T / 2 pi)^2, kg m2."""
     ship = weather_particulars(model.particulars)
     stiffness = ship.require("mass") * GRAVITY * ship.require("metacentric_height")
     return stiffness * (ship.require("roll_period") / (2.0 * np.pi)) ** 2

@@ -97,7 +97,8 @@ def wave_motion(
 ) -> WaveMotion:
     """Variance of wave-induced heading and roll for waves from all directions.
 
-    Particulars are estimated where absent, as in :func:`shipgym.sea.wave_drift`. Roll meets the waves at `speed`, m/s, by default that of service, or 0 where that is
+    Particulars are estimated where absent, as in :func:`shipgym.sea.wave_drift`. Roll
+    meets the waves at `speed`, m/s, by default that of service, or 0 where that is
     not known.
     """
     ship = weather_particulars(particulars)

@@ -184,7 +184,7 @@ def by_waves(waves: FromBow, drift: float, p: SeaParameters) -> Accelerations:
 
 
 def encounter(waves: FromBow, u: float, v: float, p: SeaParameters) -> float:
-    """Frequency at which a ship meets the waves of the peak, rad/s; Fossen 2011, (8.106)."""
+    """Frequency at which a ship meets the peak's waves, rad/s; Fossen 2011, (8.106)."""
     ahead = u * waves.cosine + v * waves.sine
     met = p.wave_frequency + p.wave_number * ahead
     return max(fabs(met), SLOWEST_ENCOUNTER * p.wave_frequency)
@@ -206,7 +206,7 @@ def first_order_motion(
     roll: Oscillator,
     p: SeaParameters,
 ) -> FirstOrderMotion:
-    """First-order motion of a ship at an angle to the waves, met at a frequency in rad/s.
+    """First-order motion of a ship that meets waves at an angle and a frequency, rad/s.
 
     The angle is the oscillator's velocity, which is white noise through gain s / (s^2 +
     2 lambda w s + w^2). Its own derivative has no finite variance, so the rate is the
@@ -271,7 +271,7 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
 
 
 def direction(given: float, word: Any, draw: Any) -> float:
-    """Return a given direction, or one drawn from the full circle where it is NaN, rad."""
+    """Return a direction, rad, or one drawn from the full circle where it is NaN."""
     drawn = 2.0 * pi * TO_UNIT * float(mix(word + draw) >> S11)
     return drawn if given != given else given
 

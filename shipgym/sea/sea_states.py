@@ -1,4 +1,4 @@
-"""Sea states of WMO code table 3700, with the waves and the wind that are taken for them."""
+"""Sea states of WMO code table 3700, and waves and wind that are taken for them."""
 
 from dataclasses import dataclass
 
@@ -47,7 +47,7 @@ def wind_at_10_m(knots: float) -> float:
 
 
 def find_sea_state(name: str | int) -> SeaState:
-    """Sea state by its name or WMO code; InputError for one that is not in the table."""
+    """Sea state by its name or WMO code; InputError for one that is not there."""
     states = sea_states()
     for state in states.values():
         if not isinstance(name, bool) and name in (state.name, state.code):

@@ -1,4 +1,4 @@
-"""Current, wind and waves as they act on one ship: parameters of the sea that loops read."""
+"""Current, wind and waves as they act on one ship: parameters of its sea."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Wave spectra, and the linear filters that stand for first-order motion and slow drift."""
+"""Wave spectra, and linear filters for first-order motion and slow drift."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -18,10 +18,10 @@ from shipgym.ships.particulars import Particulars
 
 
 class WaveFilter(NamedTuple):
-    """h(s) = gain s / (s^2 + 2 damping w0 s + w0^2), driven by white noise of unit intensity.
+    """h(s) = gain s / (s^2 + 2 damping w0 s + w0^2), driven by white noise.
 
-    Its output has unit variance: gain^2 = 4 damping w0. At sea w0, and so the gain, is
-    that of encounter.
+    The intensity of the noise is 1. Its output has unit variance: gain^2 = 4 damping
+    w0. At sea w0, and so the gain, is that of encounter.
     """
 
     peak_frequency: float  # w0 for a ship at rest, rad/s
@@ -53,10 +53,11 @@ def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
 
 
 def jonswap(omega: ArrayLike, Hs: float, Tp: float, gamma: float = 3.3) -> Floats:
-    """Spectrum of a growing sea (Hasselmann et al. 1973), normalised to Hs; as `pierson_moskowitz`.
+    """Spectrum of a growing sea (Hasselmann et al. 1973), normalised to Hs.
 
-    The factor 1 - 0.287 ln(gamma) of the literature (DNV-RP-C205) is replaced by the
-    exact integral; a peak enhancement gamma of 1 gives :func:`pierson_moskowitz`.
+    Arguments and density are those of :func:`pierson_moskowitz`. The factor 1 - 0.287
+    ln(gamma) of the literature (DNV-RP-C205) is replaced by the exact integral; a peak
+    enhancement gamma of 1 gives :func:`pierson_moskowitz`.
     """
     ratio = np.asarray(omega, dtype=float) * Tp / (2.0 * pi)
     plain = pierson_moskowitz(omega, Hs, Tp)
@@ -86,7 +87,7 @@ def wave_spectrum(waves: Waves, omega: ArrayLike) -> Floats:
 
 
 def frequencies(waves: Waves) -> Floats:
-    """Frequencies for integrals over the spectrum, from 0.4 to 12 times that of the peak, rad/s."""
+    """Frequencies for integrals over the spectrum, 0.4 to 12 times the peak, rad/s."""
     return 2.0 * pi / waves.peak_period * np.geomspace(0.4, 12.0, 400)
 
 
@@ -123,7 +124,7 @@ def encounter_frequency(omega: ArrayLike, speed: ArrayLike, chi: ArrayLike) -> F
 
 
 def wave_filter(waves: Waves) -> WaveFilter:
-    """Second-order filter whose output has the shape of the wave spectrum and unit variance.
+    """Second-order filter with the shape of the wave spectrum and unit variance.
 
     The relative damping is fitted by least squares to the spectrum of unit variance; it
     depends on the peak enhancement alone. Saelid, Jenssen & Balchen 1983 (Design and
@@ -167,7 +168,7 @@ def draught_attenuation(omega: ArrayLike, draught: float) -> Floats:
 
 
 def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
-    """Process s(t), without unit, of the slowly varying drift force: mean force * (1 + s).
+    """Process s(t) of the slowly varying drift force, mean force * (1 + s).
 
     By Newman's approximation (Newman 1974, Second order slowly varying forces on
     vessels in irregular waves) the force is the squared envelope of a narrow-banded

@@ -29,7 +29,7 @@ AIR_DENSITY = 1.225
 
 @dataclass(frozen=True)
 class WindCurves:
-    """Wind forces and moments by dynamic pressure (half the air's density times relative speed squared).
+    """Wind forces and moments by dynamic pressure, 0.5 air density relative speed^2.
 
     The angle is that of the relative wind seen from the bow, 0 ahead, pi / 2 from
     starboard: where (u_rw, v_rw) is the ship's velocity through the air in body axes

@@ -121,7 +121,7 @@ class WindTable:
     def from_dict(
         cls, mapping: Mapping[str, Any], where: str = "wind table"
     ) -> WindTable:
-        """Read a table as it stands in JSON; InputError for an unknown or missing row."""
+        """Read a table from JSON; InputError for an unknown or missing row."""
         needed = ("angles_deg", "CX", "CY", "CN")
         return cls(**check_table(mapping, where, (*needed, "CK"), needed))
 
