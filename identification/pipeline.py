@@ -2,31 +2,30 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
-import numpy as np
-
-import shipgym
-from identification.estimators.estimator import Estimator, FitTask
+from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.kernel_residual import (
-    BLACK_BOX,
+    INPUT_CHANNELS,
+    KernelResidual,
     fit_kernel,
-    reference_options,
+    inputs_of,
     stabilised,
 )
-from identification.estimators.methods import Method, get_method
+from identification.estimators.methods import get_method
+from identification.estimators.rm_svm import RMSVM
 from identification.estimators.threads import single_threaded
-from identification.options import (
-    Given,
-    Options,
-    name_of,
-    provenance_settings,
-    whole_call,
+from identification.evaluation import (
+    MEMORY,
+    evaluated,
+    provenance_of,
+    scaled_covariance,
 )
-from identification.regression.grey_box import bare_metrics, explained_samples
-from identification.regression.problem import Problem, held_out, pose
-from identification.regression.samples import Samples
+from identification.options import AUTO, Given, Options, name_of, stage, whole_call
+from identification.regression.grey_box import explained_samples
+from identification.regression.preprocess import Preprocessing, smoothed_channels
+from identification.regression.problem import held_out, pose
+from identification.regression.samples import Sampling
 from identification.result import IdentificationResult
 from identification.simulation_error.maximum_a_posteriori import (
     MAP,
@@ -34,385 +33,229 @@ from identification.simulation_error.maximum_a_posteriori import (
     fit_mmg,
 )
 from identification.simulation_error.prior import with_prior
-from identification.simulation_error.refine import Refined, refine, split_settings
-from identification.uncertainty.bootstrap import (
-    bootstrap_covariance,
-    influence_covariance,
-)
-from identification.uncertainty.covariance import (
-    coefficient_covariance,
-    joint_covariance,
-)
-from identification.uncertainty.model_error import (
-    FEWEST_TRIALS,
-    model_error,
-    without_trial,
-)
-from identification.validation.diagnostics import diagnose
-from identification.validation.guard import (
-    GuardedFit,
-    guarded_fit,
-    reasons_unstable,
-    with_coefficients,
-)
-from identification.validation.prediction import predict, trial_metrics
+from identification.simulation_error.prior_knowledge import PriorKnowledge
+from identification.simulation_error.refine import refine
+from identification.uncertainty.uncertainty import Uncertainty
+from identification.validation.guard import GuardedFit, guarded_fit, reasons_unstable
 from identification.validation.selection import select
-from shipgym import ShipModel, SteeringGear, Trial
-from shipgym.arrays import Floats
+from shipgym import InputError, ShipModel, SteeringGear, Trial
+from shipgym.checks import quoted
 from shipgym.ships import GreyBox, Structure
 from shipgym.ships.catalogue import fitted_box
+from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.mmg import MMG
-from shipgym.trials.identify_table import AUTO
 
-MEMORY = 1.0  # of residuals, in the time to sail one ship length
+#: The structure beneath a kernel where none is named.
+BLACK_BOX = "linear"
+#: Methods that an identification with a kernel may have; those of its reference ship.
+KERNEL_METHODS = ("tls-svm", "ls-svm", "rm-svm", "output-error", MAP)
 
 
 @single_threaded()
 def identify(
     trials: Sequence[Trial],
     structure: str | Structure = "abkowitz",
-    method: str = "tls-svm",
-    samples: str = "spline",
+    method: Any = "tls-svm",
+    samples: str | Sampling = "spline",
     particulars: Given = None,
     steering: SteeringGear | None = None,
-    **options: Any,
+    *,
+    preprocessing: str | Preprocessing = "spline",
+    reference_model: str | ShipModel | None = None,
+    kernel: str | KernelResidual | None = None,
+    prior: str | ShipModel | PriorKnowledge | None = None,
+    uncertainty: str | Uncertainty = "analytic",
+    current: str | Mapping[str, float] = "auto",
+    wind: str | Mapping[str, Any] = "auto",
+    hold_out: str | Sequence[str] = (),
+    guarded: bool = True,
+    name: str | None = None,
+    service_shaft_speed: float | None = None,
 ) -> IdentificationResult:
     """Identify a manoeuvring model from recorded trials.
 
-    Trials marked `validate` are predicted, and influence no coefficient.
-
-    Raises InputError for trials that excite nothing, lack channels or samples, and for
-    particulars that do not suffice.
+    `Options` documents all arguments but the trials. A stage is an object, such as
+    `method=TruncatedLSSVM(rank=12)`, or the name of a default one, such as "tls-svm".
 
     Parameters
     ----------
     trials : sequence of Trial
         Those with `use` "fit" are fitted; they need the channels u, v, r and delta, and
-        n for structures that know the shaft speed.
-    structure : str or Structure
-        Terms of the model: a name of `shipgym.list_structures`, a table, or "auto": the
-        structure and method that predict the trials to fit best, each held out in turn;
-        a method other than the default is kept.
-    method : str or estimator
-        A name of `identification.estimators.methods.METHODS`, or an object with
-        scikit-learn's interface, `fit(X, y)` that sets `coef_`, of which each equation
-        gets a copy.
-    samples : {"spline", "integral", "euler"}
-        How the samples become a regression.
-    particulars : Particulars or mapping
-        Of the ship; at least the length, and, for structures of forces, what is needed
-        to estimate mass and added mass. The service speed is estimated from the start
-        of the trials where absent.
-    steering : SteeringGear, optional
-        Estimated from the rudders of the trials where absent.
-    **options
-        The other fields of `Options`: of the identification, and settings of the
-        method.
+        n for structures that know the shaft speed. Those marked "validate" are
+        predicted, and influence no coefficient.
+
+    Raises
+    ------
+    InputError
+        For trials that excite nothing, lack channels or samples, and for particulars
+        that do not suffice.
     """
-    asked = Options.of(
-        {"structure": structure, "method": method, "samples": samples, **options}
+    options = Options(
+        structure=structure,
+        method=method,
+        samples=stage(Sampling, samples),
+        particulars=particulars,
+        steering=steering,
+        preprocessing=stage(Preprocessing, preprocessing),
+        reference_model=reference_model,
+        kernel=None if kernel is None else stage(KernelResidual, kernel),
+        prior=None if prior is None else stage(PriorKnowledge, prior),
+        uncertainty=stage(Uncertainty, uncertainty),
+        current=current,
+        wind=wind,
+        hold_out=hold_out,
+        guarded=guarded,
+        name=name,
+        service_shaft_speed=service_shaft_speed,
     )
-    return _identified(trials, asked, particulars, steering)
+    return identified(trials, options)
 
 
-def _identified(
-    trials: Sequence[Trial],
-    options: Options,
-    particulars: Given,
-    steering: SteeringGear | None,
-) -> IdentificationResult:
-    """By regression, unless the options ask for another way."""
+def identified(trials: Sequence[Trial], options: Options) -> IdentificationResult:
+    """Identify by regression, unless the options ask for another way."""
     if options.kernel is not None:
-        return _identified_with_kernel(trials, options, particulars, steering)
+        return _by_kernel(trials, options, options.kernel)
     if options.structure == AUTO:
-        return _identified_best(trials, options, particulars, steering)
+        return _by_selection(trials, options)
     if options.structure == MMG:
-        return _identified_mmg(trials, checked_mmg(options), particulars, steering)
+        return _by_simulation(trials, checked_mmg(options))
+    return _by_regression(trials, options)
+
+
+def _by_regression(trials: Sequence[Trial], options: Options) -> IdentificationResult:
+    """Fit the regression of each equation, guard the model, and refine it where asked."""
     method = get_method(options.method)
-    problem = pose(trials, options, particulars, steering)
-    fit, refined, of_method = _fitted(method, options, problem)
-    provenance = _provenance(options, method.name, of_method, fit, problem)
+    problem = pose(trials, options)
+    task = FitTask(problem.samples, problem.blank, problem.used)
     if options.prior is not None:
-        prior = getattr(next(iter(fit.estimators.values()), None), "prior_", {})
-        provenance |= {"prior": name_of(options.prior), **prior}
+        method = with_prior(method, options.prior, task.blank)
+    fit = guarded_fit(method, task, options.guarded)
+    refined = None
+    if method.refinement is not None:
+        memory = MEMORY * task.blank.travel_time
+        refined = refine(fit, task, method.refinement, memory)
+        fit = refined.fit
+
+    provenance = provenance_of(options, method.name, fit, problem)
+    if options.prior is not None:
+        provenance |= {"prior": name_of(options.prior.source), **_prior_report(fit)}
     if refined is not None:
         provenance["refinement"] = refined.report
-    if options.uncertainty != "analytic":
-        provenance["uncertainty"] = options.uncertainty
-    covariance = _scaled_covariance(options, fit, refined, problem, provenance)
-    return _evaluated(
-        replace(fit.model, covariance=covariance), fit, problem, provenance
-    )
+    if options.uncertainty.covariance != "analytic":
+        provenance["uncertainty"] = options.uncertainty.covariance
+    covariance, error = scaled_covariance(options.uncertainty, fit, refined, problem)
+    if error:
+        provenance["model_error"] = error
+    model = replace(fit.model, covariance=covariance)
+    call = whole_call(options, problem.trials)
+    return evaluated(model, fit, problem, provenance, call)
 
 
-def _identified_best(
-    trials: Sequence[Trial],
-    options: Options,
-    particulars: Given,
-    steering: SteeringGear | None,
-) -> IdentificationResult:
-    """By the structure and method that predict the trials to fit best, each held out, and the ranking."""
+def _prior_report(fit: GuardedFit) -> dict[str, Any]:
+    """How strong a prior was; every estimator has the same report."""
+    for estimator in fit.estimators.values():
+        return dict(getattr(estimator, "prior_", {}))
+    return {}
+
+
+def _by_selection(trials: Sequence[Trial], options: Options) -> IdentificationResult:
+    """By the structure and method that predict the trials to fit best, each held out, with the ranking."""
     marked = held_out(trials, options.hold_out)
-    fitted = partial(_identified, particulars=particulars, steering=steering)
-    chosen, found = select(
-        fitted, [trial for trial in marked if trial.use == "fit"], options
-    )
-    best = fitted(trials, chosen)
-    model = replace(
-        best.model, provenance={**(best.model.provenance or {}), "selection": found}
-    )
-    call = whole_call(options, marked, particulars, steering)
+    to_fit = [trial for trial in marked if trial.use == "fit"]
+    chosen, ranking = select(identified, to_fit, options)
+    best = identified(trials, chosen)
+    provenance = {**(best.model.provenance or {}), "selection": ranking}
     return replace(
-        best, model=model, metrics=best.metrics | {"selection": found}, settings=call
+        best,
+        model=replace(best.model, provenance=provenance),
+        metrics=best.metrics | {"selection": ranking},
+        settings=whole_call(options, marked),
     )
 
 
-def _identified_with_kernel(
-    trials: Sequence[Trial],
-    options: Options,
-    particulars: Given,
-    steering: SteeringGear | None,
+def _by_kernel(
+    trials: Sequence[Trial], options: Options, kernel: KernelResidual
 ) -> IdentificationResult:
     """A reference ship, fitted to the trials or named, and a kernel on what she leaves."""
     beneath = reference_options(options)
-    problem = pose(trials, beneath, particulars, steering)
+    problem = pose(trials, beneath)
     blank, box = problem.blank, problem.table
     if not isinstance(box, GreyBox):
-        fitted = _identified(trials, beneath, particulars, steering).model
-        blank = stabilised(fitted) if beneath.structure == BLACK_BOX else fitted
+        blank = identified(trials, beneath).model
+        if beneath.structure == BLACK_BOX:
+            blank = stabilised(blank)
         box = fitted_box(blank)
-    found = fit_kernel(blank, problem.used, box, options, problem.sampling)
-    fit = _simulated(found.model, found.estimators, problem.used)
-    call = whole_call(options, problem.trials, particulars, steering)
+
+    channels = [
+        smoothed_channels(trial, INPUT_CHANNELS, options.preprocessing.smoothing)
+        for trial in problem.used
+    ]
+    found = fit_kernel(
+        kernel,
+        blank,
+        problem.used,
+        box,
+        inputs_of(channels, blank.particulars),
+        lambda table: problem.rows_of(table, blank),
+    )
     problem = replace(
-        problem,
-        blank=found.model,
-        table=found.model.table,
-        samples=found.samples,
-        call=call,
+        problem, blank=found.model, table=found.model.table, samples=found.samples
     )
+    fit = _unguarded(found.model, found.estimators, problem.used)
     named = replace(options, structure=beneath.structure)
-    provenance = _provenance(
-        named, name_of(options.method), options.settings(), fit, problem
-    )
+    provenance = provenance_of(named, name_of(options.method), fit, problem)
     provenance["kernel"] = found.report
-    covariance = _scaled_covariance(options, fit, None, problem, provenance)
-    return _evaluated(
-        replace(found.model, covariance=covariance), fit, problem, provenance
-    )
+    covariance, error = scaled_covariance(options.uncertainty, fit, None, problem)
+    if error:
+        provenance["model_error"] = error
+    model = replace(found.model, covariance=covariance)
+    call = whole_call(options, problem.trials)
+    return evaluated(model, fit, problem, provenance, call)
 
 
-def _identified_mmg(
-    trials: Sequence[Trial],
-    options: Options,
-    particulars: Given,
-    steering: SteeringGear | None,
-) -> IdentificationResult:
-    """The MMG form; its regression is that on the model's own accelerations."""
-    problem = pose(trials, options, particulars, steering)
+def reference_options(options: Options) -> Options:
+    """The options by which the reference ship beneath a kernel is identified; a grey box names hers."""
+    method = options.method
+    if name_of(method) not in KERNEL_METHODS:
+        raise InputError(
+            f"method: expected one of {quoted(KERNEL_METHODS)} with a kernel, got"
+            f" {name_of(method)!r}; choose 'rm-svm' or 'ls-svm', or leave the kernel"
+            " out"
+        )
+    if isinstance(method, RMSVM):
+        has_band = method.regression != "ls-svm" or method.epsilon is not None
+        if has_band:
+            raise InputError(
+                "method: expected RM-SVM by regression 'ls-svm' without epsilon with a"
+                " kernel, which is fitted by LS-SVM only, got epsilon-SVR"
+            )
+
+    structure = options.structure
+    if structure in (Options.structure, AUTO):  # none was named
+        structure = BLACK_BOX if options.reference_model is None else GREY_BOX
+    if structure != GREY_BOX and name_of(method) == RMSVM.name:
+        method = "ls-svm"
+    return replace(options, structure=structure, method=method, kernel=None)
+
+
+def _by_simulation(trials: Sequence[Trial], options: Options) -> IdentificationResult:
+    """The MMG form by its simulation error; its regression is that on the model's own accelerations."""
+    problem = pose(trials, options)
     model, report = fit_mmg(problem, options)
     samples, estimators = explained_samples(problem.used, model, **problem.sampling)
-    fit = _simulated(model, estimators, problem.used)
     problem = replace(problem, samples=samples, blank=model)
-    return _evaluated(
-        model, fit, problem, _provenance(options, MAP, {}, fit, problem) | report
-    )
+    fit = _unguarded(model, estimators, problem.used)
+    provenance = provenance_of(options, MAP, fit, problem) | report
+    call = whole_call(options, problem.trials)
+    return evaluated(model, fit, problem, provenance, call)
 
 
-def _simulated(
-    model: ShipModel, estimators: dict[str, Estimator], used: Sequence[Trial]
+def _unguarded(
+    model: ShipModel, estimators: Estimators, used: Sequence[Trial]
 ) -> GuardedFit:
     """A fit that was not guarded, and whether it runs away."""
     reasons = reasons_unstable(model, used)
-    report = (
-        {"decision": "runs away", "rejected": reasons}
-        if reasons
-        else {"decision": "stable as fitted"}
-    )
+    report: dict[str, Any] = {"decision": "stable as fitted"}
+    if reasons:
+        report = {"decision": "runs away", "rejected": reasons}
     return GuardedFit(model, estimators, not reasons, report)
-
-
-def _fitted(
-    method: Method, options: Options, problem: Problem
-) -> tuple[GuardedFit, Refined | None, dict[str, Any]]:
-    """Fit, guard and refine; also the settings of the method alone."""
-    task = FitTask(problem.samples, problem.blank, problem.used)
-    if options.prior is not None:
-        method = with_prior(
-            method,
-            options.prior,
-            options.prior_strength,
-            task.blank,
-            options.prior_folds,
-        )
-    refinement, settings = split_settings(options.settings(), method.refined)
-    fit = guarded_fit(method, settings, task, options.guarded)
-    if refinement is None:
-        return fit, None, settings
-    refined = refine(fit, task, refinement, MEMORY * task.blank.travel_time)
-    return refined.fit, refined, settings
-
-
-def _provenance(
-    options: Options,
-    method: str,
-    settings: Mapping[str, Any],
-    fit: GuardedFit,
-    problem: Problem,
-) -> dict[str, Any]:
-    """How a model came about, for its file; `settings`: of the method."""
-    box, further = problem.table, {}
-    if isinstance(box, GreyBox):
-        further["reference"] = {
-            "name": box.ship.name,
-            "similarity": problem.similarity,
-            "shaft": box.shaft,
-        }
-    if searched := {
-        q: m.chosen_ for q, m in fit.estimators.items() if hasattr(m, "chosen_")
-    }:
-        further["search"] = searched
-    return {
-        "structure": name_of(options.structure),
-        "method": method,
-        "samples": options.samples,
-        "settings": provenance_settings(options, settings),
-        **further,
-        "software": f"shipgym {shipgym.__version__}",
-        "steps_per_window": problem.samples.window,
-        "ranks": {
-            q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.estimators.items()
-        },
-        "guard": fit.report,
-        "stable": fit.stable,
-        "trials": [
-            {
-                "name": trial.name,
-                "sha256": trial.raw.sha256,
-                "derived": sorted(trial.derived),
-            }
-            | ({"repaired": dict(trial.repaired)} if trial.repaired else {})
-            for trial in problem.used
-        ],
-    }
-
-
-def _scaled_covariance(
-    options: Options,
-    fit: GuardedFit,
-    refined: Refined | None,
-    problem: Problem,
-    provenance: dict[str, Any],
-) -> Floats:
-    """Covariance of the coefficients, scaled by the model error, of which the provenance tells."""
-    covariance = _covariance(
-        fit, problem.samples, problem.blank, refined, options.uncertainty
-    )
-    if not options.model_error:
-        return covariance
-    own = replace(fit.model, covariance=covariance)
-    error = model_error(own, _left_out(fit, problem, refined, covariance), problem.used)
-    provenance["model_error"] = error
-    factor: float = error["factor"]
-    return factor**2 * covariance
-
-
-def _covariance(
-    fit: GuardedFit,
-    regression: Samples,
-    blank: ShipModel,
-    refined: Refined | None,
-    uncertainty: str,
-) -> Floats:
-    """Covariance of the coefficients, with errors correlated over the time to sail one ship length."""
-    memory, bootstrap = MEMORY * blank.travel_time, uncertainty == "bootstrap"
-    if refined is None or refined.covariance is None:
-        by_estimators = bootstrap_covariance if bootstrap else joint_covariance
-        covariance = by_estimators(fit.estimators, regression, memory)
-    elif bootstrap:
-        covariance = influence_covariance(
-            refined.influences, max(round(memory / refined.width), 1)
-        )
-    else:
-        covariance = refined.covariance
-    return coefficient_covariance(covariance, blank.acceleration_matrix)
-
-
-def _left_out(
-    fit: GuardedFit, problem: Problem, refined: Refined | None, covariance: Floats
-) -> list[ShipModel]:
-    """The models, with covariance, that the fit would have given without each of the trials."""
-    count, blank = len(problem.used), problem.blank
-    if count < FEWEST_TRIALS:
-        return []
-    if refined is None or refined.covariance is None:
-        models = []
-        for estimators, rows in (
-            without_trial(fit.estimators, problem.samples, i) for i in range(count)
-        ):
-            own = _covariance(
-                replace(fit, estimators=estimators), rows, blank, None, "analytic"
-            )
-            models.append(
-                replace(with_coefficients(fit.model, estimators), covariance=own)
-            )
-        return models
-    values, most = np.array(list(fit.model.coefficients.values())), count / (count - 1)
-    changes = [
-        np.linalg.solve(blank.acceleration_matrix, one.sum(axis=0))
-        for one in refined.influences
-    ]
-    return [
-        replace(
-            fit.model.with_coefficients(values - most * change),
-            covariance=most * covariance,
-        )
-        for change in changes
-    ]
-
-
-def _evaluated(
-    model: ShipModel, fit: GuardedFit, problem: Problem, provenance: dict[str, Any]
-) -> IdentificationResult:
-    """The model with its provenance, its predictions of all trials that are not skipped, and diagnostics."""
-    provenance |= problem.sea
-    provenance["steering"] = (
-        "estimated" if problem.call["steering"] is None else "given"
-    )
-    trials = tuple(trial for trial in problem.trials if trial.use != "skip")
-    predictions = {trial.name: predict(model, trial) for trial in trials}
-    if lost := [name for name, predicted in predictions.items() if predicted is None]:
-        provenance |= {"stable": False, "runs_away_on": lost}
-    model, stable = replace(model, provenance=provenance), bool(provenance["stable"])
-    reasons = [f"trial {name!r}, open loop" for name in lost] or provenance[
-        "guard"
-    ].get("rejected", [])
-    bare = (
-        {"reference": bare_metrics(model, trials)}
-        if isinstance(problem.table, GreyBox)
-        else {}
-    )
-    metrics = {
-        "stable": stable,
-        "instability": None if stable else f"runs away: {'; '.join(reasons)}",
-        "trials": {
-            t.name: trial_metrics(model, t, predictions[t.name]) for t in trials
-        },
-        **bare,
-    }
-    return IdentificationResult(
-        model=model,
-        stable=stable,
-        metrics=metrics,
-        predictions=predictions,
-        trials=trials,
-        diagnostics=diagnose(fit.estimators, problem.samples, problem.table),
-        samples=problem.samples,
-        estimators=fit.estimators,
-        settings=problem.call,
-        searches={
-            q: search
-            for q, m in fit.estimators.items()
-            if (search := getattr(m, "search_", None))
-        },
-    )

@@ -22,6 +22,7 @@ from agents.cli.benchmark import benchmark_command
 from agents.cli.command import FAILED, answered, fail
 from agents.cli.export import export_command
 from agents.cli.identification import advise_command, identify_command, reduce_command
+from agents.cli.identify_options import with_identify_options
 from agents.cli.logs import look_command, new_ship_command
 from agents.cli.reproduction import reproduce_command
 from agents.cli.steer import simulate_command, steer_command
@@ -142,6 +143,7 @@ def _print_trials(found: StandardTrials, page: Path | None) -> None:
 
 
 @answered
+@with_identify_options
 def autopilot_command(
     ship: command.ShipFileArgument,
     out: Annotated[
@@ -153,7 +155,7 @@ def autopilot_command(
     ] = 200,
     seed: Annotated[int, Option(min=0, help="Random seed of draws and episodes.")] = 0,
     *,
-    options: command.IdentifyOptions,
+    options: dict[str, Any],
     agents: Annotated[
         list[str] | None,
         Option(
@@ -314,18 +316,9 @@ COMMANDS = (
     replay_command,
     doctor_command,
 )
-IDENTIFYING = (
-    "identify",
-    "advise",
-    "reduce",
-    "autopilot",
-)  # they take the options of `identify`
 
 for name, function in zip(EXAMPLES, COMMANDS, strict=True):
-    kind = command.IdentifyCommand if name in IDENTIFYING else None
-    app.command(name, epilog=f"Example: shipgym {name} {EXAMPLES[name]}", cls=kind)(
-        function
-    )
+    app.command(name, epilog=f"Example: shipgym {name} {EXAMPLES[name]}")(function)
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 from typer import Argument, Option
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperGroup
 
 from agents.cli.parameters import take_parameters, typed_parameters
 
@@ -34,9 +34,6 @@ Address = Annotated[
         metavar="HOST:PORT", help="Ray cluster; default: start Ray on this computer."
     ),
 ]
-IdentifyOptions = Annotated[
-    dict[str, Any], Option(parser=dict, hidden=True)
-]  # see IdentifyCommand
 Json = Annotated[
     bool, Option("--json", help="Print JSON for programs instead of tables.")
 ]
@@ -120,18 +117,3 @@ def fail(message: str, code: int) -> NoReturn:
 
     tell(message)
     raise typer.Exit(code) from None
-
-
-class IdentifyCommand(TyperCommand):
-    """A command that takes the options of `identify`, which are read, with numpy, only when it is called."""
-
-    def make_context(self, *args: Any, **kwargs: Any) -> Any:
-        """The context of the same command with these options in place of its parameter `options`."""
-        from agents.cli.identify_options import takes_identify_options
-
-        app = typer.Typer(
-            add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
-        )
-        whole = takes_identify_options(inspect.unwrap(self.callback))  # type: ignore[arg-type]
-        app.command(self.name, epilog=self.epilog)(answered(whole))
-        return typer.main.get_command(app).make_context(*args, **kwargs)

@@ -26,7 +26,7 @@ from identification.regression.integrals import (
 from identification.regression.rudder import rebuild, straight
 from shipgym import InputError, Particulars, SteeringGear, Trial
 from shipgym.arrays import Floats, Integers, integral
-from shipgym.checks import check_whole
+from shipgym.checks import check_choice, check_whole
 from shipgym.ships import GreyBox, Structure
 
 SAMPLE_STRUCTURES = ("euler", "integral", "spline")
@@ -37,6 +37,30 @@ SHORTEST_GAP = (
 )
 NEIGHBOURS = 11  # steps whose median is the usual one
 FEWEST_SAMPLES = 10  # between gaps; fewer are left out
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How a trial becomes a regression.
+
+    Parameters
+    ----------
+    rule : {"spline", "integral", "euler"}
+        Gauss quadrature on splines through the samples, broken where the rudder starts
+        or stops moving; trapezoid rule over each window (ISSI of Cao 2015); or value at
+        the start of each step (ESSI of Cao 2015), biased at long steps.
+    window : int or None, at least 1
+        Sampling steps over which velocities are integrated. None: 1 without noise,
+        otherwise chosen by the noise level.
+    """
+
+    rule: str = "spline"
+    window: int | None = None
+
+    def __post_init__(self) -> None:
+        check_choice(self.rule, SAMPLE_STRUCTURES, "samples")
+        if self.window is not None:
+            check_whole(self.window, "window", at_least=1, hint="in sampling steps")
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,13 +144,7 @@ def build_samples(
     shaft_speed : float
         At service speed, 1/s, for terms that refer to it.
     """
-    if samples not in SAMPLE_STRUCTURES:
-        raise InputError(
-            f"samples: {samples!r} found, expected one of"
-            f" {', '.join(SAMPLE_STRUCTURES)}"
-        )
-    if window is not None:
-        check_whole(window, "window", at_least=1, hint="in sampling steps")
+    Sampling(samples, window)
     sampling = _Sampling(
         structure, particulars, samples, window, gear, smooth, shaft_speed
     )

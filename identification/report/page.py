@@ -3,6 +3,7 @@
 from typing import Any
 
 from identification.fit import Fit
+from identification.options import settings_in_words
 from identification.report.figures import coefficients_figure, regression_figures
 from identification.report.view import fit_view, trial_figures
 from identification.validation.warnings import (
@@ -31,5 +32,6 @@ def report_page(fit: Fit) -> str:
         instability=instability,
         held_out=held_out_error(fit),
         undetermined=undetermined(fit),
-        settings=fit.settings,
+        settings=settings_in_words(fit.settings),
+        trials=fit.settings["trials"],
     )

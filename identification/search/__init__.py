@@ -1,6 +1,6 @@
 """Search for settings: optimisers behind one signature, by name."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, cast
 
 from numpy.typing import ArrayLike
@@ -27,7 +27,7 @@ __all__ = [
     "minimise",
 ]
 
-OPTIMISERS: dict[str, Callable[..., Optimiser]] = {
+OPTIMISERS: dict[str, type[Optimiser]] = {
     "abc": ArtificialBeeColony,
     "pso": ParticleSwarm,
     "grid": GridSearch,
@@ -36,18 +36,18 @@ OPTIMISERS: dict[str, Callable[..., Optimiser]] = {
 
 
 def get_optimiser(optimiser: str | Mapping[str, Any] | Optimiser) -> Optimiser:
-    """An optimiser by name, as a table with settings, `{"name": "abc", "rounds": 60}`, or as given."""
+    """An optimiser as given, by name, or by a table with settings, `{"name": "abc", "rounds": 60}`."""
     if hasattr(optimiser, "minimise"):
         return cast(Optimiser, optimiser)
-    settings = (
-        dict(optimiser) if isinstance(optimiser, Mapping) else {"name": optimiser}
-    )
+    table = optimiser if isinstance(optimiser, Mapping) else {"name": optimiser}
+    settings = dict(table)
     name = check_choice(settings.pop("name", None), OPTIMISERS, "optimiser")
     try:
         return OPTIMISERS[name](**settings)
     except TypeError as error:
         raise InputError(
-            f"optimiser: {', '.join(settings)} found for {name!r}: {error}"
+            f"optimiser: expected settings of {name!r}, got {', '.join(settings)}:"
+            f" {error}"
         ) from None
 
 

@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 from identification.options import Options, name_of
 from identification.regression.problem import Problem
 from identification.simulation_error.mmg_prior import YOSHIMURA, MMGPrior, mmg_prior
+from identification.simulation_error.prior_knowledge import PriorKnowledge
 from identification.simulation_error.segments import (
     Segment,
     channel_units,
@@ -23,6 +24,7 @@ from identification.simulation_error.segments import (
     cut,
     sailed,
 )
+from identification.uncertainty.uncertainty import Uncertainty
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_number
@@ -30,7 +32,7 @@ from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES
 from shipgym.ships.mmg import IDENTIFIED
 
-MAP, DEFAULT_METHOD = "map", Options.method
+MAP = "map"
 SEGMENT_LENGTHS, INTERVAL = (
     1.7,
     0.067,
@@ -64,27 +66,26 @@ class Estimate:
 
 def checked_mmg(options: Options) -> Options:
     """The options of an identification of the MMG form; InputError for those that it does not have."""
-    method = name_of(options.method)
-    if method not in (MAP, DEFAULT_METHOD):
+    if not (options.method_is_default or options.method == MAP):
         raise InputError(
-            f"method: {method!r} found with structure 'mmg', which is not linear in its"
-            " coefficients: it is fitted by simulation error with a prior; leave the"
-            " method out, or choose another structure"
+            "method: expected none with structure 'mmg', which is not linear in its"
+            " coefficients and fitted by simulation error with a prior, got"
+            f" {name_of(options.method)!r}; leave the method and its settings out, or"
+            " choose another structure"
         )
-    others = [
-        *options.settings(),
-        *(["uncertainty"] if options.uncertainty != Options.uncertainty else []),
-    ]
-    if others:
+    if options.uncertainty.covariance != Uncertainty.covariance:
         raise InputError(
-            f"settings: {', '.join(others)} found, which structure 'mmg' does not know;"
-            " leave them out, or choose another structure"
+            "uncertainty: expected 'analytic' with structure 'mmg', got"
+            f" {options.uncertainty.covariance!r}; leave it out, or choose another"
+            " structure"
         )
-    if options.prior is not None and options.reference_model is not None:
+    prior = None if options.prior is None else options.prior.source
+    if prior is not None and options.reference_model is not None:
         raise InputError(
-            f"reference_model: {name_of(options.reference_model)!r} found together with"
-            f" prior {name_of(options.prior)!r}, expected one of them: the coefficients"
-            " of structure 'mmg' are pulled to one reference ship, or to formulas"
+            "reference_model: expected none together with prior"
+            f" {name_of(prior)!r}, got {name_of(options.reference_model)!r}: the"
+            " coefficients of structure 'mmg' are pulled to one reference ship, or to"
+            " formulas"
         )
     return replace(options, method=MAP)
 
@@ -98,10 +99,10 @@ def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, An
     2, 3 whose error, each trial predicted from the others, is within a tenth of the
     least.
     """
-    prior = mmg_prior(
-        options.reference_model or options.prior or YOSHIMURA, problem.blank.particulars
-    )
-    given = options.prior_strength
+    asked = options.prior or PriorKnowledge()
+    source = options.reference_model or asked.source or YOSHIMURA
+    prior = mmg_prior(source, problem.blank.particulars)
+    given = asked.strength
     if given is not None:
         check_number(given, "prior_strength", above=0.0)
     strengths = STRENGTHS if given is None else (given,)

@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 
 from identification.estimators.estimator import Estimator, Estimators, FitTask
-from identification.estimators.methods import METHODS, Method, fit_all
+from identification.estimators.methods import Method, fit_all, get_method
 from identification.regression.samples import Samples, build_samples
 from identification.simulation_error.formulas import FORMULAS, formula_coefficients
+from identification.simulation_error.prior_knowledge import PriorKnowledge
 from identification.simulation_error.similarity import AUTO, select_reference
 from identification.validation.folds import (
-    FOLDS,
     LARGEST_RUDDER,
     TRIALS,
     of_largest_rudder,
@@ -35,7 +35,6 @@ from identification.validation.guard import (
 )
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Flags, Floats
-from shipgym.checks import check_choice, check_number
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.ships import GreyBox, converted_model
 
@@ -98,7 +97,7 @@ def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
         shaft_speed=blank.service_shaft_speed,
     )
     centre = {
-        q: one.coef_ for q, one in fit_all(METHODS["ls"].estimator, samples).items()
+        q: one.coef_ for q, one in fit_all(get_method("ls").make, samples).items()
     }
     weight = 1.0 / (samples.duration[:, None] * np.sqrt(len(samples)))
     roots = {
@@ -148,41 +147,34 @@ def virtual_trials(model: ShipModel) -> list[Trial]:
     return trials
 
 
-def with_prior(
-    method: Method,
-    prior: str | ShipModel,
-    strength: float | None,
-    blank: ShipModel,
-    folds: str = TRIALS,
-) -> Method:
+def with_prior(method: Method, knowledge: PriorKnowledge, blank: ShipModel) -> Method:
     """The method, with its coefficients pulled toward a prior.
 
     The method fits what the prior leaves: where it drops a direction, the prior's
-    coefficients stay. `method`: as asked for; `prior`: "auto", "clarke", "kijima", or a
-    reference ship; `strength`: 0 leaves the method as it is, infinity gives the prior;
-    None chooses by cross-validation; `blank`: the target but for its coefficients;
-    `folds`: what the strength is chosen by (`Pulled.chosen_strength`), one of `trials`,
-    `largest-rudder`. Raises InputError for a grey box, which has a reference ship, and
-    for a prior without coefficients for the structure.
+    coefficients stay. `knowledge`: its source is "auto", "clarke", "kijima", or a
+    reference ship; a strength of 0 leaves the method as it is, infinity gives the
+    prior, None chooses by cross-validation (`Pulled.chosen_strength`); `blank`: the
+    target but for its coefficients. Raises InputError for a grey box, which has a
+    reference ship, and for a prior without coefficients for the structure.
     """
+    source = knowledge.source
+    assert source is not None
     if isinstance(blank.table, GreyBox):
         raise InputError(
-            f"prior: {prior!r} found with structure 'grey-box', which has a reference"
-            " ship already; leave the prior out, or choose another structure"
+            "prior: expected none with structure 'grey-box', which has a reference ship"
+            f" already, got {source!r}; leave the prior out, or choose another"
+            " structure"
         )
-    if strength is not None and strength != np.inf:
-        hint = "0 for no prior, inf for the prior itself"
-        check_number(strength, "prior_strength", at_least=0.0, hint=hint)
-    check_choice(folds, FOLDS, "prior_folds")
-    by_formula = isinstance(prior, str) and prior in FORMULAS
-    given = (
-        formula_prior(str(prior), blank)
+    by_formula = isinstance(source, str) and source in FORMULAS
+    prior = (
+        formula_prior(str(source), blank)
         if by_formula
-        else reference_prior(prior, blank)
+        else reference_prior(source, blank)
     )
 
     def fit(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-        return Pulled(method, make, given, task).fitted(strength, folds)
+        pulled = Pulled(method, make, prior, task)
+        return pulled.fitted(knowledge.strength, knowledge.folds)
 
     return replace(method, fit=fit)
 

@@ -7,8 +7,8 @@ Maine & Iliff 1985, NASA RP-1138).
 """
 
 import copy
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -18,6 +18,7 @@ from scipy.optimize import least_squares
 from identification.estimators.estimator import FitTask
 from identification.regression.samples import Samples
 from identification.simulation_error.prior import reference_turns
+from identification.simulation_error.refinement import Refinement
 from identification.simulation_error.segments import (
     BLOCK,
     Segment,
@@ -31,9 +32,7 @@ from identification.uncertainty.covariance import newey_west
 from identification.validation.guard import GuardedFit, reasons_unstable
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_number
 
-STARTS = ("free", "measured")
 # of fits, between which scales of the residuals and starts of the segments are renewed
 ROUNDS = 3
 OFFSET = np.radians(
@@ -42,73 +41,6 @@ OFFSET = np.radians(
 # factor on the pull from attempt to attempt, while the refined model runs away
 STRONGER = 10.0
 ATTEMPTS = 4
-
-
-@dataclass(frozen=True, eq=False)
-class Refinement:
-    """Settings of the refinement."""
-
-    #: length of a segment: the time to sail that many ship lengths at service speed
-    segment_lengths: float = 3.4
-    staggered: bool = (
-        True  # whether a second set of segments begins half a segment later
-    )
-    #: whether the state at the start of each segment is fitted with it ("free"), which
-    #: leaves no bias by noise, or is the smoothed measurement
-    segment_start: str = "free"
-    #: strength of the pull toward the start: relative cost of a coefficient whose term
-    #: changes by the whole acceleration (root mean squares over the trials)
-    pull: float = 1e-6
-    #: whether the trials differ in the zero of their rudders, known beforehand to a
-    #: degree. The model has the mean of them: its own terms give the neutral helm
-    rudder_offsets: bool = False
-    #: further trials that the refinement alone sees, such as turns of a reference ship
-    extra_trials: Sequence[Trial] = ()
-    extra_weight: float = (
-        1.0  # of their squared residuals, relative to those of the trials
-    )
-    #: a reference ship whose turning circles, at the target's scale, join the extra
-    #: trials: what holds the steady turn, which lies outside all zigzags. "auto" for
-    #: the shipped one most like the target
-    anchor: str | ShipModel | None = None
-    anchor_weight: float = 1e-3  # of the squared residuals of those turns
-
-    def __post_init__(self) -> None:
-        lengths, hint = self.segment_lengths, "in ship lengths"
-        check_number(lengths, "segment_lengths", at_least=0.1, at_most=1e6, hint=hint)
-        check_choice(self.segment_start, STARTS, "segment_start")
-        check_number(self.pull, "pull", at_least=0.0)
-        for name in ("extra_weight", "anchor_weight"):
-            check_number(getattr(self, name), name, above=0.0)
-
-    def plain(self) -> dict[str, Any]:
-        """The settings for the provenance, extra trials by name and hash."""
-        extra = [
-            {"name": trial.name, "sha256": trial.sha256} for trial in self.extra_trials
-        ]
-        names = [
-            item.name
-            for item in fields(self)
-            if item.name not in ("extra_trials", "anchor")
-        ]
-        anchor = self.anchor.name if isinstance(self.anchor, ShipModel) else self.anchor
-        return {name: getattr(self, name) for name in names} | {
-            "extra_trials": extra,
-            "anchor": anchor,
-        }
-
-
-def split_settings(
-    settings: Mapping[str, Any], refined: bool
-) -> tuple[Refinement | None, dict[str, Any]]:
-    """The settings of the refinement, None for a method without one, and those left for its estimator."""
-    if not refined:
-        return None, dict(settings)
-    names = {item.name for item in fields(Refinement)}
-    own = {name: value for name, value in settings.items() if name in names}
-    return Refinement(**own), {
-        name: value for name, value in settings.items() if name not in names
-    }
 
 
 @dataclass(frozen=True, eq=False)

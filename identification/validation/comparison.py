@@ -1,18 +1,22 @@
 """Structures and methods on the same trials, ranked by what they predict of trials not seen."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from identification.estimators.methods import METHODS, Method, get_method
-from identification.options import name_of
+from identification.estimators.methods import (
+    METHODS,
+    get_method,
+    make_method,
+    method_options,
+)
+from identification.options import AUTO, DEFAULT_METHOD, Options, name_of
 from identification.pipeline import identify
 from identification.progress import counted
 from identification.regression.problem import held_out
 from identification.report.comparison import comparison_page
 from identification.result import IdentificationResult
-from identification.simulation_error.refine import Refinement
+from identification.uncertainty.uncertainty import Uncertainty
 from identification.validation.ranking import (
     Ranking,
     Standing,
@@ -32,7 +36,6 @@ from shipgym.files import write_json, write_text
 from shipgym.ships import Structure
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.mmg import MMG
-from shipgym.trials.identify_table import AUTO, OPTIONS, Options
 
 #: Compared where none are named; for a grey box also RM-SVM.
 USUAL = (
@@ -79,6 +82,7 @@ def compare_methods(
     trials: Sequence[Trial],
     methods: Sequence[Any] | None = None,
     structures: Sequence[str | Structure] | None = None,
+    settings: Mapping[str, Any] | None = None,
     **arguments: Any,
 ) -> Comparison:
     """Identify by several methods, or structures and methods, and rank them on held-out trials.
@@ -99,9 +103,11 @@ def compare_methods(
     structures : sequence of str or Structure, optional
         As for `identify`; `auto` for all that it tries. A `reference_model` goes to
         those that know one.
+    settings : mapping, optional
+        Settings by name for the methods given by name. A method is not given settings
+        that it does not have.
     **arguments
-        Of `identify` but for `method`. A method is not given settings that it does not
-        have.
+        Of `identify` but for `method`.
     """
     wanted = (
         [arguments.pop("structure", Options.structure)]
@@ -127,15 +133,18 @@ def compare_methods(
         raise InputError(
             f'{told} the methods on; mark one use = "validate", or give two to fit'
         )
-    left_out = _left_out([get_method(method) for _, method in pairs], arguments)
+    left_out = _left_out([method for _, method in pairs], settings or {})
     found, refused = list[tuple[Standing, IdentificationResult]](), dict[str, str]()
     for structure, method in counted("structures and methods", pairs):
         name = get_method(method).name
-        own = {
-            key: value
-            for key, value in arguments.items()
-            if key not in left_out.get(name, ())
-        }
+        own = dict(arguments)
+        if isinstance(method, str):
+            known = {
+                key: value
+                for key, value in (settings or {}).items()
+                if key not in left_out.get(name, ())
+            }
+            method = make_method(method, known) if known else method
         if several:
             own["reference_model"] = reference_of(structure, own.get("reference_model"))
         try:
@@ -145,7 +154,7 @@ def compare_methods(
                 own |= {
                     "structure": structure,
                     "method": method,
-                    "uncertainty": "analytic",
+                    "uncertainty": Uncertainty(model_error=False),
                 }
                 seen = cross_validate(
                     fitted, **{k: v for k, v in own.items() if k != "hold_out"}
@@ -195,7 +204,7 @@ def cross_validate(
             groups, "folds", at_least=2, at_most=len(used), hint="at most one per trial"
         )
     )
-    own = {"model_error": False, **arguments}
+    own = {"uncertainty": Uncertainty(model_error=False), **arguments}
     return in_turn(lambda held: identify(used, hold_out=held, **own), used, groups)[0]
 
 
@@ -208,7 +217,7 @@ def _pairs(
         own = methods
         if own is None:
             usual = (*USUAL, RM_SVM) if structure == GREY_BOX else USUAL
-            own = methods_of(structure, Options.method) if several else usual
+            own = methods_of(structure, DEFAULT_METHOD) if several else usual
         elif several and structure == MMG:
             own = own[:1]
         pairs += [
@@ -219,23 +228,18 @@ def _pairs(
 
 
 def _left_out(
-    chosen: Sequence[Method], arguments: Mapping[str, Any]
+    chosen: Sequence[Any], settings: Mapping[str, Any]
 ) -> dict[str, tuple[str, ...]]:
-    """Settings that each method does not have but another one does."""
-    settings = [name for name in arguments if name in OPTIONS and OPTIONS[name].setting]
-    of_refinement, left = (
-        {item.name for item in fields(Refinement)},
-        dict[str, tuple[str, ...]](),
-    )
-    for method in chosen:
-        further = of_refinement if method.refined else set()
-        left[method.name] = tuple(
-            one for one in settings if not (one in further or method.knows(one))
-        )
+    """Settings that each method by name does not have but another one does."""
+    left = {
+        method: tuple(one for one in settings if one not in method_options(method))
+        for method in chosen
+        if isinstance(method, str)
+    }
     for setting in settings:
         if all(setting in unknown for unknown in left.values()):
             raise InputError(
-                f"settings: {setting} found, which none of the methods"
-                f" {', '.join(left)} knows"
+                f"{setting}: expected a setting of one of the methods"
+                f" {', '.join(left)}, got one that none of them knows"
             )
     return {name: unknown for name, unknown in left.items() if unknown}

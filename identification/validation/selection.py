@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from identification.options import Options
+from identification.options import Options, name_of
 from identification.progress import counted
 from identification.result import IdentificationResult
 from identification.simulation_error.maximum_a_posteriori import MAP
 from identification.simulation_error.similarity import AUTO
+from identification.uncertainty.uncertainty import Uncertainty
 from identification.validation.folds import pieces
 from identification.validation.ranking import Standing, in_turn, named, standing
 from shipgym import InputError, Trial
@@ -53,15 +54,15 @@ def select(
     what does not know a setting is refused; InputError where nothing can be fitted,
     with the first reason.
     """
-    free = options.method == Options.method and not options.settings()
+    free = options.method_is_default
     parts = [
         trial.with_(kind=None)
         for trial in (pieces(trials[0]) if len(trials) == 1 else trials)
     ]
-    cheap = replace(options, hold_out=(), model_error=False, uncertainty="analytic")
+    cheap = replace(options, hold_out=(), uncertainty=Uncertainty(model_error=False))
     found, refused = list[Standing](), dict[str, str]()
 
-    def attempt(structure: str, method: str) -> None:
+    def attempt(structure: str, method: Any) -> None:
         reference = reference_of(structure, options.reference_model)
         own = replace(
             cheap, structure=structure, method=method, reference_model=reference
@@ -78,7 +79,9 @@ def select(
                 results = [identify(parts, own)]
             found.append(standing(results, seen, parts))
         except InputError as error:
-            refused[named(structure, MAP if structure == MMG else method)] = str(error)
+            refused[named(structure, MAP if structure == MMG else name_of(method))] = (
+                str(error)
+            )
 
     for structure in counted("structures", STRUCTURES):
         attempt(
@@ -92,7 +95,7 @@ def select(
         attempt(first.structure, method)
     found.sort(key=lambda one: one.rank)
     best = _simplest(found)
-    method = options.method if best.structure == MMG else best.method
+    method = best.method if free and best.structure != MMG else options.method
     reference = reference_of(best.structure, options.reference_model)
     return replace(
         options, structure=best.structure, method=method, reference_model=reference

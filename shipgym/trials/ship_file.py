@@ -22,7 +22,6 @@ from shipgym.ships.structures import own_structure
 from shipgym.ships.term_table import Structure
 from shipgym.trials.columns import parse_columns
 from shipgym.trials.cuts import check_cut
-from shipgym.trials.identify_table import check_options
 from shipgym.trials.navigation import Instruments
 from shipgym.trials.scale import check_scale
 from shipgym.trials.tables import read_log
@@ -70,8 +69,8 @@ class ShipFile:
     path: Path  # the TOML file
     particulars: Particulars  # as given; ``particulars.completed()`` estimates the rest
     steering: SteeringGear | None  # none where the file has no ``[steering]``
-    # defaults for the identification, by the names of
-    # :data:`shipgym.trials.identify_table.OPTIONS`
+    #: options of the identification, as written in ``[identify]``;
+    #: `identification.reading` checks them
     identify: dict[str, Any]
     entries: tuple[TrialEntry, ...]  # the trials, not read yet
     structure: Structure | None = None  # the table of terms in ``[structure]``
@@ -104,9 +103,9 @@ class ShipFile:
 
         particulars = Particulars.from_mapping(ship, f"{path}: [ship]")
         steering = section("steering", SteeringGear.from_mapping)
-        given = check_table(data.get("identify", {}), f"{path}: [identify]")
-        given = {**given, "wind": data["wind"]} if "wind" in data else given
-        identify = check_options(given, f"{path}: [identify]")
+        identify = dict(check_table(data.get("identify", {}), f"{path}: [identify]"))
+        if "wind" in data:
+            identify["wind"] = data["wind"]
         data_only(identify, f"{path}: [identify]")
         structure = section("structure", own_structure)
         return cls(

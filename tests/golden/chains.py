@@ -15,6 +15,7 @@ import numpy as np
 import shipgym
 from agents import benchmark
 from identification import identify
+from tests.golden.made_up import asked
 from tests.golden.store import Floats, numbers_in, vector
 
 ROOT = Path(__file__).parents[2]
@@ -108,7 +109,7 @@ def record_identification(method: str) -> dict[str, Floats]:
         ship.trials(),
         particulars=ship.particulars,
         steering=ship.steering,
-        **METHODS[method],
+        **asked(METHODS[method]),
     )
     errors = result.standard_errors
     found = {

@@ -51,7 +51,6 @@ from shipgym.manoeuvres.towing_tank import (
     yaw_with_drift,
 )
 from shipgym.ships import get_structure, grey_box
-from shipgym.trials.identify_table import Options
 from shipgym.trials.navigation import rotate_to_body
 from tests.golden.made_up import Parts, mariner, noisy, refused, sampled, trials
 
@@ -460,26 +459,20 @@ def record_still_water() -> dict[str, Any]:
         "none": ((first,), {"current": "none"}),
     }
     for name, (records, options) in asked.items():
-        out, report = in_still_water(records, Options(**options), ship)
+        out, report = in_still_water(records, ship, **options)
         found[name] = {"trials": [told(trial) for trial in out], **report}
     one_way = over_ground(trials()[1], 0.1, 0.05)
     fast = {"north": 7.0, "east": 8.0}
-    _, doubtful = in_still_water([one_way], Options(), ship)
+    _, doubtful = in_still_water([one_way], ship)
     found["doubtful"] = doubtful
-    found["own speed"] = in_still_water(
-        [first], Options(current=given), {"length": 160.9}
-    )[1]
-    found["nothing"] = len(in_still_water([first], Options(), None)[1])
+    found["own speed"] = in_still_water([first], {"length": 160.9}, given)[1]
+    found["nothing"] = len(in_still_water([first], None)[1])
     found["refused"] = [
-        refused(lambda: in_still_water([one_way], Options(current="trial"), ship)),
-        refused(lambda: in_still_water([first], Options(current=fast), ship)),
-        refused(lambda: in_still_water([first], Options(current="tide"), ship)),
-        refused(lambda: in_still_water([first], Options(current={"north": 0.1}), ship)),
-        refused(
-            lambda: in_still_water(
-                [columns], Options(current={"north": 0.3, "east": -0.5}), ship
-            )
-        ),
+        refused(lambda: in_still_water([one_way], ship, "trial")),
+        refused(lambda: in_still_water([first], ship, fast)),
+        refused(lambda: in_still_water([first], ship, "tide")),
+        refused(lambda: in_still_water([first], ship, {"north": 0.1})),
+        refused(lambda: in_still_water([columns], ship, {"north": 0.3, "east": -0.5})),
     ]
     found["through the water"] = told(through_water(logged, 0.1, 0.003 * logged.t))
     return found
@@ -515,16 +508,15 @@ def record_wind() -> dict[str, Any]:
             told(measured_wind(trial, BULKER, option))
             for trial in (windy, through, one)
         ]
-    calm = Options(current="none")
     for name, option in {
         "none": "none",
         "auto": "auto",
         "table": {"relative": False},
     }.items():
-        out, report = in_still_water([windy, two], replace(calm, wind=option), BULKER)
+        out, report = in_still_water([windy, two], BULKER, "none", option)
         found[f"still, {name}"] = {"trials": [told(trial) for trial in out], **report}
     unknown = Particulars(length=160.9, speed=7.7)
-    found["not known"] = in_still_water([windy], calm, unknown)[1]
+    found["not known"] = in_still_water([windy], unknown, "none")[1]
     ship = mariner().particulars
     pair = [one.with_(over_ground=False), two.with_(over_ground=False)]
     for name in ("linear-steering", "linear", "nomoto"):
@@ -539,12 +531,8 @@ def record_wind() -> dict[str, Any]:
         refused(lambda: measured_wind(windy, BULKER, {"relativ": True})),
         refused(lambda: measured_wind(windy, BULKER, {"relative": 1})),
         refused(lambda: measured_wind(windy, unknown, "blendermann")),
-        refused(
-            lambda: in_still_water([windy], replace(calm, wind="blendermann"), unknown)
-        ),
-        refused(
-            lambda: in_still_water([one], replace(calm, wind="blendermann"), BULKER)
-        ),
+        refused(lambda: in_still_water([windy], unknown, "none", "blendermann")),
+        refused(lambda: in_still_water([one], BULKER, "none", "blendermann")),
         refused(lambda: constant_wind(pair, samples, "mmg")),
     ]
     return found

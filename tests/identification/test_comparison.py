@@ -26,8 +26,7 @@ def comparison(noisy_trials: list[Trial], mariner: ShipModel) -> Comparison:
     options = {
         "particulars": mariner.particulars,
         "steering": mariner.steering,
-        "C": 1e4,
-        "rank": 8,
+        "settings": {"C": 1e4, "rank": 8},
     }
     return compare_methods(noisy_trials, methods, **options)
 
@@ -128,9 +127,7 @@ def test_two_trials_are_enough_to_hold_each_out(
     )
     headings = [np.degrees(metrics["rmse"]["psi"]) for metrics in seen.values()]
     assert first.heading_deg == pytest.approx(np.mean(headings))
-    with pytest.raises(
-        InputError, match="trials: 1 to fit found, expected at least 2 to hold one out"
-    ):
+    with pytest.raises(InputError, match=r"trials: .*at least 2 to hold one out"):
         cross_validate(noisy_trials[:1], **options)
 
 
@@ -175,10 +172,8 @@ def test_what_cannot_be_compared_is_named(
         compare_methods(noisy_trials, [], **options)
     with pytest.raises(InputError, match="1 to fit and none to validate found"):
         compare_methods(noisy_trials[:1], ["ls"], **options)
-    with pytest.raises(
-        InputError, match="settings: folds found, which none of the methods ls knows"
-    ):
-        compare_methods(noisy_trials, ["ls"], folds=3, **options)
+    with pytest.raises(InputError, match=r"folds: .*one of the methods ls"):
+        compare_methods(noisy_trials, ["ls"], settings={"folds": 3}, **options)
     with pytest.raises(InputError, match="expected structure 'grey-box'"):
         compare_methods(noisy_trials, ["rm-svm"], **options)
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from certainty import case
 
-from identification import IdentificationResult, Samples, identify
-from identification.estimators.methods import METHODS, fit_all, get_method
+from identification import IdentificationResult, Samples, Uncertainty, identify
+from identification.estimators.methods import fit_all, get_method
 from identification.estimators.rm_svm import RMSVM
-from identification.pipeline import _covariance, _left_out
+from identification.evaluation import left_out_models, unscaled_covariance
 from identification.regression.grey_box import chosen_box
 from identification.uncertainty import model_error as errors_of
 from identification.uncertainty.bootstrap import influence_covariance
@@ -56,9 +56,9 @@ def test_leaving_a_trial_out_of_the_normal_equations_is_a_fit_without_it(
     method: str,
 ) -> None:
     samples = made_up()
-    found, rest = without_trial(fit_all(METHODS[method].estimator, samples), samples, 1)
+    found, rest = without_trial(fit_all(get_method(method).make, samples), samples, 1)
     anew = fit_all(
-        get_method("ls").estimator if method == "ls" else METHODS[method].estimator,
+        get_method(method).make,
         rest,
     )
     np.testing.assert_allclose(found["r"].coef_, anew["r"].coef_, rtol=1e-4)
@@ -82,7 +82,7 @@ def test_what_a_trial_moved_a_refinement_by_is_taken_back_as_from_a_mean(
         used=(None,) * 4, blank=SimpleNamespace(acceleration_matrix=inertia)
     )
     refined = SimpleNamespace(covariance=covariance, influences=influences)
-    found = _left_out(
+    found = left_out_models(
         SimpleNamespace(model=mariner.with_coefficients(mean)),
         problem,
         refined,
@@ -93,7 +93,10 @@ def test_what_a_trial_moved_a_refinement_by_is_taken_back_as_from_a_mean(
         np.testing.assert_allclose(list(model.coefficients.values()), expected)
         np.testing.assert_allclose(model.covariance, 4.0 / 3.0 * covariance)
     problem.used = (None,) * 2  # nothing is learned from leaving out one of two
-    assert _left_out(SimpleNamespace(model=mariner), problem, refined, covariance) == []
+    assert (
+        left_out_models(SimpleNamespace(model=mariner), problem, refined, covariance)
+        == []
+    )
 
 
 @pytest.mark.parametrize(
@@ -111,10 +114,10 @@ def test_a_block_of_a_refinement_is_the_time_to_sail_a_ship_length_but_a_stretch
     refined = SimpleNamespace(
         covariance=np.diag([4.0, 8.0]), influences=influences, width=width
     )
-    drawn = _covariance(None, None, blank, refined, "bootstrap")
+    drawn = unscaled_covariance("bootstrap", None, refined, None, blank)
     np.testing.assert_allclose(drawn, influence_covariance(influences, stretches) / 4.0)
     np.testing.assert_allclose(
-        _covariance(None, None, blank, refined, "analytic"), np.diag([1.0, 2.0])
+        unscaled_covariance("analytic", None, refined, None, blank), np.diag([1.0, 2.0])
     )
 
 
@@ -274,7 +277,7 @@ def test_the_covariance_in_the_model_is_the_scaled_one(
 ) -> None:
     given = {"particulars": mariner.particulars, "steering": mariner.steering}
     scaled = identify(noisy_trials, **given)
-    bare = identify(noisy_trials, **given, model_error=False)
+    bare = identify(noisy_trials, **given, uncertainty=Uncertainty(model_error=False))
     error = scaled.model.provenance["model_error"]
     assert 1.0 <= error["factor"] < 4.0  # her own structure
     assert error["trials"] == 3

@@ -14,7 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identification import IdentificationResult, Samples, TruncatedLSSVM, identify
+from identification import (
+    RMSVM,
+    IdentificationResult,
+    Samples,
+    TruncatedLSSVM,
+    identify,
+)
+from identification.options import settings_in_words
 from identification.report.figures import (
     _logarithmic,
     coefficients_figure,
@@ -104,7 +111,7 @@ def test_settings_hold_the_whole_call(
     assert (settings["structure"], settings["method"], settings["samples"]) == (
         "abkowitz",
         "tls-svm",
-        "spline",
+        {"rule": "spline", "window": None},
     )
     assert settings["steering"]["rudder_rate_deg_s"] == 5.0
     assert [trial["use"] for trial in settings["trials"]] == [
@@ -184,7 +191,7 @@ def test_a_grey_box_tells_of_its_search_where_it_searched(
         "structure": "grey-box",
         "reference_model": "tanker",
     }
-    result = identify(noisy_trials, method="rm-svm", epsilon=epsilon, **options)
+    result = identify(noisy_trials, method=RMSVM(epsilon=epsilon), **options)
     assert result.plots().keys() & {"search", "l-curve"} == figures
     if epsilon is None:
         panels = [trace.xaxis for trace in result.plots()["search"].data]
@@ -568,9 +575,21 @@ def test_trials_are_shown_together_where_all_have_heading_and_rudder() -> None:
 
 
 def test_settings_are_told_in_words() -> None:
-    given = (True, False, ["a.csv", 3], [], 2.5, "gcv", {1: 2})
-    told = [section("setting(value)", value=value) for value in given]
-    assert told == ["yes", "no", "a.csv, 3", NONE, "2.5", "gcv", "{1: 2}"]
+    settings = {
+        "guarded": True,
+        "hold_out": ["a.csv", "b.csv"],
+        "samples": {"rule": "euler", "window": None},
+        "preprocessing": {"smoothing": "rts", "repair": False},
+        "name": None,
+        "trials": [],
+    }
+    assert settings_in_words(settings) == {
+        "guarded": "yes",
+        "hold out": "a.csv, b.csv",
+        "samples": "rule euler",
+        "preprocessing": "smoothing rts, repair no",
+    }
+    assert settings_in_words({"hold_out": []}) == {"hold out": NONE}
 
 
 def test_what_a_trial_did_not_record_is_left_out() -> None:

@@ -92,7 +92,7 @@ def test_wrong_arguments_are_named(mariner: ShipModel, cao_zigzag: Trial) -> Non
 
     with pytest.raises(
         InputError,
-        match="samples: 'cubic' found, expected one of euler, integral, spline",
+        match=r"samples: .*'euler', 'integral', 'spline'",
     ):
         build(samples="cubic")
     with pytest.raises(InputError, match="window: 0"):

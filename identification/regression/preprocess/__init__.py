@@ -1,6 +1,7 @@
 """From a noisy record to channels that can be differentiated: noise, filters, smoothers, repair."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from identification.regression.preprocess.filters import median, savitzky_golay, smooth
 from identification.regression.preprocess.kinematics import smooth_kinematics
@@ -13,7 +14,7 @@ from identification.regression.preprocess.noise import (
 from identification.regression.preprocess.repair import outliers, repaired
 from shipgym import Trial
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice
+from shipgym.checks import check_choice, check_flag
 
 #: Filters of single channels by name.
 FILTERS: dict[str, Callable[[Floats, Floats], Floats]] = {
@@ -24,6 +25,29 @@ FILTERS: dict[str, Callable[[Floats, Floats], Floats]] = {
 
 #: What `identify` may do with noisy channels.
 PREPROCESSING = (*FILTERS, "rts", "none")
+
+
+@dataclass(frozen=True)
+class Preprocessing:
+    """How noisy channels are smoothed before the regression.
+
+    Parameters
+    ----------
+    smoothing : {"spline", "savgol", "median", "rts", "none"}
+        Smoothing splines fitted to the noise level; Savitzky-Golay filter; running
+        median; Kalman filter and Rauch-Tung-Striebel smoother, with position and
+        heading; or channels as recorded.
+    repair : bool
+        Whether outliers are replaced and dropouts of up to 10 steps filled first; the
+        provenance counts them.
+    """
+
+    smoothing: str = "spline"
+    repair: bool = False
+
+    def __post_init__(self) -> None:
+        check_choice(self.smoothing, PREPROCESSING, "preprocessing")
+        check_flag(self.repair, "repair")
 
 
 def smoothed_channels(
@@ -56,6 +80,7 @@ __all__ = [
     "FILTERS",
     "NOISY",
     "PREPROCESSING",
+    "Preprocessing",
     "is_noisy",
     "median",
     "noise_level",

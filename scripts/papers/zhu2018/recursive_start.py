@@ -169,12 +169,12 @@ def at_best() -> Floats:
     model = identify(
         [zigzag_trial(noisy=True)],
         STRUCTURE,
-        "rls",
+        RecursiveLeastSquares(
+            start_samples=START_SAMPLES, start_interval=START_INTERVAL
+        ),
         particulars=ship().particulars,
         steering=ship().steering,
         guarded=False,
-        start_samples=START_SAMPLES,
-        start_interval=START_INTERVAL,
     ).model
     return np.asarray(np.array(list(model.coefficients.values())) * TO_STARBOARD)
 
