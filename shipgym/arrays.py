@@ -1,4 +1,4 @@
-"""Types of arrays, as annotations name them, their integral, and a number as JSON knows it."""
+"""Types of arrays, as annotations name them, their integral and size, and a number as JSON knows it."""
 
 from typing import Any
 
@@ -18,3 +18,8 @@ def finite(number: float) -> float | None:
 def integral(t: Floats, rate: NDArray[Any]) -> NDArray[Any]:
     """Integral over time from zero by the trapezoid rule, shape (n_samples,)."""
     return np.concatenate([[0.0], np.cumsum(0.5 * np.diff(t) * (rate[1:] + rate[:-1]))])
+
+
+def root_mean_square(values: Any, axis: int | None = None) -> Any:
+    """Root mean square of all values, or along an axis."""
+    return np.sqrt(np.mean(np.square(values), axis=axis))

@@ -81,7 +81,7 @@ def pose(trials: Sequence[Trial], options: Options) -> Problem:
     sampling: dict[str, Any] = {
         "samples": options.samples.rule,
         "window": options.samples.window,
-        "smooth": options.preprocessing.smoothing,
+        "smoothing": options.preprocessing.smoothing,
         "gear": options.steering,
     }
     samples = build_samples(used, table, ship, shaft_speed=shaft, **sampling)

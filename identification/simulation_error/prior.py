@@ -91,7 +91,7 @@ def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
         virtual_trials(model),
         table,
         ship,
-        smooth=False,
+        smoothing="none",
         gear=blank.steering,
         window=1,
         shaft_speed=blank.service_shaft_speed,

@@ -380,7 +380,7 @@ def record_recursions() -> dict[str, Any]:
         ship,
         RecursiveLeastSquares(C=1e4),
         window=7,
-        smooth=False,
+        smoothing="none",
     )
     found["one history"] = one.last
     found["not recursive"] = refused(

@@ -13,6 +13,8 @@ import shipgym
 from identification import build_samples, identify_forces
 from identification.regression.current import estimate_current
 from identification.regression.forces import force_regression, force_variances
+from identification.regression.gaps import between_gaps
+from identification.regression.gear_response import estimate_gear
 from identification.regression.grey_box import (
     bare_metrics,
     chosen_box,
@@ -30,10 +32,10 @@ from identification.regression.preprocess import (
     savitzky_golay,
     smoothed_channels,
 )
-from identification.regression.preprocess.kinematics import smooth_linear
+from identification.regression.preprocess.kalman import LinearSystem
 from identification.regression.problem import held_out
-from identification.regression.rudder import estimate_gear, estimated_gear, rebuild
-from identification.regression.samples import between_gaps, default_window
+from identification.regression.rudder import estimated_gear, rebuild
+from identification.regression.samples import default_window
 from identification.regression.still_water import in_still_water, through_water
 from identification.regression.wind import (
     constant_wind,
@@ -112,13 +114,13 @@ def record_samples() -> dict[str, Any]:
         "spline": ([clean], "linear-steering", {}),
         "gear": ([clean], "linear-steering", {"gear": gear, "window": 3}),
         "noisy": ([one, two], "cubic", {"shaft_speed": 1.3}),
-        "window": ([one], "abkowitz", {"window": 7, "smooth": False}),
-        "median": ([one], "nomoto", {"window": 4, "smooth": "median"}),
+        "window": ([one], "abkowitz", {"window": 7, "smoothing": "none"}),
+        "median": ([one], "nomoto", {"window": 4, "smoothing": "median"}),
         "windy": ([windy], "linear", {"window": 5}),
         "memory": ([one, two], "nomoto2", {"samples": "integral", "window": 6}),
         "memory, spline": ([clean], "nomoto2", {}),
         "gap": ([one, gap], "norrbin", {}),
-        "uneven": ([uneven], "nomoto", {"samples": "euler", "smooth": "savgol"}),
+        "uneven": ([uneven], "nomoto", {"samples": "euler", "smoothing": "savgol"}),
     }
     found: dict[str, Any] = {}
     for name, (records, structure, options) in asked.items():
@@ -154,7 +156,7 @@ def record_samples() -> dict[str, Any]:
     own = zigzag(itself, 20.0, 10.0, duration=60.0, dt=0.5)
     own = own.with_channels({"n": own["n_command"]})
     samples, estimators = explained_samples(
-        [own], itself, samples="integral", window=5, smooth=False
+        [own], itself, samples="integral", window=5, smoothing="none"
     )
     found["explained"] = parts(samples) | {
         q: [e.coef_, e.covariance_] for q, e in estimators.items()
@@ -244,7 +246,7 @@ def record_preprocessing() -> dict[str, Any]:
                 channel: sampled(row, 20) for channel, row in given.items()
             }
     found["yes and no"] = [
-        smoothed_channels(short, ("r",), yes)["r"][:7] for yes in (True, False)
+        smoothed_channels(short, ("r",), name)["r"][:7] for name in ("spline", "none")
     ]
     some = {
         "r alone": ("r", "u"),
@@ -299,18 +301,20 @@ def record_preprocessing() -> dict[str, Any]:
     )
     measured = random.uniform(-1.0, 1.0, (8, 2))
     measured[3, 1] = np.nan
-    arguments = (
+    system = LinearSystem(
         F,
         Q,
         H,
         np.array([0.1, 0.3]),
-        measured,
         np.array([0.4, -0.7]),
         np.array([2.0, 0.5]),
     )
+    filtered = system.filtered(measured)
     found["smoother"] = [
-        *smooth_linear(*arguments),
-        *smooth_linear(*arguments, only_likelihood=True),
+        system.smoothed(measured),
+        filtered.log_likelihood,
+        filtered.states,
+        filtered.log_likelihood,
     ]
     found["refused"] = [
         refused(lambda: smoothed_channels(short, ("u",), "best")),

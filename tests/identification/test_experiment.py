@@ -102,7 +102,7 @@ def test_the_advised_manoeuvre_really_shrinks_the_error_in_a_refit(
                 recorded(candidates[name](ship), name, 100 + seed),
             ]
             samples = build_samples(
-                runs, ship.table, PARTICULARS, "integral", 4, smooth=False
+                runs, ship.table, PARTICULARS, "integral", 4, smoothing="none"
             )
             coefficients = np.linalg.lstsq(
                 samples.features["r"], samples.targets["r"], rcond=None

@@ -1,10 +1,14 @@
-"""From a noisy record to channels that can be differentiated: noise, filters, smoothers, repair."""
+"""From a noisy record to channels that can be differentiated."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from identification.regression.preprocess.filters import median, savitzky_golay, smooth
-from identification.regression.preprocess.kinematics import smooth_kinematics
+from identification.regression.preprocess.kinematics import (
+    HEADING,
+    PLANE,
+    smooth_kinematics,
+)
 from identification.regression.preprocess.noise import (
     NOISY,
     is_noisy,
@@ -29,7 +33,7 @@ PREPROCESSING = (*FILTERS, "rts", "none")
 
 @dataclass(frozen=True)
 class Preprocessing:
-    """How noisy channels are smoothed before the regression.
+    """Smoothing of noisy channels before the regression.
 
     Parameters
     ----------
@@ -51,27 +55,23 @@ class Preprocessing:
 
 
 def smoothed_channels(
-    trial: Trial, names: Sequence[str], preprocessing: str | bool = True
+    trial: Trial, names: Sequence[str], smoothing: str = "spline"
 ) -> dict[str, Floats]:
-    """Some channels of a trial, smoothed; the rudder, which has corners, is left as it is.
+    """Some channels of a trial, smoothed (`Preprocessing`).
 
-    By one of `PREPROCESSING`: smoothing spline, also for True, Savitzky-Golay filter,
-    running median, Kalman smoother of the kinematics (the shaft speed by a spline), or
-    nothing, also for False.
+    The rudder, which has corners, is left as it is; "rts" smooths a shaft speed by a
+    spline.
     """
-    if isinstance(preprocessing, bool):
-        preprocessing = "spline" if preprocessing else "none"
-    check_choice(preprocessing, PREPROCESSING, "preprocessing")
-    if preprocessing == "none":
-        return {name: trial[name] for name in names}
-    source = smooth_kinematics(trial) if preprocessing == "rts" else trial
-    one = FILTERS.get(preprocessing, smooth)
-    done = (
-        "delta",
-        *(("x", "y", "psi", "u", "v", "r") if preprocessing == "rts" else ()),
-    )
+    check_choice(smoothing, PREPROCESSING, "preprocessing")
+    kept = {"delta"}
+    if smoothing == "none":
+        kept = set(names)
+    if smoothing == "rts":
+        trial = smooth_kinematics(trial)
+        kept |= {*HEADING, *PLANE}
+    one_channel = FILTERS.get(smoothing, smooth)
     return {
-        name: source[name] if name in done else one(source.t, source[name])
+        name: trial[name] if name in kept else one_channel(trial.t, trial[name])
         for name in names
     }
 

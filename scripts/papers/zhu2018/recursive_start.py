@@ -207,7 +207,7 @@ def spline_rows(noisy: bool) -> dict[str, tuple[Floats, Floats]]:
         ship().particulars,
         window=1,
         gear=ship().steering,
-        smooth=False,
+        smoothing="none",
     )
     return {q: (samples.features[q], samples.targets[q]) for q in table.regressed}
 
