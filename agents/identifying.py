@@ -1,15 +1,14 @@
 """Identification of a ship file: its options, those of the command line, and its trials."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from identification import IdentificationResult, identify
-from identification.design.reduced import ReducedIdentification, identify_reduced
+import identification
 from identification.estimators.methods import METHODS
-from identification.estimators.rm_svm import RMSVM
 from identification.options import AUTO
 from identification.reading import identify_arguments, read_table, settings_of
-from identification.validation.comparison import Comparison, compare_methods
 from shipgym import ShipFile, Trial
 from shipgym.checks import placed
 from shipgym.ships.grey_boxes import GREY_BOX
@@ -57,9 +56,9 @@ def _choose_structure(
 ) -> None:
     """Complete the structure and its reference ship, which the options may imply."""
     own = ship.structure
-    if chosen.get("method") == RMSVM.name and "reference_model" in chosen:
+    if chosen.get("method") == "rm-svm" and "reference_model" in chosen:
         # it needs a grey box, so a reference ship implies the structure
-        named = asked if asked.get("method") == RMSVM.name else chosen
+        named = asked if asked.get("method") == "rm-svm" else chosen
         chosen["structure"] = named.get("structure") or GREY_BOX
 
     if chosen.get("structure") == GREY_BOX:
@@ -96,14 +95,16 @@ def trials_of(
     }
 
 
-def identify_ship(ship: ShipFile, settings: Mapping[str, Any]) -> IdentificationResult:
+def identify_ship(
+    ship: ShipFile, settings: Mapping[str, Any]
+) -> identification.IdentificationResult:
     """`identify` on a ship file, which its errors name.
 
     `ship`: its trials are read; `settings`: from `identification_settings`.
     """
     trials, arguments = trials_of(ship, settings)
     with placed(str(ship.path)):
-        return identify(trials, **arguments)
+        return identification.identify(trials, **arguments)
 
 
 def compare_ship(
@@ -111,7 +112,7 @@ def compare_ship(
     settings: Mapping[str, Any],
     structures: str | None,
     methods: str | None,
-) -> Comparison:
+) -> identification.Comparison:
     """`compare_methods` on a ship file.
 
     Parameters
@@ -148,7 +149,9 @@ def compare_ship(
     if methods:
         chosen = list(METHODS) if methods == "all" else _names(methods)
     with placed(str(ship.path)):
-        return compare_methods(trials, chosen, wanted, settings=of_methods, **arguments)
+        return identification.compare_methods(
+            trials, chosen, wanted, settings=of_methods, **arguments
+        )
 
 
 def _names(text: str) -> list[str]:
@@ -157,8 +160,10 @@ def _names(text: str) -> list[str]:
 
 def reduce_ship(
     ship: ShipFile, settings: Mapping[str, Any], direction: str, tolerance: float
-) -> ReducedIdentification:
+) -> identification.ReducedIdentification:
     """`identify_reduced` on a ship file."""
     trials, arguments = trials_of(ship, settings)
     with placed(str(ship.path)):
-        return identify_reduced(trials, direction, tolerance, **arguments)
+        return identification.identify_reduced(
+            trials, direction, tolerance, **arguments
+        )

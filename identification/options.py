@@ -9,7 +9,7 @@ import numpy as np
 import shipgym
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.linear import LinearRegressor
-from identification.estimators.methods import METHODS
+from identification.estimators.methods import METHODS, make_method
 from identification.regression.preprocess import Preprocessing
 from identification.regression.samples import Sampling
 from identification.regression.still_water import check_current
@@ -24,6 +24,8 @@ from shipgym.ships.mmg import MMG
 
 Given = Particulars | Mapping[str, Any] | None  # particulars, as `identify` takes them
 DEFAULT_METHOD = "tls-svm"
+MAP = "map"  # the method of the MMG form
+MAP = "map"  # the method of the MMG form: maximum a posteriori
 AUTO = "auto"  # the structure that is chosen by trials held out
 
 Stage = TypeVar("Stage")
@@ -174,7 +176,7 @@ def changed_settings(method: Any) -> dict[str, Any]:
     settings = method_settings(method)
     if name_of(method) not in METHODS:
         return settings
-    default = method_settings(METHODS[name_of(method)]())
+    default = method_settings(make_method(name_of(method)))
     return {name: value for name, value in settings.items() if value != default[name]}
 
 

@@ -12,10 +12,9 @@ from typing import Any
 
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.methods import METHODS, make_method, method_options
-from identification.options import DEFAULT_METHOD, Options
+from identification.options import DEFAULT_METHOD, MAP, Options
 from identification.regression.preprocess import Preprocessing
 from identification.regression.samples import Sampling
-from identification.simulation_error.maximum_a_posteriori import MAP
 from identification.simulation_error.prior_knowledge import PriorKnowledge
 from identification.simulation_error.refinement import Refinement
 from identification.uncertainty.uncertainty import Uncertainty

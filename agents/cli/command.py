@@ -53,7 +53,7 @@ def answered(command: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> None:
         from agents.cli.terminal import printing
-        from agents.engines.jobs import WorkerDiedError
+        from agents.engines.job import WorkerDiedError
         from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 
         try:

@@ -1,4 +1,4 @@
-"""The options of `identify` on the command line: the common ones by name, all of them as `--set`."""
+"""Options of `identify` on the command line: common ones by name, others by `--set`."""
 
 import functools
 from collections.abc import Callable
@@ -20,7 +20,10 @@ def identify_options(
     ] = None,
     hold_out: Annotated[
         list[str] | None,
-        Option(help="Trial, by file name, that is only predicted; repeatable."),
+        Option(
+            metavar="FILE",
+            help="Trial, by file name, that is only predicted; repeatable.",
+        ),
     ] = None,
     current: Annotated[
         str | None,
@@ -32,36 +35,16 @@ def identify_options(
         str | None,
         Option(help="Logged wind: auto, none, constant, coefficients or a table."),
     ] = None,
-    samples: Annotated[
-        str | None,
-        Option(help="How a trial becomes a regression: spline, integral or euler."),
-    ] = None,
     preprocessing: Annotated[
         str | None,
         Option(help="Smoothing of noisy channels: spline, savgol, median, rts, none."),
-    ] = None,
-    repair: Annotated[
-        bool | None,
-        Option("--repair/--no-repair", help="Replace outliers, fill dropouts."),
     ] = None,
     method: Annotated[
         str | None,
         Option(help="How coefficients are fitted; default: the file's, else tls-svm."),
     ] = None,
-    C: Annotated[
-        float | None, Option("--C", help="Weight of the errors; inf: least squares.")
-    ] = None,
-    rank: Annotated[
-        int | None, Option(help="Number of directions of the features that are kept.")
-    ] = None,
     kernel: Annotated[
         str | None, Option(help="Kernel on what a reference ship leaves: rbf.")
-    ] = None,
-    objective: Annotated[
-        str | None, Option(help="Minimised by a search: k-fold, free-running, ...")
-    ] = None,
-    uncertainty: Annotated[
-        str | None, Option(help="Source of the covariance: analytic or bootstrap.")
     ] = None,
     prior: Annotated[
         str | None,
@@ -82,7 +65,7 @@ def identify_options(
         ),
     ] = None,
 ) -> dict[str, Any]:
-    """Options given on the command line, by name; those with a flag of their own go before `--set`."""
+    """Options given on the command line, by name; a flag goes before `--set`."""
     from shipgym.files import named_values, toml_value
 
     by_flag: dict[str, Any] = {
@@ -91,15 +74,9 @@ def identify_options(
         "hold_out": hold_out or None,
         "current": current,
         "wind": wind,
-        "samples": samples,
         "preprocessing": preprocessing,
-        "repair": repair,
         "method": method,
-        "C": C,
-        "rank": rank,
         "kernel": kernel,
-        "objective": objective,
-        "uncertainty": uncertainty,
         "prior": prior,
         "prior_strength": prior_strength,
     }

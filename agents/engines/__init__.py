@@ -1,5 +1,5 @@
-"""Where jobs are done: in this process, in others, on a Ray cluster."""
+"""Engines that do jobs: in this process, in others, on a Ray cluster."""
 
-from agents.engines.jobs import run_jobs
+import lazy_loader
 
-__all__ = ["run_jobs"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,41 +9,35 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import clone
 
-from identification.estimators import recursive
-from identification.estimators.comparators import (
-    LeastSquares,
-    LinearSupportVectorMachine,
-    RidgeRegression,
-)
+import identification
 from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, validated
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
-from identification.estimators.rm_svm import RMSVM, fit_rm_svm
-from identification.estimators.tuned import TunedLSSVM, fit_tuned
 from identification.regression.samples import Samples
 from identification.simulation_error.refinement import Refinement
 from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, quoted
 
-#: By name the class of an estimator, or of a refinement, with its settings as keywords.
-METHODS: dict[str, Callable[..., Any]] = {
-    "ls": LeastSquares,
-    "ridge": RidgeRegression,
-    "ls-svm": LSSVM,
-    "tls-svm": TruncatedLSSVM,
-    "cv-lssvr": partial(TunedLSSVM, optimiser="grid"),
-    "pso-lssvr": partial(TunedLSSVM, optimiser="pso"),
-    "abc-lssvr": partial(TunedLSSVM, optimiser="abc"),
-    "de-lssvr": partial(TunedLSSVM, optimiser="de"),
-    "svr": LinearSupportVectorMachine,
-    "rls": recursive.RecursiveLeastSquares,
-    "sg": recursive.StochasticGradient,
-    "nisg": partial(recursive.StochasticGradient, omega=0.5),
-    "mils": partial(recursive.MultiInnovationLeastSquares, inverse_free=False),
-    "tmils": recursive.MultiInnovationLeastSquares,
-    "output-error": Refinement,
-    "rm-svm": RMSVM,
+#: By name the class of an estimator, or of a refinement, that `identification` exports,
+#: and its settings.
+METHODS: dict[str, tuple[str, dict[str, Any]]] = {
+    "ls": ("LeastSquares", {}),
+    "ridge": ("RidgeRegression", {}),
+    "ls-svm": ("LSSVM", {}),
+    "tls-svm": ("TruncatedLSSVM", {}),
+    "cv-lssvr": ("TunedLSSVM", {"optimiser": "grid"}),
+    "pso-lssvr": ("TunedLSSVM", {"optimiser": "pso"}),
+    "abc-lssvr": ("TunedLSSVM", {"optimiser": "abc"}),
+    "de-lssvr": ("TunedLSSVM", {"optimiser": "de"}),
+    "svr": ("LinearSupportVectorMachine", {}),
+    "rls": ("RecursiveLeastSquares", {}),
+    "sg": ("StochasticGradient", {}),
+    "nisg": ("StochasticGradient", {"omega": 0.5}),
+    "mils": ("MultiInnovationLeastSquares", {"inverse_free": False}),
+    "tmils": ("MultiInnovationLeastSquares", {}),
+    "output-error": ("Refinement", {}),
+    "rm-svm": ("RMSVM", {}),
 }
 
 
@@ -56,12 +50,11 @@ def fit_all(make: Callable[[], Estimator], samples: Samples) -> Estimators:
 
 
 def fit_equations(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-    """Fit an estimator to each equation; those that are tuned on the trials, to all equations together."""
-    estimator = make()
-    if isinstance(estimator, TunedLSSVM):
-        return fit_tuned(make, task)
-    if isinstance(estimator, RMSVM):
-        return fit_rm_svm(make, task)
+    """Fit an estimator to each equation, or all together where the estimator can."""
+    estimator: Any = make()
+    if hasattr(estimator, "fit_equations"):
+        together: Estimators = estimator.fit_equations(task)
+        return together
     return fit_all(make, task.samples)
 
 
@@ -90,7 +83,7 @@ def get_method(method: str | Any) -> Method:
     structure.
     """
     if isinstance(method, str):
-        method = METHODS[check_choice(method, METHODS, "method")]()
+        method = make_method(check_choice(method, METHODS, "method"))
     if isinstance(method, Refinement):
         start = get_method(method.start)
         return Method(Refinement.name, start.make, refinement=method)
@@ -179,20 +172,19 @@ def without_constant(estimator: Any) -> Estimator:
 
 def method_options(name: str) -> tuple[str, ...]:
     """Names of the settings that a method of `METHODS` has."""
-    kind = METHODS[name]
-    if isinstance(kind, partial):
-        kind = kind.func
-    own: tuple[str, ...] = kind.options  # type: ignore[attr-defined]
-    if kind is Refinement:
+    kind, _ = METHODS[name]
+    own: tuple[str, ...] = getattr(identification, kind).options
+    if kind == "Refinement":
         return (*own, *TruncatedLSSVM.options)
     return own
 
 
-def make_method(name: str, settings: Mapping[str, Any]) -> Any:
+def make_method(name: str, settings: Mapping[str, Any] | None = None) -> Any:
     """The estimator, or the refinement, of a name with settings that were checked.
 
     Raises InputError for a setting that it does not have.
     """
+    settings = settings or {}
     known = method_options(name) if name in METHODS else ()
     for setting in settings:
         if setting not in known:
@@ -201,8 +193,9 @@ def make_method(name: str, settings: Mapping[str, Any]) -> Any:
                 f" ({', '.join(known) or 'it has none'}), got one that it does not know;"
                 " leave it out, or choose the method that it is for"
             )
-    if METHODS[name] is not Refinement:
-        return METHODS[name](**settings)
+    kind, own = METHODS[name]
+    if kind != "Refinement":
+        return getattr(identification, kind)(**(own | dict(settings)))
 
     own = {k: v for k, v in settings.items() if k in Refinement.options}
     of_start = {k: v for k, v in settings.items() if k not in own}

@@ -7,7 +7,7 @@ but insensitive band and solver are those of the epsilon-SVR that is fitted here
 """
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self, TypeVar
 
@@ -17,7 +17,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Ridge
 from sklearn.svm import SVR, LinearSVR
 
-from identification.estimators.estimator import Estimator, Estimators, FitTask
+from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, validated
 from identification.search.pattern_search import pattern_search
 from identification.search.search import BAND, SearchResult
@@ -157,6 +157,33 @@ class RMSVM(LinearRegressor):
         slopes = np.asarray(solver.coef_, dtype=float).ravel()
         return slopes, float(np.sum(solver.intercept_))
 
+    def fit_equations(self, task: FitTask) -> Estimators:
+        """Copies fitted to all equations, weight and bands chosen where not given.
+
+        The model of `task` is the bare reference ship as a model of the target. Raises
+        InputError for a model without a reference ship.
+        """
+        self.check()
+        if not isinstance(task.blank.table, GreyBox):
+            raise InputError(
+                "method 'rm-svm': expected structure 'grey-box', which has a reference"
+                f" ship, got {task.blank.structure!r}; give the structure with a"
+                " reference_model ('auto', a shipped model's name or a model file), or"
+                " choose another method, such as 'tls-svm'"
+            )
+        tuner = _Tuner(self, task)
+        weight = tuner.weight() if self.C is None else float(self.C)
+        bands, search = tuner.bands(weight)
+
+        found: Estimators = {}
+        for k, (q, band) in enumerate(zip(task.samples.features, bands, strict=True)):
+            estimator = tuner.fitted(q, weight, band, tuner.everything)
+            estimator.chosen_ = {"C": weight, "epsilon": band}
+            if search is not None:
+                estimator.search_ = search.of(k, BAND)
+            found[q] = estimator
+        return found
+
 
 class _Standardised:
     """Features and targets of zero mean, where there is a free constant, and of unit size.
@@ -236,45 +263,6 @@ def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
     both = SVR(kernel="linear", C=0.5 * C, epsilon=band)
     both.fit(np.vstack([Z, -Z]), np.append(e, -e))
     return np.asarray(both.coef_, dtype=float).ravel()
-
-
-def fit_rm_svm(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-    """Fit the corrections of all equations, with weight and insensitive bands chosen where not given.
-
-    Parameters
-    ----------
-    make : callable
-        Makes an unfitted `RMSVM` with the settings asked for.
-    task : FitTask
-        Its model is the bare reference ship as a model of the target.
-
-    Raises
-    ------
-    InputError
-        For a model without a reference ship.
-    """
-    asked = make()
-    assert isinstance(asked, RMSVM)
-    asked.check()
-    if not isinstance(task.blank.table, GreyBox):
-        raise InputError(
-            "method 'rm-svm': expected structure 'grey-box', which has a reference"
-            f" ship, got {task.blank.structure!r}; give the structure with a"
-            " reference_model ('auto', a shipped model's name or a model file), or"
-            " choose another method, such as 'tls-svm'"
-        )
-    tuner = _Tuner(asked, task)
-    weight = tuner.weight() if asked.C is None else float(asked.C)
-    bands, search = tuner.bands(weight)
-
-    found: Estimators = {}
-    for k, (q, band) in enumerate(zip(task.samples.features, bands, strict=True)):
-        estimator = tuner.fitted(q, weight, band, tuner.everything)
-        estimator.chosen_ = {"C": weight, "epsilon": band}
-        if search is not None:
-            estimator.search_ = search.of(k, BAND)
-        found[q] = estimator
-    return found
 
 
 class _Tuner:

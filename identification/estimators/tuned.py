@@ -1,6 +1,6 @@
 """LS-SVM that chooses its own weight of the errors."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 from sklearn.base import clone
 
 from identification.estimators.decomposition import check_scale, decompose
-from identification.estimators.estimator import Estimator, Estimators, FitTask
+from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, check_weight, validated
 from identification.estimators.lssvm import LSSVM
-from identification.search import OPTIMISERS, get_optimiser
+from identification.search.by_name import OPTIMISERS, get_optimiser
 from identification.search.objectives import (
     ErrorOfC,
     check_folds,
@@ -187,19 +187,16 @@ class TunedLSSVM(LinearRegressor):
         blocks = time_blocks(len(y), folds, groups)
         return held_out_error(X, y, self.scale, self.fit_intercept, blocks, weights)
 
-
-def fit_tuned(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-    """Fit estimators that choose their own C, which may use the trials as blocks or simulate them."""
-    template, samples = make(), task.samples
-    assert isinstance(template, TunedLSSVM)
-    if template.objective == "free-running":
-        return _fit_free_running(template, task)
-
-    found: Estimators = {}
-    for q, features in samples.features.items():
-        own = clone(template)
-        found[q] = own.fit(features, samples.targets[q], samples.trial)
-    return found
+    def fit_equations(self, task: FitTask) -> Estimators:
+        """Copies fitted to all equations, which may use the trials as blocks or simulate them."""
+        if self.objective == "free-running":
+            return _fit_free_running(self, task)
+        samples = task.samples
+        found: Estimators = {}
+        for q, features in samples.features.items():
+            own = clone(self)
+            found[q] = own.fit(features, samples.targets[q], samples.trial)
+        return found
 
 
 def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:

@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from identification.regression.velocities import over_ground
 from shipgym import Trial
 from shipgym.arrays import Floats
 from shipgym.ships.simulate import wind_accelerations
-from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.navigation import rotate_to_body
 
 STEP = 0.2  # of the simulation, in the time to sail one ship length
@@ -169,18 +169,6 @@ def estimate_current(
         covariance=speed**2 * covariance,
         coefficients=x[:N_COEFFICIENTS],
     )
-
-
-def over_ground(trial: Trial) -> tuple[Floats, Floats]:
-    """Velocity of midship over ground, ahead and to starboard, m/s, of a trial that knows it."""
-    derived = {"u", "v"} & trial.derived
-    if len(derived) != 1:
-        return trial["u"], trial["v"]
-    # the other one was logged, and is through the water
-    north = time_derivative(trial.t, trial["x"])
-    east = time_derivative(trial.t, trial["y"])
-    ahead, aside = rotate_to_body(north, east, trial["psi"])
-    return ahead, aside
 
 
 class _Record(NamedTuple):

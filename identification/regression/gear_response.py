@@ -83,7 +83,8 @@ def goes_on(orders: Floats, delta: Floats) -> Flags:
     ahead = np.sign(now - angle) * np.sign(before) >= 0.0
     arrives = was_ramping & ~is_ramping & ahead
     same_order = ~was_ramping & ~is_ramping & is_near
-    return same_ramp | arrives | same_order
+    continues: Flags = same_ramp | arrives | same_order
+    return continues
 
 
 def estimate_gear(t: Floats, delta: Floats) -> GearResponse:

@@ -176,7 +176,7 @@ def _switch_time(
 
     def miss(time: float) -> float:
         at_switch = gear.angle(start, first, time)
-        return float(gear.angle(at_switch, second, step - time)) - end
+        return float(gear.angle(at_switch, second, step - time) - end)
 
     if miss(0.0) * miss(step) > 0.0:
         return None

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from identification.regression.samples import Samples
+from identification.regression.velocities import CURRENT_COLUMNS
 from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_flag, check_keys, check_text
@@ -14,8 +15,6 @@ from shipgym.ships.inertia import particulars_inertia
 from shipgym.ships.mmg import MMG
 from shipgym.ships.simulate import WIND
 from shipgym.trials.navigation import rotate_to_body
-
-CURRENT_COLUMNS = ("current_north", "current_east")
 
 
 def check_wind(option: Any) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from identification.fit import Fit
-from identification.regression.still_water import SIGNIFICANT
+from identification.regression.velocities import SIGNIFICANT
 from shipgym.plots import LIMIT, MEASURED, MODEL, Panel, axis, line, panels
 from shipgym.plots.style import Figure
 from shipgym.trials.units import KNOT

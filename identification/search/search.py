@@ -1,4 +1,4 @@
-"""What every optimiser has in common: its signature, its result, and the record of a search."""
+"""Optimisers: their signature, their result, and the record of a search."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable

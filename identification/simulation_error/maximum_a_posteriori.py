@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from identification.options import Options, name_of
+from identification.options import MAP, Options, name_of
 from identification.regression.problem import Problem
 from identification.simulation_error.mmg_prior import YOSHIMURA, MMGPrior, mmg_prior
 from identification.simulation_error.prior_knowledge import PriorKnowledge
@@ -32,7 +32,6 @@ from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES
 from shipgym.ships.mmg import IDENTIFIED
 
-MAP = "map"
 SEGMENT_LENGTHS, INTERVAL = (
     1.7,
     0.067,

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from identification.options import Options, name_of
+from identification.options import MAP, Options, name_of
 from identification.progress import counted
 from identification.result import IdentificationResult
-from identification.simulation_error.maximum_a_posteriori import MAP
 from identification.simulation_error.similarity import AUTO
 from identification.uncertainty.uncertainty import Uncertainty
 from identification.validation.folds import pieces

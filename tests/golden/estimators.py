@@ -23,7 +23,7 @@ from identification import (
 from identification.estimators.comparators import LinearSupportVectorMachine
 from identification.estimators.decomposition import centre_and_scale, decompose
 from identification.estimators.estimator import FitTask
-from identification.estimators.kernel_residual import (
+from identification.estimators.kernel_fit import (
     chosen_centres,
     principal,
     stabilised,

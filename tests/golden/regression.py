@@ -36,7 +36,8 @@ from identification.regression.preprocess.kalman import LinearSystem
 from identification.regression.problem import held_out
 from identification.regression.rudder import estimated_gear, rebuild
 from identification.regression.samples import default_window
-from identification.regression.still_water import in_still_water, through_water
+from identification.regression.still_water import in_still_water
+from identification.regression.velocities import through_water
 from identification.regression.wind import (
     constant_wind,
     measured_wind,

@@ -19,12 +19,12 @@ from identification import (
     Options,
     identify,
 )
-from identification.estimators.kernel_residual import (
+from identification.estimators.kernel_fit import (
     chosen_centres,
     principal,
     stabilised,
 )
-from identification.pipeline import reference_options
+from identification.pipeline.routes import reference_options
 from identification.report.page import report_page
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError

@@ -247,7 +247,7 @@ def test_a_name_stands_for_the_default_object_of_a_method() -> None:
     for name in METHODS:
         method = get_method(name)
         assert method.name == name
-        assert method.name == get_method(METHODS[name]()).name
+        assert method.name == get_method(make_method(name)).name
     assert get_method(MultiInnovationLeastSquares(inverse_free=False)).name == "mils"
     assert get_method(StochasticGradient(omega=0.1)).name == "nisg"
     assert get_method(TunedLSSVM(optimiser={"name": "de", "rounds": 3})).name == (

@@ -12,7 +12,7 @@ from certainty import case
 from identification import IdentificationResult, Samples, Uncertainty, identify
 from identification.estimators.methods import fit_all, get_method
 from identification.estimators.rm_svm import RMSVM
-from identification.evaluation import left_out_models, unscaled_covariance
+from identification.pipeline.evaluation import left_out_models, unscaled_covariance
 from identification.regression.grey_box import chosen_box
 from identification.uncertainty import model_error as errors_of
 from identification.uncertainty.bootstrap import influence_covariance

@@ -17,12 +17,15 @@ from identification.regression.preprocess import (
     repaired,
     savitzky_golay,
     smooth,
-    smooth_kinematics,
     smoothed_channels,
 )
 from identification.regression.preprocess.filters import Reinsch
 from identification.regression.preprocess.kalman import LinearSystem
-from identification.regression.preprocess.kinematics import heading_motion, plane_motion
+from identification.regression.preprocess.kinematics import (
+    heading_motion,
+    plane_motion,
+    smooth_kinematics,
+)
 from identification.regression.preprocess.noise import is_noisy, noise_ratio
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag

@@ -18,12 +18,9 @@ from identification.regression.current import (
     accelerations,
     estimate_current,
 )
-from identification.regression.still_water import (
-    currents_of,
-    in_still_water,
-    through_water,
-    wald_probability,
-)
+from identification.regression.still_water import in_still_water
+from identification.regression.trial_currents import currents_of, wald_probability
+from identification.regression.velocities import through_water
 from identification.regression.wind import measured_wind
 from identification.report.sea import sea_sentences, track_figure
 from shipgym import ShipModel, Trial

@@ -4,11 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from identification.regression.preprocess.filters import median, savitzky_golay, smooth
-from identification.regression.preprocess.kinematics import (
-    HEADING,
-    PLANE,
-    smooth_kinematics,
-)
 from identification.regression.preprocess.noise import (
     NOISY,
     is_noisy,
@@ -67,8 +62,10 @@ def smoothed_channels(
     if smoothing == "none":
         kept = set(names)
     if smoothing == "rts":
-        trial = smooth_kinematics(trial)
-        kept |= {*HEADING, *PLANE}
+        from identification.regression.preprocess import kinematics
+
+        trial = kinematics.smooth_kinematics(trial)
+        kept |= {*kinematics.HEADING, *kinematics.PLANE}
     one_channel = FILTERS.get(smoothing, smooth)
     return {
         name: trial[name] if name in kept else one_channel(trial.t, trial[name])
@@ -89,6 +86,5 @@ __all__ = [
     "repaired",
     "savitzky_golay",
     "smooth",
-    "smooth_kinematics",
     "smoothed_channels",
 ]

@@ -40,15 +40,14 @@ def savitzky_golay(t: ArrayLike, values: ArrayLike, width: int | None = None) ->
         if is_short or noise_ratio(t, values) < NOISY:
             return values
 
-    grid = np.linspace(t[0], t[-1], len(t))
     steps = np.diff(t)
-    is_uneven = np.ptp(steps) > 1e-3 * np.median(steps)
-    if is_uneven:
-        values = np.interp(grid, t, values)
+    is_even = np.ptp(steps) <= 1e-3 * np.median(steps)
+    grid = np.linspace(t[0], t[-1], len(t))
+    sampled: Floats = values if is_even else np.interp(grid, t, values)
     if width is None:
-        width = _best_width(values, longest)
-    filtered: Floats = savgol_filter(values, width, ORDER)
-    return np.interp(t, grid, filtered) if is_uneven else filtered
+        width = _best_width(sampled, longest)
+    filtered: Floats = savgol_filter(sampled, width, ORDER)
+    return filtered if is_even else np.interp(t, grid, filtered)
 
 
 def _best_width(values: Floats, longest: int) -> int:

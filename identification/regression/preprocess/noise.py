@@ -51,7 +51,8 @@ def noise_ratio(t: ArrayLike, values: ArrayLike, window: int = 1) -> float:
     if size == 0.0:
         return 0.0
     noise_of_change = np.sqrt(2.0) * noise_level(t, values)
-    return noise_of_change / size
+    ratio: float = noise_of_change / size
+    return ratio
 
 
 def is_noisy(t: ArrayLike, channels: Iterable[ArrayLike]) -> bool:

@@ -1,8 +1,10 @@
 """An identified model: how it came about, how certain it is, and how well it predicts."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,7 +14,6 @@ from identification.regression.grey_box import bare_metrics
 from identification.regression.problem import Problem
 from identification.regression.samples import Samples
 from identification.result import IdentificationResult
-from identification.simulation_error.refine import Refined
 from identification.uncertainty.bootstrap import (
     bootstrap_covariance,
     influence_covariance,
@@ -33,6 +34,9 @@ from identification.validation.prediction import predict, trial_metrics
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.ships import GreyBox
+
+if TYPE_CHECKING:
+    from identification.simulation_error.refine import Refined
 
 MEMORY = 1.0  # of residuals, in the time to sail one ship length
 
