@@ -31,7 +31,7 @@ ROOMS: dict[str, tuple[float, int, str]] = {
     "agents.controllers": (2, 3, "PID, LQ, LQG, wheel-over, MPC"),
     "agents.suites": (3.5, 3, "tasks and seeds of benchmarks"),
     "identification.design": (0.5, 0, "which terms, which trial next"),
-    "identification.pipeline": (2, 0, "identify"),
+    "identification.pipeline": (2, 0, "identify and its routes"),
     "identification.simulation_error": (4, 0, "refinement, priors"),
     "identification.validation": (3, 1, "prediction, held-out trials"),
     "identification.result": (1.6, 1, "what identify returns"),
@@ -64,7 +64,6 @@ APART = {
     "agents.job_results": "agents.jobs",
 }
 TITLES = {
-    "identification.pipeline": "pipeline.py",
     "identification.result": "result.py, fit.py",
     "shipgym.episodes": "engine/episodes.py",
     "shipgym.interchange": "interchange.py",
