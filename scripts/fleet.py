@@ -342,7 +342,7 @@ class Fleets(VecEnv):
             self.engines, self.bounds, self.bounds[1:], strict=False
         ):
             engine.order(self.actions[first:last])
-            ended, shown = engine.advance(anew=True), engine.shown
+            ended, shown = engine.advance(anew=True), engine.outputs
             dones = shown.terminated | shown.truncated
             for row in np.flatnonzero(dones) if ended else ():
                 late = bool(shown.truncated[row] and not shown.terminated[row])

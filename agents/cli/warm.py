@@ -115,7 +115,7 @@ def _jobs(
             f"{name!r} found, expected an environment's id or a model: {error}"
         ) from None
     for loop in LOOPS:
-        yield f"{model.name}: {loop}", partial(ship_loop, model.vessel, loop)
+        yield f"{model.name}: {loop}", partial(ship_loop, model.compiled, loop)
 
 
 def _make(env_id: str, options: dict[str, Any]) -> None:

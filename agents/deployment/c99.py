@@ -109,7 +109,7 @@ def ship_source(
     water that the model does not know, and equations of one's own that use more than
     arithmetic.
     """
-    name, vessel, p = checked_name(name or model.name), model.vessel, model.particulars
+    name, compiled, p = checked_name(name or model.name), model.compiled, model.particulars
     notes: tuple[str, ...] = ()
     without = set() if "n" in model.command_names else {"shaft"}
     try:
@@ -121,10 +121,10 @@ def ship_source(
         notes, column = (f"wind is left out: {error}",), np.array(flat(CALM))
     column[leaves(SeaParameters).index("wind_speed")] = 0.0  # it is given
     types: dict[Any, str] = {Motion: f"{name}_state", ShipInput: f"{name}_input"}
-    c = Translator({**vessel.parts(), **sea_functions(True)}, name, types)
+    c = Translator({**compiled.hooks(), **sea_functions(True)}, name, types)
     longest = LONGEST_STEP * p["length"] / p["speed"]
     numbers = iter([*model.ship_numbers(water_depth, longest), *column])
-    kinds = {"SHIP": Ship, "COEFFICIENTS": vessel.coefficients, "SEA": SeaParameters}
+    kinds = {"SHIP": Ship, "COEFFICIENTS": compiled.coefficients, "SEA": SeaParameters}
     first = dict(zip(model.state_names, model.service_state.tolist(), strict=True))
     begin = {
         "n": model.service_shaft_speed,
@@ -152,7 +152,7 @@ def ship_source(
             for one, kind in kinds.items()
         },
         advance=c.function(
-            advance, Motion, ShipInput, float, vessel.coefficients, Ship, SeaParameters
+            advance, Motion, ShipInput, float, compiled.coefficients, Ship, SeaParameters
         )[0],
         lost=c.function(lost, Motion, Ship)[0],
         structures=c.structures,

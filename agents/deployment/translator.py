@@ -22,7 +22,7 @@ import numpy as np
 from shipgym import InputError
 from shipgym.engine.mathematics import power_of_bits
 from shipgym.engine.records import field_types, is_record, is_table
-from shipgym.engine.specialise import Part, named_globals
+from shipgym.engine.specialise import named_globals
 
 Kind = Any  #: float, int, bool, a record, a table, or a tuple of kinds
 NUMBERS = {float: "double", int: "int", bool: "int"}
@@ -215,7 +215,7 @@ class _Body(ast.NodeTransformer):
             case ast.Constant():
                 return node.value
             case ast.Name() if not isinstance(
-                value := self.globals.get(node.id), Part | type | FunctionType
+                value := self.globals.get(node.id), type | FunctionType
             ):
                 return value
             case ast.Attribute() if (inner := self._known(node.value)) is not None:
@@ -402,7 +402,7 @@ class _Body(ast.NodeTransformer):
         return _atom(f"({self.translator.type(kind)}){{{inside}}}"), kind
 
     def _callee(self, node: ast.expr) -> Any:
-        """What is called, found where Python would find it; of a part its function."""
+        """What is called, found where Python would find it."""
         found = None
         match node:
             case ast.Name(id=name):
@@ -411,13 +411,13 @@ class _Body(ast.NodeTransformer):
                 module := self._known(owner), ModuleType
             ):
                 found = getattr(module, name, None)
-        return found.function if isinstance(found, Part) else found
+        return found
 
     def _called(self, node: ast.Call, function: Any) -> tuple[ast.expr, Kind]:
         texts = ", ".join(self._c(one)[0] for one in node.args)
         if (
             getattr(function, "__name__", "") == "row_of"
-        ):  # a part that Numba has instructions for
+        ):  # of `shipgym.engine.records`
             table, _, row = texts.partition(", ")
             return _atom(f"{table}[(int)({row})]"), float
         if function in (float, int):

@@ -278,7 +278,7 @@ def sailed(
     """
     out = np.empty((len(segment.measured), starts.size))
     loop = ship_loop(
-        model.vessel, "segments", bool(segment.inputs[:, 3:].any())
+        model.compiled, "segments", bool(segment.inputs[:, 3:].any())
     )  # with or without wind
     loop(starts.ravel(), ships.ravel(), offsets, segment.inputs, segment.samples, out)
     return out.reshape(len(out), -1, LANES)

@@ -9,8 +9,11 @@ library (`atan.c`, Moshier 1995).
 """
 
 from math import copysign, fabs, pi
+from typing import TypeVar
 
 import numpy as np
+
+Choice = TypeVar("Choice")
 
 TWO_OVER_PI = 2.0 / pi
 HALF_PI_HIGH = 1.57079632673412561417e00
@@ -31,8 +34,8 @@ TAN_3_PI_OVER_8 = 2.41421356237309504880
 HALF_PI_REST = 6.12323399573676588613e-17  # pi / 2 less its double
 
 
-def pick(condition: bool, yes: float, no: float) -> float:
-    """One of two numbers, without a branch."""
+def pick(condition: bool, yes: Choice, no: Choice) -> Choice:
+    """Return one of two numbers, or of two records of one kind."""
     return yes if condition else no
 
 
@@ -166,12 +169,13 @@ def two_to(x: float) -> float:
 
 def arctan2(y: float, x: float) -> float:
     """Angle in [-pi, pi] of the point with the finite coordinates x and y, rad."""
-    a, b = fabs(y), fabs(x)
+    a = fabs(y)
+    b = fabs(x)
     steep = a > TAN_3_PI_OVER_8 * b
     middling = a > 0.66 * b
-    above = -b if steep else (a - b if middling else a)
-    below = a if steep else (a + b if middling else b)
-    q = above / (below if below > 0.0 else 1.0)
+    above = pick(steep, -b, pick(middling, a - b, a))
+    below = pick(steep, a, pick(middling, a + b, b))
+    q = above / pick(below > 0.0, below, 1.0)
     z = q * q
     p = -7.500855792314704667340e01 + z * (
         -1.615753718733365076637e01 + z * -8.750608600031904122785e-01
@@ -181,7 +185,7 @@ def arctan2(y: float, x: float) -> float:
     d = 4.853903996359136964868e02 + z * (4.328810604912902668951e02 + z * d)
     d = 1.945506571482613964425e02 + z * d
     arc = q + q * (z * p / d)
-    quarters = 0.5 if steep else (0.25 if middling else 0.0)
+    quarters = pick(steep, 0.5, pick(middling, 0.25, 0.0))
     angle = quarters * pi + (arc + 2.0 * quarters * HALF_PI_REST)
     if_behind = pi - (angle - 2.0 * HALF_PI_REST)
     return copysign(if_behind if copysign(1.0, x) < 0.0 else angle, y)

@@ -18,10 +18,9 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_flag, check_number, check_text, placed
+from shipgym.engine.compiled_ship import CompiledShip, compiled_ship
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.records import Record, field_types, is_record
-from shipgym.engine.specialise import Part
-from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
 from shipgym.python_files import (
     asked,
@@ -208,17 +207,17 @@ class ShipEquations:
         shaft = ("n",) if self.shaft_acceleration is not None else ()
         return ("x", "y", "psi", "u", "v", "r", *roll, "delta", *shaft)
 
-    def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
+    def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
         """What is compiled of the ship: the same whatever her coefficients are, but for the switches."""
-        parts: dict[str, Any] = {"accelerations": Part(self.accelerations)}
-        parts |= {name: bool(coefficients[name]) for name in self.switches}
+        functions: dict[str, Any] = {"accelerations": self.accelerations}
+        functions |= {name: bool(coefficients[name]) for name in self.switches}
         if self.shaft_acceleration is not None:
-            parts["shaft_acceleration"] = Part(self.shaft_acceleration)
-        return vessel_of(
+            functions["shaft_acceleration"] = self.shaft_acceleration
+        return compiled_ship(
             self.name,
             self.state_names,
             self.coefficients_record,
-            tuple(parts.items()),
+            tuple(functions.items()),
             lag,
         )
 

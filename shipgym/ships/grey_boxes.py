@@ -13,10 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shipgym.arrays import Floats
+from shipgym.engine.compiled_ship import CompiledShip, compiled_ship
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.records import Record
-from shipgym.engine.specialise import Part
-from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.particulars import Particulars
@@ -123,31 +122,31 @@ class GreyBox(Structure):
         """Whether the reference ship's shaft may turn astern."""
         return self.ship.turns_astern
 
-    def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
+    def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
         """What is compiled of a ship with this grey box: the reference ship's functions and the terms."""
         terms = coefficients_record(len(self._terms), "GreyBoxTerms")
-        return self._vessel(
+        return self._compiled(
             terms,
-            {"term_accelerations": Part(accelerations_function(self._source))},
+            {"term_accelerations": accelerations_function(self._source)},
             lag,
         )
 
-    def _vessel(
-        self, terms: Record, functions: dict[str, Any], lag: bool, **summed: Any
-    ) -> Vessel:
+    def _compiled(
+        self, terms: Record, functions: dict[str, Any], lag: bool, **staged: Any
+    ) -> CompiledShip:
         """Functions of the reference ship, of the terms with their record of coefficients, and their sum."""
-        reference = self.ship.vessel
-        parts = {
+        reference = self.ship.compiled
+        hooks = {
             **reference.functions,
-            "accelerations": Part(accelerations),
+            "accelerations": accelerations,
             "reference_accelerations": reference.functions["accelerations"],
             "KNOWS_SHAFT": self.shaft,
             **functions,
         }
-        parts.pop("shaft_acceleration", None)  # the shaft turns as commanded
+        hooks.pop("shaft_acceleration", None)  # the shaft turns as commanded
         record = _coefficients(reference.coefficients, terms)
-        named = tuple(parts.items()), lag, tuple(summed.items())
-        return vessel_of("a grey box", self.state_names, record, *named)
+        named = tuple(hooks.items()), lag, tuple(staged.items())
+        return compiled_ship("a grey box", self.state_names, record, *named)
 
     @cached_property
     def _source(self) -> str:
@@ -160,7 +159,7 @@ class GreyBox(Structure):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Numbers of the vessel's coefficients: the reference ship's, then those of the terms."""
+        """Numbers of the coefficients: the reference ship's, then those of the terms."""
         terms = self.term_numbers(coefficients, particulars, shaft_speed)
         return np.concatenate([self.ship.ship_numbers(), terms])
 
@@ -222,11 +221,11 @@ KNOWS_SHAFT = False  # whether the reference ship's shaft turns with the target'
 
 
 def reference_accelerations(motion: Motion, c: Any, ship: Ship) -> Any:
-    """A part: the reference ship's."""
+    """A hook: the accelerations of the reference ship."""
 
 
 def term_accelerations(motion: Motion, c: Any, ship: Ship) -> Any:
-    """A part: the sum of the terms."""
+    """A hook: the sum of the terms."""
 
 
 def accelerations(

@@ -17,13 +17,11 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.engine import stages
+from shipgym.engine.compiled_ship import CompiledShip
+from shipgym.engine.lane_records import Point, Sums
 from shipgym.engine.mathematics import two_to
 from shipgym.engine.motion import Motion, Ship, accelerations
-from shipgym.engine.places import row_of
-from shipgym.engine.records import Record, table_of
-from shipgym.engine.specialise import Part
-from shipgym.engine.stages import Point, Sums
-from shipgym.engine.vessel import Vessel
+from shipgym.engine.records import Record, row_of, table_of
 from shipgym.errors import InputError
 from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.particulars import Particulars
@@ -153,14 +151,16 @@ class KernelBox(GreyBox):
             (u * u + v * v)[:, None] * self.kernel.features(channels, particulars)
         )
 
-    def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
+    def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
         """What is compiled: the reference ship's functions and the sum over centres, read at run time."""
         size = self.kernel.size
         functions = {
             "N_CENTRES": size,
-            "term_accelerations": Part(kernel_accelerations),
+            "term_accelerations": kernel_accelerations,
         }
-        return self._vessel(_kernel_record(size), functions, lag, **SUMMED, N_ROWS=size)
+        return self._compiled(
+            _kernel_record(size), functions, lag, **STAGED, N_ROWS=size
+        )
 
     def numbers(
         self,
@@ -168,7 +168,7 @@ class KernelBox(GreyBox):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Numbers of the vessel's coefficients: the reference ship's, scales, offset and table of centres."""
+        """Numbers of the coefficients: the reference ship's, scales, offset and table of centres."""
         kernel = self.kernel
         weights = self.term_numbers(coefficients, particulars, shaft_speed)
         table = np.zeros((kernel.size, ROW))
@@ -217,7 +217,7 @@ class KernelCoefficients(NamedTuple):
     table: Any
 
 
-N_CENTRES = 0  # part
+N_CENTRES = 0  # set when a loop is compiled
 
 
 def coordinates(motion: Motion, c: KernelCoefficients, ship: Ship) -> Point:
@@ -259,12 +259,12 @@ def kernel_accelerations(
     return udot, vdot, rdot, 0.0, 0.0
 
 
-SUMMED = {
-    "sail_lanes": Part(stages.sail_lanes, inline=False),
-    "term_accelerations": Part(accelerations),
-    "point_of": Part(coordinates),
-    "row_sums": Part(add_centre),
-    "sum_accelerations": Part(sum_accelerations),
+STAGED = {
+    "sail_lanes": stages.sail_in_stages,
+    "term_accelerations": accelerations,
+    "point_of": coordinates,
+    "add_row": add_centre,
+    "sum_accelerations": sum_accelerations,
 }
 
 

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
+from shipgym.engine.compiled_ship import CompiledShip
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.motion import Ship
-from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
 from shipgym.ships.equations import ShipEquations
@@ -135,14 +135,14 @@ class ManoeuvringModel:
         return float(self.particulars["length"] / self.particulars["speed"])
 
     @property
-    def vessel(self) -> Vessel:
+    def compiled(self) -> CompiledShip:
         """What is compiled of the ship: one for all models that differ in numbers only."""
-        return self.dynamics.vessel(
+        return self.dynamics.compiled(
             self.coefficients, self.steering.time_constant > 0.0
         )
 
     def ship_numbers(self, water_depth: float = np.inf, step: float = 0.0) -> Floats:
-        """What her vessel reads of the ship, in the order of `vessel.layout`: `Ship`, then coefficients.
+        """Numbers of the ship in the order of `compiled.layout`: `Ship`, then coefficients.
 
         `step`, s, is that of her simulation, which a lag of her steering gear has to be
         long enough for.
@@ -227,7 +227,7 @@ class ManoeuvringModel:
         )
         depths = np.array(np.broadcast_to(depth, shape)).reshape(-1)
         out = np.empty_like(flat)
-        loop = ship_loop(self.vessel, "derivatives")
+        loop = ship_loop(self.compiled, "derivatives")
         loop(flat, two_commands(flat_commands), depths, self.ship_numbers(), out)
         return out.reshape(*shape, len(self.state_names))
 

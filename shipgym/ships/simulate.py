@@ -51,7 +51,7 @@ class Passage:
     def __init__(
         self, model: ManoeuvringModel, conditions: Conditions, dt: float
     ) -> None:
-        self.model, self.vessel, self.dt = model, model.vessel, dt
+        self.model, self.compiled, self.dt = model, model.compiled, dt
         self.numbers = model.ship_numbers(conditions.water_depth, dt)
         weather = as_weather(conditions.weather, "weather")
         self.windy = not weather.calm
@@ -72,7 +72,7 @@ class Passage:
 
     def loop(self, name: str) -> Any:
         """A loop of `shipgym.engine.loops`, compiled for the ship and for calm water or weather."""
-        return ship_loop(self.vessel, name, self.windy)
+        return ship_loop(self.compiled, name, self.windy)
 
     def run(
         self, name: str, states: Floats, *arguments: Any, since: float = 0.0
@@ -93,11 +93,13 @@ class Passage:
 
     def states(self, first: Floats, n_steps: int) -> Floats:
         """Rows for `n_steps` + 1 states, shape (n_columns,) each, and their weather; `first` filled in."""
-        width = len(self.vessel.state_names) + (len(SEA_CHANNELS) if self.windy else 0)
+        width = len(self.compiled.state_names) + (
+            len(SEA_CHANNELS) if self.windy else 0
+        )
         states = np.empty((n_steps + 1, width))
         states[0, : len(first)] = first
         if len(first) < width:
-            self.loop("meet")(states, *self.sea)
+            self.loop("sample_sea")(states, *self.sea)
         return states
 
 
@@ -160,7 +162,7 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     longest_step = LONGEST_STEP * model.travel_time
     wind = wind_accelerations(trial, model.dynamics)
     wind = 0.5 * (wind[1:] + wind[:-1])
-    loop = ship_loop(model.vessel, "open_loop", bool(wind.any()))
+    loop = ship_loop(model.compiled, "open_loop", bool(wind.any()))
     reached = loop(
         states, t, np.array(trial["delta"]), n, wind, longest_step, model.ship_numbers()
     )

@@ -13,8 +13,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_text, quoted
-from shipgym.engine.specialise import Part
-from shipgym.engine.vessel import Vessel, vessel_of
+from shipgym.engine.compiled_ship import CompiledShip, compiled_ship
 from shipgym.errors import InputError
 from shipgym.ships import term_functions
 from shipgym.ships.particulars import ADDED_MASSES, Particulars
@@ -221,17 +220,13 @@ class Structure:
         """Whether the shaft may turn astern: a table is taken at its word."""
         return True
 
-    def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
+    def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
         """What is compiled of a ship with this table; the coefficients are read at run time."""
-        parts = (
-            (
-                "accelerations",
-                Part(term_functions.accelerations_function(self._source)),
-            ),
-        )
+        accelerations = term_functions.accelerations_function(self._source)
+        functions = (("accelerations", accelerations),)
         record = term_functions.coefficients_record(len(self._terms))
-        return vessel_of(
-            "a ship with a table of terms", self.state_names, record, parts, lag
+        return compiled_ship(
+            "a ship with a table of terms", self.state_names, record, functions, lag
         )
 
     @cached_property
@@ -259,7 +254,7 @@ class Structure:
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Numbers of the vessel's coefficients: those of the terms."""
+        """Numbers of the coefficients: those of the terms."""
         return self.term_numbers(coefficients, particulars, shaft_speed)
 
     def term_numbers(

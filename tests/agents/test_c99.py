@@ -126,14 +126,11 @@ def kernel_ship():
 @pytest.mark.parametrize("name", ["tanker", "kvlcc2-rm-svm", "kernel"])
 def test_every_kind_of_ship_is_the_same_in_c_as_in_plain_python(name, tmp_path):
     model = kernel_ship() if name == "kernel" else load_model(name)
-    parts = {**model.vessel.parts(), **sea_functions(True)}
-    plain, numbers = (
-        Specialisation(parts, "plain", None).copy(advance),
-        model.ship_numbers(),
-    )
-    ship, coefficients = (
-        parts[one].function(numbers, 0) for one in ("load_ship", "load_coefficients")
-    )
+    hooks = {**model.compiled.hooks(), **sea_functions(True)}
+    plain = Specialisation(hooks).copy(advance)
+    numbers = model.ship_numbers()
+    ship = hooks["load_ship"](numbers, 0)
+    coefficients = hooks["load_coefficients"](numbers, 0)
     rudder, shaft = np.radians(20.0), model.service_shaft_speed
     found = sailed(tmp_path, model, [rudder] * 30, (0.1, 0.2, 0.0, 0.0), 1.0)
     motion, given = (

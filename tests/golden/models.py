@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from shipgym import interchange
+from shipgym.engine.lane_records import Sums
 from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.stages import Sums
 from shipgym.manoeuvres import towing_tank
 from shipgym.ships import (
     catalogue,
@@ -160,7 +160,7 @@ def reference_ships() -> Answers:
             one.coefficients, replace(p, water_density=1013.0)
         )
         found[f"{one.name} vessel"] = lambda one=one: (
-            one.vessel(one.coefficients, True).state_names
+            one.compiled(one.coefficients, True).state_names
         )
     kvlcc2.PACKAGE_FORM = True
     try:
@@ -1216,7 +1216,7 @@ def kernels() -> Answers:
                 ShipModel("k", "box", HULL, GEAR, values, own_table=box).to_dict()
             ).own_table.kernel
         ),
-        "vessel": lambda: len(box.vessel(values, True).state_names),
+        "vessel": lambda: len(box.compiled(values, True).state_names),
         "sum": kernel_boxes.sum_accelerations(
             at[1], Sums(0.3, -0.2, 0.1), of(HULL, 1.0)
         ),

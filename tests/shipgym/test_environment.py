@@ -244,7 +244,7 @@ def test_a_refused_action_leaves_what_was_shown():
     shown = [
         engine.observations,
         engine.info("heading_error").copy(),
-        engine.shown.outcomes[0].copy(),
+        engine.outputs.outcomes[0].copy(),
     ]
     with pytest.raises(
         InputError,
@@ -254,7 +254,7 @@ def test_a_refused_action_leaves_what_was_shown():
     assert shown[2].all()  # costs
     for before, now in zip(
         shown,
-        [engine.observations, engine.info("heading_error"), engine.shown.outcomes[0]],
+        [engine.observations, engine.info("heading_error"), engine.outputs.outcomes[0]],
         strict=True,
     ):
         np.testing.assert_array_equal(now, before)
@@ -268,7 +268,7 @@ def test_the_first_reward_that_is_no_number_is_named():
     engine.reset([1, 2, 3])
     engine.step(np.zeros((3, 1)))
     own = engine.task.definition.reward_source
-    engine.shown.outcomes[0, 1] = (
+    engine.outputs.outcomes[0, 1] = (
         np.inf
     )  # a sum beyond all numbers, of parts that are within
     with pytest.raises(InputError) as caught:
@@ -348,7 +348,7 @@ def test_lengths_of_a_path_are_in_metres_where_there_is_one():
     assert path.path_metres("turn_radius") == pytest.approx(4.0 * 160.93)
     assert course.path_metres("corridor") is None
     assert course.waypoints() is None
-    plan = course._voyages.state.n_rows
+    plan = course.program.state_rows.n_rows
     course._states = np.zeros((1, (plan + 4) * 64))  # a plan that is none of waypoints
     assert course.waypoints() is None
 
