@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
 
-from shipgym.engine import episodes, stages
+from shipgym.engine import episodes, sailing, stages, tiles
 from shipgym.engine.compiled_ship import CompiledShip
 from shipgym.engine.compiling import compiled, plain_python
 from shipgym.engine.envelope import Envelope
@@ -118,7 +118,7 @@ class EpisodeProgram:
         """What takes the place of hooks and constants of loops, by name."""
         of_ships = 1 if self.shared else LANES
         return {
-            "GROUP": 1 if plain_python() else episodes.GROUP,
+            "GROUP": 1 if plain_python() else tiles.GROUP,
             "SHARED_SHIP": self.shared,
             "PLAN_ROW": self.state_rows.n_rows,
             **_loaders(self.state_rows, LANES),
@@ -135,7 +135,7 @@ class EpisodeProgram:
             "readings": self.sensors.readings,
             "HAS_NOISE": self.sensors.noise,
             "HAS_FILTER": self.sensors.filter,
-            "sail_lanes": episodes.sail_in_one_loop,
+            "sail_lanes": sailing.sail_in_one_loop,
             **self.ship.hooks(shared=self.shared),
             **self.ship.staged,
             **open_sea.sea_functions(self.windy),

@@ -6,8 +6,8 @@ them gives (`shipgym.engine.specialise`); the functions here only say what is as
 it. `CompiledShip.hooks`, `sea_hooks` and `EpisodeProgram.hooks` give them.
 
 Functions that load and store records are written from the rows of each record
-(`shipgym.engine.record_code`). They take an array, which is a tile or a vector, and a
-lane. Two more hooks, `accelerations` and `shaft_acceleration`, have a body of their own
+(`shipgym.engine.record_code`). They take an array and a lane; where it is a vector and
+not a tile, the lane does not matter and is left out by who reads it. Two more hooks, `accelerations` and `shaft_acceleration`, have a body of their own
 and stand in `shipgym.engine.motion`.
 """
 
@@ -49,7 +49,7 @@ TASK = "given by the task when a loop is compiled"
 # Records of a lane, in its tile of states
 
 
-def load_motion(state: Floats, lane: int) -> Motion:
+def load_motion(state: Floats, lane: int = 0) -> Motion:
     """Read the motion of the ship."""
     raise NotImplementedError(RECORDS)
 
@@ -59,7 +59,7 @@ def store_motion(state: Floats, lane: int, motion: Motion) -> None:
     raise NotImplementedError(RECORDS)
 
 
-def load_sea(state: Floats, lane: int) -> Sea:
+def load_sea(state: Floats, lane: int = 0) -> Sea:
     """Read the state of the sea around the ship; zeros in calm water."""
     raise NotImplementedError(RECORDS)
 
@@ -150,17 +150,17 @@ def total_reward(reward: Any) -> float:
 # Records of ships, of random numbers, of settings, and of arguments
 
 
-def load_ship(ships: Floats, lane: int) -> Ship:
+def load_ship(ships: Floats, lane: int = 0) -> Ship:
     """Read what every ship has beside her coefficients."""
     raise NotImplementedError(RECORDS)
 
 
-def load_coefficients(ships: Floats, lane: int) -> Any:
+def load_coefficients(ships: Floats, lane: int = 0) -> Any:
     """Read the coefficients of the ship, a record of hers."""
     raise NotImplementedError(RECORDS)
 
 
-def load_sea_parameters(ships: Floats, lane: int) -> SeaParameters:
+def load_sea_parameters(ships: Floats, lane: int = 0) -> SeaParameters:
     """Read the parameters of the sea that the ship meets; zeros in calm water."""
     raise NotImplementedError(RECORDS)
 
@@ -195,28 +195,28 @@ def store_sea_random(random: Words, lane: int, sea_random: SeaRandom) -> None:
     raise NotImplementedError(RECORDS)
 
 
-def load_rules(settings: Floats, lane: int) -> Rules:
-    """Read the settings of the engine; there is one lane."""
+def load_rules(settings: Floats) -> Rules:
+    """Read the settings of the engine."""
     raise NotImplementedError(RECORDS)
 
 
-def load_sensor_settings(settings: Floats, lane: int) -> Any:
-    """Read the `Settings` of the sensor set; there is one lane."""
+def load_sensor_settings(settings: Floats) -> Any:
+    """Read the `Settings` of the sensor set."""
     raise NotImplementedError(RECORDS)
 
 
-def load_task_settings(settings: Floats, lane: int) -> Any:
-    """Read the `Settings` of the task; there is one lane."""
+def load_task_settings(settings: Floats) -> Any:
+    """Read the `Settings` of the task."""
     raise NotImplementedError(RECORDS)
 
 
-def load_arguments(memory: Words, lane: int) -> Arguments:
-    """Read where the arrays of an engine lie; there is one lane."""
+def load_arguments(memory: Words) -> Arguments:
+    """Read where the arrays of an engine lie."""
     raise NotImplementedError(RECORDS)
 
 
 def store_sea_channels(row: Floats, lane: int, channels: SeaChannels) -> None:
-    """Write what is recorded of the sea behind the state of a row; there is one lane."""
+    """Write what is recorded of the sea behind the state of a row."""
     raise NotImplementedError(RECORDS)
 
 

@@ -45,7 +45,7 @@ Function = Callable[..., Any]
 def loader(rows: Rows, lanes: int = LANES) -> Function:
     """Write `load(array, lane)`, which reads a record from a tile.
 
-    Without `lanes` (1) the array is a vector, and `lane` is not used.
+    With `lanes` 1 the array is a vector, and `lane` is not used and may be left out.
     """
     names: dict[str, Any] = {}
 
@@ -63,7 +63,8 @@ def loader(rows: Rows, lanes: int = LANES) -> Function:
 
     made = _constructed(rows.record, number, names)
     name = f"load_{rows.record.__name__}"
-    return _function(name, "array, lane", [f"return {made}"], names)
+    arguments = "array, lane" if lanes > 1 else "array, lane=0"
+    return _function(name, arguments, [f"return {made}"], names)
 
 
 def storer(rows: Rows, lanes: int = LANES) -> Function:

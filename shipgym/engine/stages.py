@@ -6,14 +6,6 @@ tile before the next one, and the loop over rows has that over lanes inside. Wha
 between the loops lies with the results of the tile.
 """
 
-from shipgym.engine.episodes import (
-    FIRST_LANE,
-    GROUP,
-    SHARED_SHIP,
-    end_substep,
-    sea_push,
-    ship_of,
-)
 from shipgym.engine.hooks import (
     add_row,
     load_coefficients,
@@ -44,8 +36,9 @@ from shipgym.engine.motion import (
     stage,
     start_of_step,
 )
+from shipgym.engine.sailing import end_substep, push_of, ship_of
 from shipgym.engine.specialise import called
-from shipgym.engine.tiles import Tile
+from shipgym.engine.tiles import FIRST_LANE, GROUP, SHARED_SHIP, Tile
 
 N_ROWS = 0  # of the table that is summed over, a multiple of 4; set by the ship
 
@@ -84,7 +77,7 @@ def start_of(tile: Tile, lane: int, ship: Ship) -> tuple[Motion, Held]:
     order = clip(commands.rudder_command * limit, -limit, limit)
     shaft = commands.shaft_command * ship.shaft
     start = start_of_step(load_motion(tile.state, lane), shaft)
-    return start, Held(order, shaft, sea_push(tile, lane))
+    return start, Held(order, shaft, push_of(tile, lane))
 
 
 def state_at_stage(tile: Tile, lane: int, reach: float, ship: Ship) -> Motion:

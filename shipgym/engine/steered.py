@@ -89,9 +89,9 @@ def zigzag(
     `threshold` to the side of the order, at that instant (`inside_step`) or at the next
     sample. The second number returned counts the reversals.
     """
-    ship = load_ship(numbers, 0)
-    coefficients = load_coefficients(numbers, 0)
-    motion = load_motion(out[0], 0)
+    ship = load_ship(numbers)
+    coefficients = load_coefficients(numbers)
+    motion = load_motion(out[0])
     first_heading = motion.psi
     motion = replaced(motion, 0.0, motion.delta, motion.n)  # headings from the first
     command = angle
@@ -118,7 +118,7 @@ def zigzag(
     for i in range(last, len(commands)):
         commands[i] = command
     for i in range(1, last + 1):
-        motion = load_motion(out[i], 0)
+        motion = load_motion(out[i])
         heading = first_heading + motion.psi
         motion = replaced(motion, heading, motion.delta, motion.n)
         store_motion(out[i], 0, motion)
@@ -144,9 +144,9 @@ def steer_rate(
     The helmsman is proportional and integral. `commands` receives the rudder angle held
     from each sample on; `memory` holds the integral part of his rudder and is changed.
     """
-    ship = load_ship(numbers, 0)
-    coefficients = load_coefficients(numbers, 0)
-    motion = load_motion(out[0], 0)
+    ship = load_ship(numbers)
+    coefficients = load_coefficients(numbers)
+    motion = load_motion(out[0])
     limit = ship.rudder_limit
     integral = memory[0]
     last = len(out) - 1

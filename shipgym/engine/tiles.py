@@ -15,7 +15,16 @@ from shipgym.engine.memory import (
 from shipgym.engine.records import LANES
 from shipgym.engine.specialise import called
 
-PLAN_ROW = 0  # first row of the plans of episodes, set when a loop is compiled
+# Lanes are sailed in whole vectors, whose arithmetic may be contracted otherwise than
+# that of a single lane, so that results do not depend on the number of ships.
+GROUP = 16
+# typed, since Numba compiles a function once more for a literal that it is called with
+FIRST_LANE: Any = np.int64(0)
+
+# Set when a loop is compiled, like hooks.
+PLAN_ROW = 0  # first row of the plans of episodes
+# whether all lanes have the same ship, which is then read before a loop and not in it
+SHARED_SHIP = True
 
 
 class Tile(NamedTuple):

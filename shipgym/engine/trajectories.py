@@ -95,14 +95,14 @@ def replaced(motion: Motion, psi: float, delta: float, n: float) -> Motion:
 
 def push_now(motion: Motion, sea: Any, parameters: Any) -> Push:
     """Return what the sea does to the ship now."""
-    return push(motion, load_sea(sea, 0), load_sea_parameters(parameters, 0))
+    return push(motion, load_sea(sea), load_sea_parameters(parameters))
 
 
 def sample_sea(out: Any, sea: Any, rng_state: Any, parameters: Any) -> None:
     """Draw the sea around the ship in row 0, `rng_state` seeding its random numbers."""
     if HAS_SEA:
-        p = load_sea_parameters(parameters, 0)
-        store_sea(sea, 0, begin_sea(load_motion(out[0], 0), rng_state[0], p))
+        p = load_sea_parameters(parameters)
+        store_sea(sea, 0, begin_sea(load_motion(out[0]), rng_state[0], p))
         rng_state[0] += BEGIN_WORDS
         record_sea(out, 0, sea, parameters)
 
@@ -119,16 +119,16 @@ def follow(
     """Record where a step led, and let the sea go on meanwhile."""
     store_motion(out[row], 0, motion)
     if HAS_SEA:
-        p = load_sea_parameters(parameters, 0)
-        store_sea(sea, 0, evolve(motion, h, load_sea(sea, 0), rng_state[0], p))
+        p = load_sea_parameters(parameters)
+        store_sea(sea, 0, evolve(motion, h, load_sea(sea), rng_state[0], p))
         rng_state[0] += EVOLVE_WORDS
         record_sea(out, row, sea, parameters)
 
 
 def record_sea(out: Any, row: int, sea: Any, parameters: Any) -> None:
     """Record the sea behind the state of one row."""
-    now = load_sea(sea, 0)
-    p = load_sea_parameters(parameters, 0)
+    now = load_sea(sea)
+    p = load_sea_parameters(parameters)
     channels = SeaChannels(
         psi_wave=now.psi_wave,
         r_wave=now.r_wave,
@@ -146,10 +146,10 @@ def derivatives(
     states: Any, commands: Any, depths: Any, numbers: Any, out: Any
 ) -> None:
     """Time derivative of each state; `commands` holds rudder angle and shaft speed."""
-    ship = load_ship(numbers, 0)
-    coefficients = load_coefficients(numbers, 0)
+    ship = load_ship(numbers)
+    coefficients = load_coefficients(numbers)
     for i in range(len(states)):
-        motion = load_motion(states[i], 0)
+        motion = load_motion(states[i])
         order = clip(commands[i, 0], -ship.rudder_limit, ship.rudder_limit)
         shaft = commands[i, 1]
         n = motion.n if HAS_SHAFT else shaft
@@ -185,9 +185,9 @@ def simulate(
     numbers: Any,
 ) -> int:
     """Take a row of commands, rudder and shaft speed, for each step of h seconds."""
-    ship = load_ship(numbers, 0)
-    coefficients = load_coefficients(numbers, 0)
-    motion = load_motion(out[0], 0)
+    ship = load_ship(numbers)
+    coefficients = load_coefficients(numbers)
+    motion = load_motion(out[0])
     for i in range(len(commands)):
         rudder = commands[i, 0]
         shaft = commands[i, 1]
@@ -208,9 +208,9 @@ def open_loop(
     rate. The water is calm; `wind` holds the accelerations by measured wind in surge,
     sway and yaw, one row a step, of which a loop for calm water knows nothing.
     """
-    own = load_ship(numbers, 0)
-    coefficients = load_coefficients(numbers, 0)
-    motion = load_motion(out[0], 0)
+    own = load_ship(numbers)
+    coefficients = load_coefficients(numbers)
+    motion = load_motion(out[0])
     for i in range(len(t) - 1):
         interval = t[i + 1] - t[i]
         steps = int(ceil(interval / longest_step - 1e-9))

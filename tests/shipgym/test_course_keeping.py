@@ -13,7 +13,7 @@ from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 import shipgym
 from shipgym import InputError
-from shipgym.engine.episodes import are_finite
+from shipgym.engine.sailing import are_finite
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.random import DRAW, GOLDEN, mix, uniform
 from shipgym.envs.engine import Engine
