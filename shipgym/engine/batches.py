@@ -8,6 +8,7 @@ from typing import Any
 
 from shipgym.engine.hooks import (
     load_coefficients,
+    load_inputs,
     load_motion,
     load_ship,
     store_motion,
@@ -15,9 +16,6 @@ from shipgym.engine.hooks import (
 from shipgym.engine.motion import CALM, Push, sail
 from shipgym.engine.records import LANES
 from shipgym.engine.trajectories import NO_LIMIT, replaced, with_gear
-
-# columns of the inputs of a measured trial
-TIME, RUDDER, SHAFT, SURGE, SWAY, YAW = range(6)
 
 
 def advance_tile(state: Any, command: Any, h: float, ships: Any) -> None:
@@ -59,37 +57,45 @@ def sail_segment(
     the state at a point, -1 for none. A ship that runs away leaves numbers that are not
     finite, or not any ship's.
     """
-    set_rudders(state, offsets, inputs[0, RUDDER])
+    begin = inputs[0]
+    set_rudders(state, offsets, load_inputs(begin).rudder)
     keep_sample(state, samples[0], out)
-    for i in range(len(inputs) - 1):
-        sail_between(state, ships, offsets, inputs[i], inputs[i + 1])
-        keep_sample(state, samples[i + 1], out)
+    for i in range(1, len(inputs)):
+        end = inputs[i]
+        sail_between(state, ships, offsets, begin, end)
+        keep_sample(state, samples[i], out)
+        begin = end
 
 
 def set_rudders(state: Any, offsets: Any, rudder: float) -> None:
     """Put the rudder of each ship at a measured angle and her offset."""
     for lane in range(LANES):
-        motion = load_motion(state, lane)
         delta = rudder + offsets[lane]
-        store_motion(state, lane, replaced(motion, motion.psi, delta, motion.n))
+        motion = load_motion(state, lane)
+        motion = replaced(motion, motion.psi, delta, motion.n)
+        store_motion(state, lane, motion)
 
 
 def sail_between(state: Any, ships: Any, offsets: Any, begin: Any, end: Any) -> None:
     """Move a tile of ships from one point of the inputs to the next."""
-    h = end[TIME] - begin[TIME]
-    rate = fabs(end[RUDDER] - begin[RUDDER]) / h
-    shaft = 0.5 * (begin[SHAFT] + end[SHAFT])
-    surge = 0.5 * (begin[SURGE] + end[SURGE])
-    sway = 0.5 * (begin[SWAY] + end[SWAY])
-    yaw = 0.5 * (begin[YAW] + end[YAW])
+    first = load_inputs(begin)
+    last = load_inputs(end)
+    h = last.time - first.time
+    rate = fabs(last.rudder - first.rudder) / h
+    shaft = 0.5 * (first.shaft + last.shaft)
+    surge = 0.5 * (first.wind.surge + last.wind.surge)
+    sway = 0.5 * (first.wind.sway + last.wind.sway)
+    yaw = 0.5 * (first.wind.yaw + last.wind.yaw)
     wind = Push(surge, sway, yaw, 0.0, 0.0, 0.0)
     for lane in range(LANES):
-        ship = with_gear(load_ship(ships, lane), NO_LIMIT, rate)
+        own = load_ship(ships, lane)
+        ship = with_gear(own, NO_LIMIT, rate)
         coefficients = load_coefficients(ships, lane)
-        rudder = end[RUDDER] + offsets[lane]
+        rudder = last.rudder + offsets[lane]
         motion = load_motion(state, lane)
         motion = sail(motion, rudder, shaft, h, wind, coefficients, ship)
-        store_motion(state, lane, replaced(motion, motion.psi, rudder, motion.n))
+        motion = replaced(motion, motion.psi, rudder, motion.n)
+        store_motion(state, lane, motion)
 
 
 def keep_sample(state: Any, row: int, out: Any) -> None:

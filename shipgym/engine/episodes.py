@@ -119,10 +119,11 @@ def run(memory: Any, output_memory: Any, share: int, asked: int) -> int:
 def choose_ended(tile: Tile, chosen: Any) -> None:
     """Choose the lanes of a tile whose episode was over before this interval."""
     for lane in range(tile.lanes):
+        ship = np.uintp(tile.first + lane)
+        counters = load_counters(tile.state, lane)
         outcome = load_outcome(tile.result, lane)
-        just_ended = outcome.terminated + outcome.truncated > 0.0
-        over = load_counters(tile.state, lane).ended != 0.0
-        chosen[np.uintp(tile.first + lane)] = over and not just_ended
+        just_ended = outcome.terminated + outcome.truncated
+        chosen[ship] = counters.ended > just_ended
 
 
 @called
@@ -133,10 +134,11 @@ def begin_lanes(tile: Tile, outputs: OutputTables, chosen: Any, next_one: bool) 
     the key.
     """
     for lane in range(tile.lanes):
-        if chosen[np.uintp(tile.first + lane)]:
+        ship = np.uintp(tile.first + lane)
+        if chosen[ship]:
             if next_one:
-                random = load_random(tile.random, lane)
-                following = Random(random.key, random.episode + np.uint64(1))
+                key, episode = load_random(tile.random, lane)
+                following = Random(key, episode + np.uint64(1))
                 store_random(tile.random, lane, following)
             begin_lane(tile, lane)
             write_outputs(tile, outputs, lane, lane + 1)
@@ -177,9 +179,12 @@ def clear_lane(tile: Any, lane: int) -> None:
 
 def draw_ship(tile: Tile, lane: int, random: Random) -> None:
     """Put a ship of the pool in a lane, if there is a pool."""
-    if len(tile.pool) > 0:
-        n_rows = len(tile.ships) // LANES
-        n_pool = float(len(tile.pool) // n_rows)
-        drawn = int(uniform(random.key, random.episode, SHIP_DRAW, 0.0, n_pool))
+    ships = tile.ships
+    pool = tile.pool
+    if len(pool) > 0:
+        n_rows = len(ships) // LANES
+        n_pool = len(pool) // n_rows
+        drawn = uniform(random.key, random.episode, SHIP_DRAW, 0.0, float(n_pool))
+        first = int(drawn) * n_rows
         for row in range(n_rows):
-            tile.ships[row * LANES + lane] = tile.pool[drawn * n_rows + row]
+            ships[row * LANES + lane] = pool[first + row]

@@ -25,12 +25,14 @@ if TYPE_CHECKING:
     from shipgym.engine.lane_records import (
         Commands,
         EpisodeCounters,
+        Inputs,
         Outcome,
         Point,
         Rules,
         SeaChannels,
         SeaRandom,
         Sums,
+        WindAccelerations,
     )
     from shipgym.engine.memory import Arguments
     from shipgym.engine.motion import Motion, Push, Rates, Ship
@@ -217,6 +219,16 @@ def load_arguments(memory: Words) -> Arguments:
 
 def store_sea_channels(row: Floats, lane: int, channels: SeaChannels) -> None:
     """Write what is recorded of the sea behind the state of a row."""
+    raise NotImplementedError(RECORDS)
+
+
+def load_wind(row: Floats) -> WindAccelerations:
+    """Read the accelerations by measured wind."""
+    raise NotImplementedError(RECORDS)
+
+
+def load_inputs(row: Floats) -> Inputs:
+    """Read a point of a measured trial."""
     raise NotImplementedError(RECORDS)
 
 

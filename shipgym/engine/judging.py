@@ -91,21 +91,22 @@ def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
     Returns in how many lanes of the tile an event is due, and how many episodes have
     just ended; lanes beyond them, up to so many groups, fill vectors.
     """
+    state = tile.state
     settings = settings_of(tile)
     shared = view_of(tile, FIRST_LANE)
     n_due = 0
     n_ended = 0
     for lane in range(groups * GROUP):
         ship, data, scale = shared if SHARED_SHIP else view_of(tile, lane)
-        motion = load_motion(tile.state, lane)
-        over = load_counters(tile.state, lane).ended != 0.0
+        motion = load_motion(state, lane)
+        over = load_counters(state, lane).ended != 0.0
         interval = past_interval(tile, lane, motion, data, settings.rules)
 
         task_state, just_ended = judge(tile, lane, motion, interval, ship, settings)
         memory = sample(tile, lane, motion, interval, settings)
-        memory = pick(over, load_memory(tile.state, lane), memory)
-        store_memory(tile.state, lane, memory)
-        seen = readings(motion, load_sea(tile.state, lane), memory)
+        memory = pick(over, load_memory(state, lane), memory)
+        store_memory(state, lane, memory)
+        seen = readings(motion, load_sea(state, lane), memory)
         observation = observe(seen, task_state, interval, ship, settings.task)
         store_observation(tile.result, lane, observation, scale)
 
@@ -220,16 +221,17 @@ def sample(
 @called
 def take_events(tile: Tile) -> None:
     """Take events, such as a new set-point, in the lanes in which one is due."""
+    state = tile.state
     settings = load_task_settings(tile.settings)
     for lane in range(tile.lanes):
         ship = load_ship(tile.ships, lane)
-        motion = load_motion(tile.state, lane)
-        before = load_task_state(tile.state, lane)
+        motion = load_motion(state, lane)
+        before = load_task_state(state, lane)
         interval = last_interval(tile, lane)
-        going = load_counters(tile.state, lane).ended == 0.0
+        going = load_counters(state, lane).ended == 0.0
         if going and due(motion, before, interval, ship, settings):
             random = load_random(tile.random, lane)
-            plan = plan_of(tile.state, lane)
+            plan = plan_of(state, lane)
             after = on_event(motion, before, interval, ship, settings, random, plan)
             store_task(tile, lane, after)
             observe_lane(tile, lane)
@@ -253,12 +255,15 @@ def last_interval(tile: Tile, lane: int) -> Interval:
 @called
 def observe_lane(tile: Tile, lane: int) -> None:
     """Observe a lane whose task has changed."""
-    ship = load_ship(tile.ships, lane)
+    state = tile.state
+    motion = load_motion(state, lane)
+    sea = load_sea(state, lane)
+    memory = load_memory(state, lane)
+    task_state = load_task_state(state, lane)
+
+    ship, _, scale = view_of(tile, lane)
     settings = load_task_settings(tile.settings)
-    motion = load_motion(tile.state, lane)
-    sea = load_sea(tile.state, lane)
-    seen = readings(motion, sea, load_memory(tile.state, lane))
-    task_state = load_task_state(tile.state, lane)
     interval = last_interval(tile, lane)
+    seen = readings(motion, sea, memory)
     observation = observe(seen, task_state, interval, ship, settings)
-    store_observation(tile.result, lane, observation, load_scale(tile.ships, lane))
+    store_observation(tile.result, lane, observation, scale)

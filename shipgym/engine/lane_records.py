@@ -64,6 +64,23 @@ class Sums(NamedTuple):
     r: float
 
 
+class WindAccelerations(NamedTuple):
+    """Accelerations by measured wind, m/s^2 and rad/s^2."""
+
+    surge: float
+    sway: float
+    yaw: float
+
+
+class Inputs(NamedTuple):
+    """A point of a measured trial, of which the inputs are straight between points."""
+
+    time: float  # s
+    rudder: float  # rad
+    shaft: float  # 1/s
+    wind: WindAccelerations
+
+
 class SeaChannels(NamedTuple):
     """What is recorded of the sea beside the state."""
 

@@ -8,9 +8,9 @@ from typing import Any
 from shipgym.engine import batches, steered, trajectories
 from shipgym.engine.compiled_ship import CompiledShip
 from shipgym.engine.compiling import compiled
-from shipgym.engine.lane_records import SeaChannels
-from shipgym.engine.record_code import storer
-from shipgym.engine.records import LANES, Rows
+from shipgym.engine.lane_records import Inputs, SeaChannels, WindAccelerations
+from shipgym.engine.record_code import loader, storer
+from shipgym.engine.records import LANES, Layout, Rows
 from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.sea.open_sea import sea_hooks
 
@@ -78,6 +78,8 @@ def ship_loop(ship: CompiledShip, name: str, windy: bool = False) -> Any:
         **ship.hooks(loop.lanes, loop.shared),
         **sea_hooks(windy, loop.lanes),
         "store_sea_channels": storer(channels, 1),
+        "load_inputs": loader(Layout(inputs=Inputs)["inputs"], 1),
+        "load_wind": loader(Layout(wind=WindAccelerations)["wind"], 1),
         **loop.hooks,
     }
     where = "in the open sea" if windy else "in calm water"

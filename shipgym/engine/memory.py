@@ -6,6 +6,7 @@ where each lies, `Arguments`. Tables of other types share it as views.
 """
 
 from collections.abc import Mapping
+from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,11 +91,12 @@ def allocated(
     blocks = {}
     for name, (dtype, rows, columns) in shapes.items():
         blocks[name] = Block(first, rows, columns)
-        size = rows * columns * np.dtype(dtype).itemsize
-        first += -(-size // WORD)
+        per_word = WORD // np.dtype(dtype).itemsize
+        first += ceil(rows * columns / per_word)
     return blocks, first
 
 
 def table_in(memory: Floats, at: Block, dtype: DTypeLike) -> NDArray[Any]:
     """Return the table at a block, a view."""
-    return np.ndarray((at.rows, at.columns), dtype, memory, WORD * at.first)
+    shape = (at.rows, at.columns)
+    return np.ndarray(shape, dtype, memory, WORD * at.first)

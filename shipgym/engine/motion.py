@@ -315,9 +315,13 @@ def lost(motion: Motion, ship: Ship) -> bool:
 
     Her velocities are then beyond any ship's, or not numbers.
     """
-    limit = RUNAWAY_SPEED * ship.speed
-    slow = motion.u * motion.u + motion.v * motion.v < limit * limit
-    steady = fabs(motion.r) * ship.length < RUNAWAY_YAW_RATE * ship.speed
+    u = motion.u
+    v = motion.v
+    fastest = RUNAWAY_SPEED * ship.speed
+    quickest = RUNAWAY_YAW_RATE * ship.speed
+    slow = u * u + v * v < fastest * fastest
+    steady = fabs(motion.r) * ship.length < quickest
     if HAS_ROLL:
-        return not (slow & steady & (fabs(motion.phi) < CAPSIZED))
+        upright = fabs(motion.phi) < CAPSIZED
+        return not (slow & steady & upright)
     return not (slow & steady)

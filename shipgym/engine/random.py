@@ -65,11 +65,14 @@ def normal(word: np.uint64, draw: np.uint64) -> float:
     within 1.5e-4, kurtosis 3.0001, range +-5.2.
     """
     bits = mix(word + draw)
-    pairs = (bits & QUARTERS) + ((bits >> S16) & QUARTERS)
+    even = bits & QUARTERS
+    odd = (bits >> S16) & QUARTERS
+    pairs = even + odd
     total = np.int32((pairs & LOW_32) + (pairs >> S32))
     t = (float(total) - 131070.0) * (1.0 / 65536.0)
     z = t * t
-    rest = -0.018156674707275382 + z * 0.005565249837221889
-    rest = 0.030027949208590633 + z * rest
-    rest = 0.04695799541224908 + z * rest
-    return t * (1.6670030710794617 + z * rest)
+    series = -0.018156674707275382 + z * 0.005565249837221889
+    series = 0.030027949208590633 + z * series
+    series = 0.04695799541224908 + z * series
+    series = 1.6670030710794617 + z * series
+    return t * series

@@ -38,8 +38,8 @@ from shipgym.engine.tiles import FIRST_LANE, GROUP, SHARED_SHIP, Tile
 def are_finite(actions: Any) -> bool:
     """Return whether all commands are finite."""
     wrong = 0
-    for k in range(len(actions)):
-        wrong += 0 if abs(actions[k]) < np.inf else 1
+    for action in actions:
+        wrong += 0 if abs(action) < np.inf else 1
     return wrong == 0
 
 
@@ -54,32 +54,36 @@ def take_commands(tile: Tile, actions: Any, n_ships: int) -> None:
     least_shaft = load_rules(tile.settings).least_shaft
     shafts = len(actions) - n_ships  # where commands of shafts begin, if there are any
     for lane in range(tile.lanes):
-        held = load_commands(state, lane)
-        counters = load_counters(state, lane)
-        over = counters.ended != 0.0
+        ship = tile.first + lane
+        rudder = float(actions[np.uintp(ship)])
+        shaft = float(actions[np.uintp(shafts + ship)])
+        rudder = clip(rudder, -1.0, 1.0)
+        shaft = clip(shaft, least_shaft, 1.0)
 
-        ship = np.uintp(tile.first + lane)
-        shaft_entry = np.uintp(shafts + tile.first + lane)
-        rudder = clip(float(actions[ship]), -1.0, 1.0)
-        shaft = clip(float(actions[shaft_entry]), least_shaft, 1.0)
+        held = load_commands(state, lane)
+        motion = load_motion(state, lane)
+        steps, ended, _ = load_counters(state, lane)
+        over = ended != 0.0
+        keeps_shaft = over | (shafts == 0)
         commands = Commands(
             rudder_command=pick(over, held.rudder_command, rudder),
-            shaft_command=pick(over | (shafts == 0), held.shaft_command, shaft),
-            rudder_before=load_motion(state, lane).delta,
+            shaft_command=pick(keeps_shaft, held.shaft_command, shaft),
+            rudder_before=motion.delta,
         )
-        steps = counters.steps + (1.0 - counters.ended)
+        counters = EpisodeCounters(steps + (1.0 - ended), ended, 0.0)
         store_commands(state, lane, commands)
-        store_counters(state, lane, EpisodeCounters(steps, counters.ended, 0.0))
+        store_counters(state, lane, counters)
 
 
 @called
 def sail_in_one_loop(tile: Tile, h: float, groups: int) -> None:
     """Move groups of ships by h seconds: the hook `sail_lanes` of most ships."""
+    state = tile.state
     shared = ship_of(tile, FIRST_LANE)
     for lane in range(groups * GROUP):
         ship, coefficients = shared if SHARED_SHIP else ship_of(tile, lane)
-        before = load_motion(tile.state, lane)
-        commands = load_commands(tile.state, lane)
+        before = load_motion(state, lane)
+        commands = load_commands(state, lane)
         rudder = commands.rudder_command * ship.rudder_limit
         shaft = commands.shaft_command * ship.shaft
         pushed = push_of(tile, lane)
@@ -113,8 +117,9 @@ def end_substep(tile: Tile, lane: int, after: Motion, h: float, ship: Ship) -> N
 
     motion = pick(away | over, before, after)
     ran_away = pick(away, 1.0, ran_away)
+    counters = EpisodeCounters(steps, ended, ran_away)
     store_motion(state, lane, motion)
-    store_counters(state, lane, EpisodeCounters(steps, ended, ran_away))
+    store_counters(state, lane, counters)
     if HAS_SEA:
         parameters = load_sea_parameters(tile.ships, lane)
         word = load_sea_random(tile.random, lane).rng_state

@@ -43,6 +43,8 @@ from shipgym.engine.tiles import FIRST_LANE, GROUP, SHARED_SHIP, Tile
 N_ROWS = 0  # of the table that is summed over, a multiple of 4; set by the ship
 
 
+#: Part of the step at which a stage lies, and its weight.
+STAGES = ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0))
 NO_SUMS = Sums(0.0, 0.0, 0.0)
 #: Records between the loops, by the names of `shipgym.engine.hooks`.
 BETWEEN_STAGES = {"point": Point, "sums": Sums, "slope": Rates, "slopes": Rates}
@@ -54,12 +56,10 @@ def sail_in_stages(tile: Tile, h: float, groups: int) -> None:
     for lane in range(groups * GROUP):
         store_slope(tile.result, lane, NO_RATES)
         store_slopes(tile.result, lane, NO_RATES)
-    for number in range(4):
-        reach = h * (0.0 if number == 0 else 1.0 if number == 3 else 0.5)
-        weight = 2.0 if number == 1 or number == 2 else 1.0
-        begin_stage(tile, reach, groups)
+    for part, weight in STAGES:
+        begin_stage(tile, part * h, groups)
         sum_rows(tile, groups)
-        end_stage(tile, reach, weight, groups)
+        end_stage(tile, part * h, weight, groups)
     shared = ship_of(tile, FIRST_LANE)
     for lane in range(groups * GROUP):
         ship, _ = shared if SHARED_SHIP else ship_of(tile, lane)
@@ -72,12 +72,14 @@ def sail_in_stages(tile: Tile, h: float, groups: int) -> None:
 
 def start_of(tile: Tile, lane: int, ship: Ship) -> tuple[Motion, Held]:
     """State at the start of the step, and what is held over it."""
+    motion = load_motion(tile.state, lane)
     commands = load_commands(tile.state, lane)
     limit = ship.rudder_limit
-    order = clip(commands.rudder_command * limit, -limit, limit)
+    rudder = commands.rudder_command * limit
+    order = clip(rudder, -limit, limit)
     shaft = commands.shaft_command * ship.shaft
-    start = start_of_step(load_motion(tile.state, lane), shaft)
-    return start, Held(order, shaft, push_of(tile, lane))
+    held = Held(order, shaft, push_of(tile, lane))
+    return start_of_step(motion, shaft), held
 
 
 def state_at_stage(tile: Tile, lane: int, reach: float, ship: Ship) -> Motion:

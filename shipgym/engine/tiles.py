@@ -89,24 +89,30 @@ def plan_of(state: Any, lane: int) -> Any:
 @called
 def write_outputs(tile: Tile, outputs: OutputTables, begin: int, end: int) -> None:
     """Copy results of some lanes into the users' arrays."""
+    first = tile.first
+    result = tile.result
+    observations = outputs.observations
+    outcomes = outputs.outcomes
+    flags = outputs.flags
+    n_ships = outputs.n_ships
     width = len(outputs.observed)
     for column in range(width):
         source = outputs.observed[column]
-        target = tile.first * width + column
+        target = first * width + column
         for lane in range(begin, end):
-            number = tile.result[np.uintp(source + lane)]
-            outputs.observations[np.uintp(target + lane * width)] = number
+            entry = np.uintp(target + lane * width)
+            observations[entry] = result[np.uintp(source + lane)]
 
     for row in range(len(outputs.informed)):
         source = outputs.informed[row]
-        target = tile.first + row * outputs.n_ships
+        target = first + row * n_ships
         for lane in range(begin, end):
-            number = tile.result[np.uintp(source + lane)]
-            outputs.outcomes[np.uintp(target + lane)] = number
+            entry = np.uintp(target + lane)
+            outcomes[entry] = result[np.uintp(source + lane)]
 
     for row in range(len(outputs.flagged)):
         source = outputs.flagged[row]
-        target = tile.first + row * outputs.n_ships
+        target = first + row * n_ships
         for lane in range(begin, end):
-            number = tile.result[np.uintp(source + lane)]
-            outputs.flags[np.uintp(target + lane)] = number > 0.0
+            entry = np.uintp(target + lane)
+            flags[entry] = result[np.uintp(source + lane)] > 0.0

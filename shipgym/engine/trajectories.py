@@ -19,6 +19,7 @@ from shipgym.engine.hooks import (
     load_sea,
     load_sea_parameters,
     load_ship,
+    load_wind,
     push,
     store_motion,
     store_sea,
@@ -102,7 +103,9 @@ def sample_sea(out: Any, sea: Any, rng_state: Any, parameters: Any) -> None:
     """Draw the sea around the ship in row 0, `rng_state` seeding its random numbers."""
     if HAS_SEA:
         p = load_sea_parameters(parameters)
-        store_sea(sea, 0, begin_sea(load_motion(out[0]), rng_state[0], p))
+        motion = load_motion(out[0])
+        begun = begin_sea(motion, rng_state[0], p)
+        store_sea(sea, 0, begun)
         rng_state[0] += BEGIN_WORDS
         record_sea(out, 0, sea, parameters)
 
@@ -120,7 +123,9 @@ def follow(
     store_motion(out[row], 0, motion)
     if HAS_SEA:
         p = load_sea_parameters(parameters)
-        store_sea(sea, 0, evolve(motion, h, load_sea(sea), rng_state[0], p))
+        now = load_sea(sea)
+        evolved = evolve(motion, h, now, rng_state[0], p)
+        store_sea(sea, 0, evolved)
         rng_state[0] += EVOLVE_WORDS
         record_sea(out, row, sea, parameters)
 
@@ -211,18 +216,23 @@ def open_loop(
     own = load_ship(numbers)
     coefficients = load_coefficients(numbers)
     motion = load_motion(out[0])
-    for i in range(len(t) - 1):
+    last = len(t) - 1
+    for i in range(last):
+        rudder = delta[i + 1]
+        change = n[i + 1] - n[i]
         interval = t[i + 1] - t[i]
         steps = int(ceil(interval / longest_step - 1e-9))
         h = interval / steps
-        rudder = delta[i + 1]
-        ship = with_gear(own, NO_LIMIT, fabs(rudder - delta[i]) / interval)
-        pushed = Push(wind[i, 0], wind[i, 1], wind[i, 2], 0.0, 0.0, 0.0)
+        rate = fabs(rudder - delta[i]) / interval
+        ship = with_gear(own, NO_LIMIT, rate)
+        by_wind = load_wind(wind[i])
+        pushed = Push(by_wind.surge, by_wind.sway, by_wind.yaw, 0.0, 0.0, 0.0)
+
         for k in range(steps):
-            shaft = n[i] + (n[i + 1] - n[i]) * (k + 0.5) / steps
+            shaft = n[i] + change * (k + 0.5) / steps
             motion = sail(motion, rudder, shaft, h, pushed, coefficients, ship)
         if lost(motion, ship):
             return i
         motion = replaced(motion, motion.psi, rudder, motion.n)
         store_motion(out[i + 1], 0, motion)
-    return len(t) - 1
+    return last
