@@ -18,7 +18,7 @@ from shipgym.engine.lane_records import (
 from shipgym.engine.memory import Arguments
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.record_code import clipped_storer, loader, storer, summed, zeros
-from shipgym.engine.records import LANES, Layout, leaves
+from shipgym.engine.records import LANES, Layout
 from shipgym.instruments.sensor_set import SensorSet
 from shipgym.sea import open_sea
 from shipgym.tasks.contract import Random
@@ -110,7 +110,7 @@ class EpisodeProgram:
             return rows["reported"].row(name)
         if name in Outcome._fields or part == "end":
             return rows["outcome"].row(part)
-        parts = [path.rpartition(".")[2] for path in leaves(self.task.Reward)]
+        parts = self.task.reward_names
         return rows["reward"].first + parts.index(part)
 
     @cached_property

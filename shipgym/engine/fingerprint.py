@@ -40,7 +40,8 @@ def traced(function: Any, hooks: Hooks) -> tuple[str, tuple[Any, ...]]:
     trace = _Trace(hooks)
     trace.add(_compiler())
     trace.visit(function)
-    return trace.digest.hexdigest()[:24], tuple(trace.records)
+    digest = trace.digest.hexdigest()
+    return digest[:24], tuple(trace.records)
 
 
 class _Trace:

@@ -72,7 +72,8 @@ def storer(rows: Rows, lanes: int = LANES) -> Function:
     names: dict[str, Any] = {}
     lines = []
     for path, row in rows.numbers.items():
-        lines.append(f"{_entry(row, lanes, names)} = record.{path}")
+        entry = _entry(row, lanes, names)
+        lines.append(f"{entry} = record.{path}")
     name = f"store_{rows.record.__name__}"
     return _function(name, "array, lane, record", lines, names)
 
@@ -85,10 +86,10 @@ def clipped_storer(rows: Rows, bounds: Mapping[str, tuple[float, float]]) -> Fun
     names: dict[str, Any] = {}
     lines = []
     for path, row in rows.numbers.items():
+        entry = _entry(row, LANES, names)
         low, high = map(float, bounds[path])
         scaled = f"record.{path} * scale.{path}"
-        clipped = f"min(max({scaled}, {low!r}), {high!r})"
-        lines.append(f"{_entry(row, LANES, names)} = {clipped}")
+        lines.append(f"{entry} = min(max({scaled}, {low!r}), {high!r})")
     name = f"store_{rows.record.__name__}"
     return _function(name, "array, lane, record, scale", lines, names)
 
@@ -145,12 +146,14 @@ def _function(
     name: str, arguments: str, body: list[str], names: Mapping[str, Any]
 ) -> Function:
     """Make a function of its source, which is kept for tracebacks."""
-    lines = [f"def {name}({arguments}):\n"]
+    lines = [f"def {name}({arguments}):"]
     if any(other.startswith("row_") for other in names):
-        lines.append("    entry = uintp(lane)\n")
-    lines += [f"    {line}\n" for line in body or ["pass"]]
-    source = "".join(lines)
-    file = f"<{name} {hashlib.sha256(source.encode()).hexdigest()[:12]}>"
+        lines.append("    entry = uintp(lane)")
+    for line in body or ["pass"]:
+        lines.append(f"    {line}")
+    source = "\n".join(lines) + "\n"
+    digest = hashlib.sha256(source.encode()).hexdigest()
+    file = f"<{name} {digest[:12]}>"
     linecache.cache[file] = (len(source), None, source.splitlines(True), file)
     namespace = {"__name__": __name__, "uintp": np.uintp, **names}
     exec(compile(source, file, "exec"), namespace)
