@@ -109,7 +109,11 @@ def ship_source(
     water that the model does not know, and equations of one's own that use more than
     arithmetic.
     """
-    name, compiled, p = checked_name(name or model.name), model.compiled, model.particulars
+    name, compiled, p = (
+        checked_name(name or model.name),
+        model.compiled,
+        model.particulars,
+    )
     notes: tuple[str, ...] = ()
     without = set() if "n" in model.command_names else {"shaft"}
     try:
@@ -152,7 +156,13 @@ def ship_source(
             for one, kind in kinds.items()
         },
         advance=c.function(
-            advance, Motion, ShipInput, float, compiled.coefficients, Ship, SeaParameters
+            advance,
+            Motion,
+            ShipInput,
+            float,
+            compiled.coefficients,
+            Ship,
+            SeaParameters,
         )[0],
         lost=c.function(lost, Motion, Ship)[0],
         structures=c.structures,

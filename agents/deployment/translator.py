@@ -415,9 +415,7 @@ class _Body(ast.NodeTransformer):
 
     def _called(self, node: ast.Call, function: Any) -> tuple[ast.expr, Kind]:
         texts = ", ".join(self._c(one)[0] for one in node.args)
-        if (
-            getattr(function, "__name__", "") == "row_of"
-        ):  # of `shipgym.engine.records`
+        if getattr(function, "__name__", "") == "row_of":  # of `shipgym.engine.records`
             table, _, row = texts.partition(", ")
             return _atom(f"{table}[(int)({row})]"), float
         if function in (float, int):

@@ -86,8 +86,7 @@ class Engine(Lanes):
         drawn = len(self.pool) > 1
         if drawn and len(ships) > 1:
             raise InputError(
-                "models: several lanes' ships and a pool of ships, expected one of"
-                " the two"
+                "models: expected a ship for each lane or a pool of ships, got both"
             )
         windy = any(not sea.calm for _, sea in self.pool)
         if model_index is not None:
@@ -155,27 +154,28 @@ class Engine(Lanes):
             self.renew_outputs()
         asked = STEP_AND_BEGIN if begin_ended else STEP
         if self.n_shares == 1:
-            n_ended = self._run(self._memory, self.outputs.memory, 0, asked)
+            n_ended: int = self._run(self._memory, self.outputs.memory, 0, asked)
         else:
             n_ended = self._run_shares(asked)
         if n_ended < 0:  # `REFUSED`, in every share
             self.outputs = before
             lane, which = np.argwhere(~np.isfinite(self._orders))[0]
             raise InputError(
-                f"actions: {self._orders[lane, which]} found in lane {lane}, expected"
-                " numbers in [-1, 1]"
+                f"actions: expected numbers in [-1, 1], got"
+                f" {self._orders[lane, which]} in lane {lane}"
             )
         return n_ended
 
     def _run_shares(self, asked: int) -> int:
         """Let threads step their shares of the ships; the first is done by this one."""
-        arguments = self._memory, self.outputs.memory
+        run = partial(self._run, self._memory, self.outputs.memory)
         others = [
-            self._threads.submit(self._run, *arguments, share, asked)
-            for share in range(1, self.n_shares)
+            self._threads.submit(run, share, asked) for share in range(1, self.n_shares)
         ]
-        n_ended: int = self._run(*arguments, 0, asked)
-        return n_ended + sum(share.result() for share in others)
+        n_ended: int = run(0, asked)
+        for share in others:
+            n_ended += share.result()
+        return n_ended
 
     def step_of_one(self) -> Callable[[], int]:
         """Return the step of an engine of one lane, whose arrays stay the same.
@@ -196,7 +196,7 @@ class Engine(Lanes):
     def begin(
         self, keys: ArrayLike, episodes: ArrayLike = 0, mask: ArrayLike = True
     ) -> Observation:
-        """Begin an episode in the lanes of a mask, the others go on; returns observations as `reset` does.
+        """Begin an episode in the lanes of a mask; return observations as `reset` does.
 
         An episode is a function of its key (`episode_keys`) and number under that key
         alone; keys, uint64, numbers and mask are of shape (num_envs,).
@@ -244,16 +244,16 @@ class Engine(Lanes):
         array = as_numbers(actions, "actions")
         if array.shape != self._orders.shape:
             raise InputError(
-                f"actions: shape {array.shape} found, expected {self._orders.shape}"
+                f"actions: expected shape {self._orders.shape}, got {array.shape}"
             )
         self._orders[...] = array
 
     def step(
         self, actions: ArrayLike
     ) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
-        """One control interval by orders (`order`); a lane whose episode is over stays and earns 0.
+        """Take one control interval by orders (`order`).
 
-        Returns float32 observations of shape (num_envs, n_observations), rewards, and
+        A lane whose episode is over stays as it is and earns 0. Returns float32 observations of shape (num_envs, n_observations), rewards, and
         whether episodes were terminated and truncated, of shape (num_envs,); copies.
         """
         self.order(actions)
@@ -266,10 +266,13 @@ class Engine(Lanes):
         )
 
     def refuse_rewards(self) -> None:
-        """Raise an InputError that says which part of the last rewards is not finite, in which lane."""
-        bad = ~np.isfinite(self.reward_parts)
-        sums = ~np.isfinite(self.outputs.outcomes[0])
-        lane, part = np.argwhere(bad)[0] if bad.any() else (int(np.argmax(sums)), 0)
+        """Raise an InputError that names the last reward that is not finite."""
+        parts_at_fault = np.argwhere(~np.isfinite(self.reward_parts))
+        if len(parts_at_fault):
+            lane, part = parts_at_fault[0]
+        else:  # finite numbers whose sum is not
+            lane = np.argmax(~np.isfinite(self.outputs.outcomes[0]))
+            part = 0
         name = self.task.reward_parts[part]
         raise InputError(
             f"{self.task.definition.reward_source}: {name} is {self.info(name)[lane]}"
@@ -306,18 +309,15 @@ def _check_ships(
     """Refuse another number of ships than lanes, several structures, unstable models."""
     if len(ships) not in (1, num_envs):
         raise InputError(
-            f"models: {len(ships)} found, expected 1 or one for each of {num_envs}"
-            " lanes"
+            f"models: expected 1, or one for each of {num_envs} lanes, got {len(ships)}"
         )
     refuse_unstable(ships, allow_unstable)
     if any(other.compiled is not ships[0].compiled for other in ships):
-        raise InputError(
-            "models: of several structures, expected one structure in one engine"
-        )
+        raise InputError("models: expected one structure in one engine, got several")
 
 
 def fault_in_python(model: ShipModel, task: Task) -> str:
-    """What plain Python finds wrong with the functions of a task in its first step; empty if nothing.
+    """Say what plain Python finds wrong with a task in its first step; empty if nothing.
 
     Errors of arithmetic are passed over: compiled code goes on with infinities and NaN.
     """
@@ -347,17 +347,17 @@ def as_array(actions: Any) -> NDArray[Any]:
 
 
 def as_numbers(actions: Any, where: str) -> NDArray[Any]:
-    """Actions as an array; raises InputError for texts, objects, complex numbers and ragged lists."""
+    """Return actions as an array; InputError for what is no array of real numbers."""
     array = as_array(actions)
     if array.dtype.kind not in "fiub":
         raise InputError(
-            f"{where}: {actions!r} found, expected real numbers, see the action space"
+            f"{where}: expected real numbers, got {actions!r}; see the action space"
         )
     return array
 
 
 def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:
-    """Keys of the kernels' random numbers for seeds of environments, of the same shape."""
+    """Keys of episodes for seeds of environments, of the same shape."""
     array = np.asarray(seeds)
     keys = [
         episode_key(gymnasium.utils.seeding.np_random(int(seed))[0])
@@ -367,21 +367,24 @@ def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:
 
 
 def episode_key(random: np.random.Generator) -> int:
-    """All that an environment's generator is asked for."""
+    """Draw the key of an episode: all that an environment's generator is asked for."""
     return int(random.integers(2**63))
 
 
 def refuse_unstable(models: Iterable[ShipModel], allow_unstable: bool = False) -> None:
-    """InputError for models found unstable when they were identified; a warning if `allow_unstable`."""
-    marked = [
-        model.name
-        for model in models
-        if (model.provenance or {}).get("stable") is False
-    ]
+    """Refuse models that were found unstable when they were identified.
+
+    InputError, or a warning if `allow_unstable`.
+    """
+    marked = ""
+    for model in models:
+        provenance = model.provenance or {}
+        if provenance.get("stable") is False:
+            marked = marked or model.name
     if not marked:
         return
     found = (
-        f"model {marked[0]!r} was found unstable when it was identified: it runs away"
+        f"model {marked!r} was found unstable when it was identified: it runs away"
         " where ships do not"
     )
     if not allow_unstable:

@@ -269,21 +269,20 @@ class Lanes:
         for name, expected in made_for.items():
             if given.get(name) != expected:
                 raise InputError(
-                    f"state: {name} {shown(given.get(name))} found, expected"
-                    f" {shown(expected)}: a state fits an environment made by the same"
-                    " arguments in the same version"
+                    f"state: {name}: expected {shown(expected)}, got"
+                    f" {shown(given.get(name))}: a state fits an environment made by"
+                    " the same arguments in the same version"
                 )
         for name, expected in own.items():
             if np.shape(state[name]) != np.shape(expected):
                 raise InputError(
-                    f"state: {name} of shape {np.shape(state[name])} found, expected"
-                    f" {np.shape(expected)}"
+                    f"state: {name}: expected shape {np.shape(expected)}, got"
+                    f" {np.shape(state[name])}"
                 )
         same_ship = np.array_equal(state["ships"], self._ships, equal_nan=True)
         if self.program.shared and not same_ship:
             raise InputError(
-                f"state: of another ship than this {self.model.name!r}, expected the"
-                " same"
+                f"state: expected that of this {self.model.name!r}, got another ship's"
             )
         self._check_finite(state, made_for["rows"])
 
@@ -294,10 +293,10 @@ class Lanes:
         for lane, row in np.argwhere(~np.isfinite(lanes))[:1]:
             name = rows[row] if row < len(rows) else "plan"
             raise InputError(
-                f"state: {name} in row {lane} is not finite, expected a number"
+                f"state: {name}: expected finite numbers, got none in row {lane}"
             )
         if not np.isfinite(state["observations"]).all():
-            raise InputError("state: observations are not finite, expected numbers")
+            raise InputError("state: observations: expected finite numbers")
 
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their commands, copies by name."""

@@ -11,7 +11,7 @@ from shipgym.engine import episodes
 from shipgym.engine.compiling import plain
 from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.engine.motion import Motion
-from shipgym.engine.records import field_types, is_record
+from shipgym.engine.records import Record, field_types, is_record
 from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
 from shipgym.python_files import asked, place_of
@@ -75,9 +75,9 @@ def _fault(given: Any, form: Any, name: str) -> str:
             return ""
     elif is_record(form):
         if type(given) is form:
-            for item, (field, kind) in zip(
-                given, field_types(form).items(), strict=True
-            ):
+            record: Record = form
+            fields = field_types(record).items()
+            for item, (field, kind) in zip(given, fields, strict=True):
                 kind = kind if is_record(kind) else float
                 if fault := _fault(item, kind, f"{form.__name__}.{field}"):
                     return fault

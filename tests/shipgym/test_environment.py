@@ -139,15 +139,15 @@ def test_states_that_do_not_fit_are_refused_and_change_nothing():
         (
             states[0],
             (
-                "state: task 'PathFollowing' found, expected 'PathFollowing-v1': .*"
+                "state: task: expected 'PathFollowing-v1', got 'PathFollowing': .*"
                 " same version"
             ),
         ),
-        (states[1], "state: model 'mariner-tls-svm' found, expected 'mariner'"),
-        (states[2], "state: states of shape"),
+        (states[1], "state: model: expected 'mariner', got 'mariner-tls-svm'"),
+        (states[2], "state: states: expected shape"),
         (states[3], "state: unknown key 'some_over'"),
-        (broken, "state: motion.x in row 0 is not finite"),
-        (blind, "state: observations are not finite"),
+        (broken, "state: motion.x: expected finite numbers, got none in row 0"),
+        (blind, "state: observations: expected finite"),
         (
             {**state, "engine": {**state["engine"], "made_for": 3}},
             "state: made_for: 3 found, expected a table",
@@ -248,7 +248,7 @@ def test_a_refused_action_leaves_what_was_shown():
     ]
     with pytest.raises(
         InputError,
-        match=r"^actions: inf found in lane 1, expected numbers in \[-1, 1\]$",
+        match=r"^actions: expected numbers in \[-1, 1\], got inf in lane 1$",
     ):
         env.step(np.array([[0.0], [np.inf], [np.nan]], np.float32))
     assert shown[2].all()  # costs
@@ -297,7 +297,7 @@ def test_a_state_tells_which_number_of_which_ship_is_none():
         wrong["engine"]["states"].reshape(-1, 64)[row, 2] = np.inf
         with pytest.raises(
             InputError,
-            match=f"^state: {name} in row 2 is not finite, expected a number$",
+            match=f"^state: {name}: expected finite numbers, got none in row 2$",
         ):
             env.set_state(wrong)
     first[:, 3:] = np.nan  # lanes without a ship
@@ -312,14 +312,14 @@ def test_a_state_of_another_ship_by_the_same_name_is_refused():
         each.reset(seed=0)
     with pytest.raises(
         InputError,
-        match=r"^state: of another ship than this 'mariner', expected the same$",
+        match=r"^state: expected that of this 'mariner', got another ship's$",
     ):
         env.set_state(another.get_state())
     short = env.get_state()
     short["engine"]["keys"] = short["engine"]["keys"][:, :2]
     with pytest.raises(
         InputError,
-        match=r"^state: keys of shape \(1, 2, 64\) found, expected \(1, 3, 64\)$",
+        match=r"^state: keys: expected shape \(1, 3, 64\), got \(1, 2, 64\)$",
     ):
         env.set_state(short)
 
