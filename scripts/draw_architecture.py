@@ -59,6 +59,8 @@ APART = {
     "shipgym.engine.episodes": "shipgym.episodes",
     "shipgym.engine.episode_program": "shipgym.episodes",
     "shipgym.engine.hooks": "shipgym.episodes",
+    "shipgym.engine.judging": "shipgym.episodes",
+    "shipgym.engine.sailing": "shipgym.episodes",
 }
 TITLES = {
     "identification.pipeline": "pipeline.py",
@@ -285,10 +287,10 @@ SHIP_FUNCTIONS = (
     "shaft_acceleration",
 )  # hooks in `shipgym.engine.motion`
 SELDOM = ("take_events", "begin_lanes")
-HOUSEKEEPING = ("are_finite", "choose_ended")
+HOUSEKEEPING = ("are_finite", "choose_ended", "outputs_in", "tile_of")
 OFTEN = {"sail_lanes": ", in each substep"}
-EPISODES = ROOT / "shipgym" / "engine" / "episodes.py"
-HOOKS = ROOT / "shipgym" / "engine" / "hooks.py"
+ENGINE = ROOT / "shipgym" / "engine"
+STEP_FILES = ("episodes.py", "sailing.py", "judging.py", "tiles.py")
 #: Givers by the constants that hooks raise errors with.
 RAISED = {
     "SHIP": "the ship",
@@ -300,7 +302,9 @@ RAISED = {
 
 def stages() -> dict[str, tuple[str, list[tuple[str, str]]]]:
     """What a step does, in order: docstring of each function, and what it calls, with the givers."""
-    functions = _functions(EPISODES)
+    functions = {}
+    for name in STEP_FILES:
+        functions |= _functions(ENGINE / name)
     functions["sail_lanes"] = functions["sail_in_one_loop"]  # the hook of most ships
     found = {}
     for name in sorted(_called(functions["run"]), key=SELDOM.__contains__):
@@ -319,7 +323,7 @@ def _functions(path: Path) -> dict[str, ast.FunctionDef]:
 def givers() -> dict[str, str]:
     """Who gives each hook, as the error says that it raises until then."""
     found = {}
-    for name, function in _functions(HOOKS).items():
+    for name, function in _functions(ENGINE / "hooks.py").items():
         for constant in ast.walk(function):
             if isinstance(constant, ast.Name) and constant.id in RAISED:
                 found[name] = RAISED[constant.id]

@@ -106,6 +106,23 @@ def test_the_picture_of_a_step_names_functions_that_the_parts_have():
             assert hasattr(open_sea, one), one
 
 
+NAMED = re.compile(r"`((?:shipgym|identification|agents)/[\w/]+\.py)`: `(\w+)`")
+
+
+def test_the_walks_name_what_stands_in_the_files():
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = NAMED.findall(re.sub(r"\s+", " ", page))
+    assert len(named) > 20
+    for file, name in named:
+        tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
+        defined = [
+            node.name
+            for node in ast.walk(tree)
+            if isinstance(node, ast.FunctionDef | ast.ClassDef)
+        ]
+        assert name in defined, f"{file}: {name}"
+
+
 def test_no_function_is_longer_than_sixty_lines():
     long = [
         f"{path.relative_to(ROOT)}:{node.lineno} {node.name}"
