@@ -21,7 +21,7 @@ from shipgym.engine.numba_errors import explanation
 from shipgym.engine.specialise import Hooks, Specialisation
 from shipgym.errors import InputError
 
-SECONDS = 6  # about what a loop takes to compile on a laptop; what who waits is told
+SECONDS = 7  # about what a loop takes to compile on a laptop; what who waits is told
 
 # error_model "numpy" keeps loops free of branches; contraction is the only fast-math
 # liberty taken, because the others would optimise NaN checks away and make results

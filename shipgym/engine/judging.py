@@ -59,7 +59,7 @@ class LaneView(NamedTuple):
 
 
 class AllSettings(NamedTuple):
-    """AllSettings of the engine, the sensor set and the task."""
+    """Settings of the engine, the sensor set and the task."""
 
     rules: Rules
     sensors: Any
