@@ -15,6 +15,8 @@ from numpy.typing import DTypeLike, NDArray
 from shipgym.arrays import Floats
 
 WORD = 8  # bytes of a float64
+# words of a cache line, at which tables begin: a vector across two takes twice as long
+LINE = 8
 
 
 class Block(NamedTuple):
@@ -86,14 +88,23 @@ def allocated(
 ) -> tuple[dict[str, Block], int]:
     """Blocks of tables by name, one after another, and the entry at which they end.
 
-    Of each table are given its type, rows and columns; the first begins at `first`.
+    Of each table are given its type, rows and columns; the first begins at `first` or
+    at the next cache line.
     """
     blocks = {}
     for name, (dtype, rows, columns) in shapes.items():
+        first = LINE * ceil(first / LINE)
         blocks[name] = Block(first, rows, columns)
         per_word = WORD // np.dtype(dtype).itemsize
         first += ceil(rows * columns / per_word)
     return blocks, first
+
+
+def zeros(size: int) -> Floats:
+    """Make an array of zeros that begins with a cache line, shape (size,)."""
+    memory = np.zeros(size + LINE)
+    first = -(memory.ctypes.data // WORD) % LINE
+    return memory[first : first + size]
 
 
 def table_in(memory: Floats, at: Block, dtype: DTypeLike) -> NDArray[Any]:

@@ -11,7 +11,7 @@ from shipgym.checks import check_table, shown
 from shipgym.engine.envelope import Envelope, Four, Triangle
 from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.engine.lane_records import Rules
-from shipgym.engine.memory import Arguments, allocated, table_in
+from shipgym.engine.memory import Arguments, allocated, table_in, zeros
 from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES, flat, leaves
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES, OutputPool, Outputs
@@ -115,7 +115,7 @@ class Lanes:
         n_arguments = len(leaves(Arguments))
         blocks, end = allocated(shapes, first=n_arguments)
         arguments = Arguments(**blocks, **self._output_pool.blocks)
-        self._memory = np.zeros(end)
+        self._memory = zeros(end)
         self._memory[:n_arguments].view(np.int64)[:] = flat(arguments)
         return {
             name: table_in(self._memory, blocks[name], dtype)
