@@ -1,90 +1,110 @@
-"""Identification of a ship file: its options, those given beside it, and its trials."""
+"""Identification of a ship file: its options, those of the command line, and its trials."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import identification
-from identification import IdentificationResult, identify
 from identification.estimators.methods import METHODS
+from identification.options import AUTO
+from identification.reading import identify_arguments, read_table, settings_of
 from shipgym import ShipFile, Trial
 from shipgym.checks import placed
 from shipgym.ships.grey_boxes import GREY_BOX
-from shipgym.trials.identify_table import AUTO, check_options
 
-if TYPE_CHECKING:
-    from identification import Comparison, ReducedIdentification
-
-RM_SVM = (  # needs a grey box, so a reference ship beside it implies the structure
-    "rm-svm"
-)
-MODELS = ("reference_model", "prior", "anchor")  # options that may name a model's file
+#: Options that may name a model's file.
+MODELS = ("reference_model", "prior", "method.anchor")
+EXTRA_TRIALS = "method.extra_trials"
 
 
 def identification_settings(
     ship: ShipFile, given: Mapping[str, Any], unnamed: str = AUTO
 ) -> dict[str, Any]:
-    """Arguments of `identify`: those given, else the ship file's; the others are left to their defaults.
+    """Options of an identification by their full names: those given, else the ship file's.
 
-    `ship`: files that it names are found from its folder; `given`: by option; None for
-    those that were not given; `unnamed`: the structure where neither names one, nor a
-    kernel. Raises InputError for an option that does not exist or has a value of
-    another kind.
+    Parameters
+    ----------
+    ship : ShipFile
+        Files that its options name are found from its folder.
+    given : mapping
+        Options by name, such as those of the command line; None for one that was not
+        given.
+    unnamed : str
+        The structure where neither names one, nor a kernel.
+
+    Raises
+    ------
+    InputError
+        For an option that does not exist, or a value that it cannot have.
     """
-    own = dict(ship.identify)
+    given = {name: value for name, value in given.items() if value is not None}
+    with_kernel = "kernel" in ship.identify or "kernel" in given
+    of_file = read_table(ship.identify, f"{ship.path}: [identify]", with_kernel)
     for option in MODELS:
-        if str(own.get(option, "")).endswith(".json"):
-            own[option] = str(ship.path.parent / own[option])
-    chosen = own | check_options(
-        {k: v for k, v in given.items() if v is not None}, "options"
-    )
-    if chosen.get("method") == RM_SVM and "reference_model" in chosen:
-        named = (
-            given if given.get("method") == RM_SVM else chosen
-        )  # the command line goes before the file
+        if str(of_file.get(option, "")).endswith(".json"):
+            of_file[option] = str(ship.path.parent / of_file[option])
+    asked = read_table(given, "options", with_kernel)
+
+    chosen = of_file | asked
+    _choose_structure(chosen, asked, unnamed, ship)
+    return chosen
+
+
+def _choose_structure(
+    chosen: dict[str, Any], asked: Mapping[str, Any], unnamed: str, ship: ShipFile
+) -> None:
+    """Complete the structure and its reference ship, which the options may imply."""
+    own = ship.structure
+    if chosen.get("method") == "rm-svm" and "reference_model" in chosen:
+        # it needs a grey box, so a reference ship implies the structure
+        named = asked if asked.get("method") == "rm-svm" else chosen
         chosen["structure"] = named.get("structure") or GREY_BOX
+
     if chosen.get("structure") == GREY_BOX:
         chosen.setdefault("reference_model", "auto")
-    elif (
-        "structure" in given
-        and given["structure"] is not None
-        and given.get("reference_model") is None
-    ):
-        chosen.pop("reference_model", None)  # of the structure that the ship file names
+    elif "structure" in asked and "reference_model" not in asked:
+        # one in the ship file belongs to the structure that is named there
+        chosen.pop("reference_model", None)
+
     if "kernel" not in chosen:
-        chosen.setdefault(
-            "structure", unnamed if ship.structure is None else ship.structure.name
-        )
-    if ship.structure is not None and chosen.get("structure") == ship.structure.name:
-        chosen["structure"] = ship.structure
-    return chosen
+        chosen.setdefault("structure", unnamed if own is None else own.name)
+    if own is not None and chosen.get("structure") == own.name:
+        chosen["structure"] = own
 
 
 def trials_of(
     ship: ShipFile, settings: Mapping[str, Any]
 ) -> tuple[list[Trial], dict[str, Any]]:
-    """The trials of a ship file, and the settings with what else it says.
+    """The trials of a ship file, and the arguments of `identify`.
 
-    That is its particulars and steering gear, and the extra trials read, which are left
-    out of the others.
+    `settings`: from `identification_settings`. The arguments hold particulars and
+    steering gear of the ship file, and the extra trials read, which are left out of the
+    others.
     """
-    extra = settings.get("extra_trials", [])
+    extra = settings.get(EXTRA_TRIALS, [])
     trials = [trial for trial in ship.trials() if trial.name not in extra]
-    arguments = {"particulars": ship.particulars, "steering": ship.steering, **settings}
     if extra:
-        arguments["extra_trials"] = [ship.trial(file) for file in extra]
-    return trials, arguments
+        settings = {**settings, EXTRA_TRIALS: [ship.trial(file) for file in extra]}
+    with placed(str(ship.path)):
+        arguments = identify_arguments(settings)
+    return trials, {
+        "particulars": ship.particulars,
+        "steering": ship.steering,
+        **arguments,
+    }
 
 
-def identify_ship(ship: ShipFile, settings: Mapping[str, Any]) -> IdentificationResult:
+def identify_ship(
+    ship: ShipFile, settings: Mapping[str, Any]
+) -> identification.IdentificationResult:
     """`identify` on a ship file, which its errors name.
 
     `ship`: its trials are read; `settings`: from `identification_settings`.
     """
     trials, arguments = trials_of(ship, settings)
     with placed(str(ship.path)):
-        return identify(trials, **arguments)
+        return identification.identify(trials, **arguments)
 
 
 def compare_ship(
@@ -92,37 +112,55 @@ def compare_ship(
     settings: Mapping[str, Any],
     structures: str | None,
     methods: str | None,
-) -> Comparison:
+) -> identification.Comparison:
     """`compare_methods` on a ship file.
 
-    `ship`: its trials are read; `settings`: from `identification_settings`; their
-    method does not count, and their structure where `structures` are named; names have
-    commas between, None is for the usual `methods`, and "all" for every one.
+    Parameters
+    ----------
+    ship : ShipFile
+        Its trials are read.
+    settings : mapping
+        From `identification_settings`; their method does not count, and their structure
+        where `structures` are named.
+    structures, methods : str or None
+        Names with commas between them, or "all" for every method; None for the usual
+        ones.
     """
-    trials, arguments = trials_of(ship, settings)
-    arguments.pop("method", None)
-    known: dict[str, Any] = (
-        {} if ship.structure is None else {ship.structure.name: ship.structure}
-    )
-    wanted = structures and [
-        known.get(name.strip(), name.strip()) for name in structures.split(",")
-    ]
-    if wanted:
+    of_methods = settings_of(settings, "method")
+    others = {
+        name: value
+        for name, value in settings.items()
+        if name.partition(".")[0] != "method"
+    }
+    trials, arguments = trials_of(ship, others)
+    if EXTRA_TRIALS in settings:
+        names = settings[EXTRA_TRIALS]
+        of_methods["extra_trials"] = [ship.trial(file) for file in names]
+        trials = [trial for trial in trials if trial.name not in names]
+
+    wanted: list[Any] | None = None
+    if structures:
+        wanted = _names(structures)
+        own = ship.structure
+        if own is not None:
+            wanted = [own if name == own.name else name for name in wanted]
         arguments.pop("structure", None)
-    names = (
-        list(METHODS)
-        if methods == "all"
-        else methods and [n.strip() for n in methods.split(",")]
-    )
+    chosen: Sequence[str] | None = None
+    if methods:
+        chosen = list(METHODS) if methods == "all" else _names(methods)
     with placed(str(ship.path)):
         return identification.compare_methods(
-            trials, names or None, wanted or None, **arguments
+            trials, chosen, wanted, settings=of_methods, **arguments
         )
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",")]
 
 
 def reduce_ship(
     ship: ShipFile, settings: Mapping[str, Any], direction: str, tolerance: float
-) -> ReducedIdentification:
+) -> identification.ReducedIdentification:
     """`identify_reduced` on a ship file."""
     trials, arguments = trials_of(ship, settings)
     with placed(str(ship.path)):

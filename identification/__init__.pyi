@@ -24,13 +24,19 @@ from .estimators.coefficient_history import (
 from .estimators.coefficient_history import (
     coefficient_history as coefficient_history,
 )
+from .estimators.comparators import LeastSquares as LeastSquares
+from .estimators.comparators import (
+    LinearSupportVectorMachine as LinearSupportVectorMachine,
+)
+from .estimators.comparators import RidgeRegression as RidgeRegression
+from .estimators.kernel_residual import KernelResidual as KernelResidual
 from .estimators.lssvm import (
     LSSVM as LSSVM,
 )
 from .estimators.lssvm import (
     TruncatedLSSVM as TruncatedLSSVM,
 )
-from .estimators.lssvm import (
+from .estimators.polynomial import (
     polynomial_coefficients as polynomial_coefficients,
 )
 from .estimators.recursive import (
@@ -55,7 +61,9 @@ from .regression.forces import (
 from .regression.forces import (
     identify_forces as identify_forces,
 )
+from .regression.preprocess import Preprocessing as Preprocessing
 from .regression.samples import Samples as Samples
+from .regression.samples import Sampling as Sampling
 from .regression.samples import build_samples as build_samples
 from .result import IdentificationResult as IdentificationResult
 from .search import (
@@ -76,6 +84,9 @@ from .search import (
 from .search import (
     minimise as minimise,
 )
+from .simulation_error.prior_knowledge import PriorKnowledge as PriorKnowledge
+from .simulation_error.refinement import Refinement as Refinement
+from .uncertainty.uncertainty import Uncertainty as Uncertainty
 from .validation.comparison import (
     Comparison as Comparison,
 )

@@ -1,85 +1,230 @@
-"""The options of `identify`, as a model's provenance and settings.json record them."""
+"""The options of `identify`, and how provenance and settings.json record them."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, is_dataclass
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 
 import shipgym
-from shipgym import Particulars, ShipModel, SteeringGear, Trial
+from identification.estimators.kernel_residual import KernelResidual
+from identification.estimators.linear import LinearRegressor
+from identification.estimators.methods import METHODS, make_method
+from identification.regression.preprocess import Preprocessing
+from identification.regression.samples import Sampling
+from identification.regression.still_water import check_current
+from identification.regression.wind import check_wind
+from identification.simulation_error.prior_knowledge import PriorKnowledge
+from identification.simulation_error.refinement import Refinement
+from identification.uncertainty.uncertainty import Uncertainty
+from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
+from shipgym.checks import check_flag, check_number, check_text
 from shipgym.ships import Structure
-from shipgym.trials.identify_table import Options
+from shipgym.ships.mmg import MMG
 
 Given = Particulars | Mapping[str, Any] | None  # particulars, as `identify` takes them
+DEFAULT_METHOD = "tls-svm"
+MAP = "map"  # the method of the MMG form
+MAP = "map"  # the method of the MMG form: maximum a posteriori
+AUTO = "auto"  # the structure that is chosen by trials held out
 
-__all__ = ["Given", "Options", "name_of", "provenance_settings", "whole_call"]
-
-
-def provenance_settings(
-    options: Options, of_method: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Settings for the provenance: those of the samples and of the method."""
-    found = {
-        "window": options.window,
-        "smooth": options.smooth,
-        "guarded": options.guarded,
-        **of_method,
-    }
-    if options.preprocessing is not None:
-        found["preprocessing"] = options.preprocessing
-    return {key: _plain(value) for key, value in found.items()}
+Stage = TypeVar("Stage")
 
 
-def whole_call(
-    options: Options,
-    trials: Sequence[Trial],
-    particulars: Given,
-    steering: SteeringGear | None,
-) -> dict[str, Any]:
-    """The whole call for settings.json, trials by name, use and hash."""
-    given = {
-        **options.own(),
-        **options.settings(),
-        "particulars": particulars,
-        "steering": steering,
-    }
-    return {
-        "software": f"shipgym {shipgym.__version__}",
-        **{key: _plain(value) for key, value in given.items()},
-        "trials": [
-            {"name": trial.name, "use": trial.use, "sha256": trial.raw.sha256}
-            for trial in trials
-        ],
-    }
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Options:
+    """The arguments of `identify` but for the trials, each stage as an object.
+
+    Parameters
+    ----------
+    structure : str or Structure
+        Terms of the model: a name of `shipgym.list_structures`, a table, or "auto": the
+        structure and method that predict the trials to fit best, each held out in turn;
+        a method other than the default is kept.
+    method : str or estimator
+        How the coefficients are fitted: a name of
+        `identification.estimators.methods.METHODS`, such as "tls-svm", an estimator
+        such as `TruncatedLSSVM(rank=12)`, a `Refinement`, or any object with
+        scikit-learn's interface, `fit(X, y)` that sets `coef_`, of which each equation
+        gets a copy.
+    samples : str or Sampling
+        How a trial becomes a regression.
+    particulars : Particulars or mapping
+        Of the ship; at least the length, and, for structures of forces, what is needed
+        to estimate mass and added mass. The service speed is estimated from the start
+        of the trials where absent.
+    steering : SteeringGear or None
+        Estimated from the rudders of the trials where absent.
+    preprocessing : str or Preprocessing
+        How noisy channels are smoothed, and whether outliers are repaired.
+    reference_model : str, ShipModel or None
+        Reference ship of a grey box or of the prior of `mmg`: a model, its name or
+        file, or "auto", the one most like this ship.
+    kernel : str, KernelResidual or None
+        Kernel of an LS-SVM on what a reference ship leaves.
+    prior : str, ShipModel, PriorKnowledge or None
+        What the coefficients are pulled toward.
+    uncertainty : str or Uncertainty
+        Where the covariance of the coefficients comes from.
+    current : str or table
+        Steady current in velocities over ground. "auto": estimated, one for all trials
+        unless they contradict each other, and removed if it differs from zero;
+        "shared": one for all trials, removed; "trial": one for each trial, removed;
+        "none": left in the velocities; or a known one as a table of m/s, such as
+        `{ north = 0.2, east = -0.1 }`. Columns current_north and current_east take
+        precedence.
+    wind : str or table
+        Force of the wind in columns wind_speed and wind_from. "auto": by Blendermann's
+        coefficients, where wind was logged; "none": not removed; "constant": a constant
+        sway and yaw acceleration is fitted to each trial; or by a name of coefficients
+        in `shipgym.sea`, or a table such as
+        `{ coefficients = "isherwood", relative = true }`; relative means the wind felt
+        on board, measured from the bow.
+    hold_out : sequence of str
+        Trials, by name, that are only predicted, as if they were marked validate.
+    guarded : bool
+        Whether a model that runs away in a hard turn is fitted again, with the weakest
+        sufficient penalty on terms that are large there and invisible in the data.
+    name : str or None
+        Of the model; by default that of the ship.
+    service_shaft_speed : float or None, above 0
+        Shaft speed at service speed, 1/s; by default that at the start of the trials.
+    """
+
+    structure: str | Structure = "abkowitz"
+    method: Any = DEFAULT_METHOD
+    samples: Sampling = field(default_factory=Sampling)
+    particulars: Given = None
+    steering: SteeringGear | None = None
+    preprocessing: Preprocessing = field(default_factory=Preprocessing)
+    reference_model: str | ShipModel | None = None
+    kernel: KernelResidual | None = None
+    prior: PriorKnowledge | None = None
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
+    current: str | Mapping[str, float] = "auto"
+    wind: str | Mapping[str, Any] = "auto"
+    hold_out: str | Sequence[str] = ()
+    guarded: bool = True
+    name: str | None = None
+    service_shaft_speed: float | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.steering, SteeringGear | None):
+            raise InputError(
+                "steering: expected a SteeringGear, or None to estimate it from the"
+                f" rudders, got {self.steering!r}"
+            )
+        if not isinstance(self.structure, Structure):
+            check_text(self.structure, "structure")
+        if not isinstance(self.reference_model, ShipModel | None):
+            check_text(self.reference_model, "reference_model")
+        check_current(self.current)
+        check_wind(self.wind)
+        if self.prior is not None and self.prior.source is None:
+            self._check_prior_is_implied()
+        check_flag(self.guarded, "guarded")
+        if self.name is not None:
+            check_text(self.name, "name")
+        speed = self.service_shaft_speed
+        if speed is not None:
+            check_number(speed, "service_shaft_speed", above=0.0, hint="1/s")
+
+    def _check_prior_is_implied(self) -> None:
+        if self.structure != MMG:
+            raise InputError(
+                "prior: expected a reference ship or formulas to pull the coefficients"
+                " toward, got none; name one, or leave its strength and folds out"
+            )
+
+    @property
+    def method_is_default(self) -> bool:
+        """Whether no method was asked for."""
+        return isinstance(self.method, str) and self.method == DEFAULT_METHOD
+
+
+def stage(kind: Callable[[Any], Stage], value: Stage | Any) -> Stage:
+    """The object of a stage as given, or the one that a word or a model stands for."""
+    is_word = isinstance(value, str | ShipModel) or not is_dataclass(value)
+    return kind(value) if is_word else value
 
 
 def name_of(value: Any) -> str:
-    """The name of a model or of a method, of an estimator that of its class."""
+    """The name of a model, a structure or a method; of an estimator of others that of its class."""
     if isinstance(value, str):
         return value
-    return (
-        value.name if isinstance(value, ShipModel | Structure) else type(value).__name__
-    )
+    if isinstance(value, LinearRegressor):
+        return value.method_name
+    if isinstance(value, ShipModel | Structure | Refinement):
+        return value.name
+    return type(value).__name__
 
 
-def _plain(value: Any) -> Any:
+def provenance_settings(options: Options) -> dict[str, Any]:
+    """Settings for the provenance: those of samples, preprocessing and method."""
+    return {
+        "samples": plain(options.samples),
+        "preprocessing": plain(options.preprocessing),
+        "guarded": options.guarded,
+        "method": changed_settings(options.method),
+    }
+
+
+def changed_settings(method: Any) -> dict[str, Any]:
+    """Settings in which a method differs from the default of its name, as JSON knows them."""
+    if isinstance(method, str):
+        return {}
+    settings = method_settings(method)
+    if name_of(method) not in METHODS:
+        return settings
+    default = method_settings(make_method(name_of(method)))
+    return {name: value for name, value in settings.items() if value != default[name]}
+
+
+def method_settings(method: Any) -> dict[str, Any]:
+    """Settings of an estimator or a refinement, as JSON knows them."""
+    if isinstance(method, LinearRegressor):
+        return {name: plain(getattr(method, name)) for name in method.options}
+    if isinstance(method, Refinement):
+        own = {name: plain(getattr(method, name)) for name in method.options}
+        return own | method_settings(method.start)
+    if hasattr(method, "get_params"):
+        return {
+            name: plain(value) for name, value in method.get_params(deep=False).items()
+        }
+    return {}
+
+
+def whole_call(options: Options, trials: Sequence[Trial]) -> dict[str, Any]:
+    """The whole call for settings.json, trials by name, use and hash."""
+    used = [
+        {"name": trial.name, "use": trial.use, "sha256": trial.raw.sha256}
+        for trial in trials
+    ]
+    return {
+        "software": f"shipgym {shipgym.__version__}",
+        **{item.name: plain(getattr(options, item.name)) for item in fields(options)},
+        "trials": used,
+    }
+
+
+def plain(value: Any) -> Any:
     """A setting as JSON knows it: infinity as null, models and trials by their names."""
+    if isinstance(value, str | int | bool | None):
+        return value
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
     if isinstance(value, ShipModel | Trial):
         return value.name
     if isinstance(value, Particulars | SteeringGear | Structure):
         return value.to_dict()
     if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if is_dataclass(value) and not isinstance(value, type):
-        return {"kind": type(value).__name__} | _plain(asdict(value))
-    if hasattr(value, "fit"):
-        settings = value.get_params(deep=False) if hasattr(value, "get_params") else {}
-        return {"kind": type(value).__name__} | _plain(settings)
+        return {key: plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, list | tuple | set | frozenset):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value if isinstance(value, str | int | float | bool | None) else repr(value)
+        return [plain(item) for item in value]
+    if hasattr(value, "fit") or isinstance(value, Refinement):
+        return {"name": name_of(value), **method_settings(value)}
+    if is_dataclass(value):
+        return {item.name: plain(getattr(value, item.name)) for item in fields(value)}
+    return repr(value)

@@ -1,11 +1,11 @@
-"""How far a long identification has come, for a command that shows it."""
+"""Progress of a long identification, for a command that shows it."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from typing import TypeVar
 
 T = TypeVar("T")
-#: Told the stage of the work, the units of it done and their total.
+#: Called with the stage of the work, the units of it done and their total.
 Progress = Callable[[str, int, int], None]
 
 
@@ -17,13 +17,16 @@ PROGRESS: ContextVar[Progress] = ContextVar("progress", default=_ignored)
 
 
 def counted(stage: str, items: Sequence[T]) -> Iterator[T]:
-    """The items, telling `PROGRESS` how many are done; what is counted while one is worked on is not told."""
-    tell = PROGRESS.get()
+    """The items; `PROGRESS` is called with how many are done.
+
+    What is counted while one is worked on is not reported.
+    """
+    report = PROGRESS.get()
     for done, item in enumerate(items):
-        tell(stage, done, len(items))
+        report(stage, done, len(items))
         token = PROGRESS.set(_ignored)
         try:
             yield item
         finally:
             PROGRESS.reset(token)
-    tell(stage, len(items), len(items))
+    report(stage, len(items), len(items))

@@ -65,10 +65,10 @@ class IdentificationResult(Fit):
                     else:  # an earlier one would describe another model
                         (folder / name).unlink(missing_ok=True)
         except OSError as error:
-            told = (
-                f"{folder}: cannot be written ({error.strerror}); choose another folder"
-            )
-            raise InputError(told) from error
+            raise InputError(
+                f"{folder}: expected a folder that can be written, got"
+                f" {error.strerror!r}; choose another folder"
+            ) from error
 
     def _write(self, folder: Path) -> None:
         self.model.save(folder / "model.json")

@@ -2,7 +2,7 @@
 
 from io import StringIO
 
-from rich.console import Console, RenderableType
+from rich.console import Console, JustifyMethod, RenderableType
 from rich.table import Table
 
 WIDTH = 100
@@ -21,7 +21,7 @@ def lined_table(title: str, *headings: str) -> Table:
     """A table with its title to the left; a heading that begins with > is aligned right."""
     table = Table(title=title, title_justify="left")
     for heading in headings:
-        table.add_column(
-            heading.removeprefix(">"), justify="right" if heading[0] == ">" else "left"
-        )
+        is_right = heading.startswith(">")
+        justify: JustifyMethod = "right" if is_right else "left"
+        table.add_column(heading.removeprefix(">"), justify=justify)
     return table

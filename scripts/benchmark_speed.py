@@ -64,8 +64,8 @@ GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
     ],
     "start": [
         start.start_up,
-        partial(start.cold_start, "calm", "5 s"),
-        partial(start.cold_start, "moderate", "7 s"),
+        partial(start.cold_start, "calm", "8 s"),
+        partial(start.cold_start, "moderate", "10 s"),
         start.cold_workers,
     ],
 }

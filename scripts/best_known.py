@@ -22,10 +22,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from agents.benchmarking.contestants import LEARNED, Contestant
 from numpy.typing import NDArray
 from oracle import OracleSettings, run_oracle
 
-from agents.benchmarking.contestants import LEARNED, Contestant
 from agents.benchmarking.results import BenchmarkResult, load_results
 from agents.suites.reference import best_known
 from agents.suites.suite import (

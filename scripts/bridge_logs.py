@@ -41,7 +41,7 @@ from agents.controllers.lq import LQ  # noqa: E402
 from agents.controllers.pid import PID  # noqa: E402
 from agents.rollouts.course_keeping import sail  # noqa: E402
 from agents.verification.refusal import lost_control, why_refused  # noqa: E402
-from identification import IdentificationResult, identify  # noqa: E402
+from identification import IdentificationResult, Preprocessing, identify  # noqa: E402
 from identification.regression.still_water import in_still_water  # noqa: E402
 from identification.validation.warnings import why_unstable  # noqa: E402
 from shipgym import ShipModel, Trial  # noqa: E402
@@ -50,7 +50,6 @@ from shipgym.manoeuvres import turning_circle, zigzag  # noqa: E402
 from shipgym.sea import Current, Weather, Wind  # noqa: E402
 from shipgym.tasks.task import course_keeping_task  # noqa: E402
 from shipgym.trials.conventions import Conventions  # noqa: E402
-from shipgym.trials.identify_table import Options  # noqa: E402
 from shipgym.trials.midship import to_project_conventions  # noqa: E402
 from shipgym.trials.resampling import Log  # noqa: E402
 from shipgym.trials.sensors import GNSS, Sensor, Sensors  # noqa: E402
@@ -196,7 +195,7 @@ def current_case(ship: ShipModel, seed: int) -> tuple[np.ndarray, np.ndarray, bo
     """Error of the current, north and east, its standard errors, and whether it was found to be one."""
     logs, weather = logs_of(ship, seed)
     towards = np.radians(weather.current.towards_deg)
-    _, found = in_still_water(logs, Options(), ship.particulars)
+    _, found = in_still_water(logs, ship.particulars)
     row = found["currents"][logs[0].name]
     truth = CURRENT * np.array([np.cos(towards), np.sin(towards)])
     error = np.array([row["north"], row["east"]]) - truth
@@ -339,7 +338,7 @@ def wind_table(recipes: Sequence[str]) -> str:
         under_way(Trial.from_csv(path, columns, name=path.stem, kind="zigzag"))
         for path in paths
     ]
-    known = {"particulars": particulars, "steering": ship.steering, "repair": True}
+    known = {"particulars": particulars, "steering": ship.steering}
     rows = []
     for title in recipes:
         for wind in ("none", "auto", "constant")[: 2 if title == "mmg" else 3]:
@@ -348,7 +347,13 @@ def wind_table(recipes: Sequence[str]) -> str:
                 trials = [
                     run.with_(use="validate" if run is held else "fit") for run in runs
                 ]
-                result = identify(trials, wind=wind, **known, **ESSO_OSAKA[title])
+                result = identify(
+                    trials,
+                    wind=wind,
+                    preprocessing=Preprocessing(repair=True),
+                    **known,
+                    **ESSO_OSAKA[title],
+                )
                 error = result.metrics["trials"][held.name]["rmse"]["psi"]
                 errors.append(
                     float("nan") if error is None else float(np.degrees(error))

@@ -26,7 +26,7 @@ import numpy as np
 from certainty import OTHER, holds, index_intervals, true_indices
 
 import shipgym
-from identification import IdentificationResult, identify
+from identification import IdentificationResult, KernelResidual, identify
 from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import (
     shaft_speed_steps,
@@ -212,8 +212,7 @@ MODELS: dict[str, Recipe] = {
             "structure": "grey-box",
             "method": "rm-svm",
             "reference_model": "tanker",
-            "kernel": "rbf",
-            "centres": 16,
+            "kernel": KernelResidual(centres=16),
         },
         shaft=True,
     ),

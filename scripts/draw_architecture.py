@@ -11,8 +11,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 from pathlib import Path
 
-from shipgym.engine.places import PLACES
-
 ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
 PACKAGES = ("agents", "identification", "shipgym")
@@ -31,7 +29,7 @@ ROOMS: dict[str, tuple[float, int, str]] = {
     "agents.controllers": (2, 3, "PID, LQ, LQG, wheel-over, MPC"),
     "agents.suites": (3.5, 3, "tasks and seeds of benchmarks"),
     "identification.design": (0.5, 0, "which terms, which trial next"),
-    "identification.pipeline": (2, 0, "identify"),
+    "identification.pipeline": (2, 0, "identify and its routes"),
     "identification.simulation_error": (4, 0, "refinement, priors"),
     "identification.validation": (3, 1, "prediction, held-out trials"),
     "identification.result": (1.6, 1, "what identify returns"),
@@ -59,12 +57,13 @@ APART = {
     "identification.options": "identification.result",
     "identification.text": "identification.result",
     "shipgym.engine.episodes": "shipgym.episodes",
-    "shipgym.engine.voyages": "shipgym.episodes",
-    "shipgym.engine.places": "shipgym.episodes",
+    "shipgym.engine.episode_program": "shipgym.episodes",
+    "shipgym.engine.hooks": "shipgym.episodes",
+    "shipgym.engine.judging": "shipgym.episodes",
+    "shipgym.engine.sailing": "shipgym.episodes",
     "agents.job_results": "agents.jobs",
 }
 TITLES = {
-    "identification.pipeline": "pipeline.py",
     "identification.result": "result.py, fit.py",
     "shipgym.episodes": "engine/episodes.py",
     "shipgym.interchange": "interchange.py",
@@ -288,25 +287,48 @@ FILES = {
 SHIP_FUNCTIONS = (
     "accelerations",
     "shaft_acceleration",
-)  # places of `shipgym.engine.motion`
-SELDOM = ("let_events_come", "begin_next")
-HOUSEKEEPING = ("are_finite", "tile_of")
+)  # hooks in `shipgym.engine.motion`
+SELDOM = ("take_events", "begin_lanes")
+HOUSEKEEPING = ("are_finite", "choose_ended", "outputs_in", "tile_of")
 OFTEN = {"sail_lanes": ", in each substep"}
-EPISODES = ROOT / "shipgym" / "engine" / "episodes.py"
+ENGINE = ROOT / "shipgym" / "engine"
+STEP_FILES = ("episodes.py", "sailing.py", "judging.py", "tiles.py")
+#: Givers by the constants that hooks raise errors with.
+RAISED = {
+    "SHIP": "the ship",
+    "SEA": "the sea",
+    "SENSORS": "the sensor set",
+    "TASK": "the task",
+}
 
 
 def stages() -> dict[str, tuple[str, list[tuple[str, str]]]]:
     """What a step does, in order: docstring of each function, and what it calls, with the givers."""
-    functions = {
-        node.name: node
-        for node in ast.parse(EPISODES.read_text(encoding="utf-8")).body
-        if isinstance(node, ast.FunctionDef)
-    }
+    functions = {}
+    for name in STEP_FILES:
+        functions |= _functions(ENGINE / name)
+    functions["sail_lanes"] = functions["sail_in_one_loop"]  # the hook of most ships
     found = {}
-    for name in _called(functions["step"]):
+    for name in sorted(_called(functions["run"]), key=SELDOM.__contains__):
         if name in functions and name not in HOUSEKEEPING:
             about = (ast.get_docstring(functions[name]) or "").partition("\n")[0]
             found[name] = about, list(_given(name, functions))
+    return found
+
+
+def _functions(path: Path) -> dict[str, ast.FunctionDef]:
+    """Functions of a file by name."""
+    body = ast.parse(path.read_text(encoding="utf-8")).body
+    return {node.name: node for node in body if isinstance(node, ast.FunctionDef)}
+
+
+def givers() -> dict[str, str]:
+    """Who gives each hook, as the error says that it raises until then."""
+    found = {}
+    for name, function in _functions(ENGINE / "hooks.py").items():
+        for constant in ast.walk(function):
+            if isinstance(constant, ast.Name) and constant.id in RAISED:
+                found[name] = RAISED[constant.id]
     return found
 
 
@@ -324,9 +346,8 @@ def _given(
     for called in _called(functions[name]):
         if called == "sail":
             yield from (("the ship", one) for one in SHIP_FUNCTIONS)
-        for giver in GIVERS:
-            if called in PLACES.get(giver, ()):
-                yield giver, called.removeprefix("task_")
+        if giver := givers().get(called):
+            yield giver, called.removeprefix("task_")
         if called in functions:
             yield from _given(called, functions)
 

@@ -47,31 +47,31 @@ def copy_lanes(engine: Engine, source: Engine, lanes: ArrayLike) -> None:
     there, here = divmod(which, LANES), divmod(np.arange(engine.num_envs), LANES)
     pairs: list[tuple[NDArray[Any], NDArray[Any]]] = [
         (engine._states, source._states),
-        (engine._keys, source._keys),
+        (engine._random, source._random),
     ]
-    if not engine._voyages.shared:
+    if not engine.program.shared:
         pairs.append((engine._ships, source._ships))
     for own, other in pairs:
         lanes_of(own)[here[0], :, here[1]] = lanes_of(other)[
             there[0] % len(other), :, there[1]
         ]
-    engine.shown.observations[:] = source.shown.observations[which]
-    engine.shown.outcomes[:] = source.shown.outcomes[:, which]
-    engine.shown.flags[:] = source.shown.flags[:, which]
+    engine.outputs.observations[:] = source.outputs.observations[which]
+    engine.outputs.outcomes[:] = source.outputs.outcomes[:, which]
+    engine.outputs.flags[:] = source.outputs.flags[:, which]
 
 
 def _check_alike(engine: Engine, source: Engine) -> None:
     """Refuse an engine whose lanes cannot be taken over."""
     same_task = (
-        engine._voyages is source._voyages
+        engine.program is source.program
         and engine._states.shape[1] == source._states.shape[1]
-        and np.array_equal(engine._settings, source._settings, equal_nan=True)
+        and engine.task == source.task
     )
     if not same_task:
         raise InputError(
             "source: an engine of another task found, expected one of the same"
         )
-    if engine._voyages.shared and not np.array_equal(
+    if engine.program.shared and not np.array_equal(
         source._ships, engine._ships, equal_nan=True
     ):
         raise InputError(

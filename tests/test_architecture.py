@@ -1,5 +1,6 @@
 """The order of the house: what `docs/architecture.md` says and draws is what the code does."""
 
+import ast
 import re
 import tomllib
 import xml.etree.ElementTree as ElementTree
@@ -102,6 +103,23 @@ def test_the_picture_of_a_step_names_functions_that_the_parts_have():
             assert hasattr(perfect, one), one
         if giver == "the sea":
             assert hasattr(open_sea, one), one
+
+
+NAMED = re.compile(r"`((?:shipgym|identification|agents)/[\w/]+\.py)`: `(\w+)`")
+
+
+def test_the_walks_name_what_stands_in_the_files():
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = NAMED.findall(re.sub(r"\s+", " ", page))
+    assert len(named) > 20
+    for file, name in named:
+        tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
+        defined = [
+            node.name
+            for node in ast.walk(tree)
+            if isinstance(node, ast.FunctionDef | ast.ClassDef)
+        ]
+        assert name in defined, f"{file}: {name}"
 
 
 def test_every_script_is_the_way_to_something_that_is_published():

@@ -22,7 +22,6 @@ from agents.cli.benchmark import benchmark_command
 from agents.cli.command import (
     FAILED,
     Commands,
-    IdentifyCommand,
     report_os_error,
     shared_options,
 )
@@ -134,15 +133,10 @@ COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
     "replay": (replay_command, "recordings/episode-0.json --out replay.html"),
     "doctor": (doctor_command, "--json"),
 }
-#: Commands that take the options of `identify`.
-IDENTIFYING = ("identify", "advise", "reduce", "autopilot")
 
 for name, (command, example) in COMMANDS.items():
-    app.command(
-        name,
-        epilog=f"Example: shipgym {name} {example}",
-        cls=IdentifyCommand if name in IDENTIFYING else None,
-    )(shared_options(command))
+    epilog = f"Example: shipgym {name} {example}"
+    app.command(name, epilog=epilog)(shared_options(command))
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Option
 
@@ -11,16 +11,17 @@ from agents.cli.command import (
     FAILED,
     Address,
     EngineName,
-    IdentifyOptions,
     ShipFileArgument,
     Workers,
     fail,
 )
+from agents.cli.identify_options import with_identify_options
 
 if TYPE_CHECKING:
     from agents.verification.result import AutopilotResult, Verification
 
 
+@with_identify_options
 def autopilot_command(
     ship: ShipFileArgument,
     out: Annotated[
@@ -32,7 +33,7 @@ def autopilot_command(
     ] = 200,
     seed: Annotated[int, Option(min=0, help="Random seed of draws and episodes.")] = 0,
     *,
-    options: IdentifyOptions,
+    options: dict[str, Any],
     agents: Annotated[
         list[str] | None,
         Option(

@@ -11,7 +11,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 from typer import Argument, Option
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperGroup
 
 from agents.cli.parameters import take_parameters, typed_parameters
 
@@ -40,8 +40,6 @@ AllowCode = Annotated[
     ),
 ]
 Out = Annotated[Path, Option(metavar="FOLDER", help="Folder for the results.")]
-#: The options of `identify`; see `IdentifyCommand`.
-IdentifyOptions = Annotated[dict[str, Any], Option(parser=dict, hidden=True)]
 Json = Annotated[
     bool, Option("--json", help="Print JSON for programs instead of tables.")
 ]
@@ -138,18 +136,3 @@ class Commands(TyperGroup):
             if not value or "\0" in text:
                 ctx.fail(f"{name}: expected a non-empty string, got {value!r}")
         return super().parse_args(ctx, args)
-
-
-class IdentifyCommand(TyperCommand):
-    """A command that takes the options of `identify`, which are read, with numpy, only when it is called."""
-
-    def make_context(self, *args: Any, **kwargs: Any) -> Any:
-        """The context of the same command with these options in place of its parameter `options`."""
-        from agents.cli.identify_options import takes_identify_options
-
-        app = typer.Typer(
-            add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
-        )
-        command = takes_identify_options(inspect.unwrap(self.callback))  # type: ignore[arg-type]
-        app.command(self.name, epilog=self.epilog)(shared_options(command))
-        return typer.main.get_command(app).make_context(*args, **kwargs)

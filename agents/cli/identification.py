@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Option
 
-from agents.cli.command import FAILED, IdentifyOptions, ShipFileArgument, fail
+from agents.cli.command import FAILED, ShipFileArgument, fail
+from agents.cli.identify_options import with_identify_options
 
 if TYPE_CHECKING:
     from identification import IdentificationResult
@@ -16,11 +17,12 @@ if TYPE_CHECKING:
 Out = Annotated[Path, Option(metavar="FOLDER", help="Folder for the results.")]
 
 
+@with_identify_options
 def identify_command(
     ship: ShipFileArgument,
     out: Out,
     *,
-    options: IdentifyOptions,
+    options: dict[str, Any],
     compare: Annotated[
         bool,
         Option(
@@ -150,6 +152,7 @@ def _compare(
         )
 
 
+@with_identify_options
 def advise_command(
     ship: ShipFileArgument,
     criterion: Annotated[
@@ -163,7 +166,7 @@ def advise_command(
     ] = None,
     number: Annotated[int, Option(min=1, help="Number of manoeuvres.")] = 3,
     *,
-    options: IdentifyOptions,
+    options: dict[str, Any],
 ) -> None:
     """Show what the trials determine and what to run next.
 
@@ -185,6 +188,7 @@ def advise_command(
     say(str(advice), f"run next: {', then '.join(advice.chosen)}")
 
 
+@with_identify_options
 def reduce_command(
     ship: ShipFileArgument,
     out: Out,
@@ -195,7 +199,7 @@ def reduce_command(
         float, Option(min=0.0, help="How far R2 on held-out stretches may fall.")
     ] = 1e-3,
     *,
-    options: IdentifyOptions,
+    options: dict[str, Any],
 ) -> None:
     """Drop the terms that the trials do not support. Identifies the model with the remaining ones.
 

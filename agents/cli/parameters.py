@@ -2,10 +2,10 @@
 
 import inspect
 from collections.abc import Callable
-from typing import get_type_hints
+from typing import Any, get_type_hints
 
 
-def typed_parameters(command: Callable[..., None]) -> dict[str, inspect.Parameter]:
+def typed_parameters(command: Callable[..., Any]) -> dict[str, inspect.Parameter]:
     """The parameters of a command, keyword only, their annotations as objects."""
     hints = get_type_hints(command, include_extras=True)
     return {

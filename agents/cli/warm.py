@@ -114,7 +114,7 @@ def warm_jobs(name: str, ship: str | None = None) -> dict[str, Callable[[], Any]
             f"argument: expected an environment's id or a model, got {name!r}: {error}"
         ) from None
     return {
-        f"{model.name}: {loop}": partial(ship_loop, model.vessel, loop)
+        f"{model.name}: {loop}": partial(ship_loop, model.compiled, loop)
         for loop in LOOPS
     }
 

@@ -29,7 +29,6 @@ from agents.deployment.c_syntax import (
 from agents.deployment.pruning import Constants
 from shipgym import InputError
 from shipgym.engine.records import is_record
-from shipgym.engine.specialise import Part
 
 
 class Translated(NamedTuple):
@@ -48,7 +47,7 @@ class ExpressionWriter:
     place : str
         Module and function, for messages.
     names : mapping
-        Values of the globals that the function names, parts filled.
+        Values of the globals that the function names, hooks filled.
     kinds : dict
         Kinds of arguments and variables so far, by name.
     structures : Structures
@@ -201,7 +200,7 @@ class ExpressionWriter:
         return call
 
     def _callee(self, node: ast.expr) -> Any:
-        """What is called, found where Python would find it; of a part its function."""
+        """What is called, found where Python would find it."""
         callee = None
         match node:
             case ast.Name(id=name) if isinstance(self.kinds.get(name), FunctionType):
@@ -212,7 +211,7 @@ class ExpressionWriter:
                 module = Constants(self.names).value(owner)
                 if isinstance(module, ModuleType):
                     callee = getattr(module, name, None)
-        return callee.function if isinstance(callee, Part) else callee
+        return callee
 
     def _arguments(self, node: ast.Call, function: Any) -> list[Expression]:
         """Arguments of a call in the order of the parameters, defaults among them."""
@@ -239,7 +238,7 @@ class ExpressionWriter:
 
     def _function_call(self, node: ast.Call, function: FunctionType) -> Expression:
         arguments = self._arguments(node, function)
-        if function.__name__ == "row_of":  # for which Numba has instructions
+        if function.__name__ == "row_of":  # of `shipgym.engine.records`
             return table_entry(*arguments)
         called = self.translate(function, *(one.kind for one in arguments))
         if called is None:  # it calls itself

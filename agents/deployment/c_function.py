@@ -30,7 +30,7 @@ class FunctionWriter:
     function : callable
     kinds : sequence
         Kinds of its arguments; a function is its own kind.
-    parts : mapping
+    hooks : mapping
         What takes the place of globals of the engine's functions.
     structures : Structures
     translate : callable
@@ -41,11 +41,11 @@ class FunctionWriter:
         self,
         function: Any,
         kinds: Sequence[Kind],
-        parts: Mapping[str, Any],
+        hooks: Mapping[str, Any],
         structures: Structures,
         translate: Callable[..., Translated | None],
     ) -> None:
-        names = dict(named_globals(function, parts))
+        names = dict(named_globals(function, hooks))
         self.kinds: dict[str, Kind] = {}
         self.expressions = ExpressionWriter(
             f"{function.__module__}.{function.__name__}",

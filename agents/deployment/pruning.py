@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from types import FunctionType
 from typing import Any
 
-from shipgym.engine.specialise import Part
-
 Known = Callable[[ast.AST], Any]
 
 
@@ -24,7 +22,7 @@ class Constants:
                 return node.value
             case ast.Name():
                 value = self.globals.get(node.id)
-                return None if isinstance(value, Part | type | FunctionType) else value
+                return None if isinstance(value, type | FunctionType) else value
             case ast.Attribute():
                 owner = self.value(node.value)
                 return None if owner is None else getattr(owner, node.attr, None)

@@ -84,8 +84,8 @@ def ship_source(
     weather, note = _weather(model, water_depth)
     inputs, outputs = _variables(model, windy=not note)
 
-    coefficients = model.vessel.coefficients
-    c = Translator({**model.vessel.parts(), **sea_functions(True)}, name)
+    coefficients = model.compiled.coefficients
+    c = Translator({**model.compiled.hooks(), **sea_functions(True)}, name)
     c.structures.types |= {Motion: f"{name}_state", ShipInput: f"{name}_input"}
     kinds = {"SHIP": Ship, "COEFFICIENTS": coefficients, "SEA": SeaParameters}
     numbers = iter([*model.ship_numbers(water_depth, longest), *weather])

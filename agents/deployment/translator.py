@@ -1,6 +1,6 @@
 """Plain functions on numbers and records, as `shipgym.engine` compiles them, written as C99.
 
-A function is translated for the kinds of its arguments, with all that it calls, parts
+A function is translated for the kinds of its arguments, with all that it calls, hooks
 filled as `shipgym.engine.specialise` fills them. Nothing but checked names and numbers
 becomes part of the C.
 """
@@ -19,7 +19,7 @@ class Translator:
 
     Parameters
     ----------
-    parts : mapping
+    hooks : mapping
         What takes the place of globals of the engine's functions.
     prefix : str
         Beginning of every name in C.
@@ -31,8 +31,8 @@ class Translator:
         Definitions in an order in which C can read them.
     """
 
-    def __init__(self, parts: Mapping[str, Any], prefix: str) -> None:
-        self.parts = parts
+    def __init__(self, hooks: Mapping[str, Any], prefix: str) -> None:
+        self.hooks = hooks
         self.structures = Structures(prefix)
         self.functions: list[str] = []
         # None while a function is being written
@@ -54,7 +54,7 @@ class Translator:
             self._translated[key] = None
             name = self.structures.free_name(function.__name__)
             writer = FunctionWriter(
-                function, kinds, self.parts, self.structures, self.call
+                function, kinds, self.hooks, self.structures, self.call
             )
             text, returns = writer.written(name)
             self.functions.append(text)

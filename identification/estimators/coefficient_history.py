@@ -12,6 +12,7 @@ from identification.estimators.recursive import Recursion
 from identification.regression.samples import Samples, build_samples
 from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Floats, Integers
+from shipgym.checks import check_choice
 from shipgym.ships import Structure, get_structure
 
 
@@ -38,11 +39,7 @@ class CoefficientHistory:
 
     def __getitem__(self, name: str) -> Floats:
         """The history of one coefficient, shape (n_rows,)."""
-        if name not in self.names:
-            expected = f"expected one of {', '.join(self.names)}"
-            raise InputError(
-                f"coefficient history: no coefficient {name!r}, {expected}"
-            )
+        check_choice(name, self.names, "coefficient history")
         return self.values[:, self.names.index(name)]
 
     @property
@@ -81,23 +78,32 @@ def coefficient_history(
         `samples`, `window`, `gear`, `smooth` of `build_samples`.
     """
     table = get_structure(structure) if isinstance(structure, str) else structure
-    estimator = get_method(method).estimator() if isinstance(method, str) else method
+    estimator = get_method(method).make() if isinstance(method, str) else method
     if not isinstance(estimator, Recursion):
         raise InputError(
-            f"method: {method!r} found, which fits all samples at once; expected a"
-            " recursive one"
+            "method: expected a recursive one, such as 'rls', got"
+            f" {method!r}, which fits all samples at once"
         )
-    ship = particulars.completed() if table.quantity == "force" else particulars
-    if not isinstance(source, Samples):
-        trials = [source] if isinstance(source, Trial) else list(source)
-        source = build_samples(trials, table, ship, shaft_speed=shaft_speed, **sampling)
-    found = [
-        clone(estimator).fit_history(source.features[q], source.targets[q])
-        for q in table.regressed
-    ]
-    values = np.linalg.solve(
-        table.acceleration_matrix(ship, shaft_speed), np.hstack(found).T
-    ).T
+
+    ship = particulars
+    if table.quantity == "force":
+        ship = particulars.completed()
+    samples = source
+    if not isinstance(samples, Samples):
+        trials = [samples] if isinstance(samples, Trial) else list(samples)
+        samples = build_samples(
+            trials, table, ship, shaft_speed=shaft_speed, **sampling
+        )
+
+    accelerations = []
+    for q in table.regressed:
+        own = clone(estimator)
+        accelerations.append(own.fit_history(samples.features[q], samples.targets[q]))
+    matrix = table.acceleration_matrix(ship, shaft_speed)
+    values = np.linalg.solve(matrix, np.hstack(accelerations).T).T
     return CoefficientHistory(
-        table.coefficient_names, source.start + source.duration, source.trial, values
+        names=table.coefficient_names,
+        t=samples.start + samples.duration,
+        trial=samples.trial,
+        values=values,
     )

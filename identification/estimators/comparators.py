@@ -1,20 +1,70 @@
-"""Scikit-learn's estimators in the form that `identify` fits, to compare with."""
+"""Least squares, ridge regression and epsilon-SVR, which LS-SVMs are compared with."""
 
 import warnings
-from typing import Self
+from dataclasses import dataclass
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.estimators.decomposition import centre_and_scale
-from identification.estimators.linear import LinearRegressor, settings, validated
+from identification.estimators.linear import LinearRegressor, validated
+from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.robust import MAD
+from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
 
-ITERATIONS = 20_000
+
+@dataclass(eq=False, repr=False)
+class LeastSquares(TruncatedLSSVM):
+    """Least squares: every direction of the features above rounding is kept.
+
+    Parameters
+    ----------
+    scale : bool or array-like of shape (n_features,)
+        Scales that tell rounding from what the data determine, as of `LSSVM`.
+    robust : bool
+        As of `LSSVM`.
+    """
+
+    name: ClassVar[str] = "ls"
+    options: ClassVar[tuple[str, ...]] = ("scale", "robust")
+    regularised: ClassVar[bool] = False
+
+    selection: str = "full"
 
 
-@settings()
+@dataclass(eq=False, repr=False)
+class RidgeRegression(LSSVM):
+    """Ridge regression as scikit-learn has it, on columns as they are by default.
+
+    Parameters
+    ----------
+    alpha : float, at least 0
+        Penalty, the inverse of the weight of the errors.
+    scale : bool or array-like of shape (n_features,)
+        As of `LSSVM`.
+    robust : bool
+        As of `LSSVM`.
+    """
+
+    name: ClassVar[str] = "ridge"
+    options: ClassVar[tuple[str, ...]] = ("alpha", "scale", "robust")
+
+    scale: bool | ArrayLike = False
+    alpha: float = 1e-6
+
+    def check(self) -> None:
+        """Refuse settings that cannot be, by an InputError that names the setting."""
+        super().check()
+        check_number(self.alpha, "alpha", at_least=0.0)
+
+    def error_weight(self) -> float:
+        """Weight of the squared errors in the solution."""
+        return 1.0 / self.alpha if self.alpha else np.inf
+
+
+@dataclass(eq=False, repr=False)
 class LinearSupportVectorMachine(LinearRegressor):
     """Support vector regression with a linear kernel and the epsilon-insensitive loss.
 
@@ -23,13 +73,13 @@ class LinearSupportVectorMachine(LinearRegressor):
 
     Parameters
     ----------
-    C : float
+    C : float, above 0
         Weight of the errors, finite.
-    epsilon : float
+    epsilon : float, at least 0
         Errors below it cost nothing; relative to the size of the targets.
     fit_intercept : bool
         Whether there is a constant term.
-    seed : int
+    seed : int, at least 0
         Of the order in which samples are visited.
 
     Attributes
@@ -46,58 +96,68 @@ class LinearSupportVectorMachine(LinearRegressor):
         Whether the solver reached its tolerance.
     """
 
+    name: ClassVar[str] = "svr"
+    options: ClassVar[tuple[str, ...]] = ("C", "epsilon", "seed")
+
     C: float = 100.0
     epsilon: float = 1e-3
     fit_intercept: bool = True
     seed: int = 0
 
+    def check(self) -> None:
+        """Refuse settings that cannot be, by an InputError that names the setting."""
+        check_number(self.C, "C", above=0.0)
+        check_number(self.epsilon, "epsilon", at_least=0.0)
+        check_whole(self.seed, "seed", at_least=0, at_most=2**32 - 1)
+
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
+        self.check()
+        features, targets = validated(self, X, y)
+        centre, scale = centre_and_scale(features, True, self.fit_intercept)
+        scaled = (features - centre) / scale
+        mean = float(targets.mean()) if self.fit_intercept else 0.0
+        size = float(np.sqrt(np.mean((targets - mean) ** 2))) or 1.0
+
+        slopes, offset = self._solved(scaled, (targets - mean) / size)
+        self.coef_ = slopes * size / scale
+        self.intercept_ = mean + size * offset - float(centre @ self.coef_)
+
+        errors = targets - features @ self.coef_ - self.intercept_
+        self.weights_ = _huber_weights(errors)
+        moment = (scaled.T * self.weights_) @ scaled
+        inverse = np.linalg.pinv(moment, hermitian=True) / np.outer(scale, scale)
+        self.inverse_moment_ = inverse
+
+        freedom = max(len(targets) - len(centre), 1)
+        variance = float(np.sum((self.weights_ * errors) ** 2)) / freedom
+        unscaled = scaled * scale
+        self.covariance_ = variance * inverse @ (unscaled.T @ unscaled) @ inverse
+        return self
+
+    def _solved(self, features: Floats, targets: Floats) -> tuple[Floats, float]:
+        """Slopes and offset for features and targets of root mean square 1."""
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.svm import LinearSVR
 
-        check_number(self.C, "C", above=0.0)
-        check_whole(
-            self.seed,
-            "seed",
-            at_least=0,
-            at_most=2**32 - 1,
-            hint="which this method takes",
-        )
-        check_number(self.epsilon, "epsilon", at_least=0.0)
-        X, y = validated(self, X, y)
-        centre, scale = centre_and_scale(X, True, self.fit_intercept)
-        mean = float(y.mean()) if self.fit_intercept else 0.0
-        size = float(np.sqrt(np.mean((y - mean) ** 2))) or 1.0
         estimator = LinearSVR(
             C=self.C,
             epsilon=self.epsilon,
             fit_intercept=self.fit_intercept,
             intercept_scaling=10.0,
-            max_iter=ITERATIONS,
+            max_iter=20_000,
             random_state=self.seed,
         )
-        scaled = (X - centre) / scale
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ConvergenceWarning)
-            estimator.fit(scaled, (y - mean) / size)
+            estimator.fit(features, targets)
         self.converged_ = not caught
-        self.coef_ = estimator.coef_ * size / scale
-        self.intercept_ = (
-            mean
-            + size * float(np.sum(estimator.intercept_))
-            - float(centre @ self.coef_)
-        )
-        error = (y - X @ self.coef_ - self.intercept_) / size
-        usual, errors = MAD * float(np.median(np.abs(error))), np.abs(error)
-        self.weights_ = np.divide(
-            usual, errors, out=np.ones(len(errors)), where=errors > usual
-        )
-        moment = (scaled.T * self.weights_) @ scaled
-        inverse = np.linalg.pinv(moment, hermitian=True) / scale / scale[:, None]
-        self.inverse_moment_ = inverse
-        freedom = max(len(error) - scaled.shape[1], 1)
-        variance = size**2 * float(np.sum((self.weights_ * error) ** 2)) / freedom
-        unscaled = scaled * scale
-        self.covariance_ = variance * inverse @ (unscaled.T @ unscaled) @ inverse
-        return self
+        return estimator.coef_, float(np.sum(estimator.intercept_))
+
+
+def _huber_weights(errors: Floats) -> Floats:
+    """Influence of samples by their errors: 1 within the robust scale, then its share of the error."""
+    sizes = np.abs(errors)
+    usual = MAD * float(np.median(sizes))
+    weights = np.ones(len(errors))
+    return np.divide(usual, sizes, out=weights, where=sizes > usual)

@@ -10,73 +10,95 @@ small but loses half of the digits.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import lapack
 
 from identification.estimators.threads import single_threaded
 from shipgym import InputError
 from shipgym.arrays import Floats
 
-CONSTANT = (
-    100 * np.finfo(float).eps
-)  # of its size; a feature that varies less is constant but for rounding
-BLOCK = 32  # columns that LAPACK handles at once
+#: Part of its size by which a feature has to vary; one that varies less is constant but
+#: for rounding.
+CONSTANT = 100 * np.finfo(float).eps
 
 
 @dataclass(frozen=True)
 class Decomposition:
-    """Thin singular value decomposition of centred and scaled features, and the targets in it."""
+    """Thin singular value decomposition of centred and scaled features, with the targets.
 
-    singular_values: Floats  # descending, shape (n_directions,)
-    directions: Floats  # right singular vectors, shape (n_directions, n_features)
-    projections: Floats  # targets in the left singular vectors, shape (n_directions,)
-    outside: float  # squared norm of the targets that no direction reaches
-    n_free: int  # samples, less one where there is an intercept
-    centre: Floats  # what was subtracted from the features, shape (n_features,)
-    mean: float  # what was subtracted from the targets
-    scale: Floats  # what the features were divided by, shape (n_features,)
+    Attributes
+    ----------
+    singular_values : array of shape (n_directions,)
+        Descending.
+    directions : array of shape (n_directions, n_features)
+        Right singular vectors.
+    projections : array of shape (n_directions,)
+        Targets in the left singular vectors.
+    outside : float
+        Squared norm of the targets that no direction reaches.
+    n_free : int
+        Number of samples, less one where there is an intercept.
+    centre : array of shape (n_features,)
+        Subtracted from the features.
+    mean : float
+        Subtracted from the targets.
+    scale : array of shape (n_features,)
+        By which the features were divided.
+    n_samples : int
+        Number of samples.
+    """
+
+    singular_values: Floats
+    directions: Floats
+    projections: Floats
+    outside: float
+    n_free: int
+    centre: Floats
+    mean: float
+    scale: Floats
     n_samples: int
 
     @property
     def numerical_rank(self) -> int:
         """Number of directions above rounding, at least 1."""
-        rounding = (
-            max(self.n_samples, len(self.scale))
-            * np.finfo(float).eps
-            * self.singular_values[0]
-        )
+        largest_side = max(self.n_samples, len(self.scale))
+        rounding = largest_side * np.finfo(float).eps * self.singular_values[0]
         return max(int(np.sum(self.singular_values > rounding)), 1)
 
     def filters(self, C: ArrayLike, rank: int) -> Floats:
-        """Factors s / (s^2 + 1/C) of the first directions, 0 beyond `rank` and for what is lost in rounding.
+        """Factors s / (s^2 + 1/C) of the directions, 0 beyond `rank` and below rounding.
 
         Several C of shape (..., 1) give a row each, shape (..., n_directions).
         """
         s = self.singular_values
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            filters = np.where(
-                s > 0.0, s / (s**2 + 1.0 / np.asarray(C, dtype=float)), 0.0
-            )
-        filters[..., min(rank, self.numerical_rank) :] = 0.0
+            penalty = 1.0 / np.asarray(C, dtype=float)
+            filters = np.where(s > 0.0, s / (s**2 + penalty), 0.0)
+
+        kept = min(rank, self.numerical_rank)
+        filters[..., kept:] = 0.0
         return filters
 
     def coefficients(self, filters: Floats) -> Floats:
-        """Coefficients of the features as given, shape (n_features,)."""
-        return np.asarray(self.directions.T @ (filters * self.projections) / self.scale)
+        """Coefficients of the unscaled features, shape (n_features,)."""
+        of_scaled = self.directions.T @ (filters * self.projections)
+        return np.asarray(of_scaled / self.scale)
 
 
 def triangle(
     X: Floats, y: Floats, fit_intercept: bool, weights: Floats | None = None
 ) -> Floats:
-    """Triangle of an orthogonal decomposition of [1 X y], without the ones where there is no intercept.
+    """Triangle of an orthogonal decomposition of [1 X y], or of [X y] without intercept.
 
     The weights, shape (n_samples,), are those of the squared errors.
     """
     first = int(fit_intercept)
-    table = np.empty((len(y), X.shape[1] + 1 + first), order="F")
-    table[:, :first], table[:, first:-1], table[:, -1] = 1.0, X, y
+    table = np.empty((len(y), first + X.shape[1] + 1))
+    table[:, :first] = 1.0
+    table[:, first:-1] = X
+    table[:, -1] = y
     if weights is not None:
         table *= np.sqrt(weights)[:, None]
     return _triangle_of(table)
@@ -84,17 +106,16 @@ def triangle(
 
 def stacked(triangles: Sequence[Floats]) -> Floats:
     """Triangle of all data from the triangles of its parts."""
-    return _triangle_of(np.asfortranarray(np.vstack(triangles)))
+    return _triangle_of(np.vstack(triangles))
 
 
 def _triangle_of(table: Floats) -> Floats:
-    """Upper triangle of an orthogonal decomposition, square; destroys the table."""
-    n = table.shape[1]
-    square = np.zeros((n, n))
+    """Upper triangle of an orthogonal decomposition, filled up to a square by zeros."""
     with single_threaded():
-        factored, _, _, info = lapack.dgeqrf(table, lwork=BLOCK * n, overwrite_a=True)
-    assert info == 0
-    square[: min(n, len(factored))] = np.triu(factored[:n])
+        upper = np.linalg.qr(table, mode="r")
+    n_columns = table.shape[1]
+    square = np.zeros((n_columns, n_columns))
+    square[: len(upper)] = upper
     return square
 
 
@@ -106,9 +127,8 @@ def decompose(
     weights: Floats | None = None,
 ) -> Decomposition:
     """Decompose the features of a regression (arguments as of `LSSVM` and `triangle`)."""
-    return decompose_triangle(
-        triangle(X, y, fit_intercept, weights), len(y), scale, fit_intercept
-    )
+    R = triangle(X, y, fit_intercept, weights)
+    return decompose_triangle(R, len(y), scale, fit_intercept)
 
 
 def decompose_triangle(
@@ -116,48 +136,118 @@ def decompose_triangle(
 ) -> Decomposition:
     """Decompose the features of a regression of which the `triangle` is known."""
     first = int(fit_intercept)
-    n_features, inner = len(R) - 1 - first, R[first:, first:]
-    size = np.sqrt(np.sum(inner[:, :-1] ** 2, axis=0) / n_samples)
-    whole = np.sqrt(np.sum(R[:, first:-1] ** 2, axis=0) / n_samples)
-    size[size <= CONSTANT * whole] = 0.0
+    n_features = len(R) - 1 - first
+    centred = R[first:-1, first:-1]
+    targets = R[first:-1, -1]
+    out_of_reach = R[-1, -1]
+
+    size = np.sqrt(np.sum(centred**2, axis=0) / n_samples)
+    uncentred_size = np.sqrt(np.sum(R[:, first:-1] ** 2, axis=0) / n_samples)
+    size[size <= CONSTANT * uncentred_size] = 0.0
     scales = scales_of(size, scale)
-    left, singular_values, directions = np.linalg.svd(inner[:-1, :-1] / scales)
+
+    left, singular_values, directions = np.linalg.svd(centred / scales)
+    projections = left.T @ targets
     kept = min(n_samples, n_features)
-    projections = left.T @ inner[:-1, -1]
-    outside = float(inner[-1, -1] ** 2 + np.sum(projections[kept:] ** 2))
-    means = R[0, 1:] / R[0, 0] if fit_intercept else np.zeros(n_features + 1)
+    outside = out_of_reach**2 + np.sum(projections[kept:] ** 2)
+
+    means = np.zeros(n_features + 1)
+    if fit_intercept:
+        means = R[0, 1:] / R[0, 0]
     return Decomposition(
-        singular_values[:kept],
-        directions[:kept],
-        projections[:kept],
-        outside,
-        n_samples - first,
-        means[:-1],
-        float(means[-1]),
-        scales,
-        n_samples,
+        singular_values=singular_values[:kept],
+        directions=directions[:kept],
+        projections=projections[:kept],
+        outside=float(outside),
+        n_free=n_samples - first,
+        centre=means[:-1],
+        mean=float(means[-1]),
+        scale=scales,
+        n_samples=n_samples,
     )
+
+
+def keep_solution(
+    estimator: Any,
+    problem: Decomposition,
+    filters: Floats,
+    X: Floats,
+    y: Floats,
+    weights: Floats | None,
+) -> Floats:
+    """Set the attributes of a linear estimator from its filtered decomposition.
+
+    Returns the residuals, shape (n_samples,).
+    """
+    singular_values = problem.singular_values
+    coefficients = problem.coefficients(filters)
+    intercept = problem.mean - float(problem.centre @ coefficients)
+    residuals: Floats = y - X @ coefficients - intercept
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = np.where(filters > 0.0, filters / singular_values, 0.0)
+    unscaled = problem.directions / problem.scale
+
+    # Huber's sandwich: the residuals that count are the weighted ones, the moment is
+    # that of all samples
+    counted, inflation = residuals, 1.0
+    if weights is not None:
+        counted = residuals * weights
+        inflation = len(y) / float(weights.sum())
+    freedom = problem.n_free - float(np.sum(singular_values * filters))
+    noise_variance = np.nan
+    if freedom > 0.5:
+        noise_variance = float(counted @ counted) / freedom
+    root = (problem.directions.T * filters) / problem.scale[:, None]
+
+    estimator.coef_ = coefficients
+    estimator.intercept_ = intercept
+    estimator.singular_values_ = singular_values
+    estimator.inverse_moment_ = (unscaled.T * inverse) @ unscaled
+    estimator.noise_variance_ = noise_variance
+    estimator.covariance_ = noise_variance * inflation * (root @ root.T)
+    return residuals
 
 
 def centre_and_scale(
     X: Floats, scale: bool | ArrayLike, fit_intercept: bool
 ) -> tuple[Floats, Floats]:
     """Means and scales of the features, shape (n_features,); zero means without intercept."""
-    centre = X.mean(axis=0) if fit_intercept else np.zeros(X.shape[1])
+    centre = np.zeros(X.shape[1])
+    if fit_intercept:
+        centre = X.mean(axis=0)
+
     size = np.sqrt(np.mean((X - centre) ** 2, axis=0))
+    largest = np.max(np.abs(X), axis=0, initial=0.0)
     # what is constant is centred to rounding errors, which must not be blown up
-    size[size <= CONSTANT * np.max(np.abs(X), axis=0, initial=0.0)] = 0.0
+    size[size <= CONSTANT * largest] = 0.0
     return centre, scales_of(size, scale)
 
 
 def scales_of(size: Floats, scale: bool | ArrayLike) -> Floats:
-    """What to divide features by that are of the given size; 1 for what is zero."""
+    """Divisors of features of the given sizes; 1 for a feature that is zero."""
     if isinstance(scale, bool | np.bool_):
         return np.where(size > 0.0, size, 1.0) if scale else np.ones(len(size))
-    given = np.asarray(scale, dtype=float)
-    if given.shape != size.shape or not np.all(np.isfinite(given) & (given > 0)):
+
+    given = check_scale(scale)
+    if given.shape != size.shape:
         raise InputError(
-            f"scale: shape {given.shape} found, expected {len(size)} finite numbers"
-            " above 0, True or False"
+            f"scale: expected {len(size)} finite numbers above 0, True or False, got"
+            f" an array of shape {given.shape}"
+        )
+    return given
+
+
+def check_scale(scale: Any) -> Floats:
+    """Return the scales of features as an array; a boolean becomes an empty one."""
+    if isinstance(scale, bool | np.bool_):
+        return np.empty(0)
+    try:
+        given = np.asarray(scale, dtype=float)
+    except (TypeError, ValueError):
+        given = np.full(1, np.nan)
+    if not np.all(np.isfinite(given) & (given > 0.0)):
+        raise InputError(
+            f"scale: expected finite numbers above 0, True or False, got {scale!r}"
         )
     return given

@@ -1,9 +1,7 @@
-"""What the linear estimators share: the decorator of their settings, prediction, checks."""
+"""What the linear estimators share: prediction and the checks of their arguments."""
 
-from dataclasses import dataclass
-from functools import partial
 from numbers import Real
-from typing import Any, TypeGuard
+from typing import Any, ClassVar, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,17 +11,31 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from shipgym import InputError
 from shipgym.arrays import Floats
 
-#: A dataclass is an estimator of scikit-learn's: its fields are the settings, which
-#: `__init__` only stores.
-settings = partial(dataclass, eq=False, repr=False)
-
 
 class LinearRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
-    """A regressor with one coefficient for each feature."""
+    """A regressor with one coefficient for each feature.
+
+    Estimators are dataclasses, whose fields are their settings: `__init__` only stores
+    them, as scikit-learn asks.
+    """
+
+    #: name by which `identify` knows it, and its settings that a ship file may give
+    name: ClassVar[str] = ""
+    options: ClassVar[tuple[str, ...]] = ()
+    #: whether the guard against models that run away may put a penalty in its place
+    regularised: ClassVar[bool] = True
 
     coef_: Floats
     intercept_: float = 0.0
     n_features_in_: int
+
+    @property
+    def method_name(self) -> str:
+        """Name of the method, with these settings, for the provenance."""
+        return self.name or type(self).__name__
+
+    def check(self) -> None:
+        """Refuse settings that cannot be, by an InputError that names the setting."""
 
     def predict(self, X: ArrayLike) -> Floats:
         """Targets, shape (n_samples,), of samples of shape (n_samples, n_features)."""
@@ -35,35 +47,36 @@ class LinearRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 def validated(estimator: Any, X: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
     """Features and targets as arrays of numbers, as scikit-learn checks them.
 
-    Its checks of what is sound already take as long as the decomposition: sound arrays
-    do without.
+    Its checks of sound arrays take as long as the decomposition, so these skip them.
     """
-    if _sound(X, 2) and _sound(y, 1) and len(X) == len(y) >= 2 and X.shape[1] > 0:
-        estimator.n_features_in_ = X.shape[1]
-        vars(estimator).pop("feature_names_in_", None)
-        return X, y
-    checked: tuple[Floats, Floats] = validate_data(
+    if _is_sound(X, 2) and _is_sound(y, 1):
+        n_samples, n_features = X.shape
+        if n_samples == len(y) and n_samples >= 2 and n_features > 0:
+            estimator.n_features_in_ = n_features
+            vars(estimator).pop("feature_names_in_", None)
+            return X, y
+
+    features, targets = validate_data(
         estimator, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2
     )
-    return checked[0], np.asarray(checked[1], dtype=np.float64)
+    return features, np.asarray(targets, dtype=np.float64)
 
 
-def _sound(values: ArrayLike, n_dimensions: int) -> TypeGuard[Floats]:
-    """Whether these are an array of finite numbers of double precision, and nothing else."""
-    if (
-        type(values) is not np.ndarray
-        or values.dtype != np.float64
-        or values.ndim != n_dimensions
-    ):
+def _is_sound(values: ArrayLike, n_dimensions: int) -> TypeGuard[Floats]:
+    """Tell a plain array of finite numbers of double precision from anything else."""
+    if type(values) is not np.ndarray:
+        return False
+    if values.dtype != np.float64 or values.ndim != n_dimensions:
         return False
     return bool(np.isfinite(values).all())
 
 
 def check_weight(value: Any, argument: str = "C") -> float:
     """Return a weight of errors: a number above 0, infinity included."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not float(value) > 0.0:
+    is_number = isinstance(value, Real) and not isinstance(value, bool)
+    if not is_number or not float(value) > 0.0:
         raise InputError(
-            f"{argument}: {value!r} found, expected a number above 0 (infinity gives"
-            " least squares)"
+            f"{argument}: expected a number above 0 (infinity gives least squares),"
+            f" got {value!r}"
         )
     return float(value)

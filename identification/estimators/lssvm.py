@@ -6,9 +6,8 @@ every C: V diag(s / (s^2 + 1/C)) U' y, at a cost of O(n m^2) instead of the O(n^
 the dual system.
 """
 
-from itertools import combinations_with_replacement
-from math import factorial, prod
-from typing import Any, Self
+from dataclasses import dataclass
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +17,9 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from identification.estimators.decomposition import (
     Decomposition,
     centre_and_scale,
+    check_scale,
     decompose,
+    keep_solution,
 )
 from identification.estimators.l_curve import (
     corner_rank,
@@ -26,25 +27,17 @@ from identification.estimators.l_curve import (
     l_curve,
     variance_rank,
 )
-from identification.estimators.linear import (
-    LinearRegressor,
-    check_weight,
-    settings,
-    validated,
-)
+from identification.estimators.linear import LinearRegressor, check_weight, validated
 from identification.estimators.robust import fit_weighted
 from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_number, check_whole
+from shipgym.checks import check_choice, check_flag, check_number, check_whole
 
 KERNELS = ("linear", "rbf", "poly")
 SELECTIONS = ("l-curve", "gcv", "explained-variance", "full")
-LEAST_SHARE = (
-    0.1  # a term belongs to a dropped direction with at least this share of its largest
-)
 
 
-@settings()
+@dataclass(eq=False, repr=False)
 class LSSVM(LinearRegressor):
     """Least-squares support vector regression (Suykens & Vandewalle 1999; Cao 2015).
 
@@ -52,7 +45,7 @@ class LSSVM(LinearRegressor):
 
     Parameters
     ----------
-    C : float
+    C : float, above 0
         Weight of the errors; infinity gives least squares (linear kernel only).
     kernel : {"linear", "rbf", "poly"}
         Linear in primal form; the others solve the dual system by Cholesky
@@ -66,6 +59,7 @@ class LSSVM(LinearRegressor):
     gamma : float or None
         Of the rbf and poly kernels; 1 / n_features where None.
     degree : int
+        Of the poly kernel.
     coef0 : float
         Of the poly kernel.
     robust : bool
@@ -101,6 +95,9 @@ class LSSVM(LinearRegressor):
         Number of features.
     """
 
+    name: ClassVar[str] = "ls-svm"
+    options: ClassVar[tuple[str, ...]] = ("C", "scale", "robust")
+
     C: float = 1e6
     kernel: str = "linear"
     scale: bool | ArrayLike = True
@@ -110,53 +107,61 @@ class LSSVM(LinearRegressor):
     coef0: float = 1.0
     robust: bool = False
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
+    def check(self) -> None:
+        """Refuse settings that cannot be, by an InputError that names the setting."""
         check_choice(self.kernel, KERNELS, "kernel")
         check_weight(self.C)
+        check_scale(self.scale)
         if self.gamma is not None:
             check_number(self.gamma, "gamma", above=0.0)
         check_whole(self.degree, "degree", at_least=1)
         check_number(self.coef0, "coef0")
-        X, y = validated(self, X, y)
+        check_flag(self.robust, "robust")
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
+        self.check()
+        features, targets = validated(self, X, y)
         fit_once = self._fit_primal if self.kernel == "linear" else self._fit_dual
         self.weights_ = fit_weighted(
-            lambda weights: fit_once(X, y, weights), y, self.robust
+            lambda weights: fit_once(features, targets, weights), targets, self.robust
         )
         return self
 
+    def error_weight(self) -> float:
+        """Weight of the squared errors in the solution."""
+        return self.C
+
     def _fit_primal(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
         problem = decompose(X, y, self.scale, self.fit_intercept, weights)
-        return take(
-            self,
-            problem,
-            problem.filters(self.C, len(problem.singular_values)),
-            X,
-            y,
-            weights,
-        )
+        n_directions = len(problem.singular_values)
+        filters = problem.filters(self.error_weight(), n_directions)
+        return keep_solution(self, problem, filters, X, y, weights)
 
     def _fit_dual(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
         if not np.isfinite(self.C):
             raise InputError(
-                f"C: {self.C} found, expected a finite number with kernel"
-                f" {self.kernel!r}"
+                f"C: expected a finite number with kernel {self.kernel!r}, got {self.C}"
             )
         self.centre_, self.scale_ = centre_and_scale(X, self.scale, self.fit_intercept)
         self.support_ = (X - self.centre_) / self.scale_
-        shape = {"gamma": self.gamma, "degree": self.degree, "coef0": self.coef0}
-        self.ridge_ = KernelRidge(alpha=1.0 / self.C, kernel=self.kernel, **shape)
+        self.ridge_ = KernelRidge(
+            alpha=1.0 / self.C,
+            kernel=self.kernel,
+            gamma=self.gamma,
+            degree=self.degree,
+            coef0=self.coef0,
+        )
+
         # the free b takes so much of the ones that the multipliers sum to zero
         targets = np.column_stack([y, np.ones(len(y))])
-        of_targets, of_ones = self.ridge_.fit(
-            self.support_, targets, weights
-        ).dual_coef_.T
-        self.intercept_ = (
-            float(of_targets.sum() / of_ones.sum()) if self.fit_intercept else 0.0
-        )
-        self.dual_coef_ = self.ridge_.dual_coef_ = (
-            of_targets - self.intercept_ * of_ones
-        )
+        self.ridge_.fit(self.support_, targets, weights)
+        of_targets, of_ones = self.ridge_.dual_coef_.T
+        self.intercept_ = 0.0
+        if self.fit_intercept:
+            self.intercept_ = float(of_targets.sum() / of_ones.sum())
+        self.dual_coef_ = of_targets - self.intercept_ * of_ones
+        self.ridge_.dual_coef_ = self.dual_coef_
         return np.asarray(y - self.ridge_.predict(self.support_) - self.intercept_)
 
     def predict(self, X: ArrayLike) -> Floats:
@@ -165,13 +170,11 @@ class LSSVM(LinearRegressor):
             return super().predict(X)
         check_is_fitted(self)
         features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
-        return np.asarray(
-            self.ridge_.predict((features - self.centre_) / self.scale_)
-            + self.intercept_
-        )
+        scaled = (features - self.centre_) / self.scale_
+        return np.asarray(self.ridge_.predict(scaled) + self.intercept_)
 
 
-@settings()
+@dataclass(eq=False, repr=False)
 class TruncatedLSSVM(LinearRegressor):
     """Truncated least-squares support vector machine, linear kernel (Xu 2020, section 3.2).
 
@@ -180,25 +183,28 @@ class TruncatedLSSVM(LinearRegressor):
 
     Parameters
     ----------
-    C : float
+    C : float, above 0
         Weight of the errors; infinity truncates without penalty.
-    rank : int or None
+    rank : int or None, at least 1
         Number of directions to keep; None leaves it to `selection`.
     selection : {"l-curve", "gcv", "explained-variance", "full"}
-        Corner of the L-curve, generalised cross-validation, as many directions as hold
-        the share `explained_variance` of the features, or every direction that rounding
-        leaves.
-    explained_variance : float
-        Share of the variance of the scaled features that is to be kept, above 0 and at
-        most 1.
-    scale, fit_intercept, robust
-        As in `LSSVM`.
+        Choice of the rank: corner of the L-curve, generalised cross-validation, as many
+        directions as hold the share `explained_variance` of the features, or every
+        direction above rounding.
+    scale : bool or array-like of shape (n_features,)
+        As of `LSSVM`.
+    fit_intercept : bool
+        As of `LSSVM`.
+    explained_variance : float, above 0, at most 1
+        Share of the variance of the scaled features that is to be kept.
+    robust : bool
+        As of `LSSVM`.
 
     Attributes
     ----------
     coef_, intercept_, singular_values_, covariance_, inverse_moment_, noise_variance_,
     weights_, n_features_in_
-        As in `LSSVM`.
+        As of `LSSVM`.
     rank_ : int
         Number of directions kept.
     l_curve_ : LCurve
@@ -210,6 +216,16 @@ class TruncatedLSSVM(LinearRegressor):
         For each dropped direction the features it is made of.
     """
 
+    name: ClassVar[str] = "tls-svm"
+    options: ClassVar[tuple[str, ...]] = (
+        "C",
+        "rank",
+        "selection",
+        "explained_variance",
+        "scale",
+        "robust",
+    )
+
     C: float = np.inf
     rank: int | None = None
     selection: str = "l-curve"
@@ -218,20 +234,24 @@ class TruncatedLSSVM(LinearRegressor):
     explained_variance: float = 0.9999
     robust: bool = False
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
+    def check(self) -> None:
+        """Refuse settings that cannot be, by an InputError that names the setting."""
         check_choice(self.selection, SELECTIONS, "selection")
         check_weight(self.C)
+        check_scale(self.scale)
         if self.rank is not None:
             check_whole(self.rank, "rank", at_least=1, hint="or None")
-        if not 0.0 < self.explained_variance <= 1.0:
-            raise InputError(
-                f"explained_variance: {self.explained_variance} found, expected a share"
-                " above 0 and at most 1"
-            )
-        X, y = validated(self, X, y)
+        check_number(
+            self.explained_variance, "explained_variance", above=0.0, at_most=1.0
+        )
+        check_flag(self.robust, "robust")
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
+        self.check()
+        features, targets = validated(self, X, y)
         self.weights_ = fit_weighted(
-            lambda weights: self._fit(X, y, weights), y, self.robust
+            lambda weights: self._fit(features, targets, weights), targets, self.robust
         )
         return self
 
@@ -239,108 +259,46 @@ class TruncatedLSSVM(LinearRegressor):
         problem = decompose(X, y, self.scale, self.fit_intercept, weights)
         distinct = problem.numerical_rank
         filters = problem.filters(self.C, distinct)
-        values, projections = (
+
+        lost = float(np.sum(problem.projections[distinct:] ** 2))
+        self.l_curve_ = l_curve(
             problem.singular_values[:distinct],
             problem.projections[:distinct],
+            filters[:distinct],
+            problem.outside + lost,
         )
-        outside = problem.outside + float(np.sum(problem.projections[distinct:] ** 2))
-        self.l_curve_ = l_curve(values, projections, filters[:distinct], outside)
-        self.rank_ = self._choose(problem, distinct)
+        self.rank_ = self._chosen_rank(problem, distinct)
         filters[self.rank_ :] = 0.0
+
         self.directions_ = problem.directions
-        dropped = np.abs(problem.directions[self.rank_ :])
-        shares = dropped / dropped.max(axis=1, keepdims=True)
-        self.collinear_groups_ = tuple(
-            tuple(np.flatnonzero(row >= LEAST_SHARE).tolist()) for row in shares
-        )
-        return take(self, problem, filters, X, y, weights)
+        dropped = problem.directions[self.rank_ :]
+        self.collinear_groups_ = tuple(_main_features(row) for row in dropped)
+        return keep_solution(self, problem, filters, X, y, weights)
 
     @property
     def collinear_names_(self) -> tuple[tuple[str, ...], ...]:
         """`collinear_groups_` by name: that of the table's columns, else x0, x1, ..."""
         check_is_fitted(self)
-        names = getattr(
-            self, "feature_names_in_", [f"x{i}" for i in range(self.n_features_in_)]
-        )
+        names = [f"x{i}" for i in range(self.n_features_in_)]
+        names = getattr(self, "feature_names_in_", names)
         return tuple(
             tuple(str(names[i]) for i in group) for group in self.collinear_groups_
         )
 
-    def _choose(self, problem: Decomposition, distinct: int) -> int:
-        if self.rank is not None or self.selection == "full":
-            return min(self.rank or distinct, distinct)
+    def _chosen_rank(self, problem: Decomposition, distinct: int) -> int:
+        if self.rank is not None:
+            return min(self.rank, distinct)
+        if self.selection == "full":
+            return distinct
         if self.selection == "l-curve":
             return corner_rank(self.l_curve_, problem.n_free)
         if self.selection == "gcv":
             return gcv_rank(self.l_curve_, problem.n_free)
-        return variance_rank(
-            problem.singular_values[:distinct], self.explained_variance
-        )
+        singular_values = problem.singular_values[:distinct]
+        return variance_rank(singular_values, self.explained_variance)
 
 
-def take(
-    estimator: Any,
-    problem: Decomposition,
-    filters: Floats,
-    X: Floats,
-    y: Floats,
-    weights: Floats | None,
-) -> Floats:
-    """Set the attributes of a linear estimator from its filtered decomposition; returns the residuals."""
-    root = (problem.directions.T * filters) / problem.scale[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inverse = np.where(filters > 0.0, filters / problem.singular_values, 0.0)
-    unscaled = problem.directions / problem.scale
-    estimator.coef_ = problem.coefficients(filters)
-    estimator.intercept_ = problem.mean - float(problem.centre @ estimator.coef_)
-    estimator.singular_values_ = problem.singular_values
-    estimator.inverse_moment_ = (unscaled.T * inverse) @ unscaled
-    residual: Floats = y - X @ estimator.coef_ - estimator.intercept_
-    freedom = problem.n_free - float(np.sum(problem.singular_values * filters))
-    effective = residual if weights is None else residual * weights
-    estimator.noise_variance_ = (
-        float(effective @ effective) / freedom if freedom > 0.5 else np.nan
-    )
-    # Huber's sandwich: the residuals that count are the weighted ones, the moment is
-    # that of all samples
-    unequal = 1.0 if weights is None else len(y) / float(weights.sum())
-    estimator.covariance_ = estimator.noise_variance_ * unequal * (root @ root.T)
-    return residual
-
-
-def polynomial_coefficients(estimator: LSSVM) -> dict[tuple[int, ...], float]:
-    """Coefficients of the polynomial that a fitted LS-SVM with polynomial kernel is (Zhu 2018, eq. 5.5-5.7).
-
-    The kernel (gamma x_i.x + coef0)^d is multiplied out and summed over the samples.
-
-    Returns a dict of coefficients by the powers of the features, as they were given:
-    (2, 1) is that of x0^2 x1. Raises InputError for another kernel.
-
-    Parameters
-    ----------
-    estimator : LSSVM
-        Fitted, with kernel "poly".
-    """
-    if estimator.kernel != "poly":
-        raise InputError(
-            f"kernel: {estimator.kernel!r} found, expected 'poly': only a polynomial"
-            " has them"
-        )
-    check_is_fitted(estimator)
-    degree, n_features = int(estimator.degree), estimator.n_features_in_
-    gamma = 1.0 / n_features if estimator.gamma is None else estimator.gamma
-    slope = gamma * estimator.support_ / estimator.scale_  # x as given, not centred
-    constant = estimator.coef0 - slope @ estimator.centre_
-    found = {}
-    for total in range(degree + 1):
-        for chosen in combinations_with_replacement(range(n_features), total):
-            powers = tuple(chosen.count(j) for j in range(n_features))
-            ways = factorial(degree) / (
-                prod(map(factorial, powers)) * factorial(degree - total)
-            )
-            terms = np.prod(slope ** np.array(powers), axis=1) * constant ** (
-                degree - total
-            )
-            found[powers] = ways * float(estimator.dual_coef_ @ terms)
-    found[(0,) * n_features] += estimator.intercept_
-    return found
+def _main_features(direction: Floats, least_share: float = 0.1) -> tuple[int, ...]:
+    """Features of at least a tenth of the largest share in a direction."""
+    sizes = np.abs(direction)
+    return tuple(np.flatnonzero(sizes / sizes.max() >= least_share).tolist())

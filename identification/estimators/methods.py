@@ -9,33 +9,52 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import clone
 
-from identification.estimators import recursive
-from identification.estimators.comparators import LinearSupportVectorMachine
+import identification
 from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, validated
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
-from identification.estimators.rm_svm import RMSVM, fit_rm_svm
-from identification.estimators.tuned import TunedLSSVM, fit_tuned
 from identification.regression.samples import Samples
+from identification.simulation_error.refinement import Refinement
 from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_number, quoted
+from shipgym.checks import check_choice, quoted
+
+#: By name the class of an estimator, or of a refinement, that `identification` exports,
+#: and its settings.
+METHODS: dict[str, tuple[str, dict[str, Any]]] = {
+    "ls": ("LeastSquares", {}),
+    "ridge": ("RidgeRegression", {}),
+    "ls-svm": ("LSSVM", {}),
+    "tls-svm": ("TruncatedLSSVM", {}),
+    "cv-lssvr": ("TunedLSSVM", {"optimiser": "grid"}),
+    "pso-lssvr": ("TunedLSSVM", {"optimiser": "pso"}),
+    "abc-lssvr": ("TunedLSSVM", {"optimiser": "abc"}),
+    "de-lssvr": ("TunedLSSVM", {"optimiser": "de"}),
+    "svr": ("LinearSupportVectorMachine", {}),
+    "rls": ("RecursiveLeastSquares", {}),
+    "sg": ("StochasticGradient", {}),
+    "nisg": ("StochasticGradient", {"omega": 0.5}),
+    "mils": ("MultiInnovationLeastSquares", {"inverse_free": False}),
+    "tmils": ("MultiInnovationLeastSquares", {}),
+    "output-error": ("Refinement", {}),
+    "rm-svm": ("RMSVM", {}),
+}
 
 
-def fit_all(estimator: Callable[[], Estimator], samples: Samples) -> Estimators:
+def fit_all(make: Callable[[], Estimator], samples: Samples) -> Estimators:
     """One estimator for each equation, fitted."""
-    return {
-        q: estimator().fit(X, samples.targets[q]) for q, X in samples.features.items()
-    }
+    estimators: Estimators = {}
+    for q, features in samples.features.items():
+        estimators[q] = make().fit(features, samples.targets[q])
+    return estimators
 
 
 def fit_equations(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-    """Fit an estimator to each equation; those that are tuned on the trials, to all equations together."""
-    kind = type(make())
-    if issubclass(kind, TunedLSSVM):
-        return fit_tuned(make, task)
-    if issubclass(kind, RMSVM):
-        return fit_rm_svm(make, task)
+    """Fit an estimator to each equation, or all together where the estimator can."""
+    estimator: Any = make()
+    if hasattr(estimator, "fit_equations"):
+        together: Estimators = estimator.fit_equations(task)
+        return together
     return fit_all(make, task.samples)
 
 
@@ -44,79 +63,17 @@ class Method:
     """A way to fit the regressions."""
 
     name: str  # as `identify` knows it
-    estimator: Callable[..., Estimator]  # makes an unfitted estimator from settings
-    regularised: bool = (
-        True  # whether the guard against models that run away may penalise it
-    )
-    #: fits estimators, made by its first argument, to the task that is its second; a
-    #: prior has its own
+    make: Callable[[], Estimator]  # makes an unfitted estimator
+    #: whether the guard against models that run away may penalise it
+    regularised: bool = True
+    #: fits estimators, made by its first argument, to the task that is its second
     fit: Callable[[Callable[[], Estimator], FitTask], Estimators] = fit_equations
-    # whether what was fitted is the start of a refinement by simulation (`refine`)
-    refined: bool = False
+    #: what the fit is the start of
+    refinement: Refinement | None = None
 
-    def fitted(self, settings: Mapping[str, Any], task: FitTask) -> Estimators:
-        """Estimators of all equations, fitted; InputError for settings that the method does not know."""
-        if unknown := [name for name in settings if not self.knows(name)]:
-            raise InputError(
-                f"settings: {', '.join(unknown)} found, which method {self.name!r} does"
-                " not know; leave them out, or choose the method that they are for"
-            )
-        return self.fit(partial(self.estimator, **settings), task)
-
-    def knows(self, setting: str) -> bool:
-        """Whether the estimator has a setting of that name."""
-        try:
-            self.estimator(**{setting: 1})
-        except (TypeError, InputError) as error:
-            return isinstance(
-                error, InputError
-            )  # the value does not fit, the name does
-        return True
-
-
-def _least_squares(scale: bool = True, robust: bool = False) -> Estimator:
-    return TruncatedLSSVM(
-        selection="full", fit_intercept=False, scale=scale, robust=robust
-    )
-
-
-def _ridge(alpha: float = 1e-6, **settings: Any) -> Estimator:
-    """Ridge regression as scikit-learn has it: its penalty is 1 / C, on columns as they are by default."""
-    alpha = check_number(alpha, "alpha", at_least=0.0)
-    settings = {"scale": False, **settings}
-    return LSSVM(C=1.0 / alpha if alpha else np.inf, fit_intercept=False, **settings)
-
-
-_TLS_SVM = partial(TruncatedLSSVM, fit_intercept=False)
-_TUNED = partial(TunedLSSVM, fit_intercept=False)
-
-METHODS = {
-    method.name: method
-    for method in (
-        Method("ls", _least_squares, regularised=False),
-        Method("ridge", _ridge),
-        Method("ls-svm", partial(LSSVM, fit_intercept=False)),
-        Method("tls-svm", _TLS_SVM),
-        Method("cv-lssvr", partial(_TUNED, optimiser="grid")),
-        Method("pso-lssvr", partial(_TUNED, optimiser="pso")),
-        Method("abc-lssvr", partial(_TUNED, optimiser="abc")),
-        Method("de-lssvr", partial(_TUNED, optimiser="de")),
-        Method("svr", partial(LinearSupportVectorMachine, fit_intercept=False)),
-        Method("rls", recursive.RecursiveLeastSquares, regularised=False),
-        Method("sg", recursive.StochasticGradient, regularised=False),
-        Method(
-            "nisg", partial(recursive.StochasticGradient, omega=0.5), regularised=False
-        ),
-        Method(
-            "mils",
-            partial(recursive.MultiInnovationLeastSquares, inverse_free=False),
-            regularised=False,
-        ),
-        Method("tmils", recursive.MultiInnovationLeastSquares, regularised=False),
-        Method("output-error", _TLS_SVM, refined=True),
-        Method("rm-svm", RMSVM),
-    )
-}
+    def fitted(self, task: FitTask) -> Estimators:
+        """Estimators of all equations, fitted."""
+        return self.fit(self.make, task)
 
 
 def get_method(method: str | Any) -> Method:
@@ -126,21 +83,25 @@ def get_method(method: str | Any) -> Method:
     structure.
     """
     if isinstance(method, str):
-        return METHODS[check_choice(method, METHODS, "method")]
+        method = make_method(check_choice(method, METHODS, "method"))
+    if isinstance(method, Refinement):
+        start = get_method(method.start)
+        return Method(Refinement.name, start.make, refinement=method)
     if not hasattr(method, "fit"):
         raise InputError(
-            f"method: {method!r} found, expected one of {quoted(METHODS)}, or an"
-            " estimator with scikit-learn's interface: fit(X, y) that sets coef_"
+            f"method: expected one of {quoted(METHODS)}, or an estimator with"
+            f" scikit-learn's interface, fit(X, y) that sets coef_, got {method!r}"
         )
     if isinstance(method, LSSVM) and method.kernel != "linear":
         raise InputError(
-            f"method: LSSVM with kernel {method.kernel!r} found, which has no"
-            " coefficient for each term; write identify(..., kernel='rbf') for a ship"
-            " with a kernel"
+            "method: expected LSSVM with the linear kernel, which has a coefficient for"
+            f" each term, got kernel {method.kernel!r}; write identify(...,"
+            " kernel='rbf') for a ship with a kernel"
         )
-    return Method(
-        type(method).__name__, lambda: without_constant(method), regularised=False
-    )
+    make = partial(without_constant, method)
+    if isinstance(method, LinearRegressor):
+        return Method(method.method_name, make, method.regularised)
+    return Method(type(method).__name__, make, regularised=False)
 
 
 def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Estimators:
@@ -153,14 +114,11 @@ def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Est
     """
     window = float(np.mean(samples.duration))
     C = 1.0 / (len(samples) * strength**2)
-    return {
-        q: (
-            LSSVM(C=C, scale=sizes[q] * window, fit_intercept=False).fit(
-                X, samples.targets[q]
-            )
-        )
-        for q, X in samples.features.items()
-    }
+    estimators: Estimators = {}
+    for q, features in samples.features.items():
+        ridge = LSSVM(C=C, scale=sizes[q] * window, fit_intercept=False)
+        estimators[q] = ridge.fit(features, samples.targets[q])
+    return estimators
 
 
 class Adapted(LinearRegressor):
@@ -177,34 +135,68 @@ class Adapted(LinearRegressor):
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit; InputError for an estimator that sets no `coef_` of a finite number for each feature."""
         features, targets = validated(self, X, y)
+        n_features = features.shape[1]
         self.inner.fit(features, targets)
         found = np.asarray(getattr(self.inner, "coef_", np.nan), dtype=float).ravel()
-        if found.shape != features.shape[1:] or not np.isfinite(found).all():
+        if found.shape != (n_features,) or not np.isfinite(found).all():
             raise InputError(
-                f"method: {self.inner!r} found, whose fit sets no finite coefficient"
-                f" for each of the {features.shape[1]} terms, expected a linear"
-                " estimator with coef_"
+                "method: expected a linear estimator whose fit sets coef_, a finite"
+                f" coefficient for each of the {n_features} terms, got {self.inner!r}"
             )
+
         used = np.flatnonzero(found)
-        self.coef_ = found
-        self.inverse_moment_ = np.zeros((len(found), len(found)))
         moment = features[:, used].T @ features[:, used]
-        self.inverse_moment_[np.ix_(used, used)] = np.linalg.pinv(
-            moment, hermitian=True
-        )
+        inverse = np.zeros((n_features, n_features))
+        inverse[np.ix_(used, used)] = np.linalg.pinv(moment, hermitian=True)
         residual = targets - features @ found
         freedom = max(len(targets) - len(used), 1)
-        self.covariance_ = float(residual @ residual) / freedom * self.inverse_moment_
+        self.coef_ = found
+        self.inverse_moment_ = inverse
+        self.covariance_ = float(residual @ residual) / freedom * inverse
         return self
 
 
 def without_constant(estimator: Any) -> Estimator:
     """An unfitted copy of an estimator object, with its `fit_intercept`, if it has one, set to False."""
     copied = clone(estimator, safe=False)
-    if hasattr(copied, "get_params") and "fit_intercept" in copied.get_params(
-        deep=False
-    ):
+    settings = {}
+    if hasattr(copied, "get_params"):
+        settings = copied.get_params(deep=False)
+    if "fit_intercept" in settings:
         copied.set_params(fit_intercept=False)
+
     # our own estimators know their moment; that of others is estimated
     known = type(copied).__module__.partition(".")[0] == "identification"
     return copied if known else Adapted(copied)
+
+
+def method_options(name: str) -> tuple[str, ...]:
+    """Names of the settings that a method of `METHODS` has."""
+    kind, _ = METHODS[name]
+    own: tuple[str, ...] = getattr(identification, kind).options
+    if kind == "Refinement":
+        return (*own, *TruncatedLSSVM.options)
+    return own
+
+
+def make_method(name: str, settings: Mapping[str, Any] | None = None) -> Any:
+    """The estimator, or the refinement, of a name with settings that were checked.
+
+    Raises InputError for a setting that it does not have.
+    """
+    settings = settings or {}
+    known = method_options(name) if name in METHODS else ()
+    for setting in settings:
+        if setting not in known:
+            raise InputError(
+                f"{setting}: expected a setting of method {name!r}"
+                f" ({', '.join(known) or 'it has none'}), got one that it does not know;"
+                " leave it out, or choose the method that it is for"
+            )
+    kind, own = METHODS[name]
+    if kind != "Refinement":
+        return getattr(identification, kind)(**(own | dict(settings)))
+
+    own = {k: v for k, v in settings.items() if k in Refinement.options}
+    of_start = {k: v for k, v in settings.items() if k not in own}
+    return Refinement(**own, start=TruncatedLSSVM(**of_start))

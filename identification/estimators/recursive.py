@@ -12,14 +12,15 @@ slope 1 at 0, with e in units of the targets' root mean square.
 """
 
 from abc import abstractmethod
-from typing import Any, Self
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
-from identification.estimators.decomposition import scales_of
-from identification.estimators.linear import LinearRegressor, settings, validated
+from identification.estimators.decomposition import check_scale, scales_of
+from identification.estimators.linear import LinearRegressor, validated
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.recursive_kernels import (
     least_squares,
@@ -27,29 +28,38 @@ from identification.estimators.recursive_kernels import (
 )
 from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.checks import check_number, check_whole
+from shipgym.checks import check_flag, check_number, check_whole
+
+OPTIONS = (
+    "forgetting",
+    "C",
+    "scale",
+    "start_samples",
+    "start_interval",
+    "start_C",
+)
 
 
-@settings()
+@dataclass(eq=False, repr=False)
 class Recursion(LinearRegressor):
     """What the recursive methods share; samples are taken in time order, without intercept.
 
     Parameters
     ----------
-    forgetting : float
+    forgetting : float, above 0, at most 1
         Factor by which older samples count less at each step; 1 forgets nothing. No
         coefficient of the least-squares forms becomes less certain than it was at the
         start, so that nothing winds up while the ship sails straight.
-    C : float
+    C : float, above 0
         Covariance of the scaled coefficients at the start, that is the weight of the
         errors in LS-SVM.
     scale : bool or array-like of shape (n_features,)
         Divide the regressors by their root mean square, or by given values.
-    start_samples : int
+    start_samples : int, at least 0
         Samples from which LS-SVR makes the start; 0 starts from zero.
-    start_interval : int
+    start_interval : int, at least 1
         Take every n-th sample for it.
-    start_C : float
+    start_C : float, above 0
         Weight of the errors of that LS-SVR.
 
     Attributes
@@ -64,8 +74,10 @@ class Recursion(LinearRegressor):
     weights_ : array of shape (n_samples,)
         How much each sample still counts (after `fit`).
     scale_ : array of shape (n_features,)
-        What the regressors are divided by inside.
+        Divisors of the regressors inside.
     """
+
+    regularised: ClassVar[bool] = False
 
     forgetting: float = 1.0
     C: float = 1e6
@@ -73,14 +85,28 @@ class Recursion(LinearRegressor):
     start_samples: int = 0
     start_interval: int = 1
     start_C: float = 1e6  # noqa: N815
-    # settings of some of the methods
-    innovations, omega, inverse_free = 1, 0.0, True
+    # settings that only some of the methods have
+    innovations = 1
+    omega = 0.0
+    inverse_free = True
 
     def __sklearn_tags__(self) -> Any:
         """A recursion has no intercept, which some of scikit-learn's test data would need."""
         tags = super().__sklearn_tags__()
         tags.regressor_tags.poor_score = True
         return tags
+
+    def check(self) -> None:
+        """Refuse settings that cannot be, by an InputError that names the setting."""
+        check_number(self.forgetting, "forgetting", above=0.0, at_most=1.0)
+        check_number(self.C, "C", above=0.0)
+        check_scale(self.scale)
+        check_number(self.start_C, "start_C", above=0.0)
+        check_whole(self.start_samples, "start_samples", at_least=0)
+        check_whole(self.start_interval, "start_interval", at_least=1)
+        check_whole(self.innovations, "innovations", at_least=1)
+        check_number(self.omega, "omega", at_least=0.0)
+        check_flag(self.inverse_free, "inverse_free")
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Run over samples of shape (n_samples, n_features), in time order, from the beginning."""
@@ -93,38 +119,51 @@ class Recursion(LinearRegressor):
         While LS-SVR gathers its samples these are the coefficients that it will find
         from them.
         """
-        self._check()
+        self.check()
         features, targets = validated(self, X, y)
         self._begin(features, targets[:, None])
+
         gathered = min(self.start_samples * self.start_interval, len(targets))
         picked = slice(0, gathered, self.start_interval)
         if gathered:
             self._start_from(features[picked], targets[picked])
         start = np.tile(self.coef_, (gathered, 1))
-        rest = self._run(features[gathered:, None], targets[gathered:, None])[:, 0]
+        rest = self._run(features[gathered:, None], targets[gathered:, None])
+
         multiplicity = np.zeros(len(targets))
-        multiplicity[picked] = multiplicity[gathered:] = 1.0
+        multiplicity[picked] = 1.0
+        multiplicity[gathered:] = 1.0
         self._summarise(features, targets, multiplicity)
-        return np.concatenate([start, rest])
+        return np.concatenate([start, rest[:, 0]])
 
     def update(self, phi: ArrayLike, y: ArrayLike) -> Self:
         """Take in the next sample or samples.
 
         Scales are fixed by the first call: give several samples first, or `scale`.
-        `phi`: regressors; where signals share them, their axis may be absent, shape
-        (n_features,), (n_samples, n_features) or (n_samples, n_signals, n_features);
-        `y`: what they explain, shape (n_samples,) or (n_samples, n_signals). Raises
-        InputError for shapes that do not fit and numbers that are not finite.
+
+        Parameters
+        ----------
+        phi : array-like
+            Regressors of shape (n_samples, n_signals, n_features); where signals share
+            them, (n_features,) or (n_samples, n_features).
+        y : array-like of shape (n_samples,) or (n_samples, n_signals)
+            Targets.
+
+        Raises
+        ------
+        InputError
+            For shapes that do not fit and numbers that are not finite.
         """
-        self._check()
+        self.check()
         features, targets = _shaped(phi, y)
         if not hasattr(self, "_theta"):
             self._begin(features, targets)
         if features.shape[1:] != self._theta.shape:
+            _, n_signals, n_features = features.shape
+            expected_signals, expected_features = self._theta.shape
             raise InputError(
-                f"phi: {features.shape[1]} signals of {features.shape[2]} regressors"
-                f" found, expected {self._theta.shape[0]} of {self._theta.shape[1]} as"
-                " before"
+                f"phi: expected {expected_signals} signals of {expected_features}"
+                f" regressors as before, got {n_signals} of {n_features}"
             )
         self._run(features, targets)
         return self
@@ -137,109 +176,115 @@ class Recursion(LinearRegressor):
 
     @property
     def covariance(self) -> Floats | None:
-        """Of `theta` per variance of the errors, shape ([n_signals,] n_features, n_features); None for SG."""
+        """Covariance of `theta` by variance of the errors; None for the stochastic gradient.
+
+        Shape (n_features, n_features) or (n_signals, n_features, n_features).
+        """
         check_is_fitted(self, "coef_")
         if not hasattr(self, "_P"):
             return None
         unscaled: Floats = self._P / np.multiply.outer(self.scale_, self.scale_)
         return unscaled[0] if len(unscaled) == 1 else unscaled
 
-    def _check(self) -> None:
-        check_number(self.forgetting, "forgetting", above=0.0, at_most=1.0)
-        check_number(self.C, "C", above=0.0)
-        check_number(self.start_C, "start_C", above=0.0)
-        check_whole(self.start_samples, "start_samples", at_least=0)
-        check_whole(self.start_interval, "start_interval", at_least=1)
-        check_whole(self.innovations, "innovations", at_least=1)
-        check_number(self.omega, "omega", at_least=0.0)
-
     def _begin(self, features: Floats, targets: Floats) -> None:
-        """Zero coefficients with the covariance C, in scales that the samples give."""
-        size = np.sqrt(np.mean(features**2, axis=tuple(range(features.ndim - 1))))
-        self.scale_ = scales_of(size, self.scale)
+        """Begin with zero coefficients of covariance C, in scales that the samples give."""
+        n_signals = targets.shape[1]
+        n_features = features.shape[-1]
+        every_row = features.reshape(-1, n_features)
+        self.scale_ = scales_of(np.sqrt(np.mean(every_row**2, axis=0)), self.scale)
         unit = np.sqrt(np.mean(targets**2, axis=0))
         self._unit = np.where(unit > 0.0, unit, 1.0)
-        signals, m = targets.shape[1], features.shape[-1]
-        self._theta = np.zeros((signals, m))
-        self._past = (np.empty((0, signals, m)), np.empty((0, signals)))
-        self.coef_ = np.zeros(m) if signals == 1 else np.zeros((signals, m))
+
+        self._theta = np.zeros((n_signals, n_features))
+        self.coef_ = np.zeros(n_features) if n_signals == 1 else self._theta.copy()
         self._begin_memory()
 
     def _start_from(self, features: Floats, targets: Floats) -> None:
-        """Take LS-SVR's estimate on the first samples, and how certain it is (LSSVR-RLS, Zhu 2018, 7.3)."""
-        estimator = LSSVM(C=self.start_C, scale=self.scale_, fit_intercept=False).fit(
-            features, targets
-        )
-        self._theta[0] = estimator.coef_ * self.scale_ / self._unit[0]
+        """Take LS-SVR's estimate on the first samples, and its certainty (LSSVR-RLS, Zhu 2018, 7.3)."""
+        estimator = LSSVM(C=self.start_C, scale=self.scale_, fit_intercept=False)
+        estimator.fit(features, targets)
         self.coef_ = estimator.coef_
-        if hasattr(self, "_P"):
-            self._P[0] = estimator.inverse_moment_ * np.outer(self.scale_, self.scale_)
-        else:
-            self._r += np.sum((features / self.scale_) ** 2)
+        self._theta[0] = estimator.coef_ * self.scale_ / self._unit[0]
+        self._remember_start(features / self.scale_, estimator.inverse_moment_)
 
     def _run(self, features: Floats, targets: Floats) -> Floats:
         """Take in samples of shape (n_samples, n_signals, n_features); estimate after each of them."""
-        scaled: Floats = np.ascontiguousarray(features / self.scale_)
+        scaled = np.ascontiguousarray(features / self.scale_)
+        in_units = np.ascontiguousarray(targets / self._unit)
         history: Floats = np.empty(features.shape)
-        self._advance(scaled, np.ascontiguousarray(targets / self._unit), history)
+        self._advance(scaled, in_units, history)
+
         history *= self._unit[:, None] / self.scale_
         if len(history):
-            self.coef_ = (
-                history[-1, 0].copy() if history.shape[1] == 1 else history[-1].copy()
-            )
+            last = history[-1]
+            self.coef_ = (last[0] if len(last) == 1 else last).copy()
         return history
 
     def _summarise(
         self, features: Floats, targets: Floats, multiplicity: Floats
     ) -> None:
-        """Weights and covariance of what the recursion tends to."""
+        """Set weights and covariance of the estimate that the recursion tends to."""
         # a sample is seen again while it is among the last
-        used = np.minimum(self.innovations, len(targets) - np.arange(len(targets)))
-        self.weights_ = (
-            multiplicity
-            * used
-            * self.forgetting ** np.arange(len(targets) - 1.0, -1.0, -1.0)
-        )
+        age = np.arange(len(targets) - 1.0, -1.0, -1.0)
+        times_seen = np.minimum(self.innovations, age + 1.0)
+        self.weights_ = multiplicity * times_seen * self.forgetting**age
+
         scaled = features / self.scale_
         start = np.eye(scaled.shape[1]) / self.C
         moment = (scaled.T * self.weights_) @ scaled + start
-        inverse, unscale = np.linalg.inv(moment), np.outer(self.scale_, self.scale_)
+        inverse = np.linalg.inv(moment)
+        unscale = np.outer(self.scale_, self.scale_)
         self.inverse_moment_ = inverse / unscale
+
         error = targets - features @ self.coef_
-        effective = float(np.sum(inverse * (moment - start)))
-        freedom = max(self.weights_.sum() - effective, 1.0)
+        n_effective = float(np.sum(inverse * (moment - start)))
+        freedom = max(self.weights_.sum() - n_effective, 1.0)
         self.noise_variance_ = float(self.weights_ @ error**2) / freedom
         middle = (scaled.T * self.weights_**2) @ scaled
         self.covariance_ = self.noise_variance_ * (inverse @ middle @ inverse) / unscale
 
     @abstractmethod
-    def _begin_memory(self) -> None: ...
+    def _begin_memory(self) -> None:
+        """Set up what is kept besides the estimate."""
 
     @abstractmethod
-    def _advance(self, phi: Floats, y: Floats, history: Floats) -> None: ...
+    def _remember_start(self, scaled: Floats, inverse_moment: Floats) -> None:
+        """Keep how certain a start from scaled samples is."""
+
+    @abstractmethod
+    def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
+        """Take in scaled samples and fill the history of the scaled estimate."""
 
 
+@dataclass(eq=False, repr=False)
 class RecursiveLeastSquares(Recursion):
     """Recursive least squares with forgetting, started from zero or from LS-SVR (Zhu 2018, section 7.3).
 
     Its parameters are those of `Recursion`.
     """
 
+    name: ClassVar[str] = "rls"
+    options: ClassVar[tuple[str, ...]] = OPTIONS
+
     def _begin_memory(self) -> None:
-        signals, m = self._theta.shape
-        self._P = np.tile(self.C * np.eye(m), (signals, 1, 1))
-        self._ceiling = np.full((signals, m), float(self.C))
+        n_signals, n_features = self._theta.shape
+        self._P = np.tile(self.C * np.eye(n_features), (n_signals, 1, 1))
+        self._ceiling = np.full((n_signals, n_features), float(self.C))
+        self._past_phi = np.empty((0, n_signals, n_features))
+        self._past_y = np.empty((0, n_signals))
+
+    def _remember_start(self, scaled: Floats, inverse_moment: Floats) -> None:
+        self._P[0] = inverse_moment * np.outer(self.scale_, self.scale_)
 
     def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
-        first = len(self._past[1])
-        phi, y = (
-            np.concatenate([self._past[0], phi]),
-            np.concatenate([self._past[1], y]),
-        )
-        least_squares(self.inverse_free)(
+        n_past = len(self._past_y)
+        phi = np.concatenate([self._past_phi, phi])
+        y = np.concatenate([self._past_y, y])
+        run = least_squares(self.inverse_free)
+        run(
             phi,
             y,
-            first,
+            n_past,
             self._theta,
             self._P,
             self._ceiling,
@@ -249,33 +294,46 @@ class RecursiveLeastSquares(Recursion):
             history,
             np.empty(phi.shape[-1]),
         )
-        kept = min(self.innovations - 1, len(y))
-        self._past = (phi[len(y) - kept :].copy(), y[len(y) - kept :].copy())
+        first_kept = len(y) - min(self.innovations - 1, len(y))
+        self._past_phi = phi[first_kept:].copy()
+        self._past_y = y[first_kept:].copy()
 
 
-@settings()
+@dataclass(eq=False, repr=False)
 class MultiInnovationLeastSquares(RecursiveLeastSquares):
     """Multi-innovation least squares: each step corrects by the last few innovations together.
 
+    It has the parameters of `Recursion` too.
+
     Parameters
     ----------
-    forgetting, C, scale, start_samples, start_interval, start_C
-        As in `Recursion`.
-    innovations : int
-        How many samples each step uses.
-    omega : float
+    innovations : int, at least 1
+        Number of samples that each step uses.
+    omega : float, at least 0
         Slope of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
     inverse_free : bool
         As that many scalar updates (TMILS), which with a linear innovation gives the
         same numbers, or with the matrix of innovations solved (MILS).
     """
 
+    options: ClassVar[tuple[str, ...]] = (
+        *OPTIONS,
+        "innovations",
+        "omega",
+        "inverse_free",
+    )
+
     innovations: int = 5
     omega: float = 0.0
     inverse_free: bool = True
 
+    @property
+    def method_name(self) -> str:
+        """TMILS without a matrix inverse, MILS with it."""
+        return "tmils" if self.inverse_free else "mils"
 
-@settings()
+
+@dataclass(eq=False, repr=False)
 class StochasticGradient(Recursion):
     """Stochastic gradient, with a linear (SG) or a nonlinear innovation (NISG).
 
@@ -283,22 +341,33 @@ class StochasticGradient(Recursion):
     correlated regressors it has not converged by the end of a trial. Prefer the
     least-squares forms for anything but comparison.
 
+    It has the parameters of `Recursion` too; here the sum of squares that divides the
+    steps forgets, and C is that of the ridge in `inverse_moment_`.
+
     Parameters
     ----------
-    forgetting, C, scale, start_samples, start_interval, start_C
-        As in `Recursion`; here the sum of squares that divides the steps forgets, and C
-        is that of the ridge in `inverse_moment_`.
-    omega : float
+    omega : float, at least 0
         Slope of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
     """
 
+    options: ClassVar[tuple[str, ...]] = (*OPTIONS, "omega")
+
     omega: float = 0.0
+
+    @property
+    def method_name(self) -> str:
+        """NISG with a nonlinear innovation, SG with a linear one."""
+        return "nisg" if self.omega > 0.0 else "sg"
 
     def _begin_memory(self) -> None:
         self._r = np.zeros(len(self._theta))
 
+    def _remember_start(self, scaled: Floats, inverse_moment: Floats) -> None:
+        self._r += np.sum(scaled**2)
+
     def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
-        stochastic_gradient()(
+        run = stochastic_gradient()
+        run(
             phi,
             y,
             self._theta,
@@ -311,28 +380,32 @@ class StochasticGradient(Recursion):
 
 def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
     """Samples of shape (n_samples, n_signals, n_features) and (n_samples, n_signals)."""
-    features, targets = (
-        np.asarray(phi, dtype=float),
-        np.atleast_1d(np.asarray(y, dtype=float)),
-    )
-    if features.ndim == 1:
-        features, targets = features[None], targets.reshape(1, -1)
-    features = features[:, None] if features.ndim == 2 else features
-    targets = targets[:, None] if targets.ndim == 1 else targets
-    if features.ndim != 3 or targets.ndim != 2 or len(features) != len(targets):
+    features = np.asarray(phi, dtype=float)
+    targets = np.atleast_1d(np.asarray(y, dtype=float))
+    if features.ndim == 1:  # a single sample
+        features = features[None]
+        targets = targets.reshape(1, -1)
+    if features.ndim == 2:
+        features = features[:, None]
+    if targets.ndim == 1:
+        targets = targets[:, None]
+
+    fits = features.ndim == 3 and targets.ndim == 2 and len(features) == len(targets)
+    if not fits:
         raise InputError(
-            f"phi, y: shapes {np.shape(phi)} and {np.shape(y)} found, expected"
-            " (n_samples, n_features) and (n_samples,), or (n_samples, n_signals,"
-            " n_features) and (n_samples, n_signals)"
+            "phi, y: expected shapes (n_samples, n_features) and (n_samples,), or"
+            " (n_samples, n_signals, n_features) and (n_samples, n_signals), got"
+            f" {np.shape(phi)} and {np.shape(y)}"
         )
-    if features.shape[1] not in (1, targets.shape[1]):
+    n_signals = targets.shape[1]
+    if features.shape[1] not in (1, n_signals):
         raise InputError(
-            f"phi: {features.shape[1]} signals found, expected {targets.shape[1]} as"
-            " in y"
+            f"phi: expected {n_signals} signals as in y, got {features.shape[1]}"
         )
     if not (np.all(np.isfinite(features)) and np.all(np.isfinite(targets))):
         raise InputError(
-            "phi, y: a value that is not finite found, expected numbers; repair the"
-            " samples first"
+            "phi, y: expected finite numbers, got one that is not; repair the samples"
+            " first"
         )
-    return np.broadcast_to(features, (*targets.shape, features.shape[-1])), targets
+    shape = (*targets.shape, features.shape[-1])
+    return np.broadcast_to(features, shape), targets

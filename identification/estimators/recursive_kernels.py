@@ -1,4 +1,11 @@
-"""Recursions: one pass over samples in time order, for any number of signals side by side."""
+"""Recursions: one pass over samples in time order, for any number of signals side by side.
+
+Arrays are `phi`, regressors of shape (n_samples, n_signals, n_features), `y`, targets
+of shape (n_samples, n_signals), `theta`, estimates of shape (n_signals, n_features),
+and `P`, covariances of shape (n_signals, n_features, n_features). Rows of `phi` and `y`
+before `first` are of an earlier call. `theta` and `P` are changed in place; `history`,
+shape (n_samples - first, n_signals, n_features), receives each theta.
+"""
 
 from functools import cache
 from math import tanh
@@ -17,20 +24,22 @@ def innovation(error: float, omega: float) -> float:
 
 
 def forget(P: Any, forgetting: float, ceiling: Any, stretch: Any) -> None:
-    """Divide a covariance by the forgetting factor, but let no coefficient forget beyond where it began.
+    """Divide a covariance by the forgetting factor, but let no coefficient forget beyond its start.
 
-    Rows and columns are stretched alike, so that the matrix stays positive; `stretch`
-    is scratch.
+    Rows and columns are stretched by the same factors, so that the matrix stays
+    positive; `stretch` is scratch.
     """
     full = 1.0 / np.sqrt(forgetting)
     for i in range(ceiling.size):
-        room = ceiling[i] / P[i, i] if P[i, i] > 0.0 else 1.0
-        stretch[i] = min(full, max(np.sqrt(room), 1.0))
+        room = 1.0
+        if P[i, i] > 0.0:
+            room = np.sqrt(ceiling[i] / P[i, i])
+        stretch[i] = min(full, max(room, 1.0))
+
     for i in range(ceiling.size):
         for j in range(ceiling.size):
-            P[i, j] *= (
-                stretch[i] * stretch[j]
-            )  # in this order the matrix stays symmetric to the last bit
+            # in this order the matrix stays symmetric to the last bit
+            P[i, j] *= stretch[i] * stretch[j]
 
 
 def rank_one(phi: Any, y: float, theta: Any, P: Any, omega: float, gain: Any) -> None:
@@ -41,15 +50,20 @@ def rank_one(phi: Any, y: float, theta: Any, P: Any, omega: float, gain: Any) ->
     for k in range(m):
         for j in range(m):
             gain[j] += P[k, j] * phi[k]
-    error, variance = y, 1.0
+
+    error = y
+    variance = 1.0
     for j in range(m):
         error -= theta[j] * phi[j]
         variance += gain[j] * phi[j]
-    step, shrink = innovation(error, omega) / variance, 1.0 / variance
+
+    step = innovation(error, omega) / variance
+    shrink = 1.0 / variance
     for j in range(m):
         theta[j] += step * gain[j]
         for k in range(m):
-            P[j, k] -= (gain[j] * gain[k]) * shrink  # symmetric to the last bit
+            # in this order the matrix stays symmetric to the last bit
+            P[j, k] -= (gain[j] * gain[k]) * shrink
 
 
 def scalar_updates(
@@ -65,18 +79,16 @@ def scalar_updates(
     history: Any,
     scratch: Any,
 ) -> None:
-    """Least squares by rank-one updates over the last samples (TMILS, Song 2020, 4-12); RLS with one.
-
-    Rows before `first` are history. `theta`, `P` are changed in place; `history`
-    receives each theta.
-    """
+    """Least squares by rank-one updates over the last samples (TMILS, Song 2020, 4-12); RLS with one."""
+    n_signals, n_features = theta.shape
     for t in range(first, phi.shape[0]):
-        for s in range(theta.shape[0]):
+        oldest = max(t - innovations + 1, 0)
+        for s in range(n_signals):
             if forgetting < 1.0:
                 forget(P[s], forgetting, ceiling[s], scratch)
-            for i in range(max(t - innovations + 1, 0), t + 1):
+            for i in range(oldest, t + 1):
                 rank_one(phi[i, s], y[i, s], theta[s], P[s], omega, scratch)
-            for j in range(theta.shape[1]):
+            for j in range(n_features):
                 history[t - first, s, j] = theta[s, j]
 
 
@@ -94,15 +106,18 @@ def matrix_updates(
     scratch: Any,
 ) -> None:
     """Multi-innovation least squares with its matrix of innovations solved (MILS, Song 2020, 4-11)."""
+    n_signals = theta.shape[0]
     for t in range(first, phi.shape[0]):
-        low = max(t - innovations + 1, 0)
-        for s in range(theta.shape[0]):
+        oldest = max(t - innovations + 1, 0)
+        for s in range(n_signals):
             if forgetting < 1.0:
                 forget(P[s], forgetting, ceiling[s], scratch)
-            X = np.ascontiguousarray(phi[low : t + 1, s])
-            errors = y[low : t + 1, s] - X @ theta[s]
+
+            X = np.ascontiguousarray(phi[oldest : t + 1, s])
+            errors = y[oldest : t + 1, s] - X @ theta[s]
             for i in range(errors.size):
                 errors[i] = innovation(errors[i], omega)
+
             XP = X @ P[s]
             gain = np.linalg.solve(np.eye(errors.size) + XP @ X.T, XP)
             theta[s] += errors @ gain
@@ -115,15 +130,20 @@ def gradient_updates(
     phi: Any, y: Any, theta: Any, r: Any, forgetting: float, omega: float, history: Any
 ) -> None:
     """Stochastic gradient, theta += phi e / r, r += |phi|^2 (Song 2020, equations 3-3 to 3-8)."""
+    n_signals, n_features = theta.shape
     for t in range(phi.shape[0]):
-        for s in range(theta.shape[0]):
-            error, size = y[t, s], 0.0
-            for j in range(theta.shape[1]):
+        for s in range(n_signals):
+            error = y[t, s]
+            size = 0.0
+            for j in range(n_features):
                 error -= theta[s, j] * phi[t, s, j]
                 size += phi[t, s, j] * phi[t, s, j]
+
             r[s] = forgetting * r[s] + size
-            step = innovation(error, omega) / r[s] if r[s] > 0.0 else 0.0
-            for j in range(theta.shape[1]):
+            step = 0.0
+            if r[s] > 0.0:
+                step = innovation(error, omega) / r[s]
+            for j in range(n_features):
                 theta[s, j] += step * phi[t, s, j]
                 history[t, s, j] = theta[s, j]
 

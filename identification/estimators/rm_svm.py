@@ -7,8 +7,9 @@ but insensitive band and solver are those of the epsilon-SVR that is fitted here
 """
 
 import warnings
-from collections.abc import Callable, Sequence
-from typing import Any, Self, TypeVar
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,34 +17,29 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Ridge
 from sklearn.svm import SVR, LinearSVR
 
-from identification.estimators.estimator import Estimator, Estimators, FitTask
-from identification.estimators.linear import LinearRegressor, settings, validated
+from identification.estimators.estimator import Estimators, FitTask
+from identification.estimators.linear import LinearRegressor, validated
 from identification.search.pattern_search import pattern_search
 from identification.search.search import BAND, SearchResult
 from identification.validation.folds import FOLDS, TRIALS, held_out_rows
 from identification.validation.prediction import predict
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Flags, Floats
-from shipgym.checks import check_choice, check_number
+from shipgym.checks import check_choice, check_flag, check_number, check_whole
 from shipgym.ships import GreyBox
 
 OBJECTIVES = ("rmse", "correlation")
 REGRESSIONS = ("svr", "ls-svm")
-NO_CORRECTION = (
-    0.0  # weight of the errors at which nothing is added to the reference ship
-)
-WEIGHTS = (NO_CORRECTION, *np.geomspace(0.01, 100.0, 9).tolist())
-ERROR_TOLERANCE = 1.1  # times the least error counts as equally good
+#: Weight of the errors at which nothing is added to the reference ship.
+NO_CORRECTION = 0.0
+WEAKEST = 0.01  # weight of the errors of the weakest correction
+WEIGHTS = (NO_CORRECTION, *np.geomspace(WEAKEST, 100.0, 9).tolist())
 FIRST_BAND = 0.1
-MOST_ROWS = (
-    600  # of the regression: sequential minimal optimisation takes the square of it
-)
-MOST_SWEEPS = 20_000  # of coordinate descent through the samples
 
 Choice = TypeVar("Choice")
 
 
-@settings()
+@dataclass(eq=False, repr=False)
 class RMSVM(LinearRegressor):
     """The linear correction of one equation: epsilon-SVR with standardised features and targets.
 
@@ -52,11 +48,11 @@ class RMSVM(LinearRegressor):
 
     Parameters
     ----------
-    C : float or None
+    C : float or None, at least 0
         Weight of the errors, by the mean over samples; 0 adds nothing to the reference
         ship. None: 1, or by `identify` the strongest regularisation nearly as good as
         the best on trials held out.
-    epsilon : float or None
+    epsilon : float or None, at least 0
         The insensitive band in [0, 1], standard deviations of the target. None: 0.1, or
         by `identify` from a pattern search.
     objective : {"rmse", "correlation"}
@@ -87,6 +83,17 @@ class RMSVM(LinearRegressor):
         Number of features.
     """
 
+    name: ClassVar[str] = "rm-svm"
+    options: ClassVar[tuple[str, ...]] = (
+        "C",
+        "epsilon",
+        "objective",
+        "regression",
+        "free_constant",
+        "folds",
+        "constant",
+    )
+
     C: float | None = None
     epsilon: float | None = None
     objective: str = "rmse"
@@ -96,73 +103,139 @@ class RMSVM(LinearRegressor):
     folds: str = TRIALS
 
     def check(self) -> None:
-        """Refuse settings that cannot be by an InputError."""
+        """Refuse settings that cannot be, by an InputError that names the setting."""
         check_choice(self.objective, OBJECTIVES, "objective")
         check_choice(self.regression, REGRESSIONS, "regression")
         check_choice(self.folds, FOLDS, "folds")
+        check_flag(self.free_constant, "free_constant")
+        if self.constant is not None:
+            check_whole(self.constant, "constant", at_least=0)
         if self.C is not None:
             check_number(self.C, "C", at_least=0.0)
         if self.epsilon is not None:
-            check_number(
-                self.epsilon,
-                "epsilon",
-                at_least=0.0,
-                hint="in standard deviations of the target",
-            )
+            hint = "in standard deviations of the target"
+            check_number(self.epsilon, "epsilon", at_least=0.0, hint=hint)
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
         self.check()
-        features, target = validated(self, X, y)
+        features, targets = validated(self, X, y)
         weight = 1.0 if self.C is None else float(self.C)
-        self._fit(features, target, weight or WEIGHTS[1])
-        if weight == NO_CORRECTION:  # its uncertainty is that of the weakest correction
+        if weight == NO_CORRECTION:
+            # its uncertainty is that of the weakest correction
+            self._fit(features, targets, WEAKEST)
             self.coef_ = np.zeros(features.shape[1])
-        self.covariance_ = (
-            float(np.mean((target - features @ self.coef_) ** 2)) * self.inverse_moment_
-        )
+        else:
+            self._fit(features, targets, weight)
+
+        residuals = targets - features @ self.coef_
+        self.covariance_ = float(np.mean(residuals**2)) * self.inverse_moment_
         return self
 
     def _fit(self, X: Floats, y: Floats, weight: float) -> None:
-        band = FIRST_BAND if self.epsilon is None else float(self.epsilon)
-        duration = np.ones(len(y)) if self.constant is None else X[:, self.constant]
-        rows, target = X / duration[:, None], y / duration
-        free = np.arange(X.shape[1]) != self.constant  # all of them without a constant
-        centre, level = np.zeros(X.shape[1]), 0.0
-        if self.constant is not None:
-            centre, level = np.where(free, rows.mean(axis=0), 0.0), float(target.mean())
-        scale = np.sqrt(np.mean((rows - centre) ** 2, axis=0))
-        scale = np.where((scale > 0.0) & free, scale, 1.0)
-        deviation = float(np.sqrt(np.mean((target - level) ** 2))) or 1.0
-        Z, e = ((rows - centre) / scale)[:, free], (target - level) / deviation
-        slope, offset = self._solve(Z, e, weight, band)
-        self.coef_ = np.zeros(X.shape[1])
-        self.coef_[free] = slope * deviation / scale[free]
-        if self.constant is not None:
-            self.coef_[self.constant] = level + deviation * offset - centre @ self.coef_
-        penalty = np.diag(
-            np.where(free, len(y) / weight * scale**2 * np.mean(duration) ** 2, 0.0)
-        )
-        self.inverse_moment_ = np.linalg.pinv(X.T @ X + penalty, hermitian=True)
+        rows = _Standardised(X, y, self.constant)
+        self.coef_ = rows.coefficients(*self._solve(rows, weight))
+        self.inverse_moment_ = rows.inverse_moment(weight)
 
-    def _solve(
-        self, Z: Floats, e: Floats, weight: float, band: float
-    ) -> tuple[Floats, float]:
+    def _solve(self, rows: "_Standardised", weight: float) -> tuple[Floats, float]:
         """Slopes and offset for standardised features and targets."""
+        Z, e = rows.features, rows.targets
         if not Z.shape[1]:
             return np.zeros(0), 0.0
-        has_offset, C, svr = (
-            self.constant is not None,
-            weight / len(e),
-            self.regression == "svr",
-        )
-        if svr and not has_offset:
+
+        has_offset = self.constant is not None
+        band = FIRST_BAND if self.epsilon is None else float(self.epsilon)
+        C = weight / len(e)
+        if self.regression == "ls-svm":
+            solver = Ridge(alpha=1.0 / C, fit_intercept=has_offset)
+        elif has_offset:
+            solver = SVR(kernel="linear", C=C, epsilon=band)
+        else:
             return _through_zero(Z, e, C, band), 0.0
-        ridge = Ridge(alpha=1.0 / C, fit_intercept=has_offset)
-        solver = (SVR(kernel="linear", C=C, epsilon=band) if svr else ridge).fit(Z, e)
-        return np.asarray(solver.coef_, dtype=float).ravel(), float(
-            np.sum(solver.intercept_)
-        )
+
+        solver.fit(Z, e)
+        slopes = np.asarray(solver.coef_, dtype=float).ravel()
+        return slopes, float(np.sum(solver.intercept_))
+
+    def fit_equations(self, task: FitTask) -> Estimators:
+        """Copies fitted to all equations, weight and bands chosen where not given.
+
+        The model of `task` is the bare reference ship as a model of the target. Raises
+        InputError for a model without a reference ship.
+        """
+        self.check()
+        if not isinstance(task.blank.table, GreyBox):
+            raise InputError(
+                "method 'rm-svm': expected structure 'grey-box', which has a reference"
+                f" ship, got {task.blank.structure!r}; give the structure with a"
+                " reference_model ('auto', a shipped model's name or a model file), or"
+                " choose another method, such as 'tls-svm'"
+            )
+        tuner = _Tuner(self, task)
+        weight = tuner.weight() if self.C is None else float(self.C)
+        bands, search = tuner.bands(weight)
+
+        found: Estimators = {}
+        for k, (q, band) in enumerate(zip(task.samples.features, bands, strict=True)):
+            estimator = tuner.fitted(q, weight, band, tuner.everything)
+            estimator.chosen_ = {"C": weight, "epsilon": band}
+            if search is not None:
+                estimator.search_ = search.of(k, BAND)
+            found[q] = estimator
+        return found
+
+
+class _Standardised:
+    """Features and targets of zero mean, where there is a free constant, and of unit size.
+
+    Attributes
+    ----------
+    features : array of shape (n_samples, n_penalised)
+        Of the penalised terms.
+    targets : array of shape (n_samples,)
+        In standard deviations.
+    """
+
+    def __init__(self, X: Floats, y: Floats, constant: int | None) -> None:
+        self._X = X
+        self._constant = constant
+        self._penalised = np.arange(X.shape[1]) != constant
+        self._duration = np.ones(len(y)) if constant is None else X[:, constant]
+        rows = X / self._duration[:, None]
+        targets = y / self._duration
+
+        self._centre = np.zeros(X.shape[1])
+        self._level = 0.0
+        if constant is not None:
+            self._centre = np.where(self._penalised, rows.mean(axis=0), 0.0)
+            self._level = float(targets.mean())
+
+        size = np.sqrt(np.mean((rows - self._centre) ** 2, axis=0))
+        has_size = (size > 0.0) & self._penalised
+        self._scale = np.where(has_size, size, 1.0)
+        deviations = targets - self._level
+        self._deviation = float(np.sqrt(np.mean(deviations**2))) or 1.0
+
+        scaled = (rows - self._centre) / self._scale
+        self.features = scaled[:, self._penalised]
+        self.targets = deviations / self._deviation
+
+    def coefficients(self, slopes: Floats, offset: float) -> Floats:
+        """Coefficients of the features as given, shape (n_features,)."""
+        found = np.zeros(len(self._penalised))
+        scale = self._scale[self._penalised]
+        found[self._penalised] = slopes * self._deviation / scale
+        if self._constant is not None:
+            at_centre = self._centre @ found
+            found[self._constant] = self._level + self._deviation * offset - at_centre
+        return found
+
+    def inverse_moment(self, weight: float) -> Floats:
+        """Regularised inverse of X'X of the ridge regression of the same strength."""
+        strength = len(self._X) / weight * np.mean(self._duration) ** 2
+        penalty = np.where(self._penalised, strength * self._scale**2, 0.0)
+        moment = self._X.T @ self._X + np.diag(penalty)
+        return np.linalg.pinv(moment, hermitian=True)
 
 
 def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
@@ -172,57 +245,36 @@ def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
     does not converge, by sequential minimal optimisation of the samples and their
     mirror image, which makes the offset zero.
     """
-    solver = {"dual": True, "tol": 1e-6, "max_iter": MOST_SWEEPS, "random_state": 0}
-    quick = LinearSVR(C=C, epsilon=band, fit_intercept=False, **solver)
+    quick = LinearSVR(
+        C=C,
+        epsilon=band,
+        fit_intercept=False,
+        dual=True,
+        tol=1e-6,
+        max_iter=20_000,
+        random_state=0,
+    )
     with warnings.catch_warnings(action="error", category=ConvergenceWarning):
         try:
             return np.asarray(quick.fit(Z, e).coef_, dtype=float)
         except ConvergenceWarning:
-            both = SVR(kernel="linear", C=0.5 * C, epsilon=band).fit(
-                np.vstack([Z, -Z]), np.append(e, -e)
-            )
-            return np.asarray(both.coef_, dtype=float).ravel()
+            pass
 
-
-def fit_rm_svm(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-    """Fit the corrections of all equations, with weight and insensitive bands chosen where not given.
-
-    `make`: makes an unfitted `RMSVM` with the settings asked for; `task`: its model is
-    the bare reference ship as a model of the target. Raises InputError for a model
-    without a reference ship.
-    """
-    asked = make()
-    assert isinstance(asked, RMSVM)
-    asked.check()
-    if not isinstance(task.blank.table, GreyBox):
-        raise InputError(
-            f"method: 'rm-svm' found with structure {task.blank.structure!r}, expected"
-            " structure 'grey-box', which has a reference ship, with a"
-            " reference_model: 'auto', a shipped model's name or a model file; or"
-            " choose another method, such as 'tls-svm'"
-        )
-    tuner, found = _Tuner(asked, task), dict[str, Estimator]()
-    weight = tuner.weight() if asked.C is None else float(asked.C)
-    bands, search = tuner.bands(weight)
-    for k, (q, band) in enumerate(zip(task.samples.features, bands, strict=True)):
-        found[q] = estimator = tuner.fitted(q, weight, band, tuner.everything)
-        estimator.chosen_ = {"C": weight, "epsilon": band}
-        if search is not None:
-            estimator.search_ = search.of(k, BAND)
-    return found
+    both = SVR(kernel="linear", C=0.5 * C, epsilon=band)
+    both.fit(np.vstack([Z, -Z]), np.append(e, -e))
+    return np.asarray(both.coef_, dtype=float).ravel()
 
 
 class _Tuner:
     """Fits with different settings, and simulations with what they give."""
 
-    def __init__(self, asked: RMSVM, task: FitTask) -> None:
-        self.asked, self.samples, self.blank, self.trials = (
-            asked,
-            task.samples,
-            task.blank,
-            task.trials,
-        )
-        self.thin = max(1, -(-len(task.samples) // MOST_ROWS))
+    def __init__(self, asked: RMSVM, task: FitTask, most_rows: int = 600) -> None:
+        self.asked = asked
+        self.samples = task.samples
+        self.blank = task.blank
+        self.trials = task.trials
+        # sequential minimal optimisation takes the square of the number of rows
+        self.every = max(1, -(-len(task.samples) // most_rows))
         self.everything = np.ones(len(task.samples), dtype=bool)
         band = FIRST_BAND if asked.epsilon is None else asked.epsilon
         self.first_bands = [band] * len(task.samples.features)
@@ -232,25 +284,30 @@ class _Tuner:
         """The estimator of one equation for some of the rows."""
         key = (equation, weight, band, rows.tobytes())
         if key not in self._known:
-            names = [term.name for term in self.blank.table.terms(equation)]
-            constant = (
-                names.index("0") if self.asked.free_constant and "0" in names else None
-            )
-            used = np.flatnonzero(rows)[:: self.thin]
-            X, y = (
-                self.samples.features[equation][used],
-                self.samples.targets[equation][used],
-            )
-            chosen = {"C": weight, "epsilon": band, "constant": constant}
-            self._known[key] = RMSVM(**self.asked.get_params() | chosen).fit(X, y)
+            chosen = {
+                "C": weight,
+                "epsilon": band,
+                "constant": self._free_constant(equation),
+            }
+            used = np.flatnonzero(rows)[:: self.every]
+            X = self.samples.features[equation][used]
+            y = self.samples.targets[equation][used]
+            estimator = RMSVM(**self.asked.get_params() | chosen)
+            self._known[key] = estimator.fit(X, y)
         return self._known[key]
+
+    def _free_constant(self, equation: str) -> int | None:
+        """Column of the constant that has no penalty."""
+        names = [term.name for term in self.blank.table.terms(equation)]
+        if self.asked.free_constant and "0" in names:
+            return names.index("0")
+        return None
 
     def model(self, weight: float, bands: Sequence[float], rows: Flags) -> ShipModel:
         """The grey box with the corrections fitted to some of the rows."""
-        equations = zip(self.samples.features, bands, strict=True)
-        coefficients = {
-            q: self.fitted(q, weight, band, rows).coef_ for q, band in equations
-        }
+        coefficients = {}
+        for q, band in zip(self.samples.features, bands, strict=True):
+            coefficients[q] = self.fitted(q, weight, band, rows).coef_
         return self.blank.with_accelerations(coefficients)
 
     def weight(self) -> float:
@@ -263,60 +320,63 @@ class _Tuner:
         folds = list(held_out_rows(self.trials, self.samples, self.asked.folds))
 
         def error(weight: float) -> float:
-            models = (
-                (self.model(weight, self.first_bands, rows), held)
-                for rows, held in folds
-            )
-            return float(
-                np.mean([heading_error(model, held, "rmse") for model, held in models])
-            )
+            errors = []
+            for rows, held in folds:
+                model = self.model(weight, self.first_bands, rows)
+                errors.append(heading_error(model, held, "rmse"))
+            return float(np.mean(errors))
 
         return float(most_regularised(WEIGHTS, [error(weight) for weight in WEIGHTS]))
 
     def bands(self, weight: float) -> tuple[list[float], SearchResult | None]:
         """The insensitive bands, by a pattern search on the simulated heading of the trials."""
-        first = self.first_bands
-        if (
-            self.asked.epsilon is not None
-            or weight == NO_CORRECTION
-            or self.asked.regression == "ls-svm"
-        ):
+        first, asked = self.first_bands, self.asked
+        has_no_band = weight == NO_CORRECTION or asked.regression == "ls-svm"
+        if asked.epsilon is not None or has_no_band:
             return first, None
 
         def error(bands: Floats) -> float:
             model = self.model(weight, bands.tolist(), self.everything)
-            return float(
-                np.mean(
-                    [heading_error(model, t, self.asked.objective) for t in self.trials]
-                )
-            )
+            errors = [heading_error(model, t, asked.objective) for t in self.trials]
+            return float(np.mean(errors))
 
         search = pattern_search(error, first, np.zeros(len(first)), np.ones(len(first)))
         return search.x.tolist(), search
 
 
-def most_regularised(choices: Sequence[Choice], errors: Sequence[float]) -> Choice:
-    """The first of choices, the most regularised first, whose error is nearly the least, if any is finite."""
-    allowed = ERROR_TOLERANCE * min(errors)
-    found = (
-        choice
-        for choice, error in zip(choices, errors, strict=True)
-        if error <= allowed
-    )
-    return next(found, choices[0])
+def most_regularised(
+    choices: Sequence[Choice], errors: Sequence[float], tolerance: float = 1.1
+) -> Choice:
+    """The first choice whose error is nearly the least; the first of all if none is finite.
+
+    Parameters
+    ----------
+    choices : sequence
+        The most regularised first.
+    errors : sequence of float
+        Of each choice.
+    tolerance : float
+        Times the least error counts as equally good.
+    """
+    allowed = tolerance * min(errors)
+    for choice, error in zip(choices, errors, strict=True):
+        if error <= allowed:
+            return choice
+    return choices[0]
 
 
 def heading_error(model: ShipModel, trial: Trial, objective: str) -> float:
-    """How far the heading of an open-loop simulation is from the measured one.
+    """Error of the simulated heading of a trial, open loop; infinite where the model runs away.
 
-    Root mean square, rad ("rmse"), or 1 less Pearson's correlation; infinite where the
-    model runs away.
+    Root mean square, rad ("rmse"), or 1 less Pearson's correlation with the measured
+    one ("correlation").
     """
-    if (prediction := predict(model, trial)) is None:
+    prediction = predict(model, trial)
+    if prediction is None:
         return np.inf
-    ours, theirs = prediction["psi"], trial["psi"]
+    predicted, measured = prediction["psi"], trial["psi"]
     if objective == "rmse":
-        return float(np.sqrt(np.mean((ours - theirs) ** 2)))
-    if np.ptp(ours) == 0.0 or np.ptp(theirs) == 0.0:
+        return float(np.sqrt(np.mean((predicted - measured) ** 2)))
+    if np.ptp(predicted) == 0.0 or np.ptp(measured) == 0.0:
         return 1.0
-    return 1.0 - float(np.corrcoef(ours, theirs)[0, 1])
+    return 1.0 - float(np.corrcoef(predicted, measured)[0, 1])

@@ -6,19 +6,11 @@ import numpy as np
 
 from shipgym.arrays import Floats
 
-INNER, OUTER = (
-    2.5,
-    3.0,
-)  # of the scale of the residuals; full weight up to the first, least from the second
+#: Standard deviation by median absolute deviation, of a normal distribution.
+MAD = 1.4826
+#: Residuals, by their scale, of full weight up to the first and of least from the second.
+INNER, OUTER = 2.5, 3.0
 LEAST_WEIGHT = 1e-4
-MAD = (
-    1.4826  # standard deviation by median absolute deviation, of a normal distribution
-)
-ROUNDING = (
-    64 * np.finfo(float).eps
-)  # of the largest target; residuals below it are not worth weighting
-MOST_ROUNDS = 50
-SETTLED = 1e-3  # change of a weight
 
 
 def hampel_weights(residuals: Floats, largest: float) -> Floats:
@@ -27,29 +19,55 @@ def hampel_weights(residuals: Floats, largest: float) -> Floats:
     The scale is estimated by the median absolute deviation; residuals of the rounding
     of the `largest` target all have the weight 1.
     """
-    scale = MAD * float(np.median(np.abs(residuals - np.median(residuals))))
-    if scale <= ROUNDING * largest:
+    rounding = 64 * np.finfo(float).eps * largest
+    deviation = np.abs(residuals - np.median(residuals))
+    scale = MAD * float(np.median(deviation))
+    if scale <= rounding:
         return np.ones(len(residuals))
-    ramp = (OUTER - np.abs(residuals) / scale) / (OUTER - INNER)
+
+    sizes = np.abs(residuals) / scale
+    ramp = (OUTER - sizes) / (OUTER - INNER)
     return np.clip(ramp, LEAST_WEIGHT, 1.0)
 
 
 def fit_weighted(
-    fit: Callable[[Floats | None], Floats], y: Floats, robust: bool
+    fit: Callable[[Floats | None], Floats],
+    y: Floats,
+    robust: bool,
+    most_rounds: int = 50,
+    settled: float = 1e-3,
 ) -> Floats:
-    """Fit; if robust weight the samples by their residuals and fit again until the weights converge.
+    """Fit; if robust weight the samples by their residuals and fit again until they settle.
 
-    `fit` takes weights, None for equal ones, and returns the residuals. Returns the
-    weights of the last fit; after 50 rounds without settling the last ones are taken.
+    Parameters
+    ----------
+    fit : callable
+        Takes weights, None for equal ones, and returns the residuals.
+    y : array of shape (n_samples,)
+        Targets.
+    robust : bool
+        Whether samples are weighted.
+    most_rounds : int
+        After which the last weights are taken even if they have not settled.
+    settled : float
+        Largest change of a weight that ends the rounds.
+
+    Returns
+    -------
+    array of shape (n_samples,)
+        Weights of the last fit.
     """
     residuals = fit(None)
     if not robust:
         return np.ones(len(y))
+
     largest = float(np.max(np.abs(y)))
     weights = hampel_weights(residuals, largest)
-    for _ in range(MOST_ROUNDS):
-        previous, weights = weights, hampel_weights(fit(weights), largest)
-        if float(np.max(np.abs(weights - previous))) < SETTLED:
+    for _ in range(most_rounds):
+        previous = weights
+        weights = hampel_weights(fit(previous), largest)
+        change = float(np.max(np.abs(weights - previous)))
+        if change < settled:
             return previous
     fit(weights)
     return weights

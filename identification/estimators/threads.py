@@ -1,4 +1,4 @@
-"""One thread for linear algebra on tall, narrow matrices: sharing them out costs more than it saves."""
+"""One thread for linear algebra on tall, narrow matrices: sharing them costs more than it saves."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,6 +20,5 @@ def single_threaded() -> Iterator[None]:
 
 @cache
 def _controller() -> ThreadpoolController:
-    return (
-        ThreadpoolController()
-    )  # looks through the loaded libraries, which takes 20 ms
+    # looks through the loaded libraries, which takes 20 ms
+    return ThreadpoolController()

@@ -1,24 +1,21 @@
 """LS-SVM that chooses its own weight of the errors."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Self
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import clone
 
-from identification.estimators.decomposition import decompose
-from identification.estimators.estimator import Estimator, Estimators, FitTask
-from identification.estimators.linear import (
-    LinearRegressor,
-    check_weight,
-    settings,
-    validated,
-)
+from identification.estimators.decomposition import check_scale, decompose
+from identification.estimators.estimator import Estimators, FitTask
+from identification.estimators.linear import LinearRegressor, check_weight, validated
 from identification.estimators.lssvm import LSSVM
-from identification.search import get_optimiser
+from identification.search.by_name import OPTIMISERS, get_optimiser
 from identification.search.objectives import (
     ErrorOfC,
+    check_folds,
     held_out_error,
     time_blocks,
     training_error,
@@ -27,35 +24,44 @@ from identification.search.search import Optimiser, SearchResult
 from identification.validation.prediction import predict
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_whole
+from shipgym.checks import check_choice, check_flag, check_whole
 
 OBJECTIVES = ("k-fold", "training", "free-running")
-COMPARED = ("u", "v", "r")
+#: Names of the methods by their search.
+METHOD_NAMES = {
+    "abc": "abc-lssvr",
+    "pso": "pso-lssvr",
+    "de": "de-lssvr",
+    "grid": "cv-lssvr",
+}
 RAN_AWAY = 1e3  # error, relative to the motion, of a ship that ran away
 
 
-@settings()
+@dataclass(eq=False, repr=False)
 class TunedLSSVM(LinearRegressor):
     """LS-SVM with a linear kernel and C found by a search over its logarithm (Zhu 2018, section 5.3).
 
     Parameters
     ----------
-    optimiser : {"abc", "pso", "grid", "de"}, mapping or Optimiser
+    optimiser : {"abc", "pso", "grid", "de"}, table or Optimiser
         Artificial bee colony, particle swarm, grid or differential evolution; with its
         settings as `{"name": "abc", "rounds": 60}`.
     objective : {"k-fold", "training", "free-running"}
         Error on held-out blocks of time; error on the fitted samples, as in the thesis,
-        whose optimum is the upper bound; error of simulated trials (through `identify`
-        only).
+        whose optimum is the upper bound; error of the simulated trials, slower, but
+        what counts in the end (through `identify` only).
     bounds : tuple of float
         Least and largest C.
     folds : int or "trials"
-        Blocks of time of the k-fold objective, or a block for each trial.
-    seed : int
-        Of the search.
-    scale, fit_intercept, robust
-        As of `LSSVM`. With `robust` the blocks are weighted as in the fit with the
-        largest C.
+        Number of blocks of time of the k-fold objective, or a block for each trial.
+    seed : int, at least 0
+        Of the search; the same seed gives the same search.
+    scale : bool or array-like of shape (n_features,)
+        As of `LSSVM`.
+    fit_intercept : bool
+        As of `LSSVM`.
+    robust : bool
+        As of `LSSVM`; the blocks are then weighted as in the fit with the largest C.
 
     Attributes
     ----------
@@ -65,10 +71,20 @@ class TunedLSSVM(LinearRegressor):
     C_ : float
         The weight of the errors that was found.
     search_ : SearchResult
-        How; its variable is log10 C.
+        How it was found; its variable is log10 C.
     chosen_ : dict
         For the provenance.
     """
+
+    options: ClassVar[tuple[str, ...]] = (
+        "optimiser",
+        "objective",
+        "bounds",
+        "folds",
+        "seed",
+        "scale",
+        "robust",
+    )
 
     optimiser: str | Mapping[str, Any] | Optimiser = "abc"
     objective: str = "k-fold"
@@ -79,24 +95,43 @@ class TunedLSSVM(LinearRegressor):
     fit_intercept: bool = True
     robust: bool = False
 
+    @property
+    def method_name(self) -> str:
+        """Name of the method by its search."""
+        kind = type(get_optimiser(self.optimiser))
+        for name, known in OPTIMISERS.items():
+            if kind is known:
+                return METHOD_NAMES[name]
+        return super().method_name
+
+    def check(self) -> None:
+        """Refuse settings that cannot be, by an InputError that names the setting."""
+        get_optimiser(self.optimiser)
+        check_choice(self.objective, OBJECTIVES, "objective")
+        self.log_bounds()
+        check_folds(self.folds)
+        check_whole(self.seed, "seed", at_least=0)
+        check_scale(self.scale)
+        check_flag(self.robust, "robust")
+
     def fit(self, X: ArrayLike, y: ArrayLike, groups: ArrayLike | None = None) -> Self:
         """Search for C and fit to samples of shape (n_samples, n_features), in the order of time.
 
         Targets have the shape (n_samples,), as have `groups`: the trial of each sample,
         for folds="trials".
         """
-        check_choice(self.objective, OBJECTIVES, "objective")
-        check_whole(self.seed, "seed", at_least=0)
+        self.check()
         if self.objective == "free-running":
             raise InputError(
-                "objective: 'free-running' found, expected 'k-fold' or 'training':"
-                " samples alone cannot be simulated; use identify(...,"
-                " objective='free-running')"
+                "objective: expected 'k-fold' or 'training', got 'free-running', but"
+                " samples alone cannot be simulated; give the estimator to identify"
             )
-        optimiser, bounds = get_optimiser(self.optimiser), self.log_bounds()
-        X, y = validated(self, X, y)
-        objective = self._objective(X, y, groups, self._estimator(10.0 ** bounds[1]))
-        return self.fit_with(X, y, optimiser.minimise(objective, [bounds], self.seed))
+        features, targets = validated(self, X, y)
+        objective = self._objective(features, targets, groups)
+        search = get_optimiser(self.optimiser).minimise(
+            objective, [self.log_bounds()], self.seed
+        )
+        return self.fit_with(features, targets, search)
 
     def log_bounds(self) -> tuple[float, float]:
         """Bounds of log10 C, checked."""
@@ -104,27 +139,33 @@ class TunedLSSVM(LinearRegressor):
             low, high = self.bounds
         except (TypeError, ValueError):
             raise InputError(
-                f"bounds: {self.bounds!r} found, expected the least and the largest C,"
-                " such as (0.01, 1e12)"
+                "bounds: expected the least and the largest C, such as (0.01, 1e12),"
+                f" got {self.bounds!r}"
             ) from None
-        low, high = check_weight(low, "bounds"), check_weight(high, "bounds")
+        low = check_weight(low, "bounds")
+        high = check_weight(high, "bounds")
         if not low < high < np.inf:
             raise InputError(
-                f"bounds: {(low, high)} found, expected a least C and a finite one that"
-                " is larger"
+                "bounds: expected a least C and a finite one that is larger, got"
+                f" {(low, high)}"
             )
         return float(np.log10(low)), float(np.log10(high))
 
     def fit_with(self, X: ArrayLike, y: ArrayLike, search: SearchResult) -> Self:
-        """Take C as a search found it, and fit."""
-        X, y = validated(self, X, y)
-        self.C_, self.search_ = 10.0 ** float(search.x[0]), search
-        fitted = vars(self._estimator(self.C_).fit(X, y))
-        self.__dict__.update(
-            {name: value for name, value in fitted.items() if name.endswith("_")}
-        )
-        found = {"value": search.value, "evaluations": search.evaluations}
-        self.chosen_ = {"C": self.C_, "objective": self.objective, **found}
+        """Fit with the C that a search found."""
+        features, targets = validated(self, X, y)
+        self.C_ = 10.0 ** float(search.x[0])
+        self.search_ = search
+        self.chosen_ = {
+            "C": self.C_,
+            "objective": self.objective,
+            "value": search.value,
+            "evaluations": search.evaluations,
+        }
+        fitted = self._estimator(self.C_).fit(features, targets)
+        for name, value in vars(fitted).items():
+            if name.endswith("_"):
+                setattr(self, name, value)
         return self
 
     def _estimator(self, C: float) -> LSSVM:
@@ -132,27 +173,30 @@ class TunedLSSVM(LinearRegressor):
             C=C, scale=self.scale, fit_intercept=self.fit_intercept, robust=self.robust
         )
 
-    def _objective(
-        self, X: Floats, y: Floats, groups: ArrayLike | None, loosest: LSSVM
-    ) -> ErrorOfC:
-        weights = loosest.fit(X, y).weights_ if self.robust else None
+    def _objective(self, X: Floats, y: Floats, groups: ArrayLike | None) -> ErrorOfC:
+        weights = None
+        if self.robust:
+            _, largest = self.log_bounds()
+            weights = self._estimator(10.0**largest).fit(X, y).weights_
         if self.objective == "training":
             return training_error(X, y, self.scale, self.fit_intercept, weights)
-        folds = min(self.folds, len(y)) if isinstance(self.folds, int) else self.folds
+
+        folds = self.folds
+        if isinstance(folds, int):
+            folds = min(folds, len(y))
         blocks = time_blocks(len(y), folds, groups)
         return held_out_error(X, y, self.scale, self.fit_intercept, blocks, weights)
 
-
-def fit_tuned(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-    """Fit estimators that choose their own C, which may use the trials as blocks or simulate them."""
-    template, samples = make(), task.samples
-    assert isinstance(template, TunedLSSVM)
-    if template.objective == "free-running":
-        return _fit_free_running(template, task)
-    return {
-        q: clone(template).fit(X, samples.targets[q], samples.trial)
-        for q, X in samples.features.items()
-    }
+    def fit_equations(self, task: FitTask) -> Estimators:
+        """Copies fitted to all equations, which may use the trials as blocks or simulate them."""
+        if self.objective == "free-running":
+            return _fit_free_running(self, task)
+        samples = task.samples
+        found: Estimators = {}
+        for q, features in samples.features.items():
+            own = clone(self)
+            found[q] = own.fit(features, samples.targets[q], samples.trial)
+        return found
 
 
 def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:
@@ -163,17 +207,18 @@ def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:
     """
     errors = []
     for trial in trials:
-        run, motion = (
-            predict(model, trial),
-            [c for c in COMPARED if np.ptp(trial[c]) > 0.0],
-        )
-        ratios = (
-            [np.mean((run[c] - trial[c]) ** 2) / np.var(trial[c]) for c in motion]
-            if run
-            else [RAN_AWAY]
-        )
-        errors.append(np.mean(ratios))
-    return float(np.mean(np.minimum(errors, RAN_AWAY)))
+        predicted = predict(model, trial)
+        if predicted is None:
+            errors.append(RAN_AWAY)
+            continue
+        ratios = []
+        for channel in ("u", "v", "r"):
+            measured = trial[channel]
+            if np.ptp(measured) > 0.0:
+                square = np.mean((predicted[channel] - measured) ** 2)
+                ratios.append(square / np.var(measured))
+        errors.append(min(float(np.mean(ratios)), RAN_AWAY))
+    return float(np.mean(errors))
 
 
 def _fit_free_running(settings: TunedLSSVM, task: FitTask) -> Estimators:
@@ -181,29 +226,31 @@ def _fit_free_running(settings: TunedLSSVM, task: FitTask) -> Estimators:
 
     The variables of their common search are log10 C in the order of the equations.
     """
+    settings.check()
     samples = task.samples
-    whitened = {
+    decomposed = {
         q: decompose(X, samples.targets[q], settings.scale, settings.fit_intercept)
         for q, X in samples.features.items()
     }
 
     def error(log_c: Floats) -> float:
-        accelerations = {
-            q: fit.coefficients(fit.filters(10.0**exponent, len(fit.singular_values)))
-            for (q, fit), exponent in zip(whitened.items(), log_c, strict=True)
-        }
-        return free_running_error(
-            task.blank.with_accelerations(accelerations), task.trials
-        )
+        accelerations = {}
+        for (q, problem), exponent in zip(decomposed.items(), log_c, strict=True):
+            n_directions = len(problem.singular_values)
+            filters = problem.filters(10.0**exponent, n_directions)
+            accelerations[q] = problem.coefficients(filters)
+        model = task.blank.with_accelerations(accelerations)
+        return free_running_error(model, task.trials)
 
-    optimiser, bounds = (
-        get_optimiser(settings.optimiser),
-        [settings.log_bounds()] * len(whitened),
-    )
-    search = optimiser.minimise(
-        lambda xs: np.array([error(x) for x in xs]), bounds, settings.seed
-    )
-    return {
-        q: clone(settings).fit_with(X, samples.targets[q], search.of(k))
-        for k, (q, X) in enumerate(samples.features.items())
-    }
+    def errors(candidates: Floats) -> Floats:
+        return np.array([error(log_c) for log_c in candidates])
+
+    bounds = [settings.log_bounds()] * len(decomposed)
+    optimiser = get_optimiser(settings.optimiser)
+    search = optimiser.minimise(errors, bounds, settings.seed)
+
+    found: Estimators = {}
+    for k, (q, features) in enumerate(samples.features.items()):
+        own = clone(settings)
+        found[q] = own.fit_with(features, samples.targets[q], search.of(k))
+    return found

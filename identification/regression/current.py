@@ -7,69 +7,118 @@ is linear (Maine & Iliff 1985, NASA RP-1138, output error with prior). So the cu
 does not depend on the structure to be identified. Its covariance is that of estimates
 with each trial, or each third of one, left out (jackknife): it holds what the equations
 miss.
+
+All quantities of the simulation are in units of the ship's length and service speed.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from identification.regression.velocities import over_ground
 from shipgym import Trial
 from shipgym.arrays import Floats
 from shipgym.ships.simulate import wind_accelerations
-from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.navigation import rotate_to_body
 
-STEP, STEPS = (
-    0.2,
-    5,
-)  # of the simulation, ship lengths at service speed; steps in a mean
-#: Mean and standard deviation of the coefficients of `_accelerations` before any trial,
-#: in units of L and U0.
-PRIOR = np.array(
-    [
-        (0.0, 0.02),
-        (-0.10, 0.2),
-        (-0.05, 0.2),
-        (0.9, 0.6),
-        (-0.5, 1.5),
-        (0.0, 0.3),
-        (-0.03, 0.15),
-        (-0.03, 0.15),
-        (0.0, 0.02),
-        (-0.9, 0.6),
-        (-3.0, 4.0),
-        (-0.35, 0.25),
-        (0.0, 0.5),
-        (-0.5, 1.5),
-        (0.0, 1.5),
-        (-0.06, 0.1),
-        (-0.04, 0.1),
-        (1.0, 0.25),
-    ]
-).T
-COEFFICIENTS = PRIOR.shape[1]
-START, CURRENT = (
-    (0.3, 0.15),
-    0.5,
-)  # standard deviations of u and v at the start, and of the current, by U0
-KNOWN = 1e-4  # the same of coefficients that are known, by those of the prior
-ROUNDS, ENOUGH, DIFFERENCE = (
-    20,
-    1e-3,
-    1e-4,
-)  # of Levenberg-Marquardt; its end; of finite differences
-SMALLEST = 0.003  # standard deviation of a residual, by U0
+STEP = 0.2  # of the simulation, in the time to sail one ship length
+STEPS = 5  # in a window, over which velocities are averaged
+DIFFERENCE = 1e-4  # of finite differences
 
 
 class CurrentEstimate(NamedTuple):
     """The currents of some trials, north and east after each other, and how certain they are."""
 
-    mean: Floats  # m/s, shape (2 n_trials,); alike where shared
+    mean: Floats  # m/s, shape (2 n_trials,); the same pair repeated where shared
     covariance: Floats  # (m/s)^2, shape (2 n_trials, 2 n_trials)
-    coefficients: (
-        Floats  # of the equations of surge and sway, in deviations of the prior
+    #: of the equations of surge and sway, in deviations of the prior, shape (18,)
+    coefficients: Floats
+
+
+class Coefficients(NamedTuple):
+    """Coefficients of `accelerations`."""
+
+    X_0: Any
+    X_u: Any
+    X_uu: Any
+    X_vr: Any
+    X_vv: Any
+    X_rr: Any
+    X_dd: Any
+    X_uudd: Any
+    Y_0: Any
+    Y_uv: Any
+    Y_vv: Any
+    Y_ur: Any
+    Y_rr: Any
+    Y_vr: Any
+    Y_rv: Any
+    Y_uud: Any
+    Y_d: Any
+    wind: Any
+
+
+#: Mean and standard deviation of the coefficients before any trial.
+PRIOR = Coefficients(
+    X_0=(0.0, 0.02),
+    X_u=(-0.10, 0.2),
+    X_uu=(-0.05, 0.2),
+    X_vr=(0.9, 0.6),
+    X_vv=(-0.5, 1.5),
+    X_rr=(0.0, 0.3),
+    X_dd=(-0.03, 0.15),
+    X_uudd=(-0.03, 0.15),
+    Y_0=(0.0, 0.02),
+    Y_uv=(-0.9, 0.6),
+    Y_vv=(-3.0, 4.0),
+    Y_ur=(-0.35, 0.25),
+    Y_rr=(0.0, 0.5),
+    Y_vr=(-0.5, 1.5),
+    Y_rv=(0.0, 1.5),
+    Y_uud=(-0.06, 0.1),
+    Y_d=(-0.04, 0.1),
+    wind=(1.0, 0.25),
+)
+MEAN, DEVIATION = np.array(PRIOR).T
+N_COEFFICIENTS = len(PRIOR)
+
+
+class Inputs(NamedTuple):
+    """Measured quantities that move a ship in surge and sway."""
+
+    r: Any
+    delta: Any
+    n: Any  # by that at the start
+    ahead: Any  # acceleration by wind
+    aside: Any
+
+
+def accelerations(u: Any, v: Any, at: Inputs, c: Coefficients) -> tuple[Any, Any]:
+    """Surge and sway acceleration by quadratic equations of any ship."""
+    surge = (
+        c.X_0
+        + c.X_u * (u - at.n)
+        + c.X_uu * (u**2 - at.n**2)
+        + c.X_vr * v * at.r
+        + c.X_vv * v**2
+        + c.X_rr * at.r**2
+        + (c.X_dd + c.X_uudd * u**2) * at.delta**2
+        + c.wind * at.ahead
     )
+    sway = (
+        c.Y_0
+        + c.Y_uv * u * v
+        + c.Y_vv * v * abs(v)
+        + c.Y_ur * u * at.r
+        + c.Y_rr * at.r * abs(at.r)
+        + c.Y_vr * v * abs(at.r)
+        + c.Y_rv * at.r * abs(v)
+        + (c.Y_uud * u**2 + c.Y_d) * at.delta
+        + c.wind * at.aside
+    )
+    return surge, sway
 
 
 def estimate_current(
@@ -82,201 +131,261 @@ def estimate_current(
     """The current of each trial, or of all, from psi, r, delta and velocities over ground.
 
     n, accelerations by wind and a speed u through the water are used where they are
-    there. `known`, shape (18,), are coefficients of another estimate, which are then
-    not fitted.
+    there.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        With psi, r, delta, u and v.
+    length, speed : float
+        Of the ship, m and m/s.
+    shared : bool
+        Whether the trials have one current.
+    known : array of shape (18,), optional
+        Coefficients of another estimate, which are then not fitted.
     """
-    runs = _Runs(trials, length, speed, shared, known)
-    x, slopes, residuals = runs.fitted()
-    J, changes = slopes.reshape(-1, len(x)), []
-    information = J.T @ J + np.diag(runs.weights**2)
-    parts = 1 if shared and len(trials) > 2 else 3
+    records = [_record(trial, length / speed, speed) for trial in trials]
+    problem = _Problem(_together(records, trials), shared, known)
+    fit = problem.fitted()
+    x, slopes, residuals = fit.x, fit.slopes, fit.residuals
+    every_slope = slopes.reshape(-1, len(x))
+    information = every_slope.T @ every_slope + np.diag(problem.weights**2)
+
+    changes = []  # of the estimate, where a part of the record is left out
+    n_parts = 1 if shared and len(trials) > 2 else 3
     for k in range(len(trials)):
-        for rows in np.array_split(
-            np.flatnonzero(np.isfinite(runs.seen[:, 0, k])), parts
-        ):
-            own, left = (
-                slopes[rows, :, k].reshape(-1, len(x)),
-                residuals[rows, :, k].ravel(),
-            )
-            changes.append(np.linalg.solve(information - own.T @ own, own.T @ left))
-    left_out = np.cov(np.transpose(changes)) * (len(changes) - 1) ** 2 / len(changes)
-    columns = runs.columns.ravel()
-    joint = (left_out + np.linalg.inv(information))[np.ix_(columns, columns)]
-    return CurrentEstimate(speed * x[columns], speed**2 * joint, x[:COEFFICIENTS])
+        measured = np.flatnonzero(np.isfinite(problem.runs.seen[:, 0, k]))
+        for rows in np.array_split(measured, n_parts):
+            own = slopes[rows, :, k].reshape(-1, len(x))
+            score = own.T @ residuals[rows, :, k].ravel()
+            changes.append(np.linalg.solve(information - own.T @ own, score))
 
-
-def over_ground(trial: Trial) -> tuple[Floats, Floats]:
-    """Velocity of midship over ground, ahead and to starboard, m/s, of a trial that knows it."""
-    if len({"u", "v"} & trial.derived) != 1:
-        return trial["u"], trial["v"]
-    north, east = (time_derivative(trial.t, trial[name]) for name in "xy")
-    return rotate_to_body(north, east, trial["psi"])
-
-
-def _accelerations(
-    u: Floats, v: Floats, measured: Floats, c: Floats
-) -> tuple[Floats, Floats]:
-    """Surge and sway of ships of coefficients `c` for measured r, delta, n and acceleration by wind."""
-    r, delta, n, ahead, aside = measured
-    surge = (
-        c[0]
-        + c[1] * (u - n)
-        + c[2] * (u * u - n * n)
-        + c[3] * v * r
-        + c[4] * v * v
-        + c[5] * r * r
-    )
-    sway = c[8] + c[9] * u * v + c[10] * v * abs(v) + c[11] * u * r + c[12] * r * abs(r)
-    crossed = c[13] * v * abs(r) + c[14] * r * abs(v) + (c[15] * u * u + c[16]) * delta
-    return (
-        surge + (c[6] + c[7] * u * u) * delta * delta + c[17] * ahead,
-        sway + crossed + c[17] * aside,
+    inflation = (len(changes) - 1) ** 2 / len(changes)
+    jackknife = np.cov(np.transpose(changes)) * inflation
+    columns = problem.current_columns.ravel()
+    covariance = (jackknife + np.linalg.inv(information))[np.ix_(columns, columns)]
+    return CurrentEstimate(
+        mean=speed * x[columns],
+        covariance=speed**2 * covariance,
+        coefficients=x[:N_COEFFICIENTS],
     )
 
 
+class _Record(NamedTuple):
+    """A trial in units of length and service speed, arrays of shape (n_samples,)."""
+
+    t: Floats
+    inputs: Inputs
+    psi: Floats
+    #: velocity north and east over ground, and ahead through the water; NaN where not
+    #: measured
+    seen: tuple[Floats, Floats, Floats]
+
+
+def _record(trial: Trial, travel_time: float, speed: float) -> _Record:
+    wind = wind_accelerations(trial) * travel_time / speed
+    shaft = trial["n"] if "n" in trial else np.zeros(len(trial))
+    ahead, aside = over_ground(trial)
+    north, east = rotate_to_body(ahead, aside, -trial["psi"])
+    logged = np.full(len(trial), np.nan)
+    if "v" in trial.derived and "u" not in trial.derived:
+        logged = trial["u"]
+    return _Record(
+        t=(trial.t - trial.t[0]) / travel_time,
+        inputs=Inputs(
+            trial["r"] * travel_time, trial["delta"], shaft, wind[:, 0], wind[:, 1]
+        ),
+        psi=trial["psi"],
+        seen=(north / speed, east / speed, logged / speed),
+    )
+
+
+@dataclass(frozen=True, eq=False)
 class _Runs:
-    """Trials on a grid of time, and what ships of given coefficients do there; all in units of L and U0.
+    """Trials on one grid of time; trials shorter than the longest stay at their last sample."""
 
-    Unknowns `x` are the coefficients, in deviations of the prior, u and v at the start
-    of each trial, and the current of each or of all.
+    inputs: Floats  # as of `Inputs`, shape (n_times, 5, n_trials)
+    psi: Floats  # shape (n_times, n_trials)
+    seen: Floats  # means over windows of time, shape (n_windows, 3, n_trials)
+
+    @property
+    def n_trials(self) -> int:
+        return len(self.psi[0])
+
+
+def _together(records: Sequence[_Record], trials: Sequence[Trial]) -> _Runs:
+    longest = max(record.t[-1] for record in records)
+    n_windows = int(longest / (STEP * STEPS))
+    grid = np.arange(n_windows * STEPS + 1) * STEP
+    shaft_speed = _starting_shaft_speed(trials)
+
+    inputs = np.empty((len(grid), len(Inputs._fields), len(records)))
+    psi = np.empty((len(grid), len(records)))
+    seen = np.full((len(grid), 3, len(records)), np.nan)
+    for k, record in enumerate(records):
+        shaft = np.ones(len(record.t))
+        if shaft_speed is not None:
+            shaft = record.inputs.n / shaft_speed
+        for i, row in enumerate(record.inputs._replace(n=shaft)):
+            inputs[:, i, k] = np.interp(grid, record.t, row)
+        psi[:, k] = np.interp(grid, record.t, record.psi)
+        is_recorded = grid <= record.t[-1]
+        for i, row in enumerate(record.seen):
+            on_grid = np.interp(grid, record.t, row)
+            seen[:, i, k] = np.where(is_recorded, on_grid, np.nan)
+    return _Runs(inputs, psi, _averaged(seen))
+
+
+def _starting_shaft_speed(trials: Sequence[Trial]) -> float | None:
+    """Median of the shaft speeds at which trials start, 1/s; None where not all turn ahead."""
+    starts = []
+    for trial in trials:
+        if "n" not in trial or not trial["n"][0] > 0.0:
+            return None
+        starts.append(trial["n"][0])
+    return float(np.median(starts))
+
+
+def _averaged(values: Floats) -> Floats:
+    """Means over the windows of the grid, whose times are the first axis."""
+    windows = values[:-1].reshape(-1, STEPS, *values.shape[1:])
+    return np.asarray(windows.mean(axis=1))
+
+
+class _Fit(NamedTuple):
+    """The most probable unknowns, and slopes and residuals there by their standard deviation."""
+
+    x: Floats
+    slopes: Floats  # shape (n_windows, 3, n_trials, n_unknowns)
+    residuals: Floats  # shape (n_windows, 3, n_trials)
+
+
+class _Problem:
+    """What ships of given coefficients do in the trials, and their fit.
+
+    Unknowns are the coefficients, in deviations of the prior, then u and v at the start
+    of each trial, then the current of each trial or of all.
     """
 
-    def __init__(
-        self,
-        trials: Sequence[Trial],
-        length: float,
-        speed: float,
-        shared: bool,
-        known: Floats | None,
-    ) -> None:
-        travel = length / speed
-        shafts = [
-            trial["n"][0] for trial in trials if "n" in trial and trial["n"][0] > 0.0
-        ]
-        shaft = float(np.median(shafts)) if len(shafts) == len(trials) else None
-        self.windows = max(
-            int(trial.duration / (STEP * STEPS * travel)) for trial in trials
-        )
-        grid = np.arange(self.windows * STEPS + 1) * STEP
-        self.measured = np.empty((len(grid), 5, 1, len(trials)))
-        self.psi = np.empty((len(grid), len(trials)))
-        seen = np.full((len(grid), 3, len(trials)), np.nan)
-        for k, trial in enumerate(trials):
-            wind = wind_accelerations(trial).T[:2] * travel / speed
-            n = trial["n"] / shaft if shaft is not None else np.ones(len(trial))
-            north, east = rotate_to_body(*over_ground(trial), -trial["psi"])
-            has_log = (
-                "v" in trial.derived and "u" not in trial.derived
-            )  # of the speed through the water
-            logged = trial["u"] if has_log else np.full(len(trial), np.nan)
-            seen_at = [row / speed for row in (north, east, logged)]
-            rows = [
-                trial["r"] * travel,
-                trial["delta"],
-                n,
-                *wind,
-                trial["psi"],
-                *seen_at,
+    def __init__(self, runs: _Runs, shared: bool, known: Floats | None) -> None:
+        self.runs = runs
+        pairs = np.arange(2 * runs.n_trials).reshape(-1, 2)
+        self.start_columns = N_COEFFICIENTS + pairs
+        self.current_columns = self.start_columns + pairs.size
+        n_currents = runs.n_trials
+        if shared:
+            self.current_columns = np.tile(self.current_columns[0], (len(pairs), 1))
+            n_currents = 1
+
+        deviations = np.concatenate(
+            [
+                np.ones(N_COEFFICIENTS),
+                np.tile([0.3, 0.15], runs.n_trials),  # of u and v at the start
+                np.full(2 * n_currents, 0.5),
             ]
-            times = (trial.t - trial.t[0]) / travel
-            on_grid = np.array([np.interp(grid, times, row) for row in rows])
-            self.measured[:, :, 0, k], self.psi[:, k] = on_grid[:5].T, on_grid[5]
-            seen[:, :, k] = np.where(grid <= times[-1], on_grid[6:], np.nan).T
-        self.seen = self.averaged(seen)
-        # where the currents of the trials stand among the unknowns, shape (n_trials, 2)
-        self.columns = (
-            COEFFICIENTS + 2 * len(trials) + np.arange(2 * len(trials)).reshape(-1, 2)
         )
-        self.columns = (
-            np.repeat(self.columns[:1], len(trials), axis=0) if shared else self.columns
-        )
-        of_current = np.full(2 if shared else 2 * len(trials), CURRENT)
-        self.weights = 1.0 / np.concatenate(
-            [np.ones(COEFFICIENTS), np.tile(START, len(trials)), of_current]
-        )
-        self.centre = np.zeros(len(self.weights))
+        self.centre = np.zeros(len(deviations))
         if known is not None:
-            self.weights[:COEFFICIENTS], self.centre[:COEFFICIENTS] = 1.0 / KNOWN, known
+            deviations[:N_COEFFICIENTS] = 1e-4
+            self.centre[:N_COEFFICIENTS] = known
+        self.weights = 1.0 / deviations
 
-    def averaged(self, values: Floats) -> Floats:
-        """Means over the windows of the grid."""
-        return np.asarray(
-            values[:-1].reshape(self.windows, STEPS, *values.shape[1:]).mean(axis=1)
-        )
+    def simulated(self, x: Floats) -> Floats:
+        """Velocities without current, means over windows, shape (n_windows, 3, n_lanes, n_trials).
 
-    def at(self, x: Floats) -> tuple[Floats, Floats]:
+        These are north, east and ahead. The first lane has the unknowns as given, then
+        follow lanes in which each of the coefficients, and u and v at the start, are
+        moved by `DIFFERENCE`.
+        """
+        runs = self.runs
+        n_lanes = 1 + N_COEFFICIENTS + 2
+        values = np.tile(MEAN + x[:N_COEFFICIENTS] * DEVIATION, (n_lanes, 1))
+        moved = np.arange(N_COEFFICIENTS)
+        values[1 + moved, moved] += DIFFERENCE * DEVIATION
+        c = Coefficients(*values.T[:, :, None])
+
+        start = x[self.start_columns]
+        u = np.tile(start[:, 0] + runs.inputs[0, 2], (n_lanes, 1))
+        v = np.tile(start[:, 1], (n_lanes, 1))
+        u[-2] += DIFFERENCE
+        v[-1] += DIFFERENCE
+
+        motion = np.empty((len(runs.psi), 2, n_lanes, runs.n_trials))
+        motion[0] = u, v
+        for k in range(len(runs.psi) - 1):
+            u, v = _midpoint_step(u, v, runs.inputs[k], runs.inputs[k + 1], c)
+            motion[k + 1] = u, v
+
+        ahead, aside = motion[:, 0], motion[:, 1]
+        north, east = rotate_to_body(ahead, aside, -runs.psi[:, None])
+        return _averaged(np.stack([north, east, ahead], axis=1))
+
+    def errors(self, x: Floats) -> tuple[Floats, Floats]:
         """What is measured less what is simulated, and the slopes of the latter by the unknowns.
 
         Shapes (n_windows, 3, n_trials) and (n_windows, 3, n_trials, n_unknowns): north,
         east, and ahead through the water; 0 where nothing was measured.
         """
-        moves, lanes = np.arange(COEFFICIENTS), COEFFICIENTS + 3
-        c = np.repeat(
-            (PRIOR[0] + x[:COEFFICIENTS] * PRIOR[1])[:, None, None], lanes, axis=1
-        )
-        c[moves, moves + 1] += DIFFERENCE * PRIOR[1][:, None]
-        start = x[COEFFICIENTS : self.columns[0, 0]].reshape(-1, 2).T[:, None]
-        u, v = np.repeat(start, lanes, axis=1)
-        u, v = u + self.measured[0, 2], v.copy()
-        u[-2] += DIFFERENCE
-        v[-1] += DIFFERENCE
-        motion = np.empty((len(self.measured), 2, *u.shape))
-        motion[0] = u, v
-        for i, (now, then) in enumerate(
-            zip(self.measured[:-1], self.measured[1:], strict=True)
-        ):
-            surge, sway = _accelerations(u, v, now, c)
-            halfway = u + 0.5 * STEP * surge, v + 0.5 * STEP * sway
-            surge, sway = _accelerations(*halfway, 0.5 * (now + then), c)
-            u, v = (
-                np.clip(u + STEP * surge, -2.0, 3.0),
-                np.clip(v + STEP * sway, -2.0, 2.0),
-            )
-            motion[i + 1] = u, v
-        cosine, sine = np.cos(self.psi)[:, None], np.sin(self.psi)[:, None]
-        u, v = motion[:, 0], motion[:, 1]
-        simulated = self.averaged(
-            np.stack([u * cosine - v * sine, u * sine + v * cosine, u], axis=1)
-        )
-        slopes = np.zeros((*self.seen.shape, len(x)))
-        steps = (
-            np.moveaxis(simulated[:, :, 1:] - simulated[:, :, :1], 2, 3) / DIFFERENCE
-        )
-        slopes[..., :COEFFICIENTS] = steps[..., :COEFFICIENTS]
-        found = simulated[:, :, 0]
-        found[:, :2] += x[self.columns].T
-        for k, own in enumerate(self.columns):
-            slopes[:, :, k, COEFFICIENTS + 2 * k : COEFFICIENTS + 2 * k + 2] = steps[
-                :, :, k, COEFFICIENTS:
-            ]
-            slopes[:, [0, 1], k, own] = 1.0
-        missing = ~np.isfinite(self.seen)
+        simulated = self.simulated(x)
+        predicted = simulated[:, :, 0]
+        changes = (simulated[:, :, 1:] - simulated[:, :, :1]) / DIFFERENCE
+        by_lane = np.moveaxis(changes, 2, 3)
+        predicted[:, :2] += x[self.current_columns].T
+
+        slopes = np.zeros((*predicted.shape, len(x)))
+        slopes[..., :N_COEFFICIENTS] = by_lane[..., :N_COEFFICIENTS]
+        for k in range(self.runs.n_trials):
+            north, east = self.current_columns[k]
+            slopes[:, :, k, self.start_columns[k]] = by_lane[:, :, k, N_COEFFICIENTS:]
+            slopes[:, 0, k, north] = 1.0
+            slopes[:, 1, k, east] = 1.0
+
+        missing = ~np.isfinite(self.runs.seen)
         slopes[missing] = 0.0
-        return np.where(missing, 0.0, self.seen - found), slopes
+        return np.where(missing, 0.0, self.runs.seen - predicted), slopes
 
-    def fitted(self) -> tuple[Floats, Floats, Floats]:
-        """The most probable unknowns, and slopes and residuals there by their standard deviation."""
-        x, damping, scale = self.centre, 1e-2, 0.1
-        residuals, slopes = self.at(x)
-        count = max(int(np.isfinite(self.seen).sum()) - len(x), 1)
+    def fitted(self, most_rounds: int = 20, enough: float = 1e-3) -> _Fit:
+        """Fit by Levenberg & Marquardt, the scale of the residuals renewed from round to round."""
+        x = self.centre
+        damping, scale = 1e-2, 0.1
+        errors, slopes = self.errors(x)
+        n_measured = int(np.isfinite(self.runs.seen).sum())
+        freedom = max(n_measured - len(x), 1)
+        for _ in range(most_rounds):
+            before = self._cost(errors / scale, x)
+            J = slopes.reshape(-1, len(x)) / scale
+            e = errors.ravel() / scale
+            hessian = J.T @ J + np.diag(self.weights**2)
+            downhill = J.T @ e - self.weights**2 * (x - self.centre)
+            damped = hessian + damping * np.diag(np.diag(hessian))
+            moved = x + np.linalg.solve(damped, downhill)
 
-        def cost(residuals: Floats, x: Floats) -> float:
-            return float(
-                np.sum(residuals**2) / scale**2
-                + np.sum((self.weights * (x - self.centre)) ** 2)
-            )
-
-        for _ in range(ROUNDS):
-            J, before = slopes.reshape(-1, len(x)), cost(residuals, x)
-            A = J.T @ J / scale**2 + np.diag(self.weights**2)
-            b = J.T @ residuals.ravel() / scale**2 - self.weights**2 * (x - self.centre)
-            moved = x + np.linalg.solve(A + damping * np.diag(np.diag(A)), b)
-            tried = self.at(moved)
-            after = cost(tried[0], moved)
-            damping = max(0.1 * damping, 1e-9) if after < before else 10.0 * damping
+            new_errors, new_slopes = self.errors(moved)
+            after = self._cost(new_errors / scale, moved)
             if after < before:
-                x, (residuals, slopes) = moved, tried
-                scale = max(float(np.sqrt(np.sum(residuals**2) / count)), SMALLEST)
-            if abs(before - after) < ENOUGH * before:
+                damping = max(0.1 * damping, 1e-9)
+                x, errors, slopes = moved, new_errors, new_slopes
+                # residuals below that are rounding of the sensors
+                scale = max(float(np.sqrt(np.sum(errors**2) / freedom)), 0.003)
+            else:
+                damping *= 10.0
+            if abs(before - after) < enough * before:
                 break
-        return x, slopes / scale, residuals / scale
+        return _Fit(x, slopes / scale, errors / scale)
+
+    def _cost(self, residuals: Floats, x: Floats) -> float:
+        from_prior = self.weights * (x - self.centre)
+        return float(np.sum(residuals**2) + np.sum(from_prior**2))
+
+
+def _midpoint_step(
+    u: Floats, v: Floats, now: Floats, then: Floats, c: Coefficients
+) -> tuple[Floats, Floats]:
+    """One step of the midpoint rule, kept within what a ship does."""
+    surge, sway = accelerations(u, v, Inputs(*now), c)
+    u_half = u + 0.5 * STEP * surge
+    v_half = v + 0.5 * STEP * sway
+    surge, sway = accelerations(u_half, v_half, Inputs(*(0.5 * (now + then))), c)
+    u = np.clip(u + STEP * surge, -2.0, 3.0)
+    v = np.clip(v + STEP * sway, -2.0, 2.0)
+    return u, v

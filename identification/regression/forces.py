@@ -1,4 +1,4 @@
-"""From captive tests to the coefficients of a table for forces: X, Y and N in one regression.
+"""From captive tests to the coefficients of a table for forces, in one regression.
 
 A coefficient that stands in several equations (`shipgym.ships.shared_structure`) has
 one column; the rows of X, Y and N are stacked. Source: Xu, Hassani & Guedes Soares
@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from sklearn.metrics import r2_score
 
+from identification.arrays import root_mean_square
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.estimators.threads import single_threaded
@@ -25,14 +26,12 @@ from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
 
 FORCES = ("X", "Y", "N")
 NEEDED = ("u", "v", "r", *FORCES)
-# of the usual change of a velocity from sample to sample: another angle of a static
-# test
+#: Times the usual change of a velocity from sample to sample: another angle of a static
+#: test.
 JUMP = 20.0
 FEWEST = 4  # samples between jumps
-METHODS = {
-    "ls": "full",
-    "tls-svm": "l-curve",
-}  # how each chooses the directions that it keeps
+#: How each method chooses the directions that it keeps.
+METHODS = {"ls": "full", "tls-svm": "l-curve"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,21 +63,20 @@ class ForceRegression:
 
     def scales(self) -> Floats:
         """Root mean square of each row's force over all tests, shape (n_rows,)."""
-        sizes = np.array(
-            [np.sqrt(np.mean(self.targets[self.equation == i] ** 2)) for i in range(3)]
-        )
-        return np.where(sizes > 0.0, sizes, 1.0)[self.equation]
+        sizes = [
+            root_mean_square(self.targets[self.equation == i])
+            for i in range(len(FORCES))
+        ]
+        return np.array([size or 1.0 for size in sizes])[self.equation]
 
     def r_squared(self, coefficients: Floats) -> dict[str, float]:
         """Share of the variance of X, Y and N that is explained (equation 22)."""
-        fitted, forces = (
-            self.features @ coefficients,
-            {f: self.equation == i for i, f in enumerate(FORCES)},
-        )
-        return {
-            f: float(r2_score(self.targets[rows], fitted[rows]))
-            for f, rows in forces.items()
-        }
+        fitted = self.features @ coefficients
+        shares = {}
+        for i, force in enumerate(FORCES):
+            own = self.equation == i
+            shares[force] = float(r2_score(self.targets[own], fitted[own]))
+        return shares
 
 
 def force_regression(
@@ -108,109 +106,127 @@ def force_regression(
     """
     if not trials:
         raise InputError(
-            "trials: none found, expected captive tests with the channels u, v, r, X,"
-            " Y, N"
+            "trials: expected captive tests with the channels u, v, r, X, Y, N, got"
+            " none"
         )
-    ship, names = particulars.completed(), structure.coefficient_names
-    parts, index = [], []
+    ship = particulars.completed()
+    features, targets, index = [], [], []
     for i, trial in enumerate(trials):
-        if missing := [name for name in NEEDED if name not in trial]:
+        missing = [name for name in NEEDED if name not in trial]
+        if missing:
             raise InputError(
-                f"trial {trial.name!r}: channel {missing[0]!r} is missing, structure"
-                f" {structure.name!r} needs {', '.join(NEEDED)}; give captive tests"
+                f"trial {trial.name!r}: expected the channels {', '.join(NEEDED)} for"
+                f" structure {structure.name!r}, got no {missing[0]!r}; give captive"
+                " tests"
             )
-        for rows in _between_jumps(trial):
-            parts.append(_one_piece(trial, rows, structure, ship, model_inertia))
-            index += [i] * (rows.stop - rows.start)
-    if not parts:
+        for rows in between_jumps(trial):
+            piece = trial.part(rows)
+            motion = _prime_motion(piece, ship)
+            features.append(_shares(motion, structure))
+            targets.append(_prime_forces(piece, motion, ship, model_inertia))
+            index += [i] * len(piece)
+    if not index:
         raise InputError(
-            f"trial {trials[0].name!r}: nowhere {FEWEST} samples between jumps of the"
-            " velocity, expected more"
+            f"trial {trials[0].name!r}: expected {FEWEST} samples somewhere between"
+            " jumps of the velocity, got fewer"
         )
-    features, targets = (
-        np.concatenate(part, axis=1) for part in zip(*parts, strict=True)
-    )
-    equation, trial_index = np.repeat(np.arange(3), len(index)), np.tile(index, 3)
+
+    n_forces, n_rows = len(FORCES), len(index)
+    names = structure.coefficient_names
     return ForceRegression(
-        features.reshape(-1, len(names)), targets.ravel(), names, equation, trial_index
+        features=np.concatenate(features, axis=1).reshape(-1, len(names)),
+        targets=np.concatenate(targets, axis=1).ravel(),
+        names=names,
+        equation=np.repeat(np.arange(n_forces), n_rows),
+        trial=np.tile(index, n_forces),
     )
 
 
-def _between_jumps(trial: Trial) -> list[slice]:
-    """Stretches in which the velocities change smoothly."""
+def between_jumps(trial: Trial) -> list[slice]:
+    """Stretches of a captive test in which the velocities change smoothly.
+
+    A jump is a change from sample to sample of more than 20 usual ones, the median of
+    the test; stretches of fewer than 4 samples are left out.
+    """
     jumps = np.zeros(len(trial) - 1, dtype=bool)
     for name in "uvr":
         change = np.abs(np.diff(trial[name]))
-        floor = 1e-9 * float(np.abs(trial[name]).max())
-        jumps |= change > np.maximum(JUMP * np.median(change), floor) + floor
-    edges = [0, *(np.flatnonzero(jumps) + 1).tolist(), len(trial)]
+        rounding = 1e-9 * float(np.abs(trial[name]).max())
+        largest = max(JUMP * float(np.median(change)), rounding)
+        jumps |= change > largest + rounding
+    starts = np.flatnonzero(jumps) + 1
+    edges = [0, *starts.tolist(), len(trial)]
     return [slice(i, j) for i, j in pairwise(edges) if j - i >= FEWEST]
 
 
-def _one_piece(
-    trial: Trial,
-    rows: slice,
-    structure: SharedStructure,
-    ship: Particulars,
-    model_inertia: bool,
-) -> tuple[Floats, Floats]:
-    """Features and targets of X, Y, N over one stretch, prime system; the first axis is the force."""
-    t, length = trial.t[rows], ship.length
-    u, v, r = (trial[name][rows] for name in "uvr")
-    speed = np.hypot(u, v)
+def _prime_motion(trial: Trial, ship: Particulars) -> dict[str, Floats]:
+    """Velocities, their sizes, and accelerations of a carriage, prime system."""
+    length = ship.length
+    speed = np.hypot(trial["u"], trial["v"])
     if not np.all(speed > 0.0):
         raise InputError(
-            f"trial {trial.name!r}: a ship at rest found, expected way on her: U"
-            " divides the forces"
+            f"trial {trial.name!r}: expected way on the ship, whose speed divides the"
+            " forces, got a ship at rest"
         )
-    rates = [CubicSpline(t, values)(t, 1) * length / speed**2 for values in (u, v, r)]
-    prime = {"u": u / speed, "v": v / speed, "r": r * length / speed}
-    prime |= dict(
-        zip(ACCELERATIONS, (rates[0], rates[1], rates[2] * length), strict=True)
-    )
-    prime |= {f"|{name}|": np.abs(prime[name]) for name in "uvr"}
+    motion = {}
+    scales = {"u": 1.0, "v": 1.0, "r": length}
+    for name, scale in scales.items():
+        rate = CubicSpline(trial.t, trial[name])(trial.t, 1)
+        motion[name] = trial[name] * scale / speed
+        motion[f"|{name}|"] = np.abs(motion[name])
+        motion[f"{name}dot"] = rate * length / speed**2 * scale
+    return motion
+
+
+def _prime_forces(
+    trial: Trial, motion: dict[str, Floats], ship: Particulars, model_inertia: bool
+) -> Floats:
+    """Hydrodynamic X, Y and N, prime system, shape (3, n_samples)."""
+    length = ship.length
+    speed = np.hypot(trial["u"], trial["v"])
     unit = 0.5 * ship.require("water_density") * length**2 * speed**2
-    targets = np.array(
-        [
-            trial[force][rows] / unit / (length if force == "N" else 1.0)
-            for force in FORCES
-        ]
+    forces = np.array(
+        [trial["X"] / unit, trial["Y"] / unit, trial["N"] / unit / length]
     )
-    if model_inertia:
-        inertia = ship.mass_prime, ship.mass_prime * ship.xg_prime, ship.inertia_prime
-        motion = ([prime[name] for name in names] for names in (AXES, ACCELERATIONS))
-        targets += rigid_body_forces(inertia, *motion)
-    column = {name: i for i, name in enumerate(structure.coefficient_names)}
-    features = np.zeros((len(AXES), len(t), len(column)))
-    for own, axis in zip(features, AXES, strict=True):
+    if not model_inertia:
+        return forces
+    mass = ship.mass_prime
+    velocities = [motion[name] for name in AXES]
+    accelerations = [motion[name] for name in ACCELERATIONS]
+    rigid = (mass, mass * ship.xg_prime, ship.inertia_prime)
+    return forces + rigid_body_forces(rigid, velocities, accelerations)
+
+
+def _shares(motion: dict[str, Floats], structure: SharedStructure) -> Floats:
+    """Share of each coefficient in X, Y and N, shape (3, n_samples, n_coefficients)."""
+    names = structure.coefficient_names
+    found = np.zeros((len(AXES), len(motion["u"]), len(names)))
+    for i, axis in enumerate(AXES):
         for share in structure.shares[axis]:
-            factors = [
-                prime[symbol] ** float(power) for symbol, power in share.term.powers
-            ]
-            own[:, column[share.coefficient]] += share.sign * np.prod(factors, axis=0)
-    return features, targets
+            powers = share.term.powers
+            factors = [motion[symbol] ** float(power) for symbol, power in powers]
+            column = names.index(share.coefficient)
+            found[i, :, column] += share.sign * np.prod(factors, axis=0)
+    return found
 
 
 def fit_forces(
     regression: ForceRegression, estimator: Estimator
 ) -> tuple[Floats, Floats]:
-    """Coefficients and their covariance; X, Y and N count alike, each by its root mean square.
+    """Coefficients and their covariance.
 
-    `estimator` has no intercept. The covariance is for white errors of the size of each
+    X, Y and N count alike, each by its root mean square. `estimator` has no intercept. The covariance is for white errors of the size of each
     force's residuals.
     """
     scales = regression.scales()
-    features, targets = (
-        regression.features / scales[:, None],
-        regression.targets / scales,
-    )
+    features = regression.features / scales[:, None]
+    targets = regression.targets / scales
     estimator.fit(features, targets)
+
     half = features @ estimator.inverse_moment_
-    left, leverages = (
-        targets - estimator.predict(features),
-        np.sum(half * features, axis=1),
-    )
-    variances = force_variances(regression.equation, left, leverages)
+    residuals = targets - estimator.predict(features)
+    leverages = np.sum(half * features, axis=1)
+    variances = force_variances(regression.equation, residuals, leverages)
     covariance = (half.T * variances[regression.equation]) @ half
     return estimator.coef_, 0.5 * (covariance + covariance.T)
 
@@ -222,10 +238,12 @@ def force_variances(equation: Integers, residuals: Floats, leverages: Floats) ->
     (n_rows, ...); `leverages`: diagonal of the matrix that maps targets to fitted
     values, shape (n_rows,).
     """
-    forces = [equation == i for i in range(len(FORCES))]
-    freedom = [max(float(np.sum(1.0 - leverages[rows])), 1.0) for rows in forces]
-    squares = [np.sum(residuals[rows] ** 2, axis=0) for rows in forces]
-    return np.array([square / n for square, n in zip(squares, freedom, strict=True)])
+    variances = []
+    for i in range(len(FORCES)):
+        own = equation == i
+        freedom = max(float(np.sum(1.0 - leverages[own])), 1.0)
+        variances.append(np.sum(residuals[own] ** 2, axis=0) / freedom)
+    return np.array(variances)
 
 
 @single_threaded()
@@ -263,30 +281,26 @@ def identify_forces(
     check_choice(method, METHODS, "method")
     if rank is not None and method != "tls-svm":
         raise InputError(
-            f"rank: {rank} found with method {method!r}, which keeps all; choose"
-            " 'tls-svm'"
+            f"rank: expected none with method {method!r}, which keeps all, got {rank};"
+            " choose 'tls-svm'"
         )
     if particulars is None:
         raise InputError(
-            "particulars: None found, expected at least length, speed and mass of the"
-            " ship"
+            "particulars: expected at least length, speed and mass of the ship, got"
+            " None"
         )
-    table = get_structure(structure)
-    if not isinstance(table, SharedStructure):
-        raise InputError(
-            f"structure: {structure!r} found, which is identified from free-running"
-            " trials, expected one for captive tests, such as 'pmm18'; use identify"
-        )
+    table = _captive_structure(structure)
     regression = force_regression(trials, table, particulars, model_inertia)
     estimator = TruncatedLSSVM(
         selection=METHODS[method], rank=rank, fit_intercept=False
     )
-    coefficients, covariance = fit_forces(regression, estimator)
+    values, covariance = fit_forces(regression, estimator)
+    coefficients = dict(zip(regression.names, values.tolist(), strict=True))
     provenance = {
         "structure": structure,
         "method": method,
         "rank": estimator.rank_,
-        "r_squared": regression.r_squared(coefficients),
+        "r_squared": regression.r_squared(values),
         "trials": [{"name": trial.name, "sha256": trial.sha256} for trial in trials],
     }
     return ShipModel(
@@ -296,5 +310,15 @@ def identify_forces(
         steering=steering or SteeringGear(),
         covariance=covariance,
         provenance=provenance,
-        coefficients=dict(zip(regression.names, coefficients.tolist(), strict=True)),
+        coefficients=coefficients,
     )
+
+
+def _captive_structure(name: str) -> SharedStructure:
+    structure = get_structure(name)
+    if not isinstance(structure, SharedStructure):
+        raise InputError(
+            "structure: expected one for captive tests, such as 'pmm18', got"
+            f" {name!r}, which is identified from free-running trials; use identify"
+        )
+    return structure

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from identification.estimators.estimator import Estimator
-from identification.estimators.methods import METHODS, fit_all
+from identification.estimators.methods import fit_all, get_method
 from identification.regression.samples import Samples, build_samples
 from identification.simulation_error.similarity import (
     AUTO,
@@ -34,9 +34,10 @@ class _OwnAccelerations:
         self, equation: str, channels: Any, particulars: Particulars, shaft_speed: float
     ) -> Floats:
         """Shape (n_samples, 1)."""
-        return self._box.converted_accelerations(channels, particulars, shaft_speed)[
-            equation
-        ][:, None]
+        accelerations = self._box.converted_accelerations(
+            channels, particulars, shaft_speed
+        )
+        return accelerations[equation][:, None]
 
 
 def chosen_box(
@@ -44,31 +45,34 @@ def chosen_box(
 ) -> tuple[GreyBox, dict[str, float]]:
     """The grey box of a reference ship, and the correlations of the candidates where she was not named.
 
-    `reference`: a model, its name or file; "auto" chooses the one most like the target
-    by `select_reference`; the target's trials tell whether its shaft speed and roll are
-    known.
+    Parameters
+    ----------
+    reference : str or ShipModel
+        A model, its name or file; "auto" chooses the one most like the target by
+        `select_reference`.
+    particulars : Particulars
+        Of the target.
+    trials : sequence of Trial
+        Of the target; they tell whether its shaft speed and roll are known.
     """
     if reference is None:
         raise InputError(
-            "reference_model: None found, expected the name of a reference ship, a"
-            " model file, or 'auto': a grey box is a reference ship plus a table of"
-            " terms"
+            "reference_model: expected the name of a reference ship, a model file, or"
+            " 'auto': a grey box is a reference ship plus a table of terms; got None"
         )
-    recorded = (
-        set.intersection(*(set(trial.channels) for trial in trials))
-        if trials
-        else set()
-    )
-    found: dict[str, float] = {}
+    recorded: set[str] = set()
+    if trials:
+        recorded = set.intersection(*(set(trial.channels) for trial in trials))
+
+    similarity: dict[str, float] = {}
     if reference == AUTO:
         with suppress(InputError):  # too little may be known to estimate the rest
             particulars = particulars.completed()
-        reference, found = select_reference(particulars, recorded)
-        check_alike(
-            reference, found[reference], 'choose structure "abkowitz" or "cubic"'
-        )
+        reference, similarity = select_reference(particulars, recorded)
+        otherwise = 'choose structure "abkowitz" or "cubic"'
+        check_alike(reference, similarity[reference], otherwise)
     box = grey_box(reference)
-    return replace(box, shaft=box.shaft and "n" in recorded), found
+    return replace(box, shaft=box.shaft and "n" in recorded), similarity
 
 
 def explained_samples(
@@ -79,29 +83,25 @@ def explained_samples(
     For models that were not fitted by regression; `sampling` as in `build_samples`.
     """
     table: Any = _OwnAccelerations(grey_box(model, shaft=True))
-    own = build_samples(
+    samples = build_samples(
         trials,
         table,
         model.particulars,
         shaft_speed=model.service_shaft_speed,
         **sampling,
     )
-    estimators = fit_all(METHODS["ls"].estimator, own)
+    estimators = fit_all(get_method("ls").make, samples)
     for estimator in estimators.values():
         estimator.coef_ = np.ones(1)
-    return own, estimators
+    return samples, estimators
 
 
 def bare_metrics(model: ShipModel, trials: Sequence[Trial]) -> dict[str, Any]:
     """Name of the reference ship of a grey box, and how well she alone predicts trials (`trial_metrics`)."""
     assert isinstance(model.table, GreyBox)
-    bare = replace(
-        model, coefficients=dict.fromkeys(model.coefficients, 0.0), covariance=None
-    )
-    return {
-        "name": model.table.ship.name,
-        "trials": {
-            trial.name: trial_metrics(bare, trial, predict(bare, trial))
-            for trial in trials
-        },
-    }
+    no_correction = dict.fromkeys(model.coefficients, 0.0)
+    bare = replace(model, coefficients=no_correction, covariance=None)
+    metrics = {}
+    for trial in trials:
+        metrics[trial.name] = trial_metrics(bare, trial, predict(bare, trial))
+    return {"name": model.table.ship.name, "trials": metrics}

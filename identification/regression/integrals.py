@@ -1,6 +1,10 @@
-"""Integrals of the terms of a model over each step: Euler, trapezoid rule, Gauss on broken splines."""
+"""Integrals of the terms of a model over the steps of a record.
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+Three rules: Euler, trapezoid rule, and Gauss quadrature on broken splines.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
@@ -9,61 +13,73 @@ from identification.regression.rudder import Rudder
 from shipgym.arrays import Floats
 
 Channels = Mapping[str, Floats]
-#: The terms of an equation, an array of shape (n_samples, n_terms), from the channels
+#: The terms of each equation, arrays of shape (n_samples, n_terms), from the channels
 #: at some times.
-Terms = Callable[[str, Channels], Floats]
-Integrals = tuple[dict[str, Floats], dict[str, Floats]]
+Terms = Callable[[Channels], dict[str, Floats]]
 
 DEGREE = 3
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
-def step_integrals(
-    t: Floats, channels: Channels, equations: Iterable[str], terms: Terms, euler: bool
-) -> Integrals:
-    """As `spline_integrals`, by the value at the start of each step or by the trapezoid rule."""
-    integrals, moments = {}, {}
-    for q in equations:
-        values = terms(q, channels)
-        mean = values[:-1] if euler else 0.5 * (values[:-1] + values[1:])
-        integrals[q] = mean * np.diff(t)[:, None]
-        moments[q] = 0.5 * integrals[q] * np.diff(t)[:, None]
-    return integrals, moments
+class Integrals(NamedTuple):
+    """Integrals over each step, by equation.
+
+    Attributes
+    ----------
+    terms : dict of str to array of shape (n_samples - 1, n_terms)
+        Of the terms.
+    moments : dict of str to array of shape (n_samples - 1, n_terms)
+        Of each term times the time that is left to the end of the step.
+    """
+
+    terms: dict[str, Floats]
+    moments: dict[str, Floats]
+
+
+def step_integrals(t: Floats, channels: Channels, terms: Terms, rule: str) -> Integrals:
+    """Integrals over each step by its start ("euler") or by the trapezoid rule."""
+    steps = np.diff(t)[:, None]
+    found = Integrals({}, {})
+    for equation, values in terms(channels).items():
+        mean = values[:-1]
+        if rule != "euler":
+            mean = 0.5 * (values[:-1] + values[1:])
+        found.terms[equation] = mean * steps
+        found.moments[equation] = 0.5 * found.terms[equation] * steps
+    return found
 
 
 def spline_integrals(
-    t: Floats,
-    channels: Channels,
-    equations: Iterable[str],
-    terms: Terms,
-    rudder: Rudder,
+    t: Floats, channels: Channels, terms: Terms, rudder: Rudder
 ) -> Integrals:
-    """Integrals over each step by Gauss quadrature on splines, broken where the rudder has corners.
+    """Integrals over each step by Gauss quadrature on splines.
 
-    Returns `integrals, moments` by equation, shape (n_samples - 1, n_terms); moments
-    about the step's end.
+    Both break where the rudder has corners.
     """
     edges = np.union1d(t, rudder.corners)
-    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
-    times = middle[:, None] + half[:, None] * NODES
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    half = 0.5 * np.diff(edges)
+    nodes = middle[:, None] + half[:, None] * NODES
     at_nodes = {
-        name: _between(t, name, values, rudder)(times.ravel())
+        name: _between(t, name, values, rudder)(nodes.ravel())
         for name, values in channels.items()
     }
-    step = np.searchsorted(t, middle, side="right") - 1
-    starts = np.flatnonzero(np.diff(step, prepend=-1))
+
     weights = half[:, None] * WEIGHTS
-    to_end = t[step + 1][:, None] - times
-    integrals, moments = {}, {}
-    for q in equations:
-        values = terms(q, at_nodes).reshape(*times.shape, -1)
-        integrals[q] = np.add.reduceat(
-            np.einsum("ijk,ij->ik", values, weights), starts, axis=0
-        )
-        moments[q] = np.add.reduceat(
-            np.einsum("ijk,ij->ik", values, weights * to_end), starts, axis=0
-        )
-    return integrals, moments
+    step = np.searchsorted(t, middle, side="right") - 1
+    to_end = t[step + 1][:, None] - nodes
+    first_of_step = np.flatnonzero(np.diff(step, prepend=-1))
+
+    def integrated(values: Floats, weights: Floats) -> Floats:
+        between_edges = np.einsum("ijk,ij->ik", values, weights)
+        return np.asarray(np.add.reduceat(between_edges, first_of_step, axis=0))
+
+    found = Integrals({}, {})
+    for equation, values in terms(at_nodes).items():
+        of_nodes = values.reshape(*nodes.shape, -1)
+        found.terms[equation] = integrated(of_nodes, weights)
+        found.moments[equation] = integrated(of_nodes, weights * to_end)
+    return found
 
 
 def _between(
@@ -76,52 +92,57 @@ def _between(
 
 
 def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
-    """Cubic spline through the samples of a velocity, broken where the rudder has a corner.
+    """Cubic spline through the samples of a velocity, broken at the rudder's corners.
 
     Where the rate of the rudder jumps the second derivative of a velocity does; at a
-    jump of its acceleration the third does.
+    jump of its acceleration the third does. A corner takes the place of as many knots
+    at the nearest samples; one too close to another or to an end is passed over.
     """
     if len(t) <= DEGREE:
         return make_interp_spline(t, values, k=1)
-    interior = list(range(2, len(t) - 2))  # not-a-knot ends
-    broken: list[float] = []
+    not_a_knot = slice(2, len(t) - 2)
+    knots = t[not_a_knot]
+    corners: list[float] = []
     for corner, smoothness in zip(rudder.corners, rudder.smoothness, strict=True):
         multiplicity = DEGREE - 1 - int(smoothness)
-        nearest = sorted(interior, key=lambda i: abs(t[i] - corner))[:multiplicity]
-        after = int(np.searchsorted(t, corner))
-        if any(abs(i - after) > 2 for i in nearest) or len(nearest) < multiplicity:
-            continue  # too close to another corner or to an end
-        kept = [i for i in interior if i not in nearest]
-        if _solvable(t, _knots(t, kept, [*broken, *[corner] * multiplicity])):
-            interior, broken = kept, [*broken, *[corner] * multiplicity]
-    return make_interp_spline(t, values, k=DEGREE, t=_knots(t, interior, broken))
+        by_distance = np.argsort(np.abs(knots - corner), kind="stable")
+        nearest = by_distance[:multiplicity]
+        if len(nearest) < multiplicity or _is_far(t, knots[nearest], corner):
+            continue
+        kept = np.delete(knots, nearest)
+        broken = [*corners, *[corner] * multiplicity]
+        if _is_solvable(t, _with_ends(t, kept, broken)):
+            knots = kept
+            corners = broken
+    return make_interp_spline(t, values, k=DEGREE, t=_with_ends(t, knots, corners))
 
 
-def _knots(t: Floats, interior: Sequence[int], broken: Sequence[float]) -> Floats:
-    inner = np.sort(
-        np.concatenate([t[list(interior)], np.asarray(broken, dtype=float)])
-    )
-    return np.concatenate(
-        [np.repeat(t[0], DEGREE + 1), inner, np.repeat(t[-1], DEGREE + 1)]
-    )
+def _is_far(t: Floats, knots: Floats, corner: float) -> bool:
+    """Whether a knot is more than two samples away from a corner."""
+    after = np.searchsorted(t, corner)
+    return bool(np.any(np.abs(np.searchsorted(t, knots) - after) > 2))
 
 
-def _solvable(t: Floats, knots: Floats) -> bool:
+def _with_ends(t: Floats, knots: Floats, corners: list[float]) -> Floats:
+    """Knots of the whole spline, with as many at either end as a cubic needs."""
+    inner = np.sort(np.concatenate([knots, corners]))
+    ends = DEGREE + 1
+    return np.concatenate([np.repeat(t[0], ends), inner, np.repeat(t[-1], ends)])
+
+
+def _is_solvable(t: Floats, knots: Floats) -> bool:
     """Whether every basis function has a sample of its own (Schoenberg & Whitney 1953)."""
-    inner = slice(1, len(t) - 1)
-    return bool(
-        np.all(
-            (knots[: len(t)][inner] < t[inner])
-            & (t[inner] < knots[DEGREE + 1 :][inner])
-        )
-    )
+    inside = t[1:-1]
+    begins = knots[1 : len(t) - 1]
+    ends = knots[DEGREE + 2 : -1]
+    return bool(np.all((begins < inside) & (inside < ends)))
 
 
 def twice_integrated(t: Floats, integrals: Floats, moments: Floats) -> Floats:
-    """Integral over each step of the integral since the first sample, shape (n_samples - 1, n_terms).
+    """Integral over each step of the integral since the first sample.
 
-    `integrals` are those of the terms over each step, `moments` those of term times the
-    time left to its end.
+    `integrals` of the terms over each step and their `moments` (`Integrals`), all of
+    shape (n_samples - 1, n_terms).
     """
     before = np.cumsum(integrals, axis=0) - integrals
     return before * np.diff(t)[:, None] + moments

@@ -1,4 +1,4 @@
-"""What is to be identified: the trials used, the structure, the ship, and the regression they make."""
+"""The problem to be identified: the trials used, the structure, the ship, and the regression they make."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.options import Given, name_of, whole_call
+from identification.options import Given, Options, name_of
 from identification.regression.grey_box import chosen_box
 from identification.regression.preprocess import repaired
 from identification.regression.rudder import estimated_gear
@@ -15,15 +15,13 @@ from identification.regression.still_water import in_still_water
 from identification.regression.wind import constant_wind, with_constant_wind
 from identification.validation.checks import check_samples, check_trials
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
-from shipgym.checks import check_choice, check_number
+from shipgym.checks import check_choice
 from shipgym.ships import Envelope, Structure, Term, get_structure
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.mmg import MMG
 from shipgym.ships.structures import get_dynamics
-from shipgym.trials.identify_table import Options
 from shipgym.trials.scale import check_scale
 
-ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
 #: Stands for the MMG form where channels, excitation and particulars are checked.
 MMG_CHANNELS = Structure(
     MMG,
@@ -42,184 +40,191 @@ class Problem:
     blank: ShipModel  # the model but for its coefficients
     table: Structure  # of the regression; of the MMG form, which has none, a stand-in
     samples: Samples  # the regression
-    #: of the candidates for the reference ship of a grey box, where it was chosen among
-    #: several
+    #: correlations of the candidates for the reference ship of a grey box, where it was
+    #: chosen among several
     similarity: dict[str, float]
     sea: dict[str, Any]  # what is known of current and wind, for the provenance
-    sampling: dict[str, Any]  # arguments of `build_samples`
-    call: dict[str, Any]  # of `identify`, for settings.json
+    sampling: dict[str, Any]  # keywords of `build_samples`
 
-
-def pose(
-    trials: Sequence[Trial],
-    options: Options,
-    particulars: Given,
-    steering: SteeringGear | None,
-) -> Problem:
-    """Check what was given and make the regression; arguments and errors as in `identify`."""
-    everything, sea = in_still_water(
-        held_out(trials, options.hold_out), options, particulars
-    )
-    if not isinstance(steering, SteeringGear | None):
-        raise InputError(
-            f"steering: {steering!r} found, expected a SteeringGear, or None to"
-            " estimate it from the rudders"
+    def rows_of(self, table: Structure, ship: ShipModel) -> Samples:
+        """The regression of the same trials with another structure, of a ship."""
+        return build_samples(
+            self.used,
+            table,
+            ship.particulars,
+            shaft_speed=ship.service_shaft_speed,
+            **self.sampling,
         )
-    used = [
-        repaired(trial) if options.repair else trial
-        for trial in everything
-        if trial.use == "fit"
-    ]
-    table, similarity = _table(
-        options.structure, options.reference_model, particulars, used
+
+
+def pose(trials: Sequence[Trial], options: Options) -> Problem:
+    """Check the trials and options, and make the regression; errors as in `identify`."""
+    everything, sea = in_still_water(
+        held_out(trials, options.hold_out),
+        options.particulars,
+        options.current,
+        options.wind,
     )
-    used = [_at_constant_speed(trial, table, particulars) for trial in used]
-    everything = [_at_constant_speed(trial, table, particulars) for trial in everything]
+    used = [trial for trial in everything if trial.use == "fit"]
+    if options.preprocessing.repair:
+        used = [repaired(trial) for trial in used]
+
+    table, similarity = _table(options, used)
+    if _is_yaw_alone(table):
+        used = [_at_service_speed(trial, options.particulars) for trial in used]
+        everything = [_at_service_speed(t, options.particulars) for t in everything]
     check_trials(used, table)
-    ship = _ship(particulars, used, table)
+    ship = _ship(options.particulars, used, table)
     for trial in used:
         check_scale(trial, ship, f"trial {trial.name!r}")
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
-    smooth = options.preprocessing or options.smooth
-    sampling = dict[str, Any](
-        samples=options.samples, window=options.window, gear=steering, smooth=smooth
-    )
-    regression = build_samples(used, table, ship, shaft_speed=shaft, **sampling)
+    sampling: dict[str, Any] = {
+        "samples": options.samples.rule,
+        "window": options.samples.window,
+        "smoothing": options.preprocessing.smoothing,
+        "gear": options.steering,
+    }
+    samples = build_samples(used, table, ship, shaft_speed=shaft, **sampling)
+
     if options.wind == "constant":
-        constants = constant_wind(used, regression, options.structure)
+        constants = constant_wind(used, samples, options.structure)
         used = [with_constant_wind(trial, constants) for trial in used]
         everything = [with_constant_wind(trial, constants) for trial in everything]
-        regression = build_samples(used, table, ship, shaft_speed=shaft, **sampling)
+        samples = build_samples(used, table, ship, shaft_speed=shaft, **sampling)
         sea["wind"] = {"option": "constant", "accelerations": constants}
-    check_samples(regression, used, table)
-    gear = steering or (estimated_gear(used) if table.has_rudder else SteeringGear())
-    blank = _blank(options.name or ship["name"], table, ship, gear, shaft, used)
-    call = whole_call(options, everything, particulars, steering)
+    check_samples(samples, used, table)
+
     return Problem(
-        tuple(everything),
-        tuple(used),
-        blank,
-        table,
-        regression,
-        similarity,
-        sea,
-        sampling,
-        call,
+        trials=tuple(everything),
+        used=tuple(used),
+        blank=_blank(options, table, ship, shaft, used),
+        table=table,
+        samples=samples,
+        similarity=similarity,
+        sea=sea,
+        sampling=sampling,
     )
 
 
-def _at_constant_speed(trial: Trial, table: Structure, particulars: Given) -> Trial:
-    """A trial of heading and rudder at the service speed, for a structure of the yaw rate alone."""
+def _is_yaw_alone(table: Structure) -> bool:
+    return set(table.symbols) <= {"r", "delta"}
+
+
+def _at_service_speed(trial: Trial, particulars: Given) -> Trial:
+    """A trial of heading and rudder alone, as if sailed at the service speed."""
     speed = (particulars or {}).get("speed")
-    if (
-        {"u", "v"} & trial.channels.keys()
-        or set(table.symbols) > {"r", "delta"}
-        or speed is None
-    ):
+    if speed is None or {"u", "v"} & trial.channels.keys():
         return trial
-    return trial.with_channels(
-        {"u": np.full(len(trial), float(speed)), "v": np.zeros(len(trial))}
-    )
+    ahead = np.full(len(trial), float(speed))
+    return trial.with_channels({"u": ahead, "v": np.zeros(len(trial))})
 
 
 def _blank(
-    name: str,
+    options: Options,
     table: Structure,
     ship: Particulars,
-    gear: SteeringGear,
     shaft: float,
     used: Sequence[Trial],
 ) -> ShipModel:
     """The model but for its coefficients, with the envelope of the trials behind it."""
+    gear = options.steering
+    if gear is None:
+        gear = estimated_gear(used) if table.has_rudder else SteeringGear()
+
     dynamics = get_dynamics(MMG) if table is MMG_CHANNELS else table
+    samples = [
+        np.concatenate([trial[channel] for trial in used])
+        for channel in ("u", "v", "r", "delta")
+    ]
     return ShipModel(
-        name=name,
+        name=options.name or ship["name"],
         structure=table.name,
         particulars=ship,
         steering=gear,
         service_shaft_speed=shaft,
         coefficients=dict.fromkeys(dynamics.coefficient_names, 0.0),
         dynamics=dynamics,
-        envelope=Envelope.from_samples(
-            *(np.concatenate([t[c] for t in used]) for c in ENVELOPE_CHANNELS)
-        ),
+        envelope=Envelope.from_samples(*samples),
     )
 
 
-def held_out(trials: Any, names: Sequence[str]) -> Sequence[Trial]:
-    """The trials, those named marked to validate only; InputError for what is no list of different trials."""
-    wrong = (
-        [trials]
-        if isinstance(trials, Trial | str)
-        else [t for t in trials if not isinstance(t, Trial)]
-    )
-    if wrong:
+def held_out(trials: Any, names: str | Sequence[str]) -> Sequence[Trial]:
+    """The trials, those named marked to validate only.
+
+    Raises InputError for what is no list of trials of different names.
+    """
+    candidates: list[Any] = [trials]
+    if not isinstance(trials, Trial | str):
+        candidates = list(trials)
+    strangers = [one for one in candidates if not isinstance(one, Trial)]
+    if isinstance(trials, Trial):
+        strangers = [trials]
+    if strangers:
         raise InputError(
-            f"trials: {wrong[0]!r} found, expected a list of Trials, such as"
-            " ship.trials() of a ship file"
+            "trials: expected a list of Trials, such as ship.trials() of a ship file,"
+            f" got {strangers[0]!r}"
         )
-    known = [trial.name for trial in trials]
-    if twice := [name for name in known if known.count(name) > 1]:
+    known = [trial.name for trial in candidates]
+    repeated = [name for name in known if known.count(name) > 1]
+    if repeated:
         raise InputError(
-            f"trials: {len(known)} trials found, two of them named {twice[0]!r},"
-            " expected different names; rename one with trial.with_(name=...)"
+            f"trials: expected different names, got two trials named {repeated[0]!r};"
+            " rename one with trial.with_(name=...)"
         )
     wanted = [names] if isinstance(names, str) else list(names)
     for name in wanted:
         check_choice(name, known, "hold_out")
     return [
         trial.with_(use="validate") if trial.name in wanted else trial
-        for trial in trials
+        for trial in candidates
     ]
 
 
 def _table(
-    structure: str | Structure,
-    reference: str | ShipModel | None,
-    particulars: Given,
-    used: Sequence[Trial],
+    options: Options, used: Sequence[Trial]
 ) -> tuple[Structure, dict[str, float]]:
-    """The structure by name; a grey box with its reference ship, and the similarity of the candidates."""
+    """The structure; a grey box with its reference ship, and the similarity of the candidates."""
+    structure, reference = options.structure, options.reference_model
     if structure == MMG:
         return MMG_CHANNELS, {}
-    if structure != GREY_BOX:
-        if reference is not None:
-            raise InputError(
-                f"reference_model: {reference!r} found with structure"
-                f" {name_of(structure)!r}, expected structure 'grey-box'; or leave it"
-                " out (to pull coefficients to a ship's, give prior)"
-            )
-        return (
-            structure if isinstance(structure, Structure) else get_structure(structure)
-        ), {}
-    steering = get_structure("linear-steering")
-    check_trials(used, steering)
-    return chosen_box(reference, _ship(particulars, used, steering), used)
+    if structure == GREY_BOX:
+        steering = get_structure("linear-steering")
+        check_trials(used, steering)
+        ship = _ship(options.particulars, used, steering)
+        return chosen_box(reference, ship, used)
+    if reference is not None:
+        raise InputError(
+            "reference_model: expected none with structure"
+            f" {name_of(structure)!r}, got {name_of(reference)!r}; leave it out, or"
+            " choose structure 'grey-box' (to pull coefficients to a ship's, give"
+            " prior)"
+        )
+    if isinstance(structure, str):
+        structure = get_structure(structure)
+    return structure, {}
 
 
 def _ship(particulars: Given, trials: Sequence[Trial], table: Structure) -> Particulars:
     """Particulars with speed, and for forces inertia and added mass, estimated where absent."""
     if particulars is None:
         raise InputError(
-            "particulars: None found, expected those of the ship, at least its length"
-            " and its mass and added mass or what they are estimated from: beam,"
-            " draught, block_coefficient; for example identify(trials,"
+            "particulars: expected those of the ship, at least its length and its mass"
+            " and added mass or what they are estimated from: beam, draught,"
+            " block_coefficient; got None; for example identify(trials,"
             ' particulars={"length": 7.0, "beam": 1.27, "draught": 0.455,'
             ' "block_coefficient": 0.81}), or ship.particulars of a ship file'
         )
-    ship = (
-        particulars
-        if isinstance(particulars, Particulars)
-        else Particulars.from_mapping(particulars)
-    )
+    ship = particulars
+    if not isinstance(ship, Particulars):
+        ship = Particulars.from_mapping(ship)
     if ship.speed is None:
-        speed = float(
-            np.median([np.hypot(trial["u"][0], trial["v"][0]) for trial in trials])
-        )
+        starts = [np.hypot(trial["u"][0], trial["v"][0]) for trial in trials]
+        speed = float(np.median(starts))
         if speed <= 0.0:
             raise InputError(
-                f"trial {trials[0].name!r}: starts at rest, expected way on the ship;"
-                " give the service speed in the particulars (speed, m/s)"
+                f"trial {trials[0].name!r}: expected way on the ship at the start, got"
+                " a ship at rest; give the service speed in the particulars (speed,"
+                " m/s)"
             )
         ship = replace(ship, speed=speed, estimated=ship.estimated | {"speed"})
     return ship.completed() if table.quantity == "force" else ship
@@ -232,11 +237,11 @@ def _shaft_speed(
     if "n" not in table.command_names:
         return 0.0
     if given is not None:
-        return check_number(given, "service_shaft_speed", above=0.0, hint="in 1/s")
+        return float(given)
     shaft = float(np.median([trial["n"][0] for trial in trials]))
     if shaft <= 0.0:
         raise InputError(
-            f"trial {trials[0].name!r}: starts with a shaft speed of {shaft:g} 1/s,"
-            " expected that of service speed; give service_shaft_speed"
+            f"trial {trials[0].name!r}: expected the shaft speed of service speed at"
+            f" the start, got {shaft:g} 1/s; give service_shaft_speed"
         )
     return shaft

@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 
 from identification.regression.samples import Samples
+from identification.regression.velocities import CURRENT_COLUMNS
 from shipgym import InputError, Particulars, Trial
-from shipgym.checks import check_flag, check_keys
+from shipgym.arrays import Floats
+from shipgym.checks import check_flag, check_keys, check_text
 from shipgym.sea.wind import AIR_DENSITY, wind_curves
 from shipgym.sea.wind_coefficients import WindTable
 from shipgym.ships.inertia import particulars_inertia
@@ -15,8 +17,14 @@ from shipgym.ships.mmg import MMG
 from shipgym.ships.simulate import WIND
 from shipgym.trials.navigation import rotate_to_body
 
-# share of a constant that no term explains, below which the structure has one itself
-COLLINEAR = 1e-6
+
+def check_wind(option: Any) -> None:
+    """Refuse a wind that is neither a word nor a table of coefficients."""
+    if not isinstance(option, Mapping):
+        check_text(option, "wind")
+        return
+    check_keys(option, ("coefficients", "relative"), "wind")
+    check_flag(option.get("relative", False), "wind relative")
 
 
 def measured_wind(
@@ -24,49 +32,68 @@ def measured_wind(
 ) -> Trial:
     """The trial with the accelerations by the wind of its columns; itself where it has none.
 
-    `option`: coefficients as in `shipgym.sea.Wind`, or a table of ``coefficients``, by
-    name or a table themselves, and ``relative``: whether speed and direction are those
-    felt on board, the latter from the bow. Velocities through the water are completed
-    by a current in columns.
+    Velocities through the water are completed by a current in columns.
+
+    Parameters
+    ----------
+    trial : Trial
+        With wind_speed, wind_from, psi, u and v.
+    particulars : Particulars
+        Of the ship.
+    option : str or mapping
+        Coefficients as in `shipgym.sea.Wind`, or a table of ``coefficients``, by name
+        or a table themselves, and ``relative``: whether speed and direction are those
+        felt on board, the latter from the bow.
     """
-    table = dict(option) if isinstance(option, Mapping) else {"coefficients": option}
-    check_keys(table, ("coefficients", "relative"), "wind")
+    check_wind(option)
+    table: dict[str, Any] = {"coefficients": option}
+    if isinstance(option, Mapping):
+        table = dict(option)
     if not {"wind_speed", "wind_from", "psi", "u", "v"} <= trial.channels.keys():
         return trial
+
     named = table.get("coefficients", "auto")
-    named = (
-        WindTable.from_dict(named, "wind coefficients")
-        if isinstance(named, Mapping)
-        else named
+    if named == "auto":
+        named = "blendermann"
+    if isinstance(named, Mapping):
+        named = WindTable.from_dict(named, "wind coefficients")
+    curves = wind_curves(particulars, named)
+
+    ahead, aside = _felt_wind(trial, relative=table.get("relative", False))
+    pressure = 0.5 * AIR_DENSITY * (ahead**2 + aside**2)
+    angle = np.arctan2(aside, ahead)
+    coefficients = np.array(
+        [
+            np.interp(angle, curves.angle, row, period=2.0 * np.pi)
+            for row in (curves.X, curves.Y, curves.N)
+        ]
     )
-    curves = wind_curves(particulars, "blendermann" if named == "auto" else named)
+    forces = pressure * coefficients
+    # her resistance in still air is the model's own
+    forces[0] -= 0.5 * AIR_DENSITY * curves.X[0] * trial["u"] ** 2
+
+    inertia = particulars_inertia(particulars.completed())[:, :3]
+    accelerations = np.linalg.solve(inertia, forces)
+    return trial.with_channels(dict(zip(WIND.values(), accelerations, strict=True)))
+
+
+def _felt_wind(trial: Trial, relative: bool) -> tuple[Floats, Floats]:
+    """Wind felt on board, from ahead and from starboard, m/s."""
     speed, angle = trial["wind_speed"], trial["wind_from"]
-    # where it comes from, north and east, or ahead and aside
-    air = speed * np.cos(angle), speed * np.sin(angle)
-    if not check_flag(table.get("relative", False), "wind relative"):
-        if (
-            not trial.over_ground
-            and {"current_north", "current_east"} <= trial.channels.keys()
-        ):
-            air = air[0] + trial["current_north"], air[1] + trial["current_east"]
-        ahead, aside = rotate_to_body(*air, trial["psi"])
-        air = ahead + trial["u"], aside + trial["v"]
-    pressure, angle = (
-        0.5 * AIR_DENSITY * (air[0] ** 2 + air[1] ** 2),
-        np.arctan2(air[1], air[0]),
-    )
-    rows = (
-        np.interp(angle, curves.angle, row, period=2.0 * np.pi)
-        for row in (curves.X, curves.Y, curves.N)
-    )
-    forces = pressure * np.array([*rows])
-    forces[0] -= 0.5 * AIR_DENSITY * curves.X[0] * trial["u"] ** 2  # hers in still air
-    found = np.linalg.solve(particulars_inertia(particulars.completed())[:, :3], forces)
-    return trial.with_channels(dict(zip(WIND.values(), found, strict=True)))
+    if relative:
+        return speed * np.cos(angle), speed * np.sin(angle)
+
+    north, east = speed * np.cos(angle), speed * np.sin(angle)
+    has_current = trial.channels.keys() >= set(CURRENT_COLUMNS)
+    if has_current and not trial.over_ground:
+        north = north + trial["current_north"]
+        east = east + trial["current_east"]
+    ahead, aside = rotate_to_body(north, east, trial["psi"])
+    return ahead + trial["u"], aside + trial["v"]
 
 
 def constant_wind(
-    trials: Sequence[Trial], samples: Samples, structure: str
+    trials: Sequence[Trial], samples: Samples, structure: Any
 ) -> dict[str, dict[str, float]]:
     """The constant sway and yaw acceleration that the regression of each trial asks for, by its name.
 
@@ -75,22 +102,31 @@ def constant_wind(
     """
     if structure == MMG:
         raise InputError(
-            "wind: 'constant' found with structure 'mmg', expected a structure that is"
-            " linear in its coefficients, or columns wind_speed and wind_from"
+            "wind: expected a structure that is linear in its coefficients with"
+            " 'constant', or columns wind_speed and wind_from, got structure 'mmg'"
         )
-    own = (samples.trial[:, None] == np.arange(len(trials))) * samples.duration[:, None]
+    of_trial = samples.trial[:, None] == np.arange(len(trials))
+    constants = of_trial * samples.duration[:, None]
+
     found: dict[str, dict[str, float]] = {trial.name: {} for trial in trials}
-    for q in [q for q in "vr" if q in samples.targets]:
+    for q in ("v", "r"):
+        if q not in samples.targets:
+            continue
         known = samples.features[q]
-        values = np.linalg.lstsq(np.hstack([known, own]), samples.targets[q])[0][
-            known.shape[1] :
-        ]
-        left = samples.duration - known @ np.linalg.lstsq(known, samples.duration)[0]
-        if np.linalg.norm(left) < COLLINEAR * np.linalg.norm(samples.duration):
+        columns = np.hstack([known, constants])
+        solution = np.linalg.lstsq(columns, samples.targets[q])[0]
+        values = solution[known.shape[1] :]
+        if _explains(known, samples.duration):
             values = values - values.mean()
         for trial, value in zip(trials, values.tolist(), strict=True):
             found[trial.name][WIND[q]] = value
     return found
+
+
+def _explains(features: Floats, target: Floats, rounding: float = 1e-6) -> bool:
+    """Tell whether features explain a target but for rounding."""
+    left = target - features @ np.linalg.lstsq(features, target)[0]
+    return bool(np.linalg.norm(left) < rounding * np.linalg.norm(target))
 
 
 def with_constant_wind(

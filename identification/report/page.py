@@ -44,9 +44,15 @@ def settings_rows(settings: Mapping[str, Any]) -> dict[str, str]:
 
 
 def setting_text(value: Any) -> str:
-    """A setting in words."""
+    """A setting in words; for a stage each of its own settings."""
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, Mapping):
+        parts = []
+        for name, item in value.items():
+            if item is not None:
+                parts.append(f"{name.replace('_', ' ')} {setting_text(item)}")
+        return ", ".join(parts)
     if isinstance(value, list | tuple):
         return ", ".join(str(item) for item in value) or NONE
     return str(value)

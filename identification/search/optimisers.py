@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from identification.search.search import MOST, Optimiser, Recorder
+from identification.search.search import Optimiser, Recorder
 from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_whole
 
-LARGEST = 1e150  # value of a candidate that SciPy is told
+MOST = 100_000  # particles, rounds and the like of a search
 
 
 @dataclass(frozen=True)
@@ -35,20 +35,16 @@ class GridSearch(Optimiser):
     ) -> None:
         points = check_whole(self.points, "points", at_least=3, at_most=MOST)
         check_whole(self.refinements, "refinements", at_least=0, at_most=MOST)
+
         first, last = low, high
         for _ in range(self.refinements + 1):
-            axes = [np.linspace(a, b, points) for a, b in zip(first, last, strict=True)]
-            record(
-                np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(
-                    -1, len(low)
-                )
-            )
+            axes = np.linspace(first, last, points).T
+            grid = np.meshgrid(*axes, indexing="ij")
+            record(np.stack(grid, axis=-1).reshape(-1, len(low)))
             record.end_round()
             step = (last - first) / (points - 1)
-            first, last = (
-                np.maximum(record.x - step, low),
-                np.minimum(record.x + step, high),
-            )
+            first = np.maximum(record.x - step, low)
+            last = np.minimum(record.x + step, high)
 
 
 @dataclass(frozen=True)
@@ -88,14 +84,16 @@ class ParticleSwarm(Optimiser):
             towards_common = self.common * rng.random(shape) * (record.x - place)
             velocity = self.inertia * velocity + towards_own + towards_common
             place = place + velocity
+
+            # a particle at a wall does not go on pushing against it
             outside = (place < low) | (place > high)
             place = np.clip(place, low, high)
-            velocity[outside] = (
-                0.0  # a particle at a wall does not go on pushing against it
-            )
+            velocity[outside] = 0.0
+
             found = record(place)
             better = found < values
-            best[better], values[better] = place[better], found[better]
+            best[better] = place[better]
+            values[better] = found[better]
             record.end_round()
 
 
@@ -122,13 +120,13 @@ class DifferentialEvolution(Optimiser):
         check_whole(self.members, "members", at_least=5, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
 
-        def of_columns(x: Any, /) -> Any:
-            # a column for each candidate; SciPy takes no infinite values, and squares
-            # them
-            return np.minimum(record(np.atleast_2d(x.T)), LARGEST)
+        def values_of_columns(x: Any, /) -> Any:
+            # SciPy gives a column for each candidate, takes no infinite values, and
+            # squares them
+            return np.minimum(record(np.atleast_2d(x.T)), 1e150)
 
         differential_evolution(
-            of_columns,
+            values_of_columns,
             Bounds(low, high),
             maxiter=self.rounds,
             popsize=self.members,
@@ -172,23 +170,73 @@ class ArtificialBeeColony(Optimiser):
         n = check_whole(self.sources, "sources", at_least=2, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
         check_whole(self.limit, "limit", at_least=1, at_most=MOST)
-        sources, values = _start(record, n, low, high, rng)
-        idle = np.zeros(n, dtype=np.int64)
+        places, values = _start(record, n, low, high, rng)
+        colony = Colony(places, values, np.zeros(n, dtype=np.int64))
         for _ in range(self.rounds):
-            for onlookers in (False, True):
-                chosen = (
-                    _chances(values).searchsorted(rng.random(n), "right")
-                    if onlookers
-                    else np.arange(n)
-                )
-                moved = np.minimum(np.maximum(_moved(sources, chosen, rng), low), high)
-                _settle(sources, values, idle, chosen, moved, record(moved))
-            left = np.flatnonzero(idle > self.limit)
+            colony.send_bees(np.arange(n), record, low, high, rng)
+            onlookers = colony.chances().searchsorted(rng.random(n), "right")
+            colony.send_bees(onlookers, record, low, high, rng)
+
+            left = np.flatnonzero(colony.idle > self.limit)
             if left.size:
-                sources[left] = _drawn(left.size, low, high, rng)
-                values[left] = record(sources[left])
-                idle[left] = 0
+                colony.places[left] = _drawn(left.size, low, high, rng)
+                colony.values[left] = record(colony.places[left])
+                colony.idle[left] = 0
             record.end_round()
+
+
+@dataclass(eq=False)
+class Colony:
+    """Food sources of a bee colony."""
+
+    places: Floats  # shape (n_sources, n_dimensions)
+    values: Floats  # the objective there, shape (n_sources,)
+    idle: Integers  # moves since the last improvement, shape (n_sources,)
+
+    def chances(self) -> Floats:
+        """Cumulative chance of each source to be chosen, by its fitness, shape (n_sources,)."""
+        n_sources = len(self.values)
+        small = 1.0 / (1.0 + np.maximum(self.values, 0.0))
+        fitness = np.where(self.values >= 0.0, small, 1.0 - self.values)
+        cumulative = fitness.cumsum()
+        if not 0.0 < cumulative[-1] < np.inf:
+            cumulative = np.arange(1.0, n_sources + 1.0)
+        return np.asarray(cumulative / cumulative[-1])
+
+    def send_bees(
+        self,
+        chosen: Integers,
+        record: Recorder,
+        low: Floats,
+        high: Floats,
+        rng: np.random.Generator,
+    ) -> None:
+        """Move the chosen sources, and keep the moves that improve them."""
+        moved = np.clip(self._moved(chosen, rng), low, high)
+        found = record(moved)
+        self.idle += np.bincount(chosen, minlength=len(self.values))
+
+        # of several bees at one source the best is last, and stays
+        better = np.flatnonzero(found < self.values[chosen])
+        better = better[np.argsort(-found[better], kind="stable")]
+        improved = chosen[better]
+        self.places[improved] = moved[better]
+        self.values[improved] = found[better]
+        self.idle[improved] = 0
+
+    def _moved(self, chosen: Integers, rng: np.random.Generator) -> Floats:
+        """Sources moved in one dimension each: x + a (x - x of another), a in [-1, 1]."""
+        n_sources, n_dimensions = self.places.shape
+        draws = rng.random((3, len(chosen)))
+        distance = (draws[0] * (n_sources - 1)).astype(np.int64)
+        other = (chosen + 1 + distance) % n_sources
+        axis = (draws[1] * n_dimensions).astype(np.int64)
+        stride = 2.0 * draws[2] - 1.0
+
+        moved = self.places[chosen]
+        away = self.places[chosen, axis] - self.places[other, axis]
+        moved[np.arange(len(chosen)), axis] += stride * away
+        return moved
 
 
 def _drawn(count: int, low: Floats, high: Floats, rng: np.random.Generator) -> Floats:
@@ -204,46 +252,3 @@ def _start(
     values = record(drawn)
     record.end_round()
     return drawn, values
-
-
-def _moved(sources: Floats, chosen: Integers, rng: np.random.Generator) -> Floats:
-    """The chosen sources, each moved in one dimension: x + a (x - x of another), a in [-1, 1]."""
-    n, dimensions = sources.shape
-    draw = rng.random((3, len(chosen)))
-    other = (chosen + 1 + (draw[0] * (n - 1)).astype(np.int64)) % n
-    axis = (draw[1] * dimensions).astype(np.int64)
-    moved = sources[chosen]
-    away = sources[chosen, axis] - sources[other, axis]
-    moved[np.arange(len(chosen)), axis] += (2.0 * draw[2] - 1.0) * away
-    return moved
-
-
-def _chances(values: Floats) -> Floats:
-    """Cumulative chance of each source to be chosen, by its fitness."""
-    fitness = np.where(
-        values >= 0.0, 1.0 / (1.0 + np.maximum(values, 0.0)), 1.0 - values
-    )
-    chances = fitness.cumsum()
-    if not 0.0 < chances[-1] < np.inf:
-        chances = np.arange(1.0, len(values) + 1.0)
-    chances /= chances[-1]
-    return chances
-
-
-def _settle(
-    sources: Floats,
-    values: Floats,
-    idle: Integers,
-    chosen: Integers,
-    moved: Floats,
-    found: Floats,
-) -> None:
-    """Take the best move of each chosen source where it improves; count the tries of those that do not."""
-    idle += np.bincount(chosen, minlength=len(values))
-    better = np.flatnonzero(found < values[chosen])
-    better = better[
-        np.argsort(-found[better], kind="stable")
-    ]  # of several at one source the best is last
-    improved = chosen[better]
-    sources[improved], values[improved] = moved[better], found[better]
-    idle[improved] = 0

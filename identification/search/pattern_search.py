@@ -24,20 +24,40 @@ def pattern_search(
     finest: float = 1.0 / 64.0,
     most_evaluations: int = 200,
 ) -> SearchResult:
-    """Minimise a function of few variables without derivatives, from a start within bounds of shape (n,).
+    """Minimise a function of few variables without derivatives, from a start within bounds.
 
     Each round polls the 2n neighbours on the mesh and moves to the best of them if it
-    is better; else the mesh, given by the distance of the bounds, is halved until it is
-    finer than `finest`. No point is looked at twice. The objective may be infinite.
+    is better; else the mesh is halved until it is finer than `finest`. No point is
+    evaluated twice.
+
+    Parameters
+    ----------
+    objective : callable
+        Value of a point of shape (n,); may be infinite.
+    start, low, high : array-like of shape (n,)
+        First point and bounds.
+    mesh, finest : float
+        First and finest mesh, by the distance of the bounds.
+    most_evaluations : int
+        After which no round begins.
     """
-    lowest, highest = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
-    value_at = cache(lambda *x: objective(np.array(x)))
-    record = Recorder(lambda points: np.array([value_at(*x) for x in points.tolist()]))
-    record(np.clip(np.asarray(start, dtype=float), lowest, highest)[None])
+    lowest = np.asarray(low, dtype=float)
+    highest = np.asarray(high, dtype=float)
+
+    @cache
+    def value_at(*point: float) -> float:
+        return objective(np.array(point))
+
+    def values_at(points: Floats) -> Floats:
+        return np.array([value_at(*point) for point in points.tolist()])
+
+    record = Recorder(values_at)
+    first = np.clip(np.asarray(start, dtype=float), lowest, highest)
+    record(first[None])
     record.end_round()
-    directions = (highest - lowest) * np.vstack(
-        [np.eye(len(lowest)), -np.eye(len(lowest))]
-    )
+
+    axes = np.eye(len(lowest))
+    directions = (highest - lowest) * np.vstack([axes, -axes])
     while mesh >= finest and value_at.cache_info().currsize < most_evaluations:
         before = record.value
         record(np.clip(record.x + mesh * directions, lowest, highest))

@@ -1,4 +1,4 @@
-"""What every optimiser has in common: its signature, its result, and the record of a search."""
+"""Optimisers: their signature, their result, and the record of a search."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 from shipgym import InputError
 from shipgym.arrays import Floats
 
-LOG_C, BAND = "log10 C", "insensitive band"  # what searches look for
-MOST = 100_000  # particles, rounds and the like of a search
+LOG_C, BAND = "log10 C", "insensitive band"  # variables of a search
 
 #: Values of candidates, an array of shape (n_candidates, n_dimensions) ->
 #: (n_candidates,).
@@ -34,7 +33,7 @@ class SearchResult:
     course : array of shape (n_rounds, n_dimensions)
         Best candidate after each round.
     evaluations : int
-        Candidates evaluated.
+        Number of candidates evaluated.
     variable : str
         What a candidate holds: the logarithm of the weight C, or an insensitive band.
     """
@@ -47,7 +46,7 @@ class SearchResult:
     variable: str = LOG_C
 
     def of(self, dimension: int, variable: str = LOG_C) -> Self:
-        """What was found of one dimension."""
+        """The result for one dimension."""
         return replace(
             self,
             x=self.x[[dimension]],
@@ -72,14 +71,17 @@ class Recorder:
         values = np.array(self.objective(candidates), dtype=float)
         if values.shape != (len(candidates),):
             raise InputError(
-                f"objective: values of shape {values.shape} found for {len(candidates)}"
-                " candidates, expected one value for each row"
+                "objective: expected one value for each row of candidates"
+                f" ({len(candidates)}), got values of shape {values.shape}"
             )
         values[np.isnan(values)] = np.inf
         self.evaluations += len(candidates)
+
         best = int(np.argmin(values))
-        if values[best] < self.value or not self.x.size:
-            self.x, self.value = candidates[best].copy(), float(values[best])
+        is_first = not self.x.size
+        if values[best] < self.value or is_first:
+            self.x = candidates[best].copy()
+            self.value = float(values[best])
         return values
 
     def end_round(self) -> None:
@@ -89,7 +91,8 @@ class Recorder:
 
     def result(self) -> SearchResult:
         """The search up to now."""
-        history, course = np.array(self._history), np.array(self._course)
+        history = np.array(self._history)
+        course = np.array(self._course)
         return SearchResult(self.x, self.value, history, course, self.evaluations)
 
 
@@ -105,14 +108,15 @@ class Optimiser(ABC):
         (n_candidates, n_dimensions); the bounds have shape (n_dimensions, 2).
         """
         record = Recorder(objective)
-        self._search(record, *check_bounds(bounds), np.random.default_rng(seed))
+        low, high = check_bounds(bounds)
+        self._search(record, low, high, np.random.default_rng(seed))
         return record.result()
 
     @abstractmethod
     def _search(
         self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
     ) -> None:
-        """Evaluate candidates by `record`, which is told the end of each round."""
+        """Evaluate candidates by `record`, and call its `end_round` after each round."""
 
 
 def check_bounds(bounds: ArrayLike) -> tuple[Floats, Floats]:
@@ -120,18 +124,18 @@ def check_bounds(bounds: ArrayLike) -> tuple[Floats, Floats]:
     try:
         box = np.asarray(bounds, dtype=float)
     except (TypeError, ValueError):
-        told = (
-            f"bounds: {bounds!r} found, expected numbers, a lower and an upper for each"
-        )
-        raise InputError(told) from None
+        raise InputError(
+            "bounds: expected numbers, a lower and an upper for each dimension, got"
+            f" {bounds!r}"
+        ) from None
     if box.ndim != 2 or box.shape[1] != 2 or not len(box):
         raise InputError(
-            f"bounds: shape {box.shape} found, expected a lower and an upper bound for"
-            " each dimension, such as [(-2, 12)]"
+            "bounds: expected a lower and an upper bound for each dimension, such as"
+            f" [(-2, 12)], got shape {box.shape}"
         )
-    if not np.all(np.isfinite(box)) or not np.all(box[:, 0] < box[:, 1]):
+    low, high = box.T
+    if not np.all(np.isfinite(box)) or not np.all(low < high):
         raise InputError(
-            f"bounds: {box.tolist()} found, expected finite numbers, the lower one"
-            " first"
+            f"bounds: expected finite numbers, the lower one first, got {box.tolist()}"
         )
-    return box[:, 0], box[:, 1]
+    return low, high

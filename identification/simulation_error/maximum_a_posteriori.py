@@ -9,42 +9,41 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import by_name
-from identification.options import Options, name_of
+from identification.options import MAP, Options, name_of
 from identification.regression.problem import Problem
 from identification.simulation_error.hull_formulas import YOSHIMURA
 from identification.simulation_error.mmg_prior import MMGPrior, mmg_prior
 from identification.simulation_error.posterior import Estimate, HeldOutError, Posterior
+from identification.simulation_error.prior_knowledge import PriorKnowledge
+from identification.uncertainty.uncertainty import Uncertainty
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.ships.mmg import IDENTIFIED
 
-MAP = "map"  # the method's name
-
 
 def checked_mmg(options: Options) -> Options:
     """The options of an identification of the MMG form; InputError for those that it does not have."""
-    method = name_of(options.method)
-    if method not in (MAP, Options.method):
+    if not (options.method_is_default or options.method == MAP):
         raise InputError(
-            f"method: expected none with structure 'mmg', got {method!r}; it is not"
-            " linear in its coefficients and is fitted by simulation error with a"
-            " prior: leave the method out, or choose another structure"
+            "method: expected none with structure 'mmg', got"
+            f" {name_of(options.method)!r}; it is not linear in its coefficients and is"
+            " fitted by simulation error with a prior: leave the method and its"
+            " settings out, or choose another structure"
         )
-    others = list(options.settings())
-    if options.uncertainty != Options.uncertainty:
-        others.append("uncertainty")
-    if others:
+    covariance = options.uncertainty.covariance
+    if covariance != Uncertainty.covariance:
         raise InputError(
-            f"settings: expected those of structure 'mmg', got {', '.join(others)};"
-            " leave them out, or choose another structure"
+            "uncertainty: expected 'analytic' with structure 'mmg', got"
+            f" {covariance!r}; leave it out, or choose another structure"
         )
-    if options.prior is not None and options.reference_model is not None:
+    prior = None if options.prior is None else options.prior.source
+    if prior is not None and options.reference_model is not None:
         raise InputError(
             "reference_model: expected it without prior, got"
-            f" {name_of(options.reference_model)!r} and prior"
-            f" {name_of(options.prior)!r}; the coefficients of structure 'mmg' are"
-            " pulled to one reference ship, or to formulas"
+            f" {name_of(options.reference_model)!r} and prior {name_of(prior)!r}; the"
+            " coefficients of structure 'mmg' are pulled to one reference ship, or to"
+            " formulas"
         )
     return replace(options, method=MAP)
 
@@ -59,12 +58,13 @@ def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, An
     least.
     """
     blank = problem.blank
-    source = options.reference_model or options.prior or YOSHIMURA
+    asked = options.prior or PriorKnowledge()
+    source = options.reference_model or asked.source or YOSHIMURA
     prior = mmg_prior(source, blank.particulars)
     posterior = Posterior(replace(blank, particulars=prior.ship), problem.used, prior)
     estimates = list[Estimate]()
     z = np.zeros(len(IDENTIFIED))
-    for strength in _strengths(options):
+    for strength in _strengths(asked):
         estimate = posterior.most_probable(z, strength)
         estimates.append(estimate)
         z = estimate.z
@@ -79,12 +79,12 @@ def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, An
     return model, _report(posterior, estimates, held_out, chosen)
 
 
-def _strengths(options: Options) -> tuple[float, ...]:
+def _strengths(asked: PriorKnowledge) -> tuple[float, ...]:
     """Strengths of the prior to choose from, or the one that was given."""
-    if options.prior_strength is None:
+    if asked.strength is None:
         return 1.0, 2.0, 3.0
-    check_number(options.prior_strength, "prior_strength", above=0.0)
-    return (options.prior_strength,)
+    check_number(asked.strength, "prior_strength", above=0.0)
+    return (asked.strength,)
 
 
 def strongest_as_good(errors: list[float]) -> int:

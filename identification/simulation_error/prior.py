@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.estimators.methods import METHODS, fit_all
+from identification.estimators.methods import fit_all, get_method
 from identification.regression.samples import build_samples
 from identification.simulation_error.formulas import formula_coefficients
 from identification.simulation_error.similarity import AUTO, select_reference
@@ -60,14 +60,14 @@ def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
         virtual_trials(model),
         blank.table,
         blank.particulars,
-        smooth=False,
+        smoothing="none",
         gear=blank.steering,
         window=1,
         shaft_speed=blank.service_shaft_speed,
     )
     box = model.table
     assert isinstance(box, GreyBox)
-    fitted = fit_all(METHODS["ls"].estimator, samples)
+    fitted = fit_all(get_method("ls").make, samples)
     weight = 1.0 / (samples.duration[:, None] * np.sqrt(len(samples)))
     return Prior(
         name=box.ship.name,

@@ -17,50 +17,42 @@ from identification.estimators.methods import Method
 from identification.regression.samples import Samples
 from identification.simulation_error.formulas import FORMULAS
 from identification.simulation_error.prior import Prior, formula_prior, reference_prior
-from identification.validation.folds import FOLDS, TRIALS, sample_folds
+from identification.simulation_error.prior_knowledge import PriorKnowledge
+from identification.validation.folds import TRIALS, sample_folds
 from identification.validation.guard import reasons_unstable, with_coefficients
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats
-from shipgym.checks import check_choice, check_number
 from shipgym.ships import GreyBox
 
 STRENGTHS = (0.0, *np.geomspace(1e-4, 10.0, 11).tolist(), np.inf)
 
 
-def with_prior(
-    method: Method,
-    prior: str | ShipModel,
-    strength: float | None,
-    blank: ShipModel,
-    folds: str = TRIALS,
-) -> Method:
+def with_prior(method: Method, knowledge: PriorKnowledge, blank: ShipModel) -> Method:
     """The method, with its coefficients pulled toward a prior.
 
     The method fits what the prior leaves: where it drops a direction, the prior's
-    coefficients stay. `method`: as asked for; `prior`: "auto", "clarke", "kijima", or a
-    reference ship; `strength`: 0 leaves the method as it is, infinity gives the prior;
-    None chooses by cross-validation; `blank`: the target but for its coefficients;
-    `folds`: what the strength is chosen by (`Pulled.chosen_strength`), one of `trials`,
-    `largest-rudder`. Raises InputError for a grey box, which has a reference ship, and
-    for a prior without coefficients for the structure.
+    coefficients stay. `knowledge`: its source is "auto", "clarke", "kijima", or a
+    reference ship; a strength of 0 leaves the method as it is, infinity gives the
+    prior, None chooses by cross-validation (`Pulled.chosen_strength`); `blank`: the
+    target but for its coefficients. Raises InputError for a grey box, which has a
+    reference ship, and for a prior without coefficients for the structure.
     """
+    source = knowledge.source
+    assert source is not None
     if isinstance(blank.table, GreyBox):
         raise InputError(
             "prior: expected none with structure 'grey-box', which has a reference"
-            f" ship already, got {prior!r}; leave the prior out, or choose another"
+            f" ship already, got {source!r}; leave the prior out, or choose another"
             " structure"
         )
-    if strength is not None and strength != np.inf:
-        hint = "0 for no prior, inf for the prior itself"
-        check_number(strength, "prior_strength", at_least=0.0, hint=hint)
-    check_choice(folds, FOLDS, "prior_folds")
-    if isinstance(prior, str) and prior in FORMULAS:
-        known = formula_prior(prior, blank)
+    if isinstance(source, str) and source in FORMULAS:
+        prior = formula_prior(source, blank)
     else:
-        known = reference_prior(prior, blank)
+        prior = reference_prior(source, blank)
 
     def fit(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-        return Pulled(method, make, known, task).fitted(strength, folds)
+        pulled = Pulled(method, make, prior, task)
+        return pulled.fitted(knowledge.strength, knowledge.folds)
 
     return replace(method, fit=fit)
 

@@ -1,8 +1,8 @@
 """Refinement: a model fitted to what it simulates, from where another method left off."""
 
 import copy
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,80 +12,12 @@ from identification.estimators.estimator import Estimators, FitTask
 from identification.regression.samples import Samples
 from identification.simulation_error.output_error import OutputError, Solution
 from identification.simulation_error.prior import reference_turns
+from identification.simulation_error.refinement import Refinement
 from identification.simulation_error.segments import Segment, compared_channels, cut
 from identification.simulation_error.shooting import Shooter, about_mean
 from identification.validation.guard import GuardedFit, reasons_unstable
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_number
-
-STARTS = ("free", "measured")
-
-
-@dataclass(frozen=True, eq=False)
-class Refinement:
-    """Settings of the refinement."""
-
-    #: length of a segment: the time to sail that many ship lengths at service speed
-    segment_lengths: float = 3.4
-    #: whether a second set of segments begins half a segment later
-    staggered: bool = True
-    #: whether the state at the start of each segment is fitted with it ("free"), which
-    #: leaves no bias by noise, or is the smoothed measurement
-    segment_start: str = "free"
-    #: strength of the pull toward the start: relative cost of a coefficient whose term
-    #: changes by the whole acceleration (root mean squares over the trials)
-    pull: float = 1e-6
-    #: whether the trials differ in the zero of their rudders, known beforehand to a
-    #: degree. The model has the mean of them: its own terms give the neutral helm
-    rudder_offsets: bool = False
-    #: further trials that the refinement alone sees, such as turns of a reference ship
-    extra_trials: Sequence[Trial] = ()
-    #: of their squared residuals, relative to those of the trials
-    extra_weight: float = 1.0
-    #: a reference ship whose turning circles, at the target's scale, join the extra
-    #: trials: what holds the steady turn, which lies outside all zigzags. "auto" for
-    #: the shipped one most like the target
-    anchor: str | ShipModel | None = None
-    anchor_weight: float = 1e-3  # of the squared residuals of those turns
-
-    def __post_init__(self) -> None:
-        check_number(
-            self.segment_lengths,
-            "segment_lengths",
-            at_least=0.1,
-            at_most=1e6,
-            hint="in ship lengths",
-        )
-        check_choice(self.segment_start, STARTS, "segment_start")
-        check_number(self.pull, "pull", at_least=0.0)
-        check_number(self.extra_weight, "extra_weight", above=0.0)
-        check_number(self.anchor_weight, "anchor_weight", above=0.0)
-
-    def plain(self) -> dict[str, Any]:
-        """The settings for the provenance, extra trials by name and hash."""
-        settings = {item.name: getattr(self, item.name) for item in fields(self)}
-        del settings["extra_trials"], settings["anchor"]
-        settings["extra_trials"] = [
-            {"name": trial.name, "sha256": trial.sha256} for trial in self.extra_trials
-        ]
-        settings["anchor"] = self.anchor
-        if isinstance(self.anchor, ShipModel):
-            settings["anchor"] = self.anchor.name
-        return settings
-
-
-def split_settings(
-    settings: Mapping[str, Any],
-) -> tuple[Refinement, dict[str, Any]]:
-    """The refinement of a method, and the settings left for its estimator."""
-    others = dict(settings)
-    own = {
-        item.name: others.pop(item.name)
-        for item in fields(Refinement)
-        if item.name in others
-    }
-    return Refinement(**own), others
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from identification.regression import preprocess
+from identification.regression.gaps import between_gaps
 from identification.regression.rudder import Rudder, rebuild, straight
-from identification.regression.samples import between_gaps
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats, Integers
 from shipgym.ships import Structure

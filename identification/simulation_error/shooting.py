@@ -176,7 +176,7 @@ def sail_lanes(
     Numbers of the ships and states at the start, a column for each lane, and offsets of
     their rudders, rad.
     """
-    loop = ship_loop(model.vessel, "segments", segment.has_wind)
+    loop = ship_loop(model.compiled, "segments", segment.has_wind)
     states = np.empty((len(segment.measured), starts.size))
     loop(
         starts.ravel(), ships.ravel(), offsets, segment.inputs, segment.samples, states

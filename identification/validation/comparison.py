@@ -1,18 +1,22 @@
 """Structures and methods on the same trials, ranked by what they predict of trials not seen."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from identification.estimators.methods import METHODS, Method, get_method
-from identification.options import name_of
+from identification.estimators.methods import (
+    METHODS,
+    get_method,
+    make_method,
+    method_options,
+)
+from identification.options import AUTO, DEFAULT_METHOD, Options, name_of
 from identification.pipeline import identify
 from identification.progress import counted
 from identification.regression.problem import held_out
 from identification.report.comparison import comparison_page
 from identification.result import IdentificationResult
-from identification.simulation_error.refine import Refinement
+from identification.uncertainty.uncertainty import Uncertainty
 from identification.validation.ranking import (
     RankedFit,
     Ranking,
@@ -32,7 +36,6 @@ from shipgym.files import write_json, write_text
 from shipgym.ships import Structure
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.mmg import MMG
-from shipgym.trials.identify_table import AUTO, OPTIONS, Options
 
 #: Compared where none are named; for a grey box also RM-SVM.
 USUAL = (
@@ -85,6 +88,7 @@ def compare_methods(
     trials: Sequence[Trial],
     methods: Sequence[Any] | None = None,
     structures: Sequence[str | Structure] | None = None,
+    settings: Mapping[str, Any] | None = None,
     **arguments: Any,
 ) -> Comparison:
     """Identify by several methods, or structures and methods, and rank them on held-out trials.
@@ -105,19 +109,25 @@ def compare_methods(
     structures : sequence of str or Structure, optional
         As for `identify`; `auto` for all that it tries. A `reference_model` goes to
         those that know one.
+    settings : mapping, optional
+        Settings by name for the methods given by name. A method is not given settings
+        that it does not have.
     **arguments
-        Of `identify` but for `method`. A method is not given settings that it does not
-        have.
+        Of `identify` but for `method`.
     """
     pairs, several = _asked(structures, methods, arguments)
     fitted, held = _by_use(held_out(trials, arguments.get("hold_out", ())))
-    left_out = _left_out([get_method(method) for _, method in pairs], arguments)
+    settings = settings or {}
+    left_out = _left_out([method for _, method in pairs], settings)
     found = list[tuple[RankedFit, IdentificationResult]]()
     refused = dict[str, str]()
     for structure, method in counted("structures and methods", pairs):
+        own = dict(arguments)
         name = get_method(method).name
         unknown = left_out.get(name, ())
-        own = {key: arguments[key] for key in arguments if key not in unknown}
+        known = {key: settings[key] for key in settings if key not in unknown}
+        if isinstance(method, str) and known:
+            method = make_method(method, known)
         if several:
             name = fit_name(name_of(structure), name)
             own["reference_model"] = reference_of(structure, own.get("reference_model"))
@@ -164,7 +174,11 @@ def _each_in_turn(
     arguments: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Metrics of each trial, predicted by a fit of the others."""
-    own = {"structure": structure, "method": method, "uncertainty": "analytic"}
+    own = {
+        "structure": structure,
+        "method": method,
+        "uncertainty": Uncertainty(model_error=False),
+    }
     others = {name: value for name, value in arguments.items() if name != "hold_out"}
     return cross_validate(trials, **{**others, **own})
 
@@ -199,7 +213,7 @@ def cross_validate(
         at_most=len(used),
         hint="at most one per trial",
     )
-    settings = {"model_error": False, **arguments}
+    settings = {"uncertainty": Uncertainty(model_error=False), **arguments}
 
     def without(held: list[str]) -> IdentificationResult:
         return identify(used, hold_out=held, **settings)
@@ -253,28 +267,24 @@ def fit_pairs(
 def _usual_methods(structure: Any, several: bool) -> tuple[str, ...]:
     """Methods where none are named."""
     if several:
-        return methods_of(structure, Options.method)
+        return methods_of(structure, DEFAULT_METHOD)
     return (*USUAL, RM_SVM) if structure == GREY_BOX else USUAL
 
 
 def _left_out(
-    chosen: Sequence[Method], arguments: Mapping[str, Any]
+    chosen: Sequence[Any], settings: Mapping[str, Any]
 ) -> dict[str, tuple[str, ...]]:
-    """Settings that each method does not have but another one does, by its name."""
-    settings = [name for name in arguments if name in OPTIONS and OPTIONS[name].setting]
-    of_refinement = {item.name for item in fields(Refinement)}
-
+    """Settings that each method by name does not have but another one does."""
     left = dict[str, tuple[str, ...]]()
     for method in chosen:
-        unknown = [name for name in settings if not method.knows(name)]
-        if method.refined:
-            unknown = [name for name in unknown if name not in of_refinement]
-        left[method.name] = tuple(unknown)
+        if isinstance(method, str):
+            own = method_options(method)
+            left[method] = tuple(name for name in settings if name not in own)
 
     for setting in settings:
         if all(setting in unknown for unknown in left.values()):
             raise InputError(
-                f"settings: expected those of the methods {', '.join(left)}, got"
-                f" {setting}, which none of them knows"
+                f"{setting}: expected a setting of one of the methods"
+                f" {', '.join(left)}, got one that none of them knows"
             )
     return {name: unknown for name, unknown in left.items() if unknown}

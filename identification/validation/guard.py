@@ -4,7 +4,7 @@ A fit of zigzags extrapolates in hard turns, where terms that hardly mattered in
 data take over.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -125,14 +125,12 @@ class GuardedFit:
     report: dict[str, Any]
 
 
-def guarded_fit(
-    method: Method, settings: Mapping[str, Any], task: FitTask, guarded: bool = True
-) -> GuardedFit:
+def guarded_fit(method: Method, task: FitTask, guarded: bool = True) -> GuardedFit:
     """Fit by a method; if the model runs away, with the weakest penalty under which it does not.
 
     Not stable, and without a penalty, where none helped or it is not `guarded`.
     """
-    estimators = method.fitted(settings, task)
+    estimators = method.fitted(task)
     model = with_coefficients(task.blank, estimators)
     reasons = reasons_unstable(model, task.trials)
     if not reasons:

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from identification.options import Options
+from identification.options import MAP, Options, name_of
 from identification.progress import counted
 from identification.result import IdentificationResult
-from identification.simulation_error.maximum_a_posteriori import MAP
 from identification.simulation_error.similarity import AUTO
+from identification.uncertainty.uncertainty import Uncertainty
 from identification.validation.folds import pieces
 from identification.validation.ranking import (
     RankedFit,
@@ -61,7 +61,7 @@ def select(
     single = len(trials) == 1
     parts = pieces(trials[0]) if single else trials
     attempts = _Attempts(identify, [part.with_(kind=None) for part in parts], options)
-    free = options.method == Options.method and not options.settings()
+    free = options.method_is_default
     for structure in counted("structures", structures or STRUCTURES):
         method = options.method
         if free:
@@ -83,7 +83,7 @@ def select(
         "ranking": [asdict(fit) for fit in in_order],
         "refused": attempts.refused,
     }
-    return _chosen(options, best), report
+    return _chosen(options, best, free), report
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,13 +104,12 @@ class _Attempts:
             method=method,
             reference_model=reference_of(structure, self.options.reference_model),
             hold_out=(),
-            model_error=False,
-            uncertainty="analytic",
+            uncertainty=Uncertainty(model_error=False),
         )
         try:
             self.ranked.append(self._predicted(own))
         except InputError as error:
-            name = fit_name(structure, MAP if structure == MMG else method)
+            name = fit_name(structure, MAP if structure == MMG else name_of(method))
             self.refused[name] = str(error)
 
     def _predicted(self, options: Options) -> RankedFit:
@@ -131,12 +130,16 @@ class _Attempts:
         return sorted(self.ranked, key=lambda fit: fit.rank)
 
 
-def _chosen(options: Options, best: RankedFit) -> Options:
+def _chosen(options: Options, best: RankedFit, free: bool) -> Options:
+    """The options of the best fit; the method is another one only where it was free."""
     structure = best.structure
+    method = options.method
+    if free and structure != MMG:
+        method = best.method
     return replace(
         options,
         structure=structure,
-        method=options.method if structure == MMG else best.method,
+        method=method,
         reference_model=reference_of(structure, options.reference_model),
     )
 

@@ -129,7 +129,7 @@ def as_printed(
     ship = load_model("mariner")
     table, trial = ship.table, sampled_zigzag()
     regression = build_samples(
-        [trial], table, ship.particulars, samples, window=1, smooth=False
+        [trial], table, ship.particulars, samples, window=1, smoothing="none"
     )
     random = np.random.default_rng(SEED)
     theta = []

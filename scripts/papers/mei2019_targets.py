@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from identification import RMSVM
 from identification.estimators.methods import fit_all, get_method
 from identification.pipeline import identify
 from identification.regression.samples import build_samples
@@ -98,12 +99,11 @@ class Target:
         return identify(
             self.trials,
             structure="grey-box",
-            method="rm-svm",
+            method=RMSVM(**settings),
             particulars=self.ship.particulars,
             steering=self.ship.steering,
             service_shaft_speed=self.shaft,
             reference_model=reference,
-            **settings,
         )
 
     def bare(self, reference: str) -> ShipModel:
@@ -274,7 +274,7 @@ def taught_the_turns(rudder_deg: float) -> ShipModel:
         gear=gear,
         shaft_speed=blank.service_shaft_speed,
     )
-    return with_coefficients(blank, fit_all(get_method("ls").estimator, samples))
+    return with_coefficients(blank, fit_all(get_method("ls").make, samples))
 
 
 def acceleration_correlations(target: Target, model: ShipModel) -> dict[str, float]:

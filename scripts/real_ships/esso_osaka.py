@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from identification import Preprocessing
 from identification.pipeline import identify
 from identification.validation.prediction import predict
 from real_ships.data import Data, MeasuredShip
@@ -20,19 +21,20 @@ REFERENCE = "tanker"
 LEAST_SPEED = 0.1  # m/s; slower, the ship is taken to be at rest
 MEASURES = ("u, m/s", "v, m/s", "r, deg/s", "heading, deg")
 
+REPAIRED = Preprocessing(repair=True)
 TLS: dict[str, Any] = {"structure": "cubic", "method": "tls-svm"}
 METHODS: dict[str, dict[str, Any]] = {
     "least squares, nomoto": {"structure": "nomoto", "method": "ls"},
     "least squares, cubic": {"structure": "cubic", "method": "ls"},
     "tls-svm, cubic": TLS,
-    "tls-svm, cubic, repaired": {**TLS, "repair": True},
+    "tls-svm, cubic, repaired": {**TLS, "preprocessing": REPAIRED},
     "tls-svm, grey box of the tanker, repaired": {
         "structure": "grey-box",
         "method": "tls-svm",
         "reference_model": REFERENCE,
-        "repair": True,
+        "preprocessing": REPAIRED,
     },
-    "mmg, prior of formulas, repaired": {"structure": "mmg", "repair": True},
+    "mmg, prior of formulas, repaired": {"structure": "mmg", "preprocessing": REPAIRED},
 }
 BARE = f"{REFERENCE}, nothing fitted"
 BEST = "tls-svm, cubic, repaired"

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from identification import PriorKnowledge
 from identification.pipeline import identify
 from identification.validation.closed_loop import closed_loop
 from real_ships.data import Data, MeasuredShip
@@ -47,9 +48,9 @@ CIRCLES = ((3.095, 3.332, 18.4, 0.367), (3.003, 3.066, 19.8, 0.361))
 TURN = ("advance", "tactical diameter", "drift, deg", "U/U0")
 REFERENCE = "kvlcc2-l7"
 PRIORS: dict[str, dict[str, Any]] = {
-    f"mmg, prior of {REFERENCE}": {"reference_model": REFERENCE},
-    "mmg, prior of formulas (Yoshimura & Masumoto)": {"prior": "yoshimura"},
-    "mmg, prior of formulas (Kijima)": {"prior": "kijima"},
+    f"mmg, prior of {REFERENCE}": {"source": REFERENCE},
+    "mmg, prior of formulas (Yoshimura & Masumoto)": {"source": "yoshimura"},
+    "mmg, prior of formulas (Kijima)": {"source": "kijima"},
 }
 STRENGTHS = (1.0, 2.0, 3.0)
 MARGIN = 0.1  # by which the error held out may exceed the least for a stronger prior
@@ -143,7 +144,10 @@ def run(data: Data) -> Section:
     """The case."""
     hsva, marin = data.ship(HSVA, EVERY), data.ship(MARIN)
     scores = {
-        name: {s: held_out(hsva, **settings, prior_strength=s) for s in STRENGTHS}
+        name: {
+            s: held_out(hsva, prior=PriorKnowledge(**settings, strength=s))
+            for s in STRENGTHS
+        }
         for name, settings in PRIORS.items()
     }
     models = {
@@ -152,12 +156,16 @@ def run(data: Data) -> Section:
     }
     strengths = {name: chosen(found) for name, found in scores.items()}
     for name, settings in PRIORS.items():
-        models[name] = fitted(hsva, **settings, prior_strength=strengths[name])
+        models[name] = fitted(
+            hsva, prior=PriorKnowledge(**settings, strength=strengths[name])
+        )
     for name, settings in list(PRIORS.items())[:2]:
         for strength in STRENGTHS:
             if strength != strengths[name]:
                 label = f"{name}, strength {strength:g}"
-                models[label] = fitted(hsva, **settings, prior_strength=strength)
+                models[label] = fitted(
+                    hsva, prior=PriorKnowledge(**settings, strength=strength)
+                )
     large = {name: full_scale(model, marin) for name, model in models.items()}
     zigzags = {
         name: [all_errors(model, hsva.runs[r]) for r in OTHERS]
@@ -165,7 +173,7 @@ def run(data: Data) -> Section:
     }
     first, second, _ = PRIORS
     began = time.process_time()
-    fitted(hsva, **PRIORS[first])
+    fitted(hsva, prior=PriorKnowledge(**PRIORS[first]))
     seconds = time.process_time() - began
     text = TEXT.format(
         fitted=", ".join(FITTED),

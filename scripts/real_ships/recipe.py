@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import Any
 
 import numpy as np
 
+from identification import PriorKnowledge, Refinement
 from identification.estimators.estimator import FitTask
 from identification.estimators.methods import get_method
 from identification.pipeline import identify
@@ -65,14 +65,14 @@ def known(structure: str) -> str:
 
 
 #: Refinement from there, the reference ship's turns inside its cost.
-REFINEMENT: dict[str, Any] = {
-    "segment_lengths": 8.0,
-    "segment_start": "measured",
-    "rudder_offsets": True,
-    "pull": 1e-2,
-    "anchor": REFERENCE,
-    "anchor_weight": 1e-2,
-}
+REFINEMENT = Refinement(
+    segment_lengths=8.0,
+    segment_start="measured",
+    rudder_offsets=True,
+    pull=1e-2,
+    anchor=REFERENCE,
+    anchor_weight=1e-2,
+)
 
 
 @cache
@@ -102,7 +102,7 @@ def pulled(
     runs = [ship.runs[name] for name in names]
     samples = build_samples(runs, blank.table, blank.particulars, gear=blank.steering)
     method = get_method("ls")
-    pulled_fit = Pulled(method, method.estimator, prior, FitTask(samples, blank, runs))
+    pulled_fit = Pulled(method, method.make, prior, FitTask(samples, blank, runs))
     return with_coefficients(blank, pulled_fit.at(strength))
 
 
@@ -182,10 +182,8 @@ def refined(ship: MeasuredShip, names: Sequence[str]) -> IdentificationResult:
     return identify(
         [ship.runs[name] for name in names],
         known(STRUCTURE),
-        "output-error",
+        REFINEMENT,
         particulars=ship.particulars,
         steering=ship.steering,
-        prior=REFERENCE,
-        prior_strength=strength,
-        **REFINEMENT,
+        prior=PriorKnowledge(REFERENCE, strength),
     )

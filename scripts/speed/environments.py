@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 
 import shipgym
-from identification import identify
+from identification import KernelResidual, identify
 from shipgym.envs.registration import env_id
 from shipgym.manoeuvres import zigzag
 from shipgym.sea import Current, Waves, Weather, Wind
@@ -184,10 +184,7 @@ def kernel_ship(n_envs: int = 1024, centres: int = 64) -> Row:
     ]
     model = identify(
         trials,
-        kernel="rbf",
-        centres=centres,
-        kernel_length=1.4,
-        C=100.0,
+        kernel=KernelResidual(centres=centres, length=1.4, C=100.0),
         particulars=ship.particulars,
         steering=ship.steering,
     ).model

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import shipgym
 from shipgym.engine import motion
 from shipgym.engine.motion import Motion, Push, Ship
-from shipgym.engine.specialise import Part, named_globals
+from shipgym.engine.specialise import named_globals
 
 Floats = NDArray[np.float64]
 Batch = tuple[Floats, ...]
@@ -61,14 +61,13 @@ class OnArrays(ast.NodeTransformer):
         return ast.Name(name, node.ctx)
 
 
-def on_arrays(function: Any, parts: Mapping[str, Any]) -> Any:
+def on_arrays(function: Any, hooks: Mapping[str, Any]) -> Any:
     """A plain function of the engine and all that it calls, working on arrays."""
     namespace: dict[str, Any] = dict(MATHEMATICS)
-    for name, found in named_globals(function, parts):
-        value = found.function if isinstance(found, Part) else found
+    for name, value in named_globals(function, hooks):
         if name not in MATHEMATICS:
             namespace[name] = (
-                on_arrays(value, parts) if isinstance(value, FunctionType) else value
+                on_arrays(value, hooks) if isinstance(value, FunctionType) else value
             )
     source = textwrap.dedent(inspect.getsource(function))
     tree = ast.fix_missing_locations(OnArrays(namespace).visit(ast.parse(source)))
@@ -100,10 +99,10 @@ def numpy_step(
         From the state (arrays of shape (n_ships,) in the order of `state_names`),
         rudder command, shaft command and step to the state after it.
     """
-    sail = on_arrays(motion.sail, model.vessel.parts())
+    sail = on_arrays(motion.sail, model.compiled.hooks())
     numbers = model.ship_numbers(depth)
     ship = Ship(*numbers[: len(Ship._fields)])
-    coefficients = model.vessel.coefficients(*numbers[len(ship) :])
+    coefficients = model.compiled.coefficients(*numbers[len(ship) :])
     calm = Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     def step(state: Batch, rudder: Floats, shaft: Floats, h: float) -> Batch:

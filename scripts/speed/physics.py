@@ -38,7 +38,7 @@ def batched_physics(name: str, n_ships: int, aim: str) -> Row:
         0.01 * model.particulars["length"] / model.particulars["speed"],
         SHORT_STEPS // n_ships,
     )
-    advance, on_arrays = ship_loop(model.vessel, "alike"), numpy_step(model)
+    advance, on_arrays = ship_loop(model.compiled, "shared_ship"), numpy_step(model)
     columns, shafts = (
         tuple(np.ascontiguousarray(states.T)),
         np.ascontiguousarray(commands[:, 1]),

@@ -39,7 +39,7 @@ def cache_folder() -> Path:
 
 @cache
 def usable_folder() -> Path | None:
-    """The folder of the cache; None, with a warning, where there is none that can be used."""
+    """Return the folder of the cache; None, with a warning, if none can be used."""
     try:
         return open_folder()
     except OSError as error:
@@ -50,7 +50,7 @@ def usable_folder() -> Path | None:
 
 
 def open_folder() -> Path:
-    """The folder of the cache, without links in its path; it is made where there is none.
+    """Return the folder of the cache, without links in its path; make it if need be.
 
     Raises OSError if it cannot be made or read, ValueError if code in it might be
     another user's, with what to do.
@@ -58,51 +58,60 @@ def open_folder() -> Path:
     home = cache_folder()
     if home.parts[:1] == ("~",):
         raise OSError(ENOENT, "the user has no home")
-    for one in reversed([one for one in (home, *home.parents) if not one.is_dir()]):
-        one.mkdir(mode=0o755, exist_ok=True)
+    for folder in reversed((home, *home.parents)):
+        if not folder.is_dir():
+            folder.mkdir(mode=0o755, exist_ok=True)
     home = home.resolve(strict=True)
-    next(home.iterdir(), None)
-    for one in (home, *home.parents):
-        if why := _others_of(one.stat(), one != home):
+    next(home.iterdir(), None)  # whether it can be read
+    for folder in (home, *home.parents):
+        why = _others_of(folder.stat(), above=folder != home)
+        if why:
             remedy = f"set {CACHE_VARIABLE} to a folder that is yours alone"
-            remedy = remedy if "belongs" in why else f"chmod go-w {one}, or {remedy}"
-            raise ValueError(f"{home}: not used, because {one} {why}; {remedy}")
+            if "belongs" not in why:
+                remedy = f"chmod go-w {folder}, or {remedy}"
+            raise ValueError(f"{home}: not used, because {folder} {why}; {remedy}")
     return home
 
 
 def _others_of(found: os.stat_result, above: bool = False) -> str:
-    """Who beside root and this user could change a file or folder; `above`: it is one above the cache."""
+    """Say who beside root and this user could change a file or folder.
+
+    Empty if nobody could. `above`: it is a folder above the cache.
+    """
     if not hasattr(os, "geteuid"):  # Windows, where a user's folders are the user's
         return ""
     if found.st_uid not in (0, os.geteuid()):
         return f"belongs to another user ({found.st_uid})"
-    if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not (
-        above and found.st_mode & stat.S_ISVTX
-    ):
+    written = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    sticky = above and found.st_mode & stat.S_ISVTX
+    if written and not sticky:
         return "may be written by other users"
     return ""
 
 
 def read_loop(path: Path) -> bytes:
-    """What a loop's file holds behind its hash.
+    """Read what a loop's file holds behind its hash.
 
     Raises OSError if it cannot be read, ValueError, with what is wrong, if it is
     damaged or might be another user's.
     """
-    number = os.open(
-        path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
-    )
+    flags = os.O_RDONLY
+    for name in ("O_NOFOLLOW", "O_BINARY"):  # not on every system
+        flags |= getattr(os, name, 0)
+    number = os.open(path, flags)
     with os.fdopen(number, "rb") as file:
-        if why := _others_of(os.fstat(number)):
+        why = _others_of(os.fstat(number))
+        if why:
             raise ValueError(why)
+        digest = file.read(DIGEST)
         content = file.read()
-    if sha256(content[DIGEST:]).digest() != content[:DIGEST]:
+    if sha256(content).digest() != digest:
         raise ValueError("is damaged")
-    return content[DIGEST:]
+    return content
 
 
 def loop_fault(path: Path) -> str:
-    """What is wrong with a loop's file; empty if nothing is, or it is another file."""
+    """Say what is wrong with a loop's file; empty for a sound one, and other files."""
     try:
         if path.suffix == LOOP:
             read_loop(path)
@@ -123,16 +132,16 @@ def write_loop(content: bytes, path: Path) -> None:
 
 @contextmanager
 def locked(path: Path, waiting: Callable[[], None]) -> Iterator[None]:
-    """One process compiles a loop's file, the others wait; the lock of a process that was killed is free.
+    """Let one process compile a loop's file while others wait.
 
-    `waiting` is called where another process holds the lock. Where no lock can be had,
-    in a folder that may only be read or on a disk without locks, each compiles.
+    `waiting` is called where another process holds the lock; that of a process that was
+    killed is free. Where no lock can be had, in a folder that may only be read or on a
+    disk without locks, each compiles.
     """
     from filelock import FileLock, Timeout
 
-    lock = FileLock(
-        path.with_name(path.name.partition("-")[0] + ".lock")
-    )  # the name begins with a hash
+    tag = path.name.partition("-")[0]
+    lock = FileLock(path.with_name(f"{tag}.lock"))
     with suppress(OSError, NotImplementedError):
         try:
             lock.acquire(blocking=False)

@@ -1,112 +1,142 @@
 """How loops are compiled for a ship, a sea and a task, and kept on disk, never stale.
 
-The machine code of a loop lies in the cache under a name that hashes all that it
-depends on: the bytecode of the loop and of every function put into it, the fields of
-their records, the code generators of this folder, the versions of Python and Numba, and
-the processor. A file that is there is right, whoever made it and when; so a cache that
-was filled beforehand and may only be read is used as it is.
+A loop and the functions that it names are copied with their hooks filled
+(`shipgym.engine.specialise`) and handed to `numba.njit`. The machine code is kept under a
+name that hashes all that it depends on (`shipgym.engine.fingerprint`): a file that is
+there is right, whoever made it and when. So a cache that was filled beforehand and may
+only be read is used as it is.
 """
 
-import gc
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import cache, partial
+import uuid
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from shipgym.engine.cache_folder import locked, usable_folder
+from shipgym.engine.fingerprint import fingerprint, traced
 from shipgym.engine.numba_errors import explanation
-from shipgym.engine.specialise import (
-    SEMANTICS,
-    Parts,
-    Specialisation,
-    fingerprint,
-    is_shipped,
-)
+from shipgym.engine.specialise import Hooks, Specialisation
 from shipgym.errors import InputError
 
-SECONDS = 4  # about what a loop takes to compile on a laptop; what is told to who waits
+SECONDS = 7  # about what a loop takes to compile on a laptop; what who waits is told
+
+# error_model "numpy" keeps loops free of branches; contraction is the only fast-math
+# liberty taken, because the others would optimise NaN checks away and make results
+# depend on the batch size
+SEMANTICS = {"error_model": "numpy", "fastmath": {"contract"}}
+# functions that loops call need no entries for Python and C, which take longer to
+# compile than many a function
+INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+#: Compiled functions that loops call, by all that they depend on: loops share them.
+SHARED: dict[Any, Any] = {}
+# behind the names of compiled functions: two loops from files, made by different
+# processes, define no symbol of one name
+PROCESS = uuid.uuid4().hex
 
 
-def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
-    """A loop compiled with parts in the places that it names, or read from the cache.
+def compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
+    """Compile a loop with its hooks filled, or read it from the cache.
 
-    The loop is a plain Python function on arrays, the signature that of its arguments
-    as Numba writes it; `parts` (Parts, numbers or other globals) take the place of the
-    globals that loop and parts name; `what` says in messages what is compiled for whom.
-    With `NUMBA_DISABLE_JIT=1` it is plain Python. Raises InputError if a part does not
-    compile, naming its function, the line and Numba's reason.
+    With `NUMBA_DISABLE_JIT=1` it is plain Python.
+
+    Parameters
+    ----------
+    loop : function
+        A plain Python function on arrays.
+    signature : str
+        Types of its arguments, as Numba writes them.
+    hooks : mapping
+        What takes the place of globals that the loop and its functions name.
+    what : str
+        What is compiled for whom, for messages.
+
+    Returns
+    -------
+    callable
+
+    Raises
+    ------
+    InputError
+        If a function does not compile, naming it, the line and Numba's reason.
     """
-    tag = fingerprint(loop, parts)
     if plain_python():
-        wraps = np.errstate(
-            over="ignore"
-        )  # words of random numbers overflow, as they do when compiled
-        return wraps(Specialisation(parts, tag, None).copy(loop))
-    from shipgym.engine.disk_cache import DiskCache
+        # words of random numbers overflow, as they do when compiled
+        return np.errstate(over="ignore")(Specialisation(hooks).copy(loop))
 
-    jit = _lean_jit()
-    options = {"nogil": True, "_nrt": not is_shipped(loop), **SEMANTICS}
-    dispatcher = jit(**options)(Specialisation(parts, tag, jit).copy(loop))
+    from shipgym.engine.disk_cache import CachedLoop
+
+    tag = fingerprint(loop, hooks)
     folder = usable_folder()
     if folder is None:
-        _announce(what, None)
-    else:
-        dispatcher._cache = disk = DiskCache(folder, tag, signature)
-        if not disk.ready():
-            told = f"shipgym: another process compiles {what}; waiting for it"
-            with locked(disk.path, partial(_say, told)):
-                if not disk.ready():  # another process may have been first
-                    _announce(what, folder)
-                    _compile(dispatcher, signature, what)
-                    return dispatcher
-    _compile(dispatcher, signature, what)
-    return dispatcher
+        announce(what, None)
+        return _compiled(loop, signature, hooks, what)
+
+    cached = CachedLoop(folder, tag, signature)
+    if (found := cached.load(loop)) is not None:
+        return found
+    waiting = f"shipgym: another process compiles {what}; waiting for it"
+    with locked(cached.path, partial(tell_who_waits, waiting)):
+        if (found := cached.load(loop)) is not None:  # another process was first
+            return found
+        announce(what, folder)
+        made = _compiled(loop, signature, hooks, what)
+        cached.save(made)
+    return made
 
 
-def plain(loop: Any, parts: Parts) -> Any:
-    """The same loop in plain Python, without lanes that hold no ship and fill up vectors."""
-    return Specialisation({**parts, "GROUP": 1}, "plain", None).copy(loop)
+def entry_of(loop: Any) -> Any:
+    """Return a compiled loop that does not look at the types of its arguments.
+
+    To look takes as long as to sail a ship. Who calls it has to give the right ones.
+    """
+    if plain_python():
+        return loop
+    (overload,) = loop.overloads.values()
+    return overload.entry_point
+
+
+def plain(loop: Any, hooks: Hooks) -> Any:
+    """Return the loop in plain Python, without lanes that hold no ship."""
+    return Specialisation({**hooks, "GROUP": 1}).copy(loop)
 
 
 def plain_python() -> bool:
-    """Whether nothing is compiled (`NUMBA_DISABLE_JIT=1`)."""
-    with _uncollected():
-        import numba
+    """Return whether nothing is compiled (`NUMBA_DISABLE_JIT=1`)."""
+    import numba
 
     return bool(numba.config.DISABLE_JIT)
 
 
-@cache
-def _lean_jit() -> Any:
-    """Numba's decorator, with our compiler."""
+class Compilation(Specialisation):
+    """Copies of functions that loops call, compiled; those of other loops are shared."""
+
+    def inner(self, function: Any, inlined: bool, checked: bool) -> Any:
+        """Compile a function that others call."""
+        import numba
+
+        tag, records = traced(function, self.hooks)
+        code = function.__code__
+        place = (code.co_filename, code.co_firstlineno)  # which errors name
+        key = (tag, records, inlined, checked, place)
+        if key not in SHARED:
+            options = {"forceinline": inlined, "boundscheck": checked}
+            jit = numba.njit(**options, **INNER, **SEMANTICS)
+            SHARED[key] = jit(_named(self.copy(function, checked)))
+        return SHARED[key]
+
+
+def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
+    """Compile a loop and what it calls."""
     import numba
-
-    from shipgym.engine.lean_numba import LeanCompiler, without_scipy
-
-    without_scipy()
-    return partial(numba.njit, pipeline_class=LeanCompiler)
-
-
-def _compile(dispatcher: Any, signature: str, what: str) -> None:
-    """Compile, or take from the cache."""
-    from numba.core.compiler_lock import global_compiler_lock
     from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
-    from shipgym.engine.lean_numba import lean
-
-    name = dispatcher.py_func.__qualname__
+    specialised = _named(Compilation(hooks).copy(loop))
     try:
-        with global_compiler_lock, _uncollected(), lean(name):
-            dispatcher.compile(signature)
-            for code in (
-                dispatcher.overloads.values()
-            ):  # what loops call has an environment, too, for `print`
-                for one in code._find_referenced_environments():
-                    code.library.codegen.set_env(one.env_name, one)
+        return numba.njit(signature, nogil=True, **SEMANTICS)(specialised)
     # the latter three: another record than is due, none at all, one whose field is set
     except (
         NumbaError,
@@ -115,31 +145,26 @@ def _compile(dispatcher: Any, signature: str, what: str) -> None:
         AttributeError,
         NotImplementedError,
     ) as error:
-        raise InputError(explanation(error, what)) from None
+        functions = [shared.py_func for shared in SHARED.values()]
+        raise InputError(explanation(error, what, functions)) from None
 
 
-@contextmanager
-def _uncollected() -> Iterator[None]:
-    """Collect no garbage: to look for it among all that a compilation makes takes a tenth of its time."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
+def _named(copy: Any) -> Any:
+    """Name a copy so that symbols of all that is compiled differ."""
+    copy.__qualname__ = f"{copy.__name__}_{PROCESS}"
+    copy.__module__ = __name__  # imported with the machine code, as no user's file is
+    return copy
 
 
-def _announce(what: str, folder: Path | None) -> None:
-    kept = (
-        f"kept in {folder} (beforehand: shipgym warm)"
-        if folder
-        else "kept in memory only"
-    )
-    _say(f"shipgym: compiling {what}, once, about {SECONDS} s; {kept}")
+def announce(what: str, folder: Path | None) -> None:
+    """Tell a person who waits that something is compiled, and where it is kept."""
+    kept = "kept in memory only"
+    if folder:
+        kept = f"kept in {folder} (beforehand: shipgym warm)"
+    tell_who_waits(f"shipgym: compiling {what}, once, about {SECONDS} s; {kept}")
 
 
-def _say(words: str) -> None:
-    """Tell a person who waits what is going on; programs and log files are told nothing."""
+def tell_who_waits(words: str) -> None:
+    """Print a line for a person at a terminal or a notebook, not for programs."""
     if "ipykernel" in sys.modules or sys.stderr.isatty():
         print(words, file=sys.stderr, flush=True)

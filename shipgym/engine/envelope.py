@@ -41,14 +41,19 @@ class Envelope(NamedTuple):
 
 def envelope_distance(motion: Motion, data: Envelope) -> float:
     """Size of the ellipsoid through the state relative to the one around the data."""
+    centre = data.centre
+    u = motion.u - centre.u
+    v = motion.v - centre.v
+    r = motion.r - centre.r
+    delta = motion.delta - centre.delta
+
     w = data.shape
-    a, b = motion.u - data.centre.u, motion.v - data.centre.v
-    c, d = motion.r - data.centre.r, motion.delta - data.centre.delta
-    p = w.uu * a + w.uv * b + w.ur * c + w.ud * d
-    q = w.vv * b + w.vr * c + w.vd * d
-    s = w.rr * c + w.rd * d
-    t = w.dd * d
-    return sqrt(p * p + q * q + s * s + t * t)
+    first = w.uu * u + w.uv * v + w.ur * r + w.ud * delta
+    second = w.vv * v + w.vr * r + w.vd * delta
+    third = w.rr * r + w.rd * delta
+    fourth = w.dd * delta
+    square = first * first + second * second + third * third + fourth * fourth
+    return sqrt(square)
 
 
 def outside_range(motion: Motion, data: Envelope) -> bool:

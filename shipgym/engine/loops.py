@@ -1,19 +1,23 @@
-"""The loops by name, compiled for a ship when they are first asked for."""
+"""The loops over ships without a task, compiled for a ship when they are first asked for."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
-from shipgym.engine import batches, trajectories
+from shipgym.engine import batches, steered, trajectories
+from shipgym.engine.compiled_ship import CompiledShip
 from shipgym.engine.compiling import compiled
-from shipgym.engine.records import LANES
-from shipgym.engine.specialise import Part
-from shipgym.engine.vessel import Vessel
-from shipgym.sea.open_sea import sea_parts
+from shipgym.engine.lane_records import Inputs, SeaChannels, WindAccelerations
+from shipgym.engine.record_code import loader, storer
+from shipgym.engine.records import LANES, Layout, Rows
+from shipgym.engine.trajectories import SEA_CHANNELS
+from shipgym.sea.open_sea import sea_hooks
 
-VECTOR, TABLE = "float64[::1]", "float64[:, ::1]"
+VECTOR = "float64[::1]"
+TABLE = "float64[:, ::1]"
 SEA = f"{VECTOR}, uint64[::1], {VECTOR}"  # state, random numbers, parameters
+BATCH = f"void({TABLE}, {TABLE}, float64, int64, {TABLE})"
 
 
 @dataclass(frozen=True)
@@ -23,12 +27,10 @@ class Loop:
     function: Callable[..., Any]  # a plain Python function on arrays
     signature: str  # of its arguments, as Numba writes it
     lanes: int = 1  # of a tile of states: 64, or 1 where states are vectors
-    shared: bool = (
-        True  # whether there is one ship only, so that her numbers are a vector
-    )
-    parts: Mapping[str, Any] = field(
-        default_factory=dict
-    )  # beside the ship's and the sea's
+    # whether there is one ship only, so that her numbers are a vector
+    shared: bool = True
+    # hooks and constants beside those of the ship and the sea
+    hooks: Mapping[str, Any] = field(default_factory=dict)
 
 
 MEASURED_GEAR = {"HAS_LAG": False}
@@ -36,48 +38,50 @@ LOOPS = {
     "derivatives": Loop(
         trajectories.derivatives, f"void({TABLE}, {TABLE}, {VECTOR}, {VECTOR}, {TABLE})"
     ),
-    "meet": Loop(trajectories.meet, f"void({TABLE}, {SEA})"),
+    "sample_sea": Loop(trajectories.sample_sea, f"void({TABLE}, {SEA})"),
     "simulate": Loop(
         trajectories.simulate, f"int64({TABLE}, {TABLE}, float64, {SEA}, {VECTOR})"
     ),
     "open_loop": Loop(
         trajectories.open_loop,
         f"int64({TABLE}, {VECTOR}, {VECTOR}, {VECTOR}, {TABLE}, float64, {VECTOR})",
-        parts=MEASURED_GEAR,
+        hooks=MEASURED_GEAR,
     ),
     "zigzag": Loop(
-        trajectories.zigzag,
-        f"UniTuple(int64, 2)({TABLE}, {VECTOR}, {', '.join(4 * ['float64'])}, boolean,"
-        f" {SEA}, {VECTOR})",
-        parts={"advanced": Part(trajectories.advanced, inline=False)},
+        steered.zigzag,
+        f"UniTuple(int64, 2)({TABLE}, {VECTOR}, float64, float64, float64, float64,"
+        f" boolean, {SEA}, {VECTOR})",
     ),
     "steer_rate": Loop(
-        trajectories.steer_rate,
-        f"int64({TABLE}, {VECTOR}, {VECTOR}, {', '.join(5 * ['float64'])}, {SEA},"
-        f" {VECTOR})",
+        steered.steer_rate,
+        f"int64({TABLE}, {VECTOR}, {VECTOR}, float64, float64, float64, float64,"
+        f" float64, {SEA}, {VECTOR})",
     ),
     "segments": Loop(
         batches.sail_segment,
         f"void({VECTOR}, {VECTOR}, {VECTOR}, {TABLE}, int64[::1], {TABLE})",
         LANES,
         shared=False,
-        parts=MEASURED_GEAR,
+        hooks=MEASURED_GEAR,
     ),
-    "fleet": Loop(batches.advance_batch, batches.SIGNATURE, LANES, shared=False),
-    "alike": Loop(batches.advance_batch, batches.SIGNATURE, LANES),
+    "per_ship": Loop(batches.advance_batch, BATCH, LANES, shared=False),
+    "shared_ship": Loop(batches.advance_batch, BATCH, LANES),
 }
 
 
 @cache
-def ship_loop(vessel: Vessel, name: str, windy: bool = False) -> Any:
-    """A loop of `LOOPS` for a ship in calm water or in the open sea; see `compiled`."""
+def ship_loop(ship: CompiledShip, name: str, windy: bool = False) -> Any:
+    """Compile a loop of `LOOPS` for a ship in calm water or in the open sea."""
     loop = LOOPS[name]
-    parts = {
-        **vessel.parts(loop.lanes, loop.shared),
-        **sea_parts(windy, loop.lanes),
-        **loop.parts,
+    channels = Rows(SeaChannels, len(ship.state_names), SEA_CHANNELS)
+    hooks = {
+        **ship.hooks(loop.lanes, loop.shared),
+        **sea_hooks(windy, loop.lanes),
+        "store_sea_channels": storer(channels, 1),
+        "load_inputs": loader(Layout(inputs=Inputs)["inputs"], 1),
+        "load_wind": loader(Layout(wind=WindAccelerations)["wind"], 1),
+        **loop.hooks,
     }
     where = "in the open sea" if windy else "in calm water"
-    return compiled(
-        loop.function, loop.signature, parts, f"{vessel.name} {where}: {name}"
-    )
+    what = f"{ship.name} {where}: {name}"
+    return compiled(loop.function, loop.signature, hooks, what)

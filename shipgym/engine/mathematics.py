@@ -1,4 +1,4 @@
-"""Sine, cosine, exponential, arc tangent and the like, in forms that are vectorised in loops.
+"""Sine, cosine, exponential, arc tangent and the like, in forms that vectorise.
 
 Calls into the C library would stop the loop over lanes from being vectorised. Sine and
 cosine: Cody-Waite reduction to [-pi/4, pi/4] and the minimax polynomials of fdlibm
@@ -9,8 +9,11 @@ library (`atan.c`, Moshier 1995).
 """
 
 from math import copysign, fabs, pi
+from typing import TypeVar
 
 import numpy as np
+
+Choice = TypeVar("Choice")
 
 TWO_OVER_PI = 2.0 / pi
 HALF_PI_HIGH = 1.57079632673412561417e00
@@ -18,21 +21,19 @@ HALF_PI_LOW = 6.07710050650619224932e-11
 PER_LN_2 = 1.44269504088896338700e00
 LN_2_HIGH = 6.93147180369123816490e-01
 LN_2_LOW = 1.90821492927058770002e-10
-LOWEST, HIGHEST = (
-    -746.0,
-    710.0,
-)  # exponents beyond which the exponential is 0 or infinite
+# exponents beyond which the exponential is 0 or infinite
+LOWEST = -746.0
+HIGHEST = 710.0
 # 1.5 * 2^52: a number added to it loses what is behind the point
 SHIFT = 6755399441055744.0
-EXPONENT = (
-    4503599627370496.0 + 1023.0
-)  # added to a whole number: its biased exponent in the lowest bits
+# added to a whole number: its biased exponent in the lowest bits
+EXPONENT = 4503599627370496.0 + 1023.0
 TAN_3_PI_OVER_8 = 2.41421356237309504880
 HALF_PI_REST = 6.12323399573676588613e-17  # pi / 2 less its double
 
 
-def pick(condition: bool, yes: float, no: float) -> float:
-    """One of two numbers, without a branch."""
+def pick(condition: bool, yes: Choice, no: Choice) -> Choice:
+    """Return one of two numbers, or of two records of one kind."""
     return yes if condition else no
 
 
@@ -42,30 +43,31 @@ def clip(value: float, low: float, high: float) -> float:
 
 
 def nearest(x: float) -> float:
-    """The whole number nearest to x, |x| < 2^51; a floor would be an integer, lane by lane."""
+    """Return the whole number nearest to x, |x| < 2^51, as a float.
+
+    A floor would be an integer, which is worked out lane by lane.
+    """
     return (x + SHIFT) - SHIFT
 
 
 def sine_polynomial(y: float, z: float) -> float:
     """Sine of y within [-pi/4, pi/4]; z is its square."""
-    rest = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10
-    rest = -1.98412698298579493134e-04 + z * (2.75573137070700676789e-06 + z * rest)
-    return y + y * z * (
-        -1.66666666666666324348e-01 + z * (8.33333333332248946124e-03 + z * rest)
-    )
+    series = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10
+    series = 2.75573137070700676789e-06 + z * series
+    series = -1.98412698298579493134e-04 + z * series
+    series = 8.33333333332248946124e-03 + z * series
+    series = -1.66666666666666324348e-01 + z * series
+    return y + y * z * series
 
 
 def cosine_polynomial(z: float) -> float:
     """Cosine of an angle within [-pi/4, pi/4]; z is its square."""
-    rest = 2.08757232129817482790e-09 - z * 1.13596475577881948265e-11
-    rest = 2.48015872894767294178e-05 + z * (-2.75573143513906633035e-07 + z * rest)
-    return (
-        1.0
-        - 0.5 * z
-        + z
-        * z
-        * (4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03 + z * rest))
-    )
+    series = 2.08757232129817482790e-09 - z * 1.13596475577881948265e-11
+    series = -2.75573143513906633035e-07 + z * series
+    series = 2.48015872894767294178e-05 + z * series
+    series = -1.38888888888741095749e-03 + z * series
+    series = 4.16666666666666019037e-02 + z * series
+    return 1.0 - 0.5 * z + z * z * series
 
 
 def sin_cos(x: float) -> tuple[float, float]:
@@ -73,7 +75,9 @@ def sin_cos(x: float) -> tuple[float, float]:
     quarter = nearest(x * TWO_OVER_PI)
     y = (x - quarter * HALF_PI_HIGH) - quarter * HALF_PI_LOW
     z = y * y
-    s, c = sine_polynomial(y, z), cosine_polynomial(z)
+    s = sine_polynomial(y, z)
+    c = cosine_polynomial(z)
+
     quadrant = quarter - 4.0 * nearest(0.25 * quarter - 0.375)
     odd = quadrant == 1.0 or quadrant == 3.0
     sine = c if odd else s
@@ -84,18 +88,19 @@ def sin_cos(x: float) -> tuple[float, float]:
 
 
 def small_sin_cos(x: float) -> tuple[float, float]:
-    """Sine and cosine of an angle within a quarter turn to either side, from those of its half.
+    """Sine and cosine of an angle within a quarter turn, from those of its half.
 
     The error is below 4e-16 for |x| < pi/2; beyond it grows, to 3e-9 for |x| = pi.
     """
     y = 0.5 * x
     z = y * y
     s = sine_polynomial(y, z)
-    return 2.0 * s * cosine_polynomial(z), 1.0 - 2.0 * s * s
+    c = cosine_polynomial(z)
+    return 2.0 * s * c, 1.0 - 2.0 * s * s
 
 
 def turn_sin_cos(x: float) -> tuple[float, float]:
-    """Sine and cosine of an angle that a ship turns in part of a step, within a quarter turn to either side.
+    """Sine and cosine of an angle that a ship turns in part of a step.
 
     The error is below 2e-16 for |x| < 0.6, 2e-14 for |x| < pi/4, 1e-9 for |x| < pi/2.
     """
@@ -134,12 +139,11 @@ def exponential(x: float) -> float:
     low = k * LN_2_LOW
     y = high - low
     z = y * y
-    rest = 6.61375632143793436117e-05 + z * (
-        -1.65339022054652515390e-06 + z * 4.13813679705723846039e-08
-    )
-    c = y - z * (
-        1.66666666666666019037e-01 + z * (-2.77777777770155933842e-03 + z * rest)
-    )
+    series = -1.65339022054652515390e-06 + z * 4.13813679705723846039e-08
+    series = 6.61375632143793436117e-05 + z * series
+    series = -2.77777777770155933842e-03 + z * series
+    series = 1.66666666666666019037e-01 + z * series
+    c = y - z * series
     mantissa = 1.0 - ((low - y * c / (2.0 - c)) - high)
     half = nearest(0.5 * k - 0.25)  # in two steps, for the subnormal numbers
     value = mantissa * power_of_two(half) * power_of_two(k - half)
@@ -147,44 +151,54 @@ def exponential(x: float) -> float:
 
 
 def two_to(x: float) -> float:
-    """2 to the power of x <= 0, at least 2^-1000; by a polynomial of degree 9, error below 2e-14 of it."""
+    """2 to the power of x <= 0, at least 2^-1000.
+
+    By a polynomial of degree 9, with an error below 2e-14 of it.
+    """
     within = max(x, -1000.0)
     shifted = within + (SHIFT + 1023.0)  # in its lowest bits the biased exponent
     f = within - (shifted - (SHIFT + 1023.0))
-    mantissa = 0.00015403433646322688 + f * (
-        1.5252654813770773e-05
-        + f * (1.3259667128066899e-06 + f * 1.0209003757888788e-07)
-    )
-    mantissa = 0.05550410866438316 + f * (
-        0.009618129194101738 + f * (0.001333355823666942 + f * mantissa)
-    )
-    mantissa = 1.0000000000000144 + f * (
-        0.6931471805599516 + f * (0.24022650695639336 + f * mantissa)
-    )
+    mantissa = 1.3259667128066899e-06 + f * 1.0209003757888788e-07
+    mantissa = 1.5252654813770773e-05 + f * mantissa
+    mantissa = 0.00015403433646322688 + f * mantissa
+    mantissa = 0.001333355823666942 + f * mantissa
+    mantissa = 0.009618129194101738 + f * mantissa
+    mantissa = 0.05550410866438316 + f * mantissa
+    mantissa = 0.24022650695639336 + f * mantissa
+    mantissa = 0.6931471805599516 + f * mantissa
+    mantissa = 1.0000000000000144 + f * mantissa
     return mantissa * power_of_bits(shifted)
 
 
 def arctan2(y: float, x: float) -> float:
     """Angle in [-pi, pi] of the point with the finite coordinates x and y, rad."""
-    a, b = fabs(y), fabs(x)
+    a = fabs(y)
+    b = fabs(x)
     steep = a > TAN_3_PI_OVER_8 * b
     middling = a > 0.66 * b
-    above = -b if steep else (a - b if middling else a)
-    below = a if steep else (a + b if middling else b)
-    q = above / (below if below > 0.0 else 1.0)
+    # by picks, not by branches, which a loop over lanes would have to undo
+    above = pick(steep, -b, pick(middling, a - b, a))
+    below = pick(steep, a, pick(middling, a + b, b))
+    q = above / pick(below > 0.0, below, 1.0)
+
     z = q * q
-    p = -7.500855792314704667340e01 + z * (
-        -1.615753718733365076637e01 + z * -8.750608600031904122785e-01
-    )
-    p = -6.485021904942025371773e01 + z * (-1.228866684490136173410e02 + z * p)
-    d = 1.650270098316988542046e02 + z * (2.485846490142306297962e01 + z)
-    d = 4.853903996359136964868e02 + z * (4.328810604912902668951e02 + z * d)
+    p = -1.615753718733365076637e01 + z * -8.750608600031904122785e-01
+    p = -7.500855792314704667340e01 + z * p
+    p = -1.228866684490136173410e02 + z * p
+    p = -6.485021904942025371773e01 + z * p
+    d = 2.485846490142306297962e01 + z
+    d = 1.650270098316988542046e02 + z * d
+    d = 4.328810604912902668951e02 + z * d
+    d = 4.853903996359136964868e02 + z * d
     d = 1.945506571482613964425e02 + z * d
     arc = q + q * (z * p / d)
-    quarters = 0.5 if steep else (0.25 if middling else 0.0)
-    angle = quarters * pi + (arc + 2.0 * quarters * HALF_PI_REST)
-    if_behind = pi - (angle - 2.0 * HALF_PI_REST)
-    return copysign(if_behind if copysign(1.0, x) < 0.0 else angle, y)
+
+    quarters = pick(steep, 0.5, pick(middling, 0.25, 0.0))
+    rest = 2.0 * HALF_PI_REST
+    ahead = quarters * pi + (arc + quarters * rest)
+    behind = pi - (ahead - rest)
+    angle = pick(copysign(1.0, x) < 0.0, behind, ahead)
+    return copysign(angle, y)
 
 
 def arctan(x: float) -> float:

@@ -15,6 +15,14 @@ RUNAWAY_SPEED = 3.0
 RUNAWAY_YAW_RATE = 6.0
 CAPSIZED = 1.5707963267948966  # rad; nor does it heel beyond a right angle
 
+# What ship, gear and sea have. Set when a loop is compiled, like hooks, so that what
+# they lack costs nothing.
+HAS_ROLL = True
+HAS_SHAFT = True  # a shaft speed among the states
+HAS_MEMORY = True  # of yaw
+HAS_LAG = True  # a steering gear with a time constant
+HAS_SEA = True
+
 
 class Motion(NamedTuple):
     """State of a ship; what she does not have stays 0."""
@@ -58,9 +66,22 @@ class Push(NamedTuple):
     east: float  # m/s
 
 
-class Rates(NamedTuple):
-    """Time derivative of a state but for position."""
+CALM = Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
+
+class Held(NamedTuple):
+    """What is held over a step."""
+
+    order: float  # rad, to the rudder, within its limit
+    shaft: float  # 1/s, command to the shaft
+    push: Push
+
+
+class Rates(NamedTuple):
+    """Time derivative of a state; of x and y in the frame in which psi is small."""
+
+    x: float
+    y: float
     psi: float
     u: float
     v: float
@@ -72,38 +93,44 @@ class Rates(NamedTuple):
     n: float
 
 
-# What ship, gear and sea have is known when they are compiled, so that what they lack
-# costs nothing.
-HAS_ROLL, HAS_SHAFT, HAS_MEMORY, HAS_LAG, HAS_SEA = True, True, True, True, True
+NO_RATES = Rates(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def accelerations(
     motion: Motion, coefficients: Any, ship: Ship
 ) -> tuple[float, float, float, float, float]:
-    """Accelerations in surge, sway, yaw, roll and of the memory of yaw; the ship's own take its place."""
+    """Accelerations in surge, sway, yaw, roll and of the memory of yaw.
+
+    A hook: the ship's own function takes its place.
+    """
     return 0.0, 0.0, 0.0, 0.0, 0.0
 
 
 def shaft_acceleration(
     n: float, command: float, coefficients: Any, ship: Ship
 ) -> float:
-    """Acceleration of a shaft whose speed is a state, 1/s^2; the ship's own takes its place."""
+    """Acceleration of a shaft whose speed is a state, 1/s^2.
+
+    A hook: the function of a ship with such a shaft takes its place.
+    """
     return 0.0
 
 
 def gear_rate(delta: float, order: float, ship: Ship) -> float:
-    """Rate of a steering gear with a lag, limited in rate, rad/s; 0 for a gear without lag."""
+    """Rate of a steering gear with a lag, limited, rad/s; 0 for a gear without lag."""
     if HAS_LAG:
-        return clip(
-            (order - delta) * ship.gear_frequency, -ship.rudder_rate, ship.rudder_rate
-        )
+        rate = (order - delta) * ship.gear_frequency
+        return clip(rate, -ship.rudder_rate, ship.rudder_rate)
     return 0.0
 
 
 def rudder_after(
     delta: float, rate: float, order: float, h: float, ship: Ship
 ) -> float:
-    """Rudder angle a time h later: along the slope `rate`, or, without lag, up a ramp to the order."""
+    """Rudder angle a time h later.
+
+    With lag it moves along the slope `rate`, without it up a ramp to the order.
+    """
     if HAS_LAG:
         return delta + h * rate
     reach = ship.rudder_rate * h
@@ -114,65 +141,62 @@ def rudder_velocity(delta: float, order: float, ship: Ship) -> float:
     """Rate at which the rudder moves now, rad/s, with or without lag."""
     if HAS_LAG:
         return gear_rate(delta, order, ship)
-    return (
-        0.0
-        if order == delta
-        else (ship.rudder_rate if order > delta else -ship.rudder_rate)
-    )
+    if order == delta:
+        return 0.0
+    return ship.rudder_rate if order > delta else -ship.rudder_rate
 
 
 def upright(motion: Motion) -> float:
-    """By how much sway and yaw are less in the level plane, where she heels."""
+    """Cosine of the heel: by how much sway and yaw are less in the level plane."""
     return small_cosine(motion.phi) if HAS_ROLL else 1.0
 
 
 def ground_velocity(motion: Motion, north: float, east: float) -> tuple[float, float]:
-    """Velocity over ground, ahead and to starboard in the level plane, m/s, in a current."""
-    ahead, aside = motion.u, motion.v * upright(motion)
+    """Velocity over ground, ahead and to starboard in the level plane, m/s.
+
+    `north` and `east` are the current, m/s.
+    """
+    ahead = motion.u
+    aside = motion.v * upright(motion)
     if HAS_SEA:
         sine, cosine = sin_cos(motion.psi)
-        return (
-            ahead + north * cosine + east * sine,
-            aside + east * cosine - north * sine,
-        )
+        ahead = ahead + north * cosine + east * sine
+        aside = aside + east * cosine - north * sine
     return ahead, aside
 
 
-def rates(
-    motion: Motion,
-    order: float,
-    shaft: float,
-    push: Push,
-    coefficients: Any,
-    ship: Ship,
-) -> Rates:
-    """Time derivative of a state."""
+def rates(motion: Motion, held: Held, coefficients: Any, ship: Ship) -> Rates:
+    """Time derivative of a state whose psi is small, in still water (Fossen 2.2)."""
     udot, vdot, rdot, pdot, qdot = accelerations(motion, coefficients, ship)
     if HAS_SEA:
-        udot, vdot, rdot, pdot = (
-            udot + push.u,
-            vdot + push.v,
-            rdot + push.r,
-            pdot + push.p,
-        )
+        udot = udot + held.push.u
+        vdot = vdot + held.push.v
+        rdot = rdot + held.push.r
+        pdot = pdot + held.push.p
+
+    sine, cosine = turn_sin_cos(motion.psi)
+    level = upright(motion)
+    aside = motion.v * level
     return Rates(
-        psi=motion.r * upright(motion),
+        x=motion.u * cosine - aside * sine,
+        y=motion.u * sine + aside * cosine,
+        psi=motion.r * level,
         u=udot,
         v=vdot,
         r=rdot,
         p=pdot,
         phi=motion.p,
         q=qdot,
-        delta=gear_rate(motion.delta, order, ship),
-        n=shaft_acceleration(motion.n, shaft, coefficients, ship),
+        delta=gear_rate(motion.delta, held.order, ship),
+        n=shaft_acceleration(motion.n, held.shaft, coefficients, ship),
     )
 
 
-def along(start: Motion, k: Rates, h: float, delta: float) -> Motion:
-    """The state h seconds along the rates k, with the rudder at delta; what the ship lacks stays."""
+def after(start: Motion, k: Rates, h: float, delta: float) -> Motion:
+    """State h seconds along the rates k, with the rudder at delta."""
     return Motion(
-        x=start.x,
-        y=start.y,
+        x=start.x + h * k.x,
+        y=start.y + h * k.y,
         psi=start.psi + h * k.psi,
         u=start.u + h * k.u,
         v=start.v + h * k.v,
@@ -186,30 +210,76 @@ def along(start: Motion, k: Rates, h: float, delta: float) -> Motion:
 
 
 def stage(start: Motion, k: Rates, h: float, order: float, ship: Ship) -> Motion:
-    """The state at a stage of the step: h seconds along the rates k."""
-    return along(start, k, h, rudder_after(start.delta, k.delta, order, h, ship))
+    """State at a stage of the step, h seconds along the rates k."""
+    return after(start, k, h, rudder_after(start.delta, k.delta, order, h, ship))
 
 
-def weighted(a: Rates, b: Rates, c: Rates, d: Rates) -> Rates:
-    """Runge and Kutta's sum of four slopes, six times their mean."""
+def add_rates(total: Rates, weight: float, k: Rates) -> Rates:
+    """Sum of rates and others times a weight."""
     return Rates(
-        psi=a.psi + 2.0 * (b.psi + c.psi) + d.psi,
-        u=a.u + 2.0 * (b.u + c.u) + d.u,
-        v=a.v + 2.0 * (b.v + c.v) + d.v,
-        r=a.r + 2.0 * (b.r + c.r) + d.r,
-        p=a.p + 2.0 * (b.p + c.p) + d.p,
-        phi=a.phi + 2.0 * (b.phi + c.phi) + d.phi,
-        q=a.q + 2.0 * (b.q + c.q) + d.q,
-        delta=a.delta + 2.0 * (b.delta + c.delta) + d.delta,
-        n=a.n + 2.0 * (b.n + c.n) + d.n,
+        x=total.x + weight * k.x,
+        y=total.y + weight * k.y,
+        psi=total.psi + weight * k.psi,
+        u=total.u + weight * k.u,
+        v=total.v + weight * k.v,
+        r=total.r + weight * k.r,
+        p=total.p + weight * k.p,
+        phi=total.phi + weight * k.phi,
+        q=total.q + weight * k.q,
+        delta=total.delta + weight * k.delta,
+        n=total.n + weight * k.n,
     )
 
 
-def way(motion: Motion) -> tuple[float, float]:
-    """Velocity ahead and aside in the frame from which the ship has turned by the small angle psi."""
-    sine, cosine = turn_sin_cos(motion.psi)
-    aside = motion.v * upright(motion)
-    return motion.u * cosine - aside * sine, motion.u * sine + aside * cosine
+def start_of_step(motion: Motion, shaft: float) -> Motion:
+    """State in the ship's own frame of now: without position and heading.
+
+    A shaft without a speed of its own among the states turns as commanded.
+    """
+    return Motion(
+        x=0.0,
+        y=0.0,
+        psi=0.0,
+        u=motion.u,
+        v=motion.v,
+        r=motion.r,
+        p=motion.p,
+        phi=motion.phi,
+        q=motion.q,
+        delta=motion.delta,
+        n=motion.n if HAS_SHAFT else shaft,
+    )
+
+
+def end_of_step(
+    motion: Motion, start: Motion, slopes: Rates, held: Held, h: float, ship: Ship
+) -> Motion:
+    """State after a step of h seconds from `motion`, which is `start` in its own frame.
+
+    `slopes` is the weighted sum of the rates at the stages, six times their mean.
+    """
+    rudder = rudder_after(start.delta, slopes.delta * (1.0 / 6.0), held.order, h, ship)
+    moved = after(start, slopes, h / 6.0, rudder)
+
+    sine, cosine = sin_cos(motion.psi)
+    x = motion.x + (moved.x * cosine - moved.y * sine)
+    y = motion.y + (moved.x * sine + moved.y * cosine)
+    if HAS_SEA:
+        x = x + h * held.push.north
+        y = y + h * held.push.east
+    return Motion(
+        x=x,
+        y=y,
+        psi=motion.psi + moved.psi,
+        u=moved.u,
+        v=moved.v,
+        r=moved.r,
+        p=moved.p,
+        phi=moved.phi,
+        q=moved.q,
+        delta=moved.delta,
+        n=moved.n,
+    )
 
 
 def sail(
@@ -221,87 +291,37 @@ def sail(
     coefficients: Any,
     ship: Ship,
 ) -> Motion:
-    """State after one classical Runge-Kutta step of h seconds with the commands held, rad and 1/s.
+    """State after one classical Runge-Kutta step of h seconds.
 
-    The way made is summed in the frame of the heading at the start and turned once: the
-    stages are but a small angle away from it, whose sine and cosine cost little.
+    The commands, rad and 1/s, are held. The stages are worked out in the ship's frame
+    at the start of the step, from which she turns by a small angle only, whose sine and
+    cosine cost little; the way made is turned to north and east at the end.
     """
     order = clip(rudder, -ship.rudder_limit, ship.rudder_limit)
-    n = motion.n if HAS_SHAFT else shaft
-    one = Motion(
-        0.0,
-        0.0,
-        0.0,
-        motion.u,
-        motion.v,
-        motion.r,
-        motion.p,
-        motion.phi,
-        motion.q,
-        motion.delta,
-        n,
-    )
-    a = rates(one, order, shaft, push, coefficients, ship)
-    two = stage(one, a, 0.5 * h, order, ship)
-    b = rates(two, order, shaft, push, coefficients, ship)
-    three = stage(one, b, 0.5 * h, order, ship)
-    c = rates(three, order, shaft, push, coefficients, ship)
-    four = stage(one, c, h, order, ship)
-    d = rates(four, order, shaft, push, coefficients, ship)
-    ahead_2, aside_2 = way(two)
-    ahead_3, aside_3 = way(three)
-    ahead_4, aside_4 = way(four)
-    ahead = one.u + 2.0 * (ahead_2 + ahead_3) + ahead_4
-    aside = one.v * upright(one) + 2.0 * (aside_2 + aside_3) + aside_4
-    return arrival(
-        motion, one, weighted(a, b, c, d), ahead, aside, order, h, push, ship
-    )
+    held = Held(order, shaft, push)
+    start = start_of_step(motion, shaft)
 
+    k1 = rates(start, held, coefficients, ship)
+    k2 = rates(stage(start, k1, 0.5 * h, order, ship), held, coefficients, ship)
+    k3 = rates(stage(start, k2, 0.5 * h, order, ship), held, coefficients, ship)
+    k4 = rates(stage(start, k3, h, order, ship), held, coefficients, ship)
 
-def arrival(
-    motion: Motion,
-    one: Motion,
-    k: Rates,
-    ahead: float,
-    aside: float,
-    order: float,
-    h: float,
-    push: Push,
-    ship: Ship,
-) -> Motion:
-    """State after a step from what its stages sum up to: rates, and the way made from the state `one`."""
-    sixth = h / 6.0
-    end = along(
-        one, k, sixth, rudder_after(one.delta, k.delta * (1.0 / 6.0), order, h, ship)
-    )
-    ahead, aside = sixth * ahead, sixth * aside
-    sine, cosine = sin_cos(motion.psi)
-    x, y = (
-        motion.x + (ahead * cosine - aside * sine),
-        motion.y + (ahead * sine + aside * cosine),
-    )
-    if HAS_SEA:
-        x, y = x + h * push.north, y + h * push.east
-    return Motion(
-        x,
-        y,
-        motion.psi + end.psi,
-        end.u,
-        end.v,
-        end.r,
-        end.p,
-        end.phi,
-        end.q,
-        end.delta,
-        end.n,
-    )
+    slopes = add_rates(add_rates(add_rates(k1, 2.0, k2), 2.0, k3), 1.0, k4)
+    return end_of_step(motion, start, slopes, held, h, ship)
 
 
 def lost(motion: Motion, ship: Ship) -> bool:
-    """Whether the ship has run away or capsized: her velocities are beyond any ship's, or not numbers."""
-    limit = RUNAWAY_SPEED * ship.speed
-    slow = motion.u * motion.u + motion.v * motion.v < limit * limit
-    steady = fabs(motion.r) * ship.length < RUNAWAY_YAW_RATE * ship.speed
+    """Return whether the ship has run away or capsized.
+
+    Her velocities are then beyond any ship's, or not numbers.
+    """
+    u = motion.u
+    v = motion.v
+    fastest = RUNAWAY_SPEED * ship.speed
+    quickest = RUNAWAY_YAW_RATE * ship.speed
+    slow = u * u + v * v < fastest * fastest
+    steady = fabs(motion.r) * ship.length < quickest
     if HAS_ROLL:
-        return not (slow & steady & (fabs(motion.phi) < CAPSIZED))
+        upright = fabs(motion.phi) < CAPSIZED
+        return not (slow & steady & upright)
     return not (slow & steady)

@@ -1,49 +1,75 @@
-"""Records and where their numbers stand.
+"""Records and the rows in which their numbers lie.
 
-Numbers of many ships lie in tiles of 64 lanes, one lane a ship, row after row: a tile
-is a contiguous one-dimensional array, and lane `i` of row `k` is entry `64 k + i`. A
-single ship is a vector with one entry a row. Field order is row order, so no row number
-is written by hand.
+A record is a `NamedTuple` of numbers, and of other records. Numbers of many ships lie
+in tiles of 64 lanes, one lane a ship, row after row: a tile is a contiguous
+one-dimensional array, and lane `i` of row `k` is its entry `64 k + i`. The numbers of a
+single ship are a vector with one entry a row. The order of the fields is that of the
+rows, so no row number is written by hand; `shipgym.engine.record_code` writes the
+functions that load and store records.
 """
 
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, get_type_hints
+from typing import Any, NamedTuple, get_type_hints
+
+import numpy as np
 
 LANES = 64
 
 Record = type[tuple[Any, ...]]
 
 
-def is_record(kind: Any) -> bool:
-    """Whether a type is a `NamedTuple`."""
-    return (
-        isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
-    )
+class Table(NamedTuple):
+    """A table of numbers within a record, read one by one by `row_of`."""
+
+    array: Any  # the tile or vector in which it lies
+    first: int  # entry of its first number
+    step: int  # entries from one number to the next
 
 
-class Table:
-    """Kind of a field that is a table of numbers, read one by one (`record_code.row_reader`)."""
+class TableField:
+    """Annotation of a field that is a table, see `table_of`."""
 
     rows = 0
 
 
 @cache
-def table_of(rows: int) -> type[Table]:
-    """The kind of a table of so many numbers."""
-    return type(f"Table{rows}", (Table,), {"rows": rows})
+def table_of(rows: int) -> type[TableField]:
+    """Annotation of a field that is a table of so many numbers."""
+    return type(f"Table{rows}", (TableField,), {"rows": rows})
+
+
+def row_of(table: Table, row: int) -> float:
+    """Return one number of a table."""
+    # an index without sign: one that could count from the end prevents vectorisation
+    number: float = table.array[np.uintp(table.first + table.step * row)]
+    return number
+
+
+def is_record(kind: Any) -> bool:
+    """Return whether a type is a `NamedTuple`."""
+    return (
+        isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
+    )
 
 
 def is_table(kind: Any) -> bool:
-    """Whether a field is a table."""
-    return isinstance(kind, type) and issubclass(kind, Table)
+    """Return whether the annotation of a field says that it is a table."""
+    return isinstance(kind, type) and issubclass(kind, TableField)
+
+
+def is_list(kind: Any) -> bool:
+    """Return whether a field is a list of numbers; only the last of settings may be."""
+    if kind in (float, int, bool, Any):
+        return False
+    return not is_record(kind) and not is_table(kind)
 
 
 @cache
 def field_types(record: Record, notes: bool = False) -> dict[str, Any]:
-    """Types of a record's fields, with or without what they are annotated with."""
+    """Types of a record's fields by name; `notes`: with what `Annotated` adds."""
     return get_type_hints(
         record, globalns=vars(sys.modules[record.__module__]), include_extras=notes
     )
@@ -51,66 +77,57 @@ def field_types(record: Record, notes: bool = False) -> dict[str, Any]:
 
 @cache
 def leaves(record: Record, prefix: str = "") -> tuple[str, ...]:
-    """Paths of all numbers in a record and the records within it, in order: `u`, `steering.rudder`."""
+    """Paths of all numbers of a record and those within it, such as `u`, `helm.gain`."""
     paths: list[str] = []
     for name, kind in field_types(record).items():
-        if is_table(kind):
-            paths += [f"{prefix}{name}.{row}" for row in range(kind.rows)]
+        path = prefix + name
+        if is_record(kind):
+            paths += leaves(kind, f"{path}.")
+        elif is_table(kind):
+            paths += [f"{path}.{row}" for row in range(kind.rows)]
         else:
-            paths += (
-                leaves(kind, f"{prefix}{name}.") if is_record(kind) else [prefix + name]
-            )
+            paths.append(path)
     return tuple(paths)
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Where the numbers of a record stand."""
+    """The rows of a record in a tile or vector."""
 
-    record: Record  # a `NamedTuple` of floats, or of such records
+    record: Record
     first: int  # row of its first number
-    present: tuple[
-        str, ...
-    ]  # paths of the numbers that have a row; the others are 0 and not stored
+    present: tuple[str, ...]  # paths that have a row; other numbers are 0, not stored
 
     def row(self, path: str) -> int:
-        """Row of one number."""
+        """Return the row of one number."""
         return self.first + self.present.index(path)
 
     @property
-    def places(self) -> dict[str, int]:
+    def numbers(self) -> dict[str, int]:
         """Row of each number by its path."""
         return {path: self.first + k for k, path in enumerate(self.present)}
 
 
 class Layout:
-    """Rows of several records by name, one after another; of a record in a tuple with names only these."""
+    """Rows of several records by name, one record after another.
+
+    Each is given as a record, or as a pair of a record and the paths that have a row.
+    """
 
     def __init__(self, **records: Any) -> None:
         self.rows: dict[str, Rows] = {}
-        end = 0
+        self.n_rows = 0
         for name, given in records.items():
-            record, present = (
-                given
-                if isinstance(given, tuple) and not is_record(given)
-                else (given, None)
-            )
-            kept = tuple(n for n in leaves(record) if present is None or n in present)
-            self.rows[name] = Rows(record, end, kept)
-            end += len(kept)
-        self.n_rows = end
+            if is_record(given):
+                record, present = given, leaves(given)
+            else:
+                record, wanted = given
+                present = tuple(path for path in leaves(record) if path in wanted)
+            self.rows[name] = Rows(record, self.n_rows, present)
+            self.n_rows += len(present)
 
     def __getitem__(self, name: str) -> Rows:
         return self.rows[name]
-
-
-def is_list(kind: Any) -> bool:
-    """Whether a field is a list of numbers; only the last one of settings may be."""
-    return (
-        kind not in (float, int, bool, Any)
-        and not is_record(kind)
-        and not is_table(kind)
-    )
 
 
 def flat(record: Any) -> list[float]:

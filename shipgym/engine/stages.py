@@ -1,190 +1,150 @@
-"""Many ships through a step stage by stage, for ships part of whose accelerations is a sum over a table.
+"""Many ships through a step stage by stage, for ships with a sum over a table.
 
 A loop over the rows of a table inside the loop over lanes would keep that one from
 being vectorised. So each stage of the Runge-Kutta step is finished in all lanes of a
 tile before the next one, and the loop over rows has that over lanes inside. What stands
-between the loops lies in the room for results.
+between the loops lies with the results of the tile.
 """
 
-from typing import Any, NamedTuple
-
-from shipgym.engine.episodes import GROUP, Tile, end_of_step
-from shipgym.engine.mathematics import clip
-from shipgym.engine.motion import HAS_SHAFT, Motion, Rates, arrival, rates, stage, way
-from shipgym.engine.places import (
-    common_sea,
-    common_ship,
-    load_course,
+from shipgym.engine.hooks import (
+    add_row,
+    load_coefficients,
+    load_commands,
     load_motion,
-    load_passed,
     load_point,
-    load_sea,
     load_slope,
+    load_slopes,
     load_sums,
     point_of,
-    push,
-    row_sums,
-    sea_at,
-    ship_at,
-    store_motion,
-    store_passed,
     store_point,
     store_slope,
+    store_slopes,
     store_sums,
     sum_accelerations,
 )
+from shipgym.engine.lane_records import Point, Sums
+from shipgym.engine.mathematics import clip
+from shipgym.engine.motion import (
+    NO_RATES,
+    Held,
+    Motion,
+    Rates,
+    Ship,
+    add_rates,
+    end_of_step,
+    rates,
+    stage,
+    start_of_step,
+)
+from shipgym.engine.sailing import end_substep, push_of, ship_of
+from shipgym.engine.specialise import called
+from shipgym.engine.tiles import FIRST_LANE, GROUP, SHARED_SHIP, Tile
 
-N_ROWS = 0  # part: of the table that is summed over, a multiple of
-ROWS_AT_ONCE = 4  # written out, so that sums are loaded and stored less often
-
-
-class Point(NamedTuple):
-    """Where a ship is in the coordinates of her table."""
-
-    a: float
-    b: float
-    c: float
-    d: float
-    half: float  # half the squared distance from the origin
-
-
-class Sums(NamedTuple):
-    """Sums over the rows of the table, of surge, sway and yaw."""
-
-    u: float
-    v: float
-    r: float
+N_ROWS = 0  # of the table that is summed over, a multiple of 4; set by the ship
 
 
-class Passed(NamedTuple):
-    """Runge and Kutta's sums of the stages so far."""
+#: Part of the step at which a stage lies, and its weight.
+STAGES = ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0))
+NO_SUMS = Sums(0.0, 0.0, 0.0)
+#: Records between the loops, by the names of `shipgym.engine.hooks`.
+BETWEEN_STAGES = {"point": Point, "sums": Sums, "slope": Rates, "slopes": Rates}
 
-    total: Rates
-    ahead: float
-    aside: float
 
-
-def sail_lanes(tile: Tile, h: float, groups: int) -> None:
-    """Move ships by h seconds, as `shipgym.engine.episodes.sail_lanes`."""
-    result, none = tile.result, Rates(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+@called
+def sail_in_stages(tile: Tile, h: float, groups: int) -> None:
+    """Move ships by h seconds: the hook `sail_lanes` of a ship with a table."""
     for lane in range(groups * GROUP):
-        store_slope(result, lane, none)
-        store_passed(result, lane, Passed(none, 0.0, 0.0))
-    for number in range(4):
-        part = 0.0 if number == 0 else (1.0 if number == 3 else 0.5)
-        prepare(tile, part * h, groups)
-        common = common_ship(tile.ships)
-        for row in range(0, N_ROWS, ROWS_AT_ONCE):
-            for lane in range(groups * GROUP):
-                _, coefficients = ship_at(common, tile.ships, lane)
-                at, sums, terms = (
-                    load_point(result, lane),
-                    load_sums(result, lane),
-                    coefficients.terms,
-                )
-                sums = row_sums(at, row_sums(at, sums, terms, row), terms, row + 1)
-                sums = row_sums(at, row_sums(at, sums, terms, row + 2), terms, row + 3)
-                store_sums(result, lane, sums)
-        conclude(tile, part * h, 2.0 if number == 1 or number == 2 else 1.0, groups)
-    arrive(tile, h, groups)
-
-
-def start_of(
-    tile: Tile, common: Any, lane: int
-) -> tuple[Motion, float, float, Any, Any]:
-    """State at the beginning of the step, heading as zero; orders to rudder and shaft; the ship."""
-    ship, coefficients = ship_at(common, tile.ships, lane)
-    m, course = load_motion(tile.state, lane), load_course(tile.state, lane)
-    order = clip(
-        course.rudder_command * ship.rudder_limit, -ship.rudder_limit, ship.rudder_limit
-    )
-    shaft = course.shaft_command * ship.shaft
-    n = m.n if HAS_SHAFT else shaft
-    return (
-        Motion(0.0, 0.0, 0.0, m.u, m.v, m.r, m.p, m.phi, m.q, m.delta, n),
-        order,
-        shaft,
-        ship,
-        coefficients,
-    )
-
-
-def prepare(tile: Tile, h: float, groups: int) -> None:
-    """Where the ships are at a stage, h seconds along the slope of the one before."""
-    result, common = tile.result, common_ship(tile.ships)
+        store_slope(tile.result, lane, NO_RATES)
+        store_slopes(tile.result, lane, NO_RATES)
+    for part, weight in STAGES:
+        begin_stage(tile, part * h, groups)
+        sum_rows(tile, groups)
+        end_stage(tile, part * h, weight, groups)
+    shared = ship_of(tile, FIRST_LANE)
     for lane in range(groups * GROUP):
-        start, order, _, ship, coefficients = start_of(tile, common, lane)
-        at = stage(start, load_slope(result, lane), h, order, ship)
-        store_point(result, lane, point_of(at, coefficients.terms, ship))
-        store_sums(result, lane, Sums(0.0, 0.0, 0.0))
+        ship, _ = shared if SHARED_SHIP else ship_of(tile, lane)
+        start, held = start_of(tile, lane, ship)
+        before = load_motion(tile.state, lane)
+        slopes = load_slopes(tile.result, lane)
+        after = end_of_step(before, start, slopes, held, h, ship)
+        end_substep(tile, lane, after, h, ship)
 
 
-def conclude(tile: Tile, h: float, weight: float, groups: int) -> None:
-    """The slope at a stage, and what it adds to the step."""
-    result, common, sea_common = (
-        tile.result,
-        common_ship(tile.ships),
-        common_sea(tile.ships),
-    )
+def start_of(tile: Tile, lane: int, ship: Ship) -> tuple[Motion, Held]:
+    """State at the start of the step, and what is held over it."""
+    motion = load_motion(tile.state, lane)
+    commands = load_commands(tile.state, lane)
+    limit = ship.rudder_limit
+    rudder = commands.rudder_command * limit
+    order = clip(rudder, -limit, limit)
+    shaft = commands.shaft_command * ship.shaft
+    held = Held(order, shaft, push_of(tile, lane))
+    return start_of_step(motion, shaft), held
+
+
+def state_at_stage(tile: Tile, lane: int, reach: float, ship: Ship) -> Motion:
+    """State `reach` seconds along the rates at the stage before."""
+    start, held = start_of(tile, lane, ship)
+    return stage(start, load_slope(tile.result, lane), reach, held.order, ship)
+
+
+def begin_stage(tile: Tile, reach: float, groups: int) -> None:
+    """Find where ships are at a stage, in the coordinates of their tables."""
+    shared = ship_of(tile, FIRST_LANE)
     for lane in range(groups * GROUP):
-        start, order, shaft, ship, coefficients = start_of(tile, common, lane)
-        at = stage(start, load_slope(result, lane), h, order, ship)
-        pushed = push(
-            load_motion(tile.state, lane),
-            load_sea(tile.state, lane),
-            sea_at(sea_common, tile.ships, lane),
-        )
-        k = rates(at, order, shaft, pushed, coefficients, ship)
-        udot, vdot, rdot = sum_accelerations(at, load_sums(result, lane), ship)
-        k = Rates(
-            k.psi, k.u + udot, k.v + vdot, k.r + rdot, k.p, k.phi, k.q, k.delta, k.n
-        )
-        passed, (ahead, aside) = load_passed(result, lane), way(at)
-        store_slope(result, lane, k)
-        total = added(passed.total, weight, k)
-        store_passed(
-            result,
-            lane,
-            Passed(total, passed.ahead + weight * ahead, passed.aside + weight * aside),
-        )
+        ship, coefficients = shared if SHARED_SHIP else ship_of(tile, lane)
+        motion = state_at_stage(tile, lane, reach, ship)
+        point = point_of(motion, coefficients.terms, ship)
+        store_point(tile.result, lane, point)
+        store_sums(tile.result, lane, NO_SUMS)
 
 
-def added(total: Rates, w: float, k: Rates) -> Rates:
-    """Rates and others times a weight."""
+def sum_rows(tile: Tile, groups: int) -> None:
+    """Sum over the rows of the tables, four at once, so that sums are stored less often."""
+    _, shared = ship_of(tile, FIRST_LANE)
+    for row in range(0, N_ROWS, 4):
+        for lane in range(groups * GROUP):
+            terms = shared.terms
+            if not SHARED_SHIP:
+                terms = load_coefficients(tile.ships, lane).terms
+            point = load_point(tile.result, lane)
+            sums = load_sums(tile.result, lane)
+            sums = add_row(point, sums, terms, row)
+            sums = add_row(point, sums, terms, row + 1)
+            sums = add_row(point, sums, terms, row + 2)
+            sums = add_row(point, sums, terms, row + 3)
+            store_sums(tile.result, lane, sums)
+
+
+def end_stage(tile: Tile, reach: float, weight: float, groups: int) -> None:
+    """Work out the rates at a stage, and add them to those of the step."""
+    shared = ship_of(tile, FIRST_LANE)
+    for lane in range(groups * GROUP):
+        ship, coefficients = shared if SHARED_SHIP else ship_of(tile, lane)
+        _, held = start_of(tile, lane, ship)
+        motion = state_at_stage(tile, lane, reach, ship)
+
+        slope = rates(motion, held, coefficients, ship)
+        sums = load_sums(tile.result, lane)
+        udot, vdot, rdot = sum_accelerations(motion, sums, ship)
+        slope = with_accelerations(slope, udot, vdot, rdot)
+        slopes = load_slopes(tile.result, lane)
+        store_slope(tile.result, lane, slope)
+        store_slopes(tile.result, lane, add_rates(slopes, weight, slope))
+
+
+def with_accelerations(k: Rates, udot: float, vdot: float, rdot: float) -> Rates:
+    """Rates with more accelerations in surge, sway and yaw."""
     return Rates(
-        total.psi + w * k.psi,
-        total.u + w * k.u,
-        total.v + w * k.v,
-        total.r + w * k.r,
-        total.p + w * k.p,
-        total.phi + w * k.phi,
-        total.q + w * k.q,
-        total.delta + w * k.delta,
-        total.n + w * k.n,
+        x=k.x,
+        y=k.y,
+        psi=k.psi,
+        u=k.u + udot,
+        v=k.v + vdot,
+        r=k.r + rdot,
+        p=k.p,
+        phi=k.phi,
+        q=k.q,
+        delta=k.delta,
+        n=k.n,
     )
-
-
-def arrive(tile: Tile, h: float, groups: int) -> None:
-    """Ships at the end of the step."""
-    common, sea_common = common_ship(tile.ships), common_sea(tile.ships)
-    for lane in range(groups * GROUP):
-        start, order, _, ship, _ = start_of(tile, common, lane)
-        passed, before = load_passed(tile.result, lane), load_motion(tile.state, lane)
-        p = sea_at(sea_common, tile.ships, lane)
-        pushed = push(before, load_sea(tile.state, lane), p)
-        after = arrival(
-            before,
-            start,
-            passed.total,
-            passed.ahead,
-            passed.aside,
-            order,
-            h,
-            pushed,
-            ship,
-        )
-        store_motion(tile.state, lane, end_of_step(tile, lane, after, h, ship, p))
-
-
-#: What stands between the loops, by the names of `shipgym.engine.places`.
-ROOM = {"point": Point, "sums": Sums, "slope": Rates, "passed": Passed}

@@ -89,7 +89,7 @@ def _readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, s
     lines["rudder"] = f"{degrees(state['delta']):+.1f} deg"
     if "cross_track" in engine.task.info_names:
         lines["cross-track"] = f"{engine.info('cross_track')[lane]:+.0f} m"
-    return {**lines, "reward": f"{engine.shown.outcomes[0, lane]:+.3f}"}
+    return {**lines, "reward": f"{engine.outputs.outcomes[0, lane]:+.3f}"}
 
 
 def _bearing(angle: float) -> str:

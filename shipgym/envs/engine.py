@@ -4,7 +4,6 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from itertools import pairwise
 from typing import Any
 
 import gymnasium
@@ -13,12 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
-from shipgym.engine import episodes
-from shipgym.engine.addresses import addresses
+from shipgym.engine.compiling import entry_of
+from shipgym.engine.episode_program import EpisodeProgram, episode_program
+from shipgym.engine.episodes import BEGIN, BEGIN_NEXT, STEP, STEP_AND_BEGIN
 from shipgym.engine.records import LANES
-from shipgym.engine.voyages import Voyages, voyages
 from shipgym.envs.lanes import Lanes
-from shipgym.envs.outputs import STEP_OUTCOME, Outputs
+from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES
 from shipgym.envs.plain_python import plain_loop
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
@@ -27,7 +26,6 @@ from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task, course_keeping_task
 
 Observation = NDArray[np.float32]
-N_FIXED = 22  # words of a loop's world before those of its outputs
 
 
 class Engine(Lanes):
@@ -66,9 +64,11 @@ class Engine(Lanes):
         allow_unstable: bool = False,
         threads: int = 1,
         model_index: int | None = None,
-        loop: Callable[[Voyages], Any] | None = None,
+        loop: Callable[[EpisodeProgram], Any] | None = None,
     ) -> None:
-        self.remade: Callable[..., Engine] = partial(
+        check_whole(num_envs, "num_envs", at_least=1)
+        check_whole(threads, "threads", at_least=1)
+        self.rebuild: Callable[..., Engine] = partial(
             Engine,
             models,
             num_envs,
@@ -76,141 +76,114 @@ class Engine(Lanes):
             allow_unstable=allow_unstable,
             threads=threads,
         )
-        for name, count in (("num_envs", num_envs), ("threads", threads)):
-            check_whole(count, name, at_least=1)
-        fleet = [models] if isinstance(models, ShipModel) else list(models)
-        if len(fleet) not in (1, num_envs):
-            raise InputError(
-                f"models: {len(fleet)} found, expected 1 or one for each of {num_envs}"
-                " lanes"
-            )
-        refuse_unstable(fleet, allow_unstable)
-        model, task = fleet[0], task or course_keeping_task()
-        if any(other.vessel is not model.vessel for other in fleet):
-            raise InputError(
-                "models: of several structures, expected one structure in one engine"
-            )
+        ships = [models] if isinstance(models, ShipModel) else list(models)
+        _check_ships(ships, num_envs, allow_unstable)
+        model = ships[0]
+        task = task or course_keeping_task()
         task.check_fits(model)
+
         self.pool = (randomisation or Randomisation()).ships(model, task.seas)
         drawn = len(self.pool) > 1
-        if drawn and len(fleet) > 1:
+        if drawn and len(ships) > 1:
             raise InputError(
-                "models: several lanes' ships and a pool of ships, expected one of"
-                " the two"
+                "models: expected a ship for each lane or a pool of ships, got both"
             )
         windy = any(not sea.calm for _, sea in self.pool)
         if model_index is not None:
-            check_whole(
-                model_index, "model_index", at_least=0, at_most=len(self.pool) - 1
-            )
+            last = len(self.pool) - 1
+            check_whole(model_index, "model_index", at_least=0, at_most=last)
             self.pool = [self.pool[model_index]] * len(self.pool)
-        own = self.pool if drawn else [(one, task.seas[0]) for one in fleet]
-        made = voyages(
-            model.vessel, task.definition, task.instruments(windy), windy, len(own) == 1
-        )
-        super().__init__(made, model, task, num_envs, own, drawn)
-        self._connect(min(threads, len(self._states)))
-        self._run = (loop or self._compiled)(
-            made
-        )  # last, when nothing is left that may be refused
-        self.reset(np.arange(num_envs))
+        own = self.pool if drawn else [(ship, task.seas[0]) for ship in ships]
 
-    def _compiled(self, made: Voyages) -> Any:
-        try:
-            run = made.run
-        except InputError as error:
-            raise InputError(
-                fault_in_python(self.model, self.task) or str(error)
-            ) from None
-        cost, where = (
-            asked(made.task.worst_cost, self.task.settings),
-            made.task.reward_source,
+        program = episode_program(
+            model.compiled,
+            task.definition,
+            task.instruments(windy),
+            windy,
+            len(own) == 1,
         )
-        check_number(cost, f"{where}: worst_cost", at_least=0.0)
-        return run
-
-    def _connect(self, threads: int) -> None:
-        """Tell the loops where the arrays are: a world for each thread, with its share of the tiles."""
-        # the first share is done by the thread that asks; others begin when there is
-        # one for them
-        self._threads = ThreadPoolExecutor(max(threads - 1, 1), "shipgym")
-        shares = list(
-            pairwise(
-                np.linspace(0, len(self._states), threads + 1).astype(int).tolist()
-            )
-        )
-        self._actions = np.zeros((self.task.n_commands, self.num_envs), np.float32)
+        super().__init__(program, model, task, num_envs, own, drawn, threads)
         self._orders = self._actions.T
-        self._which = np.zeros(self.num_envs, dtype=np.bool_)
         self.all_lanes = np.ones(self.num_envs, dtype=np.bool_)
         self.all_lanes.flags.writeable = False
-        words = addresses(
-            [
-                self._states,
-                self._keys,
-                self._settings,
-                self._pool,
-                self._ships,
-                self._rows,
-                self._which,
-                self._actions,
-            ]
-        )
-        self._results = [np.zeros(self._voyages.result.n_rows * LANES) for _ in shares]
-        self._worlds = [
-            np.array([*words, *[0] * 9, *share, *addresses([result])], dtype=np.int64)
-            for share, result in zip(shares, self._results, strict=True)
-        ]
-        self.show_anew()
+        # threads begin when there is a share for them
+        self._threads = ThreadPoolExecutor(max(self.n_shares - 1, 1), "shipgym")
+        self.renew_outputs()
+        # last, when nothing is left that may be refused
+        self._run = (loop or self._compiled)(program)
+        self.reset(np.arange(num_envs))
 
-    def show_anew(self) -> None:
-        """Let what comes next be written into new arrays, so that those that were given may be kept."""
-        self._write_into(self._outputs.take())
+    def _compiled(self, program: EpisodeProgram) -> Any:
+        """Return the loop of a program; InputError names what does not compile."""
+        try:
+            run = entry_of(program.run)
+        except InputError as error:
+            fault = fault_in_python(self.model, self.task)
+            raise InputError(fault or str(error)) from None
+        cost = asked(program.task.worst_cost, self.task.settings)
+        where = f"{program.task.reward_source}: worst_cost"
+        check_number(cost, where, at_least=0.0)
+        return run
+
+    def renew_outputs(self) -> None:
+        """Write the next outputs into new arrays: those that were given stay as they are."""
+        self.outputs = self._output_pool.take()
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go on from what `get_state` of an engine made alike gave; InputError for another state."""
+        """Go on from what `get_state` gave, of this engine or one of the same arguments.
+
+        InputError for another state.
+        """
         self.check_state(state)
         self.remember(state)
-        self.show_anew()
-        for name in ("observations", "outcomes", "flags"):
-            getattr(self.shown, name)[:] = state[name]
+        self.renew_outputs()
+        self.outputs.observations[:] = state["observations"]
+        self.outputs.outcomes[:] = state["outcomes"]
+        self.outputs.flags[:] = state["flags"]
 
-    def _write_into(self, outputs: Outputs) -> None:
-        self.shown = outputs
-        for world in self._worlds:
-            world[N_FIXED : N_FIXED + len(outputs.words)] = outputs.words
+    def advance(self, begin_ended: bool = False, anew: bool = False) -> int:
+        """Take one control interval with the commands as they stand.
 
-    def advance(self, next_ones: bool = False, anew: bool = False) -> int:
-        """One control interval with the commands as they stand; returns how many episodes ended.
-
-        With `next_ones` lanes whose episode was over begin the next one, and do not
+        With `begin_ended` lanes whose episode was over begin the next one, and do not
         stay. With `anew` it is written into new arrays, so that those that were given
-        may be kept. Raises InputError if a command is not finite; nothing is changed
-        then.
+        may be kept. Returns how many episodes ended. Raises InputError if a command is
+        not finite; nothing is changed then.
         """
-        before = self.shown
+        before = self.outputs
         if anew:
-            self.show_anew()
-        asked = episodes.STEP_AND_BEGIN if next_ones else episodes.STEP
-        waiting = [
-            self._threads.submit(self._run, world, asked) for world in self._worlds[1:]
-        ]
-        counts = [
-            self._run(self._worlds[0], asked),
-            *(share.result() for share in waiting),
-        ]
-        if episodes.REFUSED in counts:
-            self._write_into(before)
+            self.renew_outputs()
+        asked = STEP_AND_BEGIN if begin_ended else STEP
+        if self.n_shares == 1:
+            n_ended: int = self._run(self._memory, self.outputs.memory, 0, asked)
+        else:
+            n_ended = self._run_shares(asked)
+        if n_ended < 0:  # `REFUSED`, in every share
+            self.outputs = before
             lane, which = np.argwhere(~np.isfinite(self._orders))[0]
             raise InputError(
-                f"actions: {self._orders[lane, which]} found in lane {lane}, expected"
-                " numbers in [-1, 1]"
+                f"actions: expected numbers in [-1, 1], got"
+                f" {self._orders[lane, which]} in lane {lane}"
             )
-        return sum(counts)
+        return n_ended
+
+    def _run_shares(self, asked: int) -> int:
+        """Let threads step their shares of the ships; the first is done by this one."""
+        run = partial(self._run, self._memory, self.outputs.memory)
+        others = [
+            self._threads.submit(run, share, asked) for share in range(1, self.n_shares)
+        ]
+        n_ended: int = run(0, asked)
+        for share in others:
+            n_ended += share.result()
+        return n_ended
 
     def step_of_one(self) -> Callable[[], int]:
-        """The step of an engine of one lane, whose arrays stay the same, without looking at them again."""
-        return partial(self._run, self._worlds[0], episodes.STEP)
+        """Return the step of an engine of one lane, whose arrays stay the same.
+
+        What it returns is the number of episodes that ended, or
+        `shipgym.engine.episodes.REFUSED`.
+        """
+        return partial(self._run, self._memory, self.outputs.memory, 0, STEP)
 
     def reset(self, seeds: ArrayLike) -> Observation:
         """Begin in each lane the episode of the single environment's `reset(seed=...)`.
@@ -223,31 +196,37 @@ class Engine(Lanes):
     def begin(
         self, keys: ArrayLike, episodes: ArrayLike = 0, mask: ArrayLike = True
     ) -> Observation:
-        """Begin an episode in the lanes of a mask, the others go on; returns observations as `reset` does.
+        """Begin an episode in the lanes of a mask; return observations as `reset` does.
 
         An episode is a function of its key (`episode_keys`) and number under that key
         alone; keys, uint64, numbers and mask are of shape (num_envs,).
         """
-        which = np.array(np.broadcast_to(mask, self.num_envs), dtype=np.bool_)
-        lanes = np.flatnonzero(which)
+        chosen = np.array(np.broadcast_to(mask, self.num_envs), dtype=np.bool_)
+        lanes = np.flatnonzero(chosen)
+        tiles, lanes_in_tile = np.divmod(lanes, LANES)
         for row, words in enumerate((keys, episodes)):
-            all_words = np.broadcast_to(
-                np.asarray(words).astype(np.uint64), (self.num_envs,)
-            )
-            self._keys[lanes // LANES, row, lanes % LANES] = all_words[lanes]
-        self._begin(which, next_one=False)
+            of_all = np.asarray(words).astype(np.uint64)
+            of_all = np.broadcast_to(of_all, (self.num_envs,))
+            self._random[tiles, row, lanes_in_tile] = of_all[lanes]
+        self._begin(chosen, BEGIN)
         return self.observations
 
-    def begin_next(self, which: NDArray[np.bool_]) -> None:
-        """Begin the next episode where `which`, shape (num_envs,), says so; `step`'s last answer stays."""
-        self._begin(which, next_one=True)
+    def begin_next(self, chosen: NDArray[np.bool_]) -> None:
+        """Begin the next episode in the lanes of a mask, shape (num_envs,).
 
-    def _begin(self, which: NDArray[np.bool_], next_one: bool) -> None:
-        self._which[:] = which
+        Reward and ends of the last step stay.
+        """
+        outputs = self.outputs
+        answer = outputs.outcomes[:ANSWER_OUTCOMES].copy()
+        ends = outputs.flags[:ANSWER_FLAGS].copy()
+        self._begin(chosen, BEGIN_NEXT)
+        outputs.outcomes[:ANSWER_OUTCOMES] = answer
+        outputs.flags[:ANSWER_FLAGS] = ends
+
+    def _begin(self, chosen: NDArray[np.bool_], asked: int) -> None:
+        self._chosen[:] = chosen
         try:
-            self._run(
-                self._worlds[0], episodes.BEGIN_NEXT if next_one else episodes.BEGIN
-            )
+            self._run(self._memory, self.outputs.memory, 0, asked)
         except IndexError as error:  # of a user's function
             why = (
                 fault_in_python(self.model, self.task)
@@ -265,33 +244,35 @@ class Engine(Lanes):
         array = as_numbers(actions, "actions")
         if array.shape != self._orders.shape:
             raise InputError(
-                f"actions: shape {array.shape} found, expected {self._orders.shape}"
+                f"actions: expected shape {self._orders.shape}, got {array.shape}"
             )
         self._orders[...] = array
 
     def step(
         self, actions: ArrayLike
     ) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
-        """One control interval by orders (`order`); a lane whose episode is over stays and earns 0.
+        """Take one control interval by orders (`order`).
 
-        Returns float32 observations of shape (num_envs, n_observations), rewards, and
+        A lane whose episode is over stays as it is and earns 0. Returns float32 observations of shape (num_envs, n_observations), rewards, and
         whether episodes were terminated and truncated, of shape (num_envs,); copies.
         """
         self.order(actions)
         self.advance()
-        shown = self.shown
         return (
             self.observations,
-            shown.outcomes[0].copy(),
-            shown.terminated.copy(),
-            shown.truncated.copy(),
+            self.outputs.outcomes[0].copy(),
+            self.outputs.terminated.copy(),
+            self.outputs.truncated.copy(),
         )
 
     def refuse_rewards(self) -> None:
-        """Raise an InputError that says which part of the last rewards is not finite, in which lane."""
-        bad = ~np.isfinite(self.reward_parts)
-        sums = ~np.isfinite(self.shown.outcomes[0])
-        lane, part = np.argwhere(bad)[0] if bad.any() else (int(np.argmax(sums)), 0)
+        """Raise an InputError that names the last reward that is not finite."""
+        parts_at_fault = np.argwhere(~np.isfinite(self.reward_parts))
+        if len(parts_at_fault):
+            lane, part = parts_at_fault[0]
+        else:  # finite numbers whose sum is not
+            lane = np.argmax(~np.isfinite(self.outputs.outcomes[0]))
+            part = 0
         name = self.task.reward_parts[part]
         raise InputError(
             f"{self.task.definition.reward_source}: {name} is {self.info(name)[lane]}"
@@ -308,14 +289,13 @@ class Engine(Lanes):
     @property
     def observations(self) -> Observation:
         """What the autopilots see, float32 array of shape (num_envs, n_observations), a copy."""
-        return self.shown.observations.copy()
+        return self.outputs.observations.copy()
 
     def info(self, name: str) -> Floats:
         """One entry of `info` for each lane, shape (num_envs,), a view of the last step."""
-        row: Floats = self.shown.outcomes[
-            STEP_OUTCOME + self.task.info_names.index(name)
-        ]
-        return row
+        row = ANSWER_OUTCOMES + self.task.info_names.index(name)
+        entry: Floats = self.outputs.outcomes[row]
+        return entry
 
     @property
     def reward_parts(self) -> Floats:
@@ -323,8 +303,21 @@ class Engine(Lanes):
         return np.stack([self.info(name) for name in self.task.reward_parts], axis=-1)
 
 
+def _check_ships(
+    ships: Sequence[ShipModel], num_envs: int, allow_unstable: bool
+) -> None:
+    """Refuse another number of ships than lanes, several structures, unstable models."""
+    if len(ships) not in (1, num_envs):
+        raise InputError(
+            f"models: expected 1, or one for each of {num_envs} lanes, got {len(ships)}"
+        )
+    refuse_unstable(ships, allow_unstable)
+    if any(other.compiled is not ships[0].compiled for other in ships):
+        raise InputError("models: expected one structure in one engine, got several")
+
+
 def fault_in_python(model: ShipModel, task: Task) -> str:
-    """What plain Python finds wrong with the functions of a task in its first step; empty if nothing.
+    """Say what plain Python finds wrong with a task in its first step; empty if nothing.
 
     Errors of arithmetic are passed over: compiled code goes on with infinities and NaN.
     """
@@ -354,17 +347,17 @@ def as_array(actions: Any) -> NDArray[Any]:
 
 
 def as_numbers(actions: Any, where: str) -> NDArray[Any]:
-    """Actions as an array; raises InputError for texts, objects, complex numbers and ragged lists."""
+    """Return actions as an array; InputError for what is no array of real numbers."""
     array = as_array(actions)
     if array.dtype.kind not in "fiub":
         raise InputError(
-            f"{where}: {actions!r} found, expected real numbers, see the action space"
+            f"{where}: expected real numbers, got {actions!r}; see the action space"
         )
     return array
 
 
 def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:
-    """Keys of the kernels' random numbers for seeds of environments, of the same shape."""
+    """Keys of episodes for seeds of environments, of the same shape."""
     array = np.asarray(seeds)
     keys = [
         episode_key(gymnasium.utils.seeding.np_random(int(seed))[0])
@@ -374,21 +367,24 @@ def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:
 
 
 def episode_key(random: np.random.Generator) -> int:
-    """All that an environment's generator is asked for."""
+    """Draw the key of an episode: all that an environment's generator is asked for."""
     return int(random.integers(2**63))
 
 
 def refuse_unstable(models: Iterable[ShipModel], allow_unstable: bool = False) -> None:
-    """InputError for models found unstable when they were identified; a warning if `allow_unstable`."""
-    marked = [
-        model.name
-        for model in models
-        if (model.provenance or {}).get("stable") is False
-    ]
+    """Refuse models that were found unstable when they were identified.
+
+    InputError, or a warning if `allow_unstable`.
+    """
+    marked = ""
+    for model in models:
+        provenance = model.provenance or {}
+        if provenance.get("stable") is False:
+            marked = marked or model.name
     if not marked:
         return
     found = (
-        f"model {marked[0]!r} was found unstable when it was identified: it runs away"
+        f"model {marked!r} was found unstable when it was identified: it runs away"
         " where ships do not"
     )
     if not allow_unstable:

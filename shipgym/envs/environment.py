@@ -204,7 +204,7 @@ class ShipsEnv:
             if name not in self._by_arguments
         }
         state = self.get_state() if self._begun else None
-        return remade, (type(self), self._arguments, state, attributes)
+        return rebuild, (type(self), self._arguments, state, attributes)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Any:
         make, (kind, arguments, state, attributes) = self.__reduce__()
@@ -262,7 +262,7 @@ class ShipsEnv:
             if "waypoints" in asked
             else self.task
         )
-        return self._own_engine.remade(task=task, model_index=asked.get("model_index"))
+        return self._own_engine.rebuild(task=task, model_index=asked.get("model_index"))
 
     def _take(self, options: Mapping[str, Any] | None, *more: str) -> Any:
         """Do what the options of a reset ask for, until the next; returns a state that is asked for.
@@ -314,7 +314,7 @@ class ShipsEnv:
                 artist.begin(self._engine) if begun else artist.note(self._engine)
 
 
-def remade(
+def rebuild(
     kind: Any, arguments: dict[str, Any], state: Any, attributes: dict[str, Any]
 ) -> Any:
     """An environment made again."""

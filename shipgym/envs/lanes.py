@@ -1,4 +1,4 @@
-"""The state of many ships by lane: laid out, read, written, copied, taken and put back between two steps."""
+"""The state of many ships by lane: laid out, read, written, copied between two steps."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,12 +8,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_table, shown
-from shipgym.engine.envelope import Envelope
-from shipgym.engine.episodes import Rules
+from shipgym.engine.envelope import Envelope, Four, Triangle
+from shipgym.engine.episode_program import EpisodeProgram
+from shipgym.engine.lane_records import Rules
+from shipgym.engine.memory import Arguments, allocated, table_in, zeros
 from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES, flat, leaves
-from shipgym.engine.voyages import Voyages
-from shipgym.envs.outputs import STEP_FLAGS, STEP_OUTCOME, OutputPool, Outputs
+from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES, OutputPool, Outputs
 from shipgym.envs.randomisation import Pool
 from shipgym.errors import InputError
 from shipgym.sea.weather_column import weather_column
@@ -24,85 +25,139 @@ from shipgym.trials.sensors import SEA_TRIAL
 #: Settings of a bridge's instruments, and the channel of a sea trial whose noise they
 #: take.
 SENSOR_NOISE = {"heading": "psi", "yaw_rate": "r", "speed": "u", "position": "x"}
+ANSWER = ("reward", "terminated", "truncated")  # outcomes before those of `info`
 
 
 class Lanes:
     """The arrays that loops work on; `Engine` steps them.
 
-    `own` are the lanes' ships and seas, one for all or one each; or, if `drawn`, the
-    pool of which each episode draws one.
+    Parameters
+    ----------
+    program : EpisodeProgram
+        Says where each number lies.
+    model : ShipModel
+        The ship, or the first of them.
+    task : Task
+    num_envs : int
+    own : Pool
+        Ships and seas of the lanes, one for all or one each; or, if `drawn`, the pool
+        of which each episode draws one.
+    drawn : bool
+    threads : int
+        That share the lanes.
     """
 
-    shown: Outputs  # what the last step answered
+    outputs: Outputs  # of the last step
 
     def __init__(
         self,
-        made: Voyages,
+        program: EpisodeProgram,
         model: ShipModel,
         task: Task,
         num_envs: int,
         own: Pool,
         drawn: bool,
+        threads: int,
     ) -> None:
         self.model, self.task, self.num_envs = model, task, num_envs
-        self.windy, self.dt = made.windy, task.interval(model)
-        self._voyages = made  # says where each number stands
-        tiles = -(-num_envs // LANES)
-        columns = ship_columns(own, self.windy, task, model, drawn)
-        self._pool = columns if drawn else np.zeros((0, columns.shape[1]))
-        self._ships = ship_tiles(columns, tiles, len(own) > 1)
-        plan = int(task.definition.plan_length(task.settings))
-        self._states = np.zeros((tiles, (made.state.n_rows + plan) * LANES))
-        self._keys = np.zeros(
-            (tiles, 3, LANES), dtype=np.uint64
-        )  # words of the random numbers
-        rules = Rules(
-            self.dt,
-            task.substeps(model),
-            task.episode_steps,
-            task.max_envelope_distance,
-            task.least_shaft(model),
-        )
-        noise = {
-            field: SEA_TRIAL[channel].noise * task.noise
-            for field, channel in SENSOR_NOISE.items()
-        }
-        sensor = task.sensor_settings or made.sensors.make_settings(
-            noise if made.sensors.noise else {}
-        )
-        self._settings = np.array(
-            [*rules, *flat(sensor), *flat(task.settings)], dtype=float
-        )
+        self.windy = program.windy
+        self.dt = task.interval(model)
+        self.program = program
         self.flag_names = [name for name in task.info_names if name in task.flags]
         observed = [quantity.path for quantity in task.observed(model)]
-        self._rows = self._shown_rows(observed)
-        self._outputs = OutputPool(
+        self._output_pool = OutputPool(
             num_envs,
             len(observed),
-            STEP_OUTCOME + len(task.info_names),
-            STEP_FLAGS + len(self.flag_names),
+            ANSWER_OUTCOMES + len(task.info_names),
+            ANSWER_FLAGS + len(self.flag_names),
         )
 
-    def _shown_rows(self, observed: Sequence[str]) -> NDArray[np.int64]:
-        """How many observations, outcomes and flags there are, and the offsets of their rows."""
-        made = self._voyages
-        outcomes = [
-            LANES * made.result["outcome"].row(name)
-            for name in ("reward", "terminated", "truncated")
-        ]
-        rows = [
-            [LANES * made.result["observation"].row(path) for path in observed],
-            [*outcomes, *(made.info_offset(name) for name in self.task.info_names)],
-            [*outcomes[1:], *(made.info_offset(name) for name in self.flag_names)],
-        ]
-        return np.array(
-            [*map(len, rows), *(row for kind in rows for row in kind)], dtype=np.int64
+        tiles = -(-num_envs // LANES)
+        columns = ship_columns(own, self.windy, task, model, drawn)
+        pool = columns if drawn else np.zeros((0, columns.shape[1]))
+        ships = ship_tiles(columns, tiles, len(own) > 1)
+        settings = self._settings()
+        shares = lane_shares(tiles, threads)
+        rows = self._output_rows(observed)
+        plan = int(task.definition.plan_length(task.settings))
+        n_state = (program.state_rows.n_rows + plan) * LANES
+
+        shapes: dict[str, tuple[Any, int, int]] = {
+            "states": (np.float64, tiles, n_state),
+            "random": (np.uint64, tiles, program.random_rows.n_rows * LANES),
+            "ships": (np.float64, *ships.shape),
+            "pool": (np.float64, 1, pool.size),
+            "settings": (np.float64, 1, len(settings)),
+            "results": (np.float64, len(shares), program.result_rows.n_rows * LANES),
+            "shares": (np.int64, *shares.shape),
+            "actions": (np.float32, task.n_commands, num_envs),
+            "chosen": (np.bool_, 1, num_envs),
+            **{name: (np.int64, 1, len(given)) for name, given in rows.items()},
+        }
+        tables = self._allocate(shapes)
+        self._states = tables["states"]
+        self._random = tables["random"].reshape(tiles, -1, LANES)
+        self._ships = tables["ships"]
+        self._actions = tables["actions"]
+        self._chosen = tables["chosen"][0]
+        self.n_shares = len(shares)
+        tables["ships"][:] = ships
+        tables["pool"][:] = pool.ravel()
+        tables["settings"][:] = settings
+        tables["shares"][:] = shares
+        for name, given in rows.items():
+            tables[name][:] = given
+
+    def _allocate(
+        self, shapes: Mapping[str, tuple[Any, int, int]]
+    ) -> dict[str, NDArray[Any]]:
+        """Make the memory for tables of such types, rows and columns; return them."""
+        n_arguments = len(leaves(Arguments))
+        blocks, end = allocated(shapes, first=n_arguments)
+        arguments = Arguments(**blocks, **self._output_pool.blocks)
+        self._memory = zeros(end)
+        self._memory[:n_arguments].view(np.int64)[:] = flat(arguments)
+        return {
+            name: table_in(self._memory, blocks[name], dtype)
+            for name, (dtype, *_) in shapes.items()
+        }
+
+    def _settings(self) -> list[float]:
+        """Settings of engine, sensor set and task, one after another."""
+        task = self.task
+        rules = Rules(
+            dt=self.dt,
+            substeps=task.substeps(self.model),
+            time_limit=task.episode_steps,
+            largest_distance=task.max_envelope_distance,
+            least_shaft=task.least_shaft(self.model),
         )
+        sensors = self.program.sensors
+        noise = {}
+        if sensors.noise:
+            for name, channel in SENSOR_NOISE.items():
+                noise[name] = SEA_TRIAL[channel].noise * task.noise
+        sensor_settings = task.sensor_settings or sensors.make_settings(noise)
+        return [*flat(rules), *flat(sensor_settings), *flat(task.settings)]
+
+    def _output_rows(self, observed: Sequence[str]) -> dict[str, list[int]]:
+        """Entries of a tile's results at which rows of outputs begin."""
+        program = self.program
+        rows = program.result_rows
+        observations = [rows["observation"].row(path) for path in observed]
+        answer = [rows["outcome"].row(name) for name in ANSWER]
+        info = [program.info_row(name) for name in self.task.info_names]
+        flags = [program.info_row(name) for name in self.flag_names]
+        return {
+            "observed": [LANES * row for row in observations],
+            "informed": [LANES * row for row in answer + info],
+            "flagged": [LANES * row for row in answer[1:] + flags],
+        }
 
     @property
     def episodes(self) -> NDArray[np.uint64]:
         """Number of each lane's episode under its key, shape (num_envs,), a copy."""
-        return self._keys[:, 1].reshape(-1)[: self.num_envs].copy()
+        return self._random[:, 1].reshape(-1)[: self.num_envs].copy()
 
     @property
     def steps(self) -> Floats:
@@ -110,138 +165,151 @@ class Lanes:
         return self.read("steps")
 
     def read(self, name: str) -> Floats:
-        """One number of the state for each lane by its name (`u`, `delta`, `course`, `steps`), a copy."""
-        row = self._voyages.row(name) * LANES
+        """Read one number of the state for each lane, a copy.
+
+        Its name is that of a field of `Motion`, `Commands`, `EpisodeCounters`, the
+        state of the task or `Sea`: `u`, `rudder_command`, `steps`.
+        """
+        row = self.program.row(name) * LANES
         return self._states[:, row : row + LANES].reshape(-1)[: self.num_envs].copy()
 
     def write(self, name: str, values: ArrayLike) -> None:
-        """Write one number of the state in all lanes: for trials of what might be, see `read`."""
-        row = self._voyages.row(name) * LANES
+        """Write one number of the state in all lanes, see `read`."""
+        row = self.program.row(name) * LANES
         lanes = self._states[:, row : row + LANES].copy().reshape(-1)
         lanes[: self.num_envs] = values
         self._states[:, row : row + LANES] = lanes.reshape(-1, LANES)
 
     def physical_state(self) -> dict[str, Floats]:
-        """State, course, commands and, unless it is calm, the weather, SI units, each of shape (num_envs,).
+        """State, course, commands and, unless it is calm, weather, in SI units.
 
-        Heading and yaw rate are without the first-order motion in waves, which has
-        names of its own, as has the weather (`weather_rows.CHANNEL_NAMES`). `set_point`
-        is the heading to steer, rad.
+        Each is of shape (num_envs,). Heading and yaw rate are without the first-order
+        motion in waves, which has names of its own, as has the weather
+        (`shipgym.engine.trajectories.SeaChannels`). `set_point` is the heading to
+        steer, rad.
         """
         state = {name: self.read(name) for name in self.model.state_names}
-        if "course" in self._voyages.state["state"].present:
+        if "course" in self.program.state_rows["task_state"].present:
             state["set_point"] = self.read("course")
-        state["delta_command"] = self.read("rudder_command") * self._ship_row(
-            "rudder_limit"
-        )
+        limit = self._ship_number("rudder_limit")
+        state["delta_command"] = self.read("rudder_command") * limit
         if "n" in self.model.command_names:
-            state["n_command"] = self.read("shaft_command") * self._ship_row("shaft")
+            shaft = self._ship_number("shaft")
+            state["n_command"] = self.read("shaft_command") * shaft
         return {**state, **self._weather_now()} if self.windy else state
 
     def _weather_now(self) -> dict[str, Floats]:
-        """What the weather is in each lane, by the names of the channels of trials."""
+        """Weather of each lane, by the names of the channels of trials."""
         roll = ["phi_wave", "p_wave"] if "phi" in self.model.state_names else []
         names = ["psi_wave", "r_wave", *roll, "current_north", "current_east"]
         now = {name: self.read(name) for name in names}
-        now["wind_speed"] = self._ship_row("wind_speed") + self.read("gust")
-        return {
-            **now,
-            "wind_from": np.arctan2(self.read("wind_east"), self.read("wind_north")),
-        }
+        now["wind_speed"] = self._ship_number("wind_speed") + self.read("gust")
+        now["wind_from"] = np.arctan2(self.read("wind_east"), self.read("wind_north"))
+        return now
 
-    def _ship_row(self, name: str) -> Floats:
+    def _ship_number(self, name: str) -> Floats:
         """One number of the ships, or of their sea, for each lane, shape (num_envs,)."""
-        layout = self._voyages.ship
-        rows = layout["ship"] if name in layout["ship"].present else layout["sea"]
-        if self._voyages.shared:
-            return np.full(self.num_envs, self._ships[0, rows.row(name)])
-        first = rows.row(name) * LANES
-        return self._ships[:, first : first + LANES].reshape(-1)[: self.num_envs].copy()
+        layout = self.program.ship_rows
+        record = "ship" if name in layout["ship"].present else "sea_parameters"
+        row = layout[record].row(name)
+        if self.program.shared:
+            return np.full(self.num_envs, self._ships[0, row])
+        lanes = self._ships[:, row * LANES : (row + 1) * LANES]
+        return lanes.reshape(-1)[: self.num_envs].copy()
 
     def waypoints(self, lane: int = 0) -> Floats | None:
-        """North and east of the path of a lane's episode, m, shape (n, 2); None where there is none."""
-        plan = lanes_of(self._states)[:, self._voyages.state.n_rows :]
+        """North and east of the path of a lane's episode, m, shape (n, 2).
+
+        None where there is none.
+        """
+        plan = lanes_of(self._states)[:, self.program.state_rows.n_rows :]
         if plan.shape[1] == 0 or "waypoints" not in self.task.definition.settings:
             return None
         tile, lane = divmod(lane, LANES)
         return plan[tile, :, lane].reshape(-1, 2).copy()
 
     def path_metres(self, name: str) -> float | None:
-        """A setting of the path that is in ship lengths, `corridor` or `turn_radius`, m; None without one."""
+        """Return a setting of the path that is in ship lengths, in m.
+
+        It is `corridor` or `turn_radius`; None for a task without one.
+        """
         lengths = getattr(self.task, name, None)
-        return (
-            None
-            if lengths is None
-            else float(lengths * self.model.particulars["length"])
-        )
+        if lengths is None:
+            return None
+        return float(lengths * self.model.particulars["length"])
 
     def get_state(self) -> dict[str, Any]:
         """All that `set_state` needs to go on from here, copies by name."""
-        shown, gear = self.shown, self._voyages.state
-        rows = [
-            f"{name}.{path}"
-            for name, place in gear.rows.items()
-            for path in place.present
-        ]
+        rows = []
+        for name, record in self.program.state_rows.rows.items():
+            rows += [f"{name}.{path}" for path in record.present]
         made_for = {
             "task": self.task.name,
             "model": self.model.name,
             "num_envs": self.num_envs,
             "rows": rows,
         }
-        outputs = {
-            name: getattr(shown, name).copy()
-            for name in ("observations", "outcomes", "flags")
+        return {
+            "made_for": made_for,
+            **self.memory(),
+            "observations": self.outputs.observations.copy(),
+            "outcomes": self.outputs.outcomes.copy(),
+            "flags": self.outputs.flags.copy(),
         }
-        return {"made_for": made_for, **self.memory(), **outputs}
 
     def check_state(self, state: Mapping[str, Any]) -> None:
-        """Refuse a state that an engine made alike did not give; InputError says what differs."""
+        """Refuse a state that an engine made by other arguments gave.
+
+        InputError says what differs.
+        """
         own = self.get_state()
-        check_table(state, "state", tuple(own), required=own)
-        made_for = check_table(state["made_for"], "state: made_for")
-        for name, expected in own["made_for"].items():
-            if (found := made_for.get(name)) != expected:
+        made_for = own.pop("made_for")
+        check_table(state, "state", ("made_for", *own), required=("made_for", *own))
+        given = check_table(state["made_for"], "state: made_for")
+        for name, expected in made_for.items():
+            if given.get(name) != expected:
                 raise InputError(
-                    f"state: {name} {shown(found)} found, expected {shown(expected)}: a"
-                    " state fits an environment made by the same arguments in the same"
-                    " version"
+                    f"state: {name}: expected {shown(expected)}, got"
+                    f" {shown(given.get(name))}: a state fits an environment made by"
+                    " the same arguments in the same version"
                 )
         for name, expected in own.items():
-            if name != "made_for" and np.shape(state[name]) != np.shape(expected):
-                found = f"of shape {np.shape(state[name])}"
+            if np.shape(state[name]) != np.shape(expected):
                 raise InputError(
-                    f"state: {name} {found} found, expected {np.shape(expected)}"
+                    f"state: {name}: expected shape {np.shape(expected)}, got"
+                    f" {np.shape(state[name])}"
                 )
-        if self._voyages.shared and not np.array_equal(
-            state["ships"], self._ships, equal_nan=True
-        ):
+        same_ship = np.array_equal(state["ships"], self._ships, equal_nan=True)
+        if self.program.shared and not same_ship:
             raise InputError(
-                f"state: of another ship than this {self.model.name!r}, expected the"
-                " same"
+                f"state: expected that of this {self.model.name!r}, got another ship's"
             )
-        lanes = np.moveaxis(lanes_of(state["states"]), 1, 2).reshape(
-            -1, len(self._states[0]) // LANES
-        )
-        for lane, row in np.argwhere(~np.isfinite(lanes[: self.num_envs]))[:1]:
-            name = (*own["made_for"]["rows"], *["plan"] * row)[row]
+        self._check_finite(state, made_for["rows"])
+
+    def _check_finite(self, state: Mapping[str, Any], rows: Sequence[str]) -> None:
+        """Refuse numbers that are not finite in the lanes that hold ships."""
+        by_lane = np.moveaxis(lanes_of(state["states"]), 1, 2)
+        lanes = by_lane.reshape(-1, by_lane.shape[-1])[: self.num_envs]
+        for lane, row in np.argwhere(~np.isfinite(lanes))[:1]:
+            name = rows[row] if row < len(rows) else "plan"
             raise InputError(
-                f"state: {name} in row {lane} is not finite, expected a number"
+                f"state: {name}: expected finite numbers, got none in row {lane}"
             )
         if not np.isfinite(state["observations"]).all():
-            raise InputError("state: observations are not finite, expected numbers")
+            raise InputError("state: observations: expected finite numbers")
 
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their commands, copies by name."""
         return {
             "states": self._states.copy(),
-            "keys": self._keys.copy(),
+            "keys": self._random.copy(),
             "ships": self._ships.copy(),
         }
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from what `memory` of the same engine, or of one made alike, gave."""
-        self._states[:], self._keys[:] = memory["states"], memory["keys"]
+        """Go on from what `memory` gave, of this engine or one of the same arguments."""
+        self._states[:] = memory["states"]
+        self._random[:] = memory["keys"]
         self._ships[:] = memory["ships"]
 
 
@@ -250,52 +318,60 @@ def lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:
     return tiles.reshape(len(tiles), -1, LANES)
 
 
+def lane_shares(tiles: int, threads: int) -> NDArray[np.int64]:
+    """First tile of each thread, and that behind its last, shape (n_shares, 2)."""
+    ends = np.linspace(0, tiles, min(threads, tiles) + 1).astype(np.int64)
+    return np.stack([ends[:-1], ends[1:]], axis=1)
+
+
 def ship_columns(
     pool: Pool, windy: bool, task: Task, base: ShipModel, drawn: bool
 ) -> Floats:
-    """Numbers of ships and of the seas they meet, a row each; the sea worked out once for each kind of ship.
+    """Numbers of ships and of the seas they meet, a row each.
 
-    Ships that are drawn for an episode are seen in the scales of the environment's
-    model.
+    The sea is worked out once for each kind of ship. Ships that are drawn for an
+    episode are seen in the scales of the environment's model.
     """
+    step = task.substep(base)
     known: dict[tuple[int, int], Floats] = {}
     columns = []
     for model, sea in pool:
-        kind = (id(model.particulars), id(sea))
-        if windy and kind not in known:
-            known[kind] = weather_column(
-                model, sea, task.substep(base), task.water_depth
-            )
-        numbers = model.ship_numbers(task.water_depth, task.substep(base))
+        numbers = model.ship_numbers(task.water_depth, step)
         if drawn and model.particulars["length"] == base.particulars["length"]:
             numbers[Ship._fields.index("scale_speed")] = base.particulars["speed"]
+        kind = (id(model.particulars), id(sea))
+        if windy and kind not in known:
+            known[kind] = weather_column(model, sea, step, task.water_depth)
+
         ship = Ship(*numbers[: len(Ship._fields)].tolist())
         scales = [task.scale(path, ship) for path in task.definition.seen]
-        per_scale = [1.0 / scale if scale else 0.0 for scale in scales]
-        columns.append(
-            [*numbers, *envelope_numbers(model), *known.get(kind, ()), *per_scale]
-        )
+        factors = [1.0 / scale if scale else 0.0 for scale in scales]
+        parameters = known.get(kind, np.zeros(0))
+        columns.append([*numbers, *envelope_numbers(model), *parameters, *factors])
     return np.stack(columns)
 
 
 def envelope_numbers(model: ShipModel) -> Floats:
-    """The envelope of a model's data in the order of its record; without one everything is inside."""
+    """Numbers of `Envelope` of a model's data; without data everything is inside."""
     if model.envelope is None:
-        numbers = np.zeros(len(leaves(Envelope)))
-        numbers[:4], numbers[4:8] = -np.inf, np.inf
-        return numbers
+        everything = Envelope(
+            low=Four(-np.inf, -np.inf, -np.inf, -np.inf),
+            high=Four(np.inf, np.inf, np.inf, np.inf),
+            centre=Four(0.0, 0.0, 0.0, 0.0),
+            shape=Triangle(*[0.0] * len(Triangle._fields)),
+        )
+        return np.array(flat(everything))
     data = model.envelope
-    return np.concatenate(
-        [data.low, data.high, data.centre, data.shape[np.triu_indices(4)]]
-    )
+    triangle = data.shape[np.triu_indices(4)]
+    return np.concatenate([data.low, data.high, data.centre, triangle])
 
 
 def ship_tiles(columns: Floats, tiles: int, own: bool) -> Floats:
-    """One vector for all lanes, or a tile for each tile of states."""
+    """Return one vector for all lanes, or a tile for each tile of states."""
     if len(columns) == 1 and not own:
         return columns.copy()
-    rest = np.tile(columns[:1], (max(tiles * LANES - len(columns), 0), 1))
-    lanes = np.concatenate([columns[: tiles * LANES], rest])
-    return np.ascontiguousarray(
-        lanes.reshape(tiles, LANES, -1).transpose(0, 2, 1)
-    ).reshape(tiles, -1)
+    missing = max(tiles * LANES - len(columns), 0)
+    filling = np.tile(columns[:1], (missing, 1))
+    lanes = np.concatenate([columns[: tiles * LANES], filling])
+    by_row = lanes.reshape(tiles, LANES, -1).transpose(0, 2, 1)
+    return np.ascontiguousarray(by_row).reshape(tiles, -1)

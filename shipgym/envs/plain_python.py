@@ -1,6 +1,7 @@
-"""Episodes in plain Python, which look at what a task's and a sensor set's functions give."""
+"""Episodes in plain Python, which look at what functions of task and sensors return."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from numbers import Integral, Real
 from typing import Any
 
@@ -8,22 +9,24 @@ import numpy as np
 
 from shipgym.engine import episodes
 from shipgym.engine.compiling import plain
+from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.engine.motion import Motion
 from shipgym.engine.records import Record, field_types, is_record
-from shipgym.engine.specialise import Part, Specialisation
-from shipgym.engine.voyages import Voyages
+from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
 from shipgym.python_files import asked, place_of
 from shipgym.tasks.contract import Readings
 
 
-def plain_loop(made: Voyages, parts: Mapping[str, Part] | None = None) -> Any:
-    """The loop `Voyages.run` in plain Python, `parts` in place of its own.
+def plain_loop(
+    program: EpisodeProgram, hooks: Mapping[str, Callable[..., Any]] | None = None
+) -> Any:
+    """Return the loop of a program in plain Python, `hooks` in place of its own.
 
-    What a function of the task or of the sensor set raises, or gives in another form
+    What a function of the task or of the sensor set raises, or returns in another form
     than the contract asks, is an InputError that names file, line and function.
     """
-    task = made.task
+    task = program.task
     forms = {
         "task_begin": (Motion, task.State),
         "task_step": (task.State, task.Reward, bool, bool),
@@ -31,71 +34,66 @@ def plain_loop(made: Voyages, parts: Mapping[str, Part] | None = None) -> Any:
         "due": bool,
         "on_event": task.State,
         "worst_cost": float,
-        "measure": made.sensors.Memory,
+        "measure": program.sensors.Memory,
         "readings": Readings,
     }
-    looked_at = {name: _looked_at(made, name, form) for name, form in forms.items()}
-    run = plain(episodes.run, {**made.parts, **looked_at, **(parts or {})})
-    return np.errstate(all="ignore")(
-        run
-    )  # words of random numbers overflow, as they do when compiled
+    checked = {name: _checked(program, name, form) for name, form in forms.items()}
+    run = plain(episodes.run, {**program.hooks, **checked, **(hooks or {})})
+    # words of random numbers overflow, as they do when compiled
+    return np.errstate(all="ignore")(run)
 
 
-def _looked_at(made: Voyages, name: str, form: Any) -> Part:
-    function = Specialisation(made.parts, "plain", None).copy(made.parts[name].function)
-    own = function.__globals__.get(
-        "reward_of_another", function
-    )  # what differs from the task's step
+def _checked(program: EpisodeProgram, name: str, form: Any) -> Callable[..., Any]:
+    """Return a function of the task or the sensor set whose results are looked at."""
+    function = Specialisation(program.hooks).copy(program.hooks[name])
+    # of a task with another's reward, what differs from its own step
+    own = function.__globals__.get("reward_of_another", function)
+    return partial(_result_of, function, own, form)
 
-    def look(*arguments: Any) -> Any:
-        given = asked(function, *arguments)
-        if fault := _fault(given, form, "what it returns"):
-            fault = (
-                fault
-                if own is function
-                else fault.replace("result 2", "what it returns")
-            )  # of a reward
-            raise InputError(f"{place_of(own)}: {fault}")
-        return given
 
-    return Part(look, code=lambda: None, key=name)
+def _result_of(function: Any, own: Any, form: Any, *arguments: Any) -> Any:
+    """Call a function, and refuse what it returns in another form than asked."""
+    given = asked(function, *arguments)
+    fault = _fault(given, form, "what it returns")
+    if fault and own is not function:
+        fault = fault.replace("result 2", "what it returns")  # the reward
+    if fault:
+        raise InputError(f"{place_of(own)}: {fault}")
+    return given
 
 
 def _fault(given: Any, form: Any, name: str) -> str:
-    """Where something differs from a record, a number (float), a truth value (bool) or a tuple of these."""
+    """Say where a value differs from a form; empty if it does not.
+
+    A form is a record, float, bool, or a tuple of forms.
+    """
     if isinstance(form, tuple):
         if isinstance(given, tuple) and len(given) == len(form):
-            each = enumerate(zip(given, form, strict=True), start=1)
-            faults = (_fault(one, kind, f"result {k}") for k, (one, kind) in each)
-            return next(filter(None, faults), "")
+            for k, (item, kind) in enumerate(zip(given, form, strict=True), start=1):
+                if fault := _fault(item, kind, f"result {k}"):
+                    return fault
+            return ""
     elif is_record(form):
         if type(given) is form:
             record: Record = form
-            faults = (
-                _fault(
-                    one, kind if is_record(kind) else float, f"{form.__name__}.{field}"
-                )
-                for one, (field, kind) in zip(
-                    given, field_types(record).items(), strict=True
-                )
-            )
-            return next(filter(None, faults), "")
+            fields = field_types(record).items()
+            for item, (field, kind) in zip(given, fields, strict=True):
+                kind = kind if is_record(kind) else float
+                if fault := _fault(item, kind, f"{form.__name__}.{field}"):
+                    return fault
+            return ""
     elif isinstance(given, np.bool_ | (Integral if form is bool else Real)):
         return ""
     return f"{name} is {_words(given)}, expected {_words(form)}"
 
 
 def _words(given: Any) -> str:
-    """Types by their names."""
+    """Name a type, or the type of a value."""
+    if given is None:
+        return "nothing"
     if type(given) is tuple:
         return f"({', '.join(map(_words, given))})"
     kind = given if isinstance(given, type) else type(given)
     if issubclass(kind, bool | np.bool_):
         return "true or false"
-    return (
-        "a number"
-        if issubclass(kind, Real)
-        else "nothing"
-        if given is None
-        else kind.__name__
-    )
+    return "a number" if issubclass(kind, Real) else kind.__name__

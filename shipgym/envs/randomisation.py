@@ -78,7 +78,7 @@ class Randomisation:
             ),
         ]
         for other in models[1:]:
-            if other.vessel is not model.vessel:
+            if other.compiled is not model.compiled:
                 raise InputError(
                     f"ensemble: {other.name!r} has other equations than {model.name!r},"
                     " expected models of one structure; make an environment for each"

@@ -17,7 +17,7 @@ from shipgym.envs.environment import (
     ShipsEnv,
     rudder_orders,
 )
-from shipgym.envs.outputs import STEP_OUTCOME
+from shipgym.envs.outputs import ANSWER_OUTCOMES
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import ENV_OPTIONS
@@ -80,8 +80,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     def _use(self, engine: Engine) -> None:
         super()._use(engine)
         self._seen, self._outcomes = (
-            engine.shown.observations[0],
-            engine.shown.outcomes[:, 0],
+            engine.outputs.observations[0],
+            engine.outputs.outcomes[:, 0],
         )
         self._advance, self._command = engine.step_of_one(), engine.command[:, 0]
 
@@ -134,7 +134,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             self._draw()
             if self.render_mode == "human":
                 self.render()
-        return self._seen.copy(), self._info(self._outcomes[STEP_OUTCOME:].tolist())
+        return self._seen.copy(), self._info(self._outcomes[ANSWER_OUTCOMES:].tolist())
 
     def step(
         self, action: Any
@@ -173,7 +173,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         values = self._outcomes.tolist()
         if not isfinite(values[0]):
             self._engine.refuse_rewards()
-        info = self._info(values[STEP_OUTCOME:])
+        info = self._info(values[ANSWER_OUTCOMES:])
         if self._artists:
             self._draw()
             if self.render_mode == "human":

@@ -129,7 +129,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         episodes = self._engine.episodes + np.uint64(1)
         if mask.all() and (state := self._take(options, "reset_mask")) is not None:
             self.set_state(state)
-            return self._engine.shown.observations, self._infos()
+            return self._engine.outputs.observations, self._infos()
         if self._keys is None:
             self._keys = self._drawn_keys()
             episodes[:] = 0
@@ -137,23 +137,23 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         for row in np.flatnonzero(mask).tolist():
             if (number := seeded[row]) is not None:
                 self._keys[row], episodes[row] = episode_keys(number), 0
-        before = self._engine.shown
-        self._engine.show_anew()
-        self._engine.shown.take(
+        before = self._engine.outputs
+        self._engine.renew_outputs()
+        self._engine.outputs.take(
             before
         )  # rows that are not begun anew keep what they show
         self._begun = True
         self._engine.begin(self._keys, episodes, mask)
         self._draw(mask)
-        shown, infos = self._engine.shown, self._infos()
+        infos = self._infos()
         infos.update({name: mask.copy() for name in self._masks})
-        return shown.observations, infos
+        return self._engine.outputs.observations, infos
 
     def _infos(self) -> Infos:
         """Rows of the last step's arrays by name, with their masks."""
-        shown = self._engine.shown
+        outputs = self._engine.outputs
         return (
-            named_rows(shown.outcomes, shown.flags, self._names, self._flags)
+            named_rows(outputs.outcomes, outputs.flags, self._names, self._flags)
             | self._masks
         )
 
@@ -220,32 +220,32 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             else actions
         )
         ended = engine.advance(self._some_over, anew=True)
-        shown = engine.shown
-        if self._own_reward and not isfinite(shown.outcomes[0].sum()):
+        outputs = engine.outputs
+        if self._own_reward and not isfinite(outputs.outcomes[0].sum()):
             engine.refuse_rewards()
         infos = self._infos()
         if self._mode is AutoresetMode.NEXT_STEP:
             self._some_over = ended > 0
         elif ended and self._mode is AutoresetMode.SAME_STEP:
             infos |= self._final()
-            engine.begin_next(shown.terminated | shown.truncated)
+            engine.begin_next(outputs.terminated | outputs.truncated)
         self._draw()
         return (
-            shown.observations,
-            shown.outcomes[0],
-            shown.terminated,
-            shown.truncated,
+            outputs.observations,
+            outputs.outcomes[0],
+            outputs.terminated,
+            outputs.truncated,
             infos,
         )
 
     def _final(self) -> Infos:
         """What episodes that ended showed last."""
-        shown = self._engine.shown
-        ended = shown.terminated | shown.truncated
+        outputs = self._engine.outputs
+        ended = outputs.terminated | outputs.truncated
         final_obs = np.full(self.num_envs, None, dtype=object)
         for row in np.flatnonzero(ended).tolist():
-            final_obs[row] = shown.observations[row].copy()
-        kept = np.where(ended, shown.outcomes, 0.0), shown.flags & ended
+            final_obs[row] = outputs.observations[row].copy()
+        kept = np.where(ended, outputs.outcomes, 0.0), outputs.flags & ended
         final_info = named_rows(*kept, self._names, self._flags)
         return {
             "final_obs": final_obs,

@@ -1,15 +1,15 @@
 """What is wrong with a task: a battery for any task, reward or sensor set of a user's own."""
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.arrays import Floats
+from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.engine.records import flat, leaves
-from shipgym.engine.specialise import Part
-from shipgym.engine.voyages import Voyages
 from shipgym.envs.engine import Engine
 from shipgym.envs.environment import DEFAULT_MODEL, read_options
 from shipgym.envs.plain_python import plain_loop
@@ -80,21 +80,18 @@ def _plain_engine(
     }
     paths = leaves(task.definition.Observation)
 
-    def loop(made: Voyages) -> Any:
-        store = made.parts["store_observation"].function
+    def noted(store: Any, tile: Any, lane: int, record: Any, scale: Any) -> None:
+        if lane < PLAIN_LANES:
+            for path, value, factor in zip(
+                paths, flat(record), flat(scale), strict=True
+            ):
+                if path in seen:
+                    seen[path].append(value * factor)
+        store(tile, lane, record, scale)
 
-        def noted(tile: Any, lane: int, record: Any, scale: Any) -> None:
-            if lane < PLAIN_LANES:
-                for path, value, per_scale in zip(
-                    paths, flat(record), flat(scale), strict=True
-                ):
-                    if path in seen:
-                        seen[path].append(value * per_scale)
-            store(tile, lane, record, scale)
-
-        return plain_loop(
-            made, {"store_observation": Part(noted, code=lambda: None, key="noted")}
-        )
+    def loop(program: EpisodeProgram) -> Any:
+        store = program.hooks["store_observation"]
+        return plain_loop(program, {"store_observation": partial(noted, store)})
 
     return Engine(model, PLAIN_LANES, task, randomisation, loop=loop), seen
 
@@ -124,7 +121,7 @@ def _not_finite(engine: Engine) -> Iterator[str]:
     names = [
         path
         for path in leaves(definition.State)
-        if path in engine._voyages.state["state"].present
+        if path in engine.program.state_rows["task_state"].present
     ]
     found: set[str] = set()
     for step in range(min(STEPS, engine.task.episode_steps) + 1):

@@ -11,7 +11,7 @@ import numpy as np
 
 from shipgym.engine.mathematics import clip, pick, sin_cos
 from shipgym.engine.motion import Motion, ground_velocity
-from shipgym.engine.random import DRAW, mix, normal, stream
+from shipgym.engine.random import DRAW, mix, normal, rng_state
 from shipgym.sea.open_sea import Sea
 from shipgym.tasks.contract import Interval, Random, Readings
 
@@ -69,7 +69,7 @@ def measure(
     r = sea.r_wave
     x, y, u, v = 0.0, 0.0, 0.0, 0.0
     if HAS_NOISE:
-        word = stream(random.key, random.episode) ^ INSTRUMENTS_STREAM
+        word = rng_state(random.key, random.episode) ^ INSTRUMENTS_STREAM
         word = mix(word + np.uint64(interval.steps) * DRAW[1])
         psi += settings.heading * normal(word, DRAW[0])
         r += settings.yaw_rate * normal(word, DRAW[1])

@@ -18,7 +18,6 @@ from shipgym.engine.motion import HAS_ROLL, HAS_SEA, Motion, Push
 from shipgym.engine.random import DRAW, S11, TO_UNIT, mix, normal
 from shipgym.engine.record_code import loader, storer
 from shipgym.engine.records import LANES, Layout
-from shipgym.engine.specialise import Part
 from shipgym.sea.filters import (
     Filter,
     Oscillator,
@@ -317,29 +316,35 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
 
 
 def sea_records(windy: bool) -> tuple[Any, Any]:
-    """State and parameters of the sea for a `Layout`; calm water takes no rows, and is read as zeros."""
+    """State and parameters of the sea for a `Layout`.
+
+    Calm water takes no rows, and is read as zeros.
+    """
     return (Sea, SeaParameters) if windy else ((Sea, ()), (SeaParameters, ()))
 
 
 def sea_functions(windy: bool) -> dict[str, Any]:
-    """What takes the place of the functions that loops name for the sea."""
+    """Return the functions of the sea that fill hooks, by name."""
     return {
         "HAS_SEA": windy,
-        "push": Part(push),
-        "evolve": Part(evolve),
-        "begin_sea": Part(begin_sea, inline=False),
-        "encounter_frequency": Part(encounter_frequency),
+        "push": push,
+        "evolve": evolve,
+        "begin_sea": begin_sea,
+        "encounter_frequency": encounter_frequency,
     }
 
 
-def sea_parts(windy: bool, lanes: int = LANES) -> dict[str, Any]:
-    """`sea_functions`, and how state and parameters, one vector for all, are loaded.
+def sea_hooks(windy: bool, lanes: int = LANES) -> dict[str, Any]:
+    """Return `sea_functions`, and those that load state and parameters, a vector for all.
 
     `lanes` are those of a tile of states, 64, or 1 where they are vectors.
     """
-    state, parameters = (Layout(sea=kind)["sea"] for kind in sea_records(windy))
-    return sea_functions(windy) | {
-        "load_sea": loader(state, lanes),
-        "store_sea": storer(state, lanes),
-        "load_sea_parameters": loader(parameters, 1),
+    sea, parameters = sea_records(windy)
+    state_rows = Layout(sea=sea)["sea"]
+    parameter_rows = Layout(parameters=parameters)["parameters"]
+    return {
+        **sea_functions(windy),
+        "load_sea": loader(state_rows, lanes),
+        "store_sea": storer(state_rows, lanes),
+        "load_sea_parameters": loader(parameter_rows, 1),
     }

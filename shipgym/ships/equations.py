@@ -21,10 +21,9 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_flag, check_number, check_text, placed, unexpected
+from shipgym.engine.compiled_ship import CompiledShip, compiled_ship
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.records import Record, field_types, is_record
-from shipgym.engine.specialise import Part
-from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
 from shipgym.python_files import (
     asked,
@@ -193,14 +192,14 @@ class ShipEquations:
         """Equations for given coefficients; some ships have more than one form."""
         return self.accelerations
 
-    def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
+    def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
         """Make the functions to be compiled, the same for all coefficients of one form."""
-        functions = {"accelerations": Part(self.form(coefficients))}
+        functions: dict[str, Any] = {"accelerations": self.form(coefficients)}
         if self.shaft_acceleration is not None:
-            functions["shaft_acceleration"] = Part(self.shaft_acceleration)
+            functions["shaft_acceleration"] = self.shaft_acceleration
         record = self.coefficients_record
-        parts = tuple(functions.items())
-        return vessel_of(self.name, self.state_names, record, parts, lag)
+        hooks = tuple(functions.items())
+        return compiled_ship(self.name, self.state_names, record, hooks, lag)
 
     def accelerations_at(
         self,

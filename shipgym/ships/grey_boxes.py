@@ -16,10 +16,9 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_flag
+from shipgym.engine.compiled_ship import CompiledShip, compiled_ship
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.records import Record
-from shipgym.engine.specialise import Part
-from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.particulars import Particulars
@@ -130,35 +129,35 @@ class GreyBox(Structure):
         """True where the reference ship's shaft may turn astern."""
         return self.ship.turns_astern
 
-    def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
+    def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
         """Make what is compiled: the reference ship's functions and the terms."""
         prime = self.normalisation == "prime"
         # an equation without terms is the reference ship's alone
         source = accelerations_source(self.equations, prime, damped=False)
         terms = coefficients_record(self._n_terms, "GreyBoxTerms")
-        function = Part(accelerations_function(source))
-        return self.vessel_with(terms, {"term_accelerations": function}, lag)
+        function = accelerations_function(source)
+        return self.compiled_with(terms, {"term_accelerations": function}, lag)
 
-    def vessel_with(
-        self, terms: Record, functions: dict[str, Any], lag: bool, **summed: Any
-    ) -> Vessel:
+    def compiled_with(
+        self, terms: Record, functions: dict[str, Any], lag: bool, **staged: Any
+    ) -> CompiledShip:
         """Make the functions to be compiled of the reference ship and a sum of terms."""
-        reference = self.ship.vessel
-        parts = {
+        reference = self.ship.compiled
+        hooks = {
             **reference.functions,
-            "accelerations": Part(accelerations),
+            "accelerations": accelerations,
             "reference_accelerations": reference.functions["accelerations"],
             "KNOWS_SHAFT": self.shaft,
             **functions,
         }
-        parts.pop("shaft_acceleration", None)  # the shaft turns as commanded
-        return vessel_of(
+        hooks.pop("shaft_acceleration", None)  # the shaft turns as commanded
+        return compiled_ship(
             "a grey box",
             self.state_names,
             _coefficients(reference.coefficients, terms),
-            tuple(parts.items()),
+            tuple(hooks.items()),
             lag,
-            tuple(summed.items()),
+            tuple(staged.items()),
         )
 
     def numbers(
@@ -277,11 +276,11 @@ KNOWS_SHAFT = False  # whether the reference ship's shaft turns with the target'
 
 
 def reference_accelerations(motion: Motion, c: Any, ship: Ship) -> Any:
-    """Place of the reference ship's accelerations."""
+    """Hook: the reference ship's accelerations."""
 
 
 def term_accelerations(motion: Motion, c: Any, ship: Ship) -> Any:
-    """Place of the sum of the terms."""
+    """Hook: the sum of the terms."""
 
 
 def accelerations(

@@ -20,13 +20,11 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_array, check_flag, check_table, check_text, unexpected
 from shipgym.engine import stages
+from shipgym.engine.compiled_ship import CompiledShip
+from shipgym.engine.lane_records import Point, Sums
 from shipgym.engine.mathematics import two_to
 from shipgym.engine.motion import Motion, Ship, accelerations
-from shipgym.engine.places import row_of
-from shipgym.engine.records import Record, table_of
-from shipgym.engine.specialise import Part
-from shipgym.engine.stages import Point, Sums
-from shipgym.engine.vessel import Vessel
+from shipgym.engine.records import Record, row_of, table_of
 from shipgym.errors import InputError
 from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
@@ -180,15 +178,15 @@ class KernelBox(GreyBox):
         features = self.kernel.features(channels, particulars)
         return np.asarray(UU[:, None] * features)
 
-    def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
+    def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
         """Make the functions to be compiled: the reference ship's and the sum over centres."""
         size = self.kernel.size
         functions = {
             "N_CENTRES": size,
-            "term_accelerations": Part(kernel_accelerations),
+            "term_accelerations": kernel_accelerations,
         }
         record = _kernel_record(size)
-        return self.vessel_with(record, functions, lag, **SUMMED, N_ROWS=size)
+        return self.compiled_with(record, functions, lag, **STAGED, N_ROWS=size)
 
     def numbers(
         self,
@@ -274,7 +272,7 @@ class KernelCoefficients(NamedTuple):
     table: Any
 
 
-N_CENTRES = 0  # place of their number
+N_CENTRES = 0  # set when a loop is compiled
 
 
 def coordinates(motion: Motion, c: KernelCoefficients, ship: Ship) -> Point:
@@ -334,12 +332,12 @@ def kernel_accelerations(
     return udot, vdot, rdot, 0.0, 0.0
 
 
-SUMMED = {
-    "sail_lanes": Part(stages.sail_lanes, inline=False),
-    "term_accelerations": Part(accelerations),
-    "point_of": Part(coordinates),
-    "row_sums": Part(add_centre),
-    "sum_accelerations": Part(sum_accelerations),
+STAGED = {
+    "sail_lanes": stages.sail_in_stages,
+    "term_accelerations": accelerations,
+    "point_of": coordinates,
+    "add_row": add_centre,
+    "sum_accelerations": sum_accelerations,
 }
 
 

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, quoted
+from shipgym.engine.compiled_ship import CompiledShip
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.motion import Ship
-from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
 from shipgym.ships.orders import check_units, two_commands
@@ -101,13 +101,13 @@ class ManoeuvringModel:
     # ---- what simulations are made of ------------------------------------------------
 
     @property
-    def vessel(self) -> Vessel:
+    def compiled(self) -> CompiledShip:
         """Functions and records to compile, shared by models that differ in numbers only."""
         lag = self.steering.time_constant > 0.0
-        return self.dynamics.vessel(self.coefficients, lag)
+        return self.dynamics.compiled(self.coefficients, lag)
 
     def ship_numbers(self, water_depth: float = np.inf, step: float = 0.0) -> Floats:
-        """Numbers that `vessel` reads, in the order of its layout: `Ship`, then coefficients.
+        """Numbers that `compiled` reads, in the order of its layout: `Ship`, then coefficients.
 
         `step`, s, is that of her simulation, which a lag of her steering gear has to be
         long enough for.
@@ -199,7 +199,7 @@ class ManoeuvringModel:
         depths = _rows(depth[..., None], shape)[:, 0].copy()
 
         rates = np.empty_like(rows)
-        loop = ship_loop(self.vessel, "derivatives")
+        loop = ship_loop(self.compiled, "derivatives")
         loop(rows, two_commands(orders), depths, self.ship_numbers(), rates)
         return rates.reshape(*shape, len(self.state_names))
 

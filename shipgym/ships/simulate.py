@@ -48,7 +48,7 @@ class Passage:
         self, model: ManoeuvringModel, conditions: Conditions, dt: float
     ) -> None:
         self.model = model
-        self.vessel = model.vessel
+        self.compiled = model.compiled
         self.dt = dt
         self.numbers = model.ship_numbers(conditions.water_depth, dt)
         weather = as_weather(conditions.weather, "weather")
@@ -66,7 +66,7 @@ class Passage:
 
     def loop(self, name: str) -> Any:
         """Loop of `shipgym.engine.loops`, compiled for the ship in calm water or weather."""
-        return ship_loop(self.vessel, name, self.windy)
+        return ship_loop(self.compiled, name, self.windy)
 
     def run(
         self, name: str, states: Floats, *arguments: Any, since: float = 0.0
@@ -87,13 +87,13 @@ class Passage:
 
     def states(self, first: Floats, n_steps: int) -> Floats:
         """Rows for `n_steps` + 1 states and their weather, with `first` filled in."""
-        width = len(self.vessel.state_names)
+        width = len(self.compiled.state_names)
         if self.windy:
             width += len(SEA_CHANNELS)
         states = np.empty((n_steps + 1, width))
         states[0, : len(first)] = first
         if len(first) < width:
-            self.loop("meet")(states, *self.sea)
+            self.loop("sample_sea")(states, *self.sea)
         return states
 
 
@@ -162,7 +162,7 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     wind = wind_accelerations(trial, model.dynamics)
     wind = 0.5 * (wind[1:] + wind[:-1])
     longest_step = LONGEST_STEP * model.travel_time
-    loop = ship_loop(model.vessel, "open_loop", bool(wind.any()))
+    loop = ship_loop(model.compiled, "open_loop", bool(wind.any()))
     reached = loop(states, t, delta, n, wind, longest_step, model.ship_numbers())
     if reached < len(t) - 1:
         raise unstable(model, t[reached], states[reached])

@@ -15,9 +15,8 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_table
+from shipgym.engine.compiled_ship import CompiledShip, compiled_ship
 from shipgym.engine.motion import Ship
-from shipgym.engine.specialise import Part
-from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
 from shipgym.ships import term_functions
 from shipgym.ships.particulars import Particulars
@@ -355,10 +354,10 @@ class Structure:
 
     # ---- simulation: the function that is compiled -----------------------------------
 
-    def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
+    def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
         """Make the functions to be compiled; coefficients are read at run time."""
-        accelerations = Part(term_functions.accelerations_function(self._source))
-        return vessel_of(
+        accelerations = term_functions.accelerations_function(self._source)
+        return compiled_ship(
             "a ship with a table of terms",
             self.state_names,
             term_functions.coefficients_record(self._n_terms),

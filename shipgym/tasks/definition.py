@@ -20,7 +20,7 @@ from shipgym.checks import (
     quoted,
     shown,
 )
-from shipgym.engine.places import reward_of_another, step_of_task
+from shipgym.engine.hooks import reward_of_another, step_of_task
 from shipgym.engine.records import Record, field_types, is_record, leaves
 from shipgym.engine.specialise import is_shipped
 from shipgym.errors import InputError

@@ -12,7 +12,6 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import own_structure
 from shipgym.ships.term_table import Structure
-from shipgym.trials.identify_table import check_options
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import USES, Trial, read_trials
@@ -44,7 +43,8 @@ class ShipFile:
     steering : SteeringGear or None
         None where the file has no ``[steering]``.
     identify : dict
-        Defaults for the identification, by the names of its options.
+        Options of the identification as they stand in ``[identify]``, the table
+        ``[wind]`` among them; `identification.reading` checks them.
     entries : tuple of TrialEntry
         The trials, not read yet.
     structure : Structure or None
@@ -146,9 +146,8 @@ def _read_particulars(path: Path, data: Mapping[str, Any]) -> Particulars:
 def _read_options(path: Path, data: Mapping[str, Any]) -> dict[str, Any]:
     """Options of the identification, with the table ``[wind]`` among them."""
     where = f"{path}: [identify]"
-    table = dict(check_table(data.get("identify", {}), where))
+    options = dict(check_table(data.get("identify", {}), where))
     if "wind" in data:
-        table["wind"] = data["wind"]
-    options = check_options(table, where)
+        options["wind"] = data["wind"]
     data_only(options, where)
     return options

@@ -100,12 +100,11 @@ def kernel_ship():
 @pytest.mark.parametrize("name", ["tanker", "kvlcc2-rm-svm", "kernel"])
 def test_every_kind_of_ship_is_the_same_in_c_as_in_plain_python(name, tmp_path):
     model = kernel_ship() if name == "kernel" else load_model(name)
-    parts = {**model.vessel.parts(), **sea_functions(True)}
-    plain = Specialisation(parts, "plain", None).copy(advance)
+    hooks = {**model.compiled.hooks(), **sea_functions(True)}
+    plain = Specialisation(hooks).copy(advance)
     numbers = model.ship_numbers()
-    ship = parts["load_ship"].function(numbers, 0)
-    coefficients = parts["load_coefficients"].function(numbers, 0)
-
+    ship = hooks["load_ship"](numbers, 0)
+    coefficients = hooks["load_coefficients"](numbers, 0)
     rudder, shaft = np.radians(20.0), model.service_shaft_speed
     found = sailed(tmp_path, model, [rudder] * 30, (0.1, 0.2, 0.0, 0.0), 1.0)
     motion = Motion(*found[0].tolist())

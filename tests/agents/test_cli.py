@@ -204,7 +204,13 @@ def test_identify_writes_model_and_metrics(demo, tmp_path):
 
 def test_identify_prints_nothing_but_json_when_asked(demo, tmp_path):
     answer = shipgym(
-        "identify", demo, "--out", tmp_path / "ship", "--samples", "integral", "--json"
+        "identify",
+        demo,
+        "--out",
+        tmp_path / "ship",
+        "--set",
+        "samples=integral",
+        "--json",
     )
     assert json.loads(answer.stdout)["stable"] is True
 

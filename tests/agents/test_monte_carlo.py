@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from agents.engines.jobs import JobEngine
 
 from agents import LQ, PID, sail
+from agents.jobs import JobEngine
 from agents.verification.index_uncertainty import (
     NominalRuns,
     SailedDraws,

@@ -363,7 +363,7 @@ def test_a_ship_file_names_models_and_no_code(evil, option):
     reference = identification_settings(found, {})[option]
     box, _ = chosen_box(reference, found.particulars, [])
     assert box.reference.structure == TEXTS[0]
-    box.vessel({}, False)
+    box.compiled({}, False)
 
 
 @pytest.mark.parametrize(

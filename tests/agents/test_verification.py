@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from agents.engines.jobs import JobEngine
 
 from agents import PID, WheelOver
+from agents.jobs import JobEngine
 from agents.verification.chain import build_autopilot, stage, with_standards
 from agents.verification.result import pilot_metrics, track_metrics
 from agents.verification.standards import heading_control

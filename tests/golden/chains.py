@@ -16,6 +16,7 @@ import shipgym
 from agents import benchmark
 from agents.suites.suite import load_suite
 from identification import identify
+from tests.golden.made_up import asked
 from tests.golden.store import Floats, numbers_in, vector
 
 ROOT = Path(__file__).parents[2]
@@ -94,7 +95,7 @@ def record_identification(method: str) -> dict[str, Floats]:
         ship.trials(),
         particulars=ship.particulars,
         steering=ship.steering,
-        **METHODS[method],
+        **asked(METHODS[method]),
     )
     errors = result.standard_errors
     found = {

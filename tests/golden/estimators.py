@@ -23,7 +23,7 @@ from identification import (
 from identification.estimators.comparators import LinearSupportVectorMachine
 from identification.estimators.decomposition import centre_and_scale, decompose
 from identification.estimators.estimator import FitTask
-from identification.estimators.kernel_residual import (
+from identification.estimators.kernel_fit import (
     chosen_centres,
     principal,
     stabilised,
@@ -35,7 +35,13 @@ from identification.estimators.l_curve import (
     variance_rank,
 )
 from identification.estimators.linear import check_weight
-from identification.estimators.methods import METHODS, fit_held, get_method
+from identification.estimators.methods import (
+    METHODS,
+    fit_held,
+    get_method,
+    make_method,
+    method_options,
+)
 from identification.estimators.rm_svm import most_regularised
 from identification.estimators.robust import hampel_weights
 from identification.search import get_optimiser
@@ -374,7 +380,7 @@ def record_recursions() -> dict[str, Any]:
         ship,
         RecursiveLeastSquares(C=1e4),
         window=7,
-        smooth=False,
+        smoothing="none",
     )
     found["one history"] = one.last
     found["not recursive"] = refused(
@@ -455,20 +461,20 @@ def record_methods() -> dict[str, Any]:
         "ls": {"scale": False, "robust": True},
     }
     found: dict[str, Any] = {}
-    for name, method in METHODS.items():
+    for name in METHODS:
         if name != "rm-svm":
-            fitted = method.fitted(quick.get(name, {}), task)
+            fitted = get_method(make_method(name, quick.get(name, {}))).fitted(task)
             found[name] = {
                 q: [one.coef_, one.covariance_, one.inverse_moment_]
                 for q, one in fitted.items()
             }
-    found["ridge, none"] = METHODS["ridge"].estimator(alpha=0.0).C
+    found["ridge, none"] = make_method("ridge", {"alpha": 0.0}).error_weight()
     for name, one in {
         "lasso": Lasso(0.05),
         "ridge": Ridge(0.3, fit_intercept=True),
         "own": LSSVM(C=2.0),
     }.items():
-        fitted = get_method(one).fitted({}, task)
+        fitted = get_method(one).fitted(task)
         found[f"object {name}"] = {
             q: [
                 one.coef_,
@@ -484,10 +490,11 @@ def record_methods() -> dict[str, Any]:
     found["held"] = {q: [one.coef_, one.C] for q, one in held.items()}
     known = ("C", "alpha", "rank", "omega", "robust", "optimiser", "seed", "rounds")
     found["knows"] = {
-        name: [method.knows(one) for one in known] for name, method in METHODS.items()
+        name: [one in method_options(name) for one in known] for name in METHODS
     }
     found["kinds"] = {
-        name: [method.regularised, method.refined] for name, method in METHODS.items()
+        name: [method.regularised, method.refinement is not None]
+        for name, method in ((name, get_method(name)) for name in METHODS)
     }
     found["refused"] = [
         refused(call)
@@ -495,10 +502,10 @@ def record_methods() -> dict[str, Any]:
             lambda: get_method("best"),
             lambda: get_method(3.0),
             lambda: get_method(LSSVM(kernel="rbf")),
-            lambda: METHODS["ls"].fitted({"C": 3.0, "rank": 2}, task),
-            lambda: METHODS["rm-svm"].fitted({}, task),
-            lambda: METHODS["ridge"].estimator(alpha=-0.1),
-            lambda: get_method(Unfinished()).fitted({}, task),
+            lambda: make_method("ls", {"C": 3.0, "rank": 2}),
+            lambda: get_method("rm-svm").fitted(task),
+            lambda: make_method("ridge", {"alpha": -0.1}).check(),
+            lambda: get_method(Unfinished()).fitted(task),
         )
     ]
     return found

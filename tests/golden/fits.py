@@ -20,14 +20,22 @@ from identification.validation.warnings import (
 )
 from shipgym import SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle
-from tests.golden.made_up import mariner, noisy, packed, refused, trials, words_of
+from tests.golden.made_up import (
+    asked,
+    mariner,
+    noisy,
+    packed,
+    refused,
+    trials,
+    words_of,
+)
 from tests.golden.regression import clean_zigzag, logs
 from tests.golden.store import Floats
 
 #: Searches and refinements stop early, by what is simulated.
 TOLERANCES = {"": 1e-5}
 #: Parts of names of what depends on the run, or on the last bit of a sample.
-LEFT_OUT = ("sha256", "software", "version")
+LEFT_OUT = ("sha256", "software", "version", "settings")
 GEAR = SteeringGear(38.0, 3.1, 0.0)
 
 LINEAR = "linear-steering"
@@ -61,7 +69,7 @@ ASKED: Mapping[str, Mapping[str, tuple[str, str, Mapping[str, Any]]]] = {
         "weak": (
             "clean",
             "steering7",
-            {"method": "ls-svm", "C": 7.0, "scale": False, "smooth": False},
+            {"method": "ls-svm", "C": 7.0, "scale": False, "preprocessing": "none"},
         ),
     },
     "regularised": {
@@ -301,7 +309,7 @@ def fitted(case: str, name: str) -> IdentificationResult:
     given = {"particulars": particulars, "hold_out": (), **options}
     if "extra_trials" in options:
         given["extra_trials"] = [records("all")[2]]
-    return identify(list(records(which)), structure, **given)
+    return identify(list(records(which)), structure, **asked(given))
 
 
 #: Cases of which the warnings are kept: they linearise many ships drawn from the
@@ -323,7 +331,6 @@ def told(case: str, name: str) -> dict[str, Any]:
         "searches": fit.searches,
         "gear": fit.model.steering,
         "envelope": fit.model.envelope,
-        "settings": fit.settings,
         "particulars": {name: fit.model.particulars[name] for name in SHOWN},
         "said": [*undetermined(fit), held_out_error(fit), why_unstable(fit) or ""],
         "warnings": model_warnings(fit) if case in WARNED else [],
@@ -364,7 +371,7 @@ def refusals() -> list[str]:
     )
     no_v = Trial(one.t, {name: one[name] for name in ("u", "r", "delta")}, name="no v")
     length = {"length": 160.9, "speed": 7.7}
-    asked: dict[str, tuple[list[Any], dict[str, Any]]] = {
+    wrong: dict[str, tuple[list[Any], dict[str, Any]]] = {
         "still": ([still], {}),
         "twice": ([twice], {}),
         "short": ([short], {"window": 1}),
@@ -434,8 +441,8 @@ def refusals() -> list[str]:
     }
     usual = {"particulars": mariner().particulars}
     return [
-        f"{name}: {refused(lambda t=given, o=options: identify(t, **{**usual, **o}))}"
-        for name, (given, options) in asked.items()
+        f"{name}: {refused(lambda t=given, o=options: identify(t, **asked({**usual, **o})))}"
+        for name, (given, options) in wrong.items()
     ]
 
 
@@ -458,7 +465,7 @@ def texts(case: str) -> str:
     lines = [
         line
         for name in ASKED[case]
-        for line in words_of(told(case, name), name, (*LEFT_OUT, "settings"))
+        for line in words_of(told(case, name), name, LEFT_OUT)
     ]
     lines += [fitted(case, SUMMARISED[case]).summary()] if case in SUMMARISED else []
     return "\n".join(lines + (bare() if case == "grey boxes" else []))

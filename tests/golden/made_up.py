@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 import shipgym
+from identification.reading import full_name, identify_arguments
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 from tests.golden.store import Floats, numbers_in
@@ -189,3 +190,15 @@ def trials() -> tuple[Trial, ...]:
         )
         for k, (rudder, heading, port, use) in enumerate(plan)
     )
+
+
+def asked(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of `identify` from options by the names that a ship file has, and from objects."""
+    words, objects = dict[str, Any](), dict[str, Any]()
+    for name, value in options.items():
+        is_object = name == "method" and not isinstance(value, str)
+        if is_object or name in ("particulars", "steering"):
+            objects[name] = value
+        else:
+            words[full_name(name, "golden", "kernel" in options)] = value
+    return identify_arguments(words) | objects

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from shipgym.engine.lane_records import Sums
 from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.stages import Sums
 from shipgym.manoeuvres import towing_tank
 from shipgym.ships import (
     catalogue,
@@ -161,7 +161,7 @@ def reference_ships() -> Answers:
             one.coefficients, replace(p, water_density=1013.0)
         )
         found[f"{one.name} vessel"] = lambda one=one: (
-            one.vessel(one.coefficients, True).state_names
+            one.compiled(one.coefficients, True).state_names
         )
     p, c = kvlcc2.SHIP.particulars, kvlcc2.Coefficients(PACKAGE_FORM=1.0)
     found["package form"] = [
@@ -1210,7 +1210,7 @@ def kernels() -> Answers:
                 ShipModel("k", "box", HULL, GEAR, values, dynamics=box).to_dict()
             ).dynamics.kernel
         ),
-        "vessel": lambda: len(box.vessel(values, True).state_names),
+        "vessel": lambda: len(box.compiled(values, True).state_names),
         "sum": kernel_boxes.sum_accelerations(
             at[1], Sums(0.3, -0.2, 0.1), of(HULL, 1.0)
         ),

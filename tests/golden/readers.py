@@ -17,7 +17,6 @@ from shipgym.trials import (
     angle_texts,
     clock_texts,
     cuts,
-    identify_table,
     sensors,
     units,
 )
@@ -1017,8 +1016,6 @@ def ship_files() -> Answers:
         'unit = "rad"': 'unit = "m"',
         'u = "u"': 'speed = "u"',
         'rudder_positive = "starboard"': 'rudder_positive = "left"',
-        'method = "ls"': 'methods = "ls"',
-        "C = 7.0": "C = -7.0",
         "rudder_offset_deg = 0.5": "rudder = 1.0",
         'file = "a.csv"': 'file = "d.csv"',
         'kind = "zigzag"': 'kind = "zag"',
@@ -1156,20 +1153,6 @@ def scales() -> Answers:
         sized(Trial(t, {"u": full["u"], "r": np.where(t == 0.0, 9.0 * r, r)}))
 
     words = ("m", "deg", "kn", "knot", "rpm", "parsec", "rad/s")
-    options: dict[str, Any] = {
-        "structure": 3,
-        "C": "large",
-        "window": 2.5,
-        "smooth": "yes",
-        "hold_out": "a.csv",
-        "bounds": [1.0],
-        "folds": 2.5,
-        "optimiser": 3,
-        "seed": -1,
-        "name": " ",
-        "nothing": 1,
-        "alpha": -1.0,
-    }
     return {
         "slender": refused(lambda b: sized(beam=b), (90.0, 98.0, 101.0, 110.0)),
         "turn": refused(turning, np.array(AROUND) * 3.0 * 6.0 / 150.0),
@@ -1200,31 +1183,6 @@ def scales() -> Answers:
             units.si_unit("r"),
             lambda: units.LARGEST_MAGNITUDES,
         ],
-        "options": {
-            name: lambda n=name, o=option: identify_table.check_options(
-                {n: o}, "[identify]"
-            )
-            for name, option in options.items()
-        },
-        "kinds": {
-            kind: [
-                bool(test(one))
-                for one in (True, 1, 1.5, "a", " ", ["a"], [1, 2], [1], {}, None)
-            ]
-            for kind, test in identify_table.KINDS.items()
-        },
-        "given": (
-            lambda: identify_table.Options.of(
-                {"C": 3.0, "method": "ls", "prior": "mariner", "prior_strength": 2.0}
-            ).settings()
-        ),
-        "own": lambda: identify_table.Options(smooth=False).own(),
-        "prior": lambda: identify_table.Options(prior_strength=2.0),
-        "mmg": lambda: (
-            identify_table.Options(structure="mmg", prior_folds="ships").prior_folds
-        ),
-        "uncertainty": lambda: identify_table.Options(uncertainty="none at all"),
-        "unknown": lambda: identify_table.Options.of({"metod": 1}),
     }
 
 

@@ -13,6 +13,8 @@ import shipgym
 from identification import build_samples, identify_forces
 from identification.regression.current import estimate_current
 from identification.regression.forces import force_regression, force_variances
+from identification.regression.gaps import between_gaps
+from identification.regression.gear_response import estimate_gear
 from identification.regression.grey_box import (
     bare_metrics,
     chosen_box,
@@ -30,11 +32,12 @@ from identification.regression.preprocess import (
     savitzky_golay,
     smoothed_channels,
 )
-from identification.regression.preprocess.kinematics import smooth_linear
+from identification.regression.preprocess.kalman import LinearSystem
 from identification.regression.problem import held_out
-from identification.regression.rudder import estimate_gear, estimated_gear, rebuild
-from identification.regression.samples import between_gaps, default_window
-from identification.regression.still_water import in_still_water, through_water
+from identification.regression.rudder import estimated_gear, rebuild
+from identification.regression.samples import default_window
+from identification.regression.still_water import in_still_water
+from identification.regression.velocities import through_water
 from identification.regression.wind import (
     constant_wind,
     measured_wind,
@@ -51,7 +54,6 @@ from shipgym.manoeuvres.towing_tank import (
     yaw_with_drift,
 )
 from shipgym.ships import get_structure, grey_box
-from shipgym.trials.identify_table import Options
 from shipgym.trials.navigation import rotate_to_body
 from tests.golden.made_up import Parts, mariner, noisy, refused, sampled, trials
 
@@ -113,13 +115,13 @@ def record_samples() -> dict[str, Any]:
         "spline": ([clean], "linear-steering", {}),
         "gear": ([clean], "linear-steering", {"gear": gear, "window": 3}),
         "noisy": ([one, two], "cubic", {"shaft_speed": 1.3}),
-        "window": ([one], "abkowitz", {"window": 7, "smooth": False}),
-        "median": ([one], "nomoto", {"window": 4, "smooth": "median"}),
+        "window": ([one], "abkowitz", {"window": 7, "smoothing": "none"}),
+        "median": ([one], "nomoto", {"window": 4, "smoothing": "median"}),
         "windy": ([windy], "linear", {"window": 5}),
         "memory": ([one, two], "nomoto2", {"samples": "integral", "window": 6}),
         "memory, spline": ([clean], "nomoto2", {}),
         "gap": ([one, gap], "norrbin", {}),
-        "uneven": ([uneven], "nomoto", {"samples": "euler", "smooth": "savgol"}),
+        "uneven": ([uneven], "nomoto", {"samples": "euler", "smoothing": "savgol"}),
     }
     found: dict[str, Any] = {}
     for name, (records, structure, options) in asked.items():
@@ -155,7 +157,7 @@ def record_samples() -> dict[str, Any]:
     own = zigzag(itself, 20.0, 10.0, duration=60.0, dt=0.5)
     own = own.with_channels({"n": own["n_command"]})
     samples, estimators = explained_samples(
-        [own], itself, samples="integral", window=5, smooth=False
+        [own], itself, samples="integral", window=5, smoothing="none"
     )
     found["explained"] = parts(samples) | {
         q: [e.coef_, e.covariance_] for q, e in estimators.items()
@@ -245,7 +247,7 @@ def record_preprocessing() -> dict[str, Any]:
                 channel: sampled(row, 20) for channel, row in given.items()
             }
     found["yes and no"] = [
-        smoothed_channels(short, ("r",), yes)["r"][:7] for yes in (True, False)
+        smoothed_channels(short, ("r",), name)["r"][:7] for name in ("spline", "none")
     ]
     some = {
         "r alone": ("r", "u"),
@@ -300,18 +302,20 @@ def record_preprocessing() -> dict[str, Any]:
     )
     measured = random.uniform(-1.0, 1.0, (8, 2))
     measured[3, 1] = np.nan
-    arguments = (
+    system = LinearSystem(
         F,
         Q,
         H,
         np.array([0.1, 0.3]),
-        measured,
         np.array([0.4, -0.7]),
         np.array([2.0, 0.5]),
     )
+    filtered = system.filtered(measured)
     found["smoother"] = [
-        *smooth_linear(*arguments),
-        *smooth_linear(*arguments, only_likelihood=True),
+        system.smoothed(measured),
+        filtered.log_likelihood,
+        filtered.states,
+        filtered.log_likelihood,
     ]
     found["refused"] = [
         refused(lambda: smoothed_channels(short, ("u",), "best")),
@@ -460,26 +464,20 @@ def record_still_water() -> dict[str, Any]:
         "none": ((first,), {"current": "none"}),
     }
     for name, (records, options) in asked.items():
-        out, report = in_still_water(records, Options(**options), ship)
+        out, report = in_still_water(records, ship, **options)
         found[name] = {"trials": [told(trial) for trial in out], **report}
     one_way = over_ground(trials()[1], 0.1, 0.05)
     fast = {"north": 7.0, "east": 8.0}
-    _, doubtful = in_still_water([one_way], Options(), ship)
+    _, doubtful = in_still_water([one_way], ship)
     found["doubtful"] = doubtful
-    found["own speed"] = in_still_water(
-        [first], Options(current=given), {"length": 160.9}
-    )[1]
-    found["nothing"] = len(in_still_water([first], Options(), None)[1])
+    found["own speed"] = in_still_water([first], {"length": 160.9}, given)[1]
+    found["nothing"] = len(in_still_water([first], None)[1])
     found["refused"] = [
-        refused(lambda: in_still_water([one_way], Options(current="trial"), ship)),
-        refused(lambda: in_still_water([first], Options(current=fast), ship)),
-        refused(lambda: in_still_water([first], Options(current="tide"), ship)),
-        refused(lambda: in_still_water([first], Options(current={"north": 0.1}), ship)),
-        refused(
-            lambda: in_still_water(
-                [columns], Options(current={"north": 0.3, "east": -0.5}), ship
-            )
-        ),
+        refused(lambda: in_still_water([one_way], ship, "trial")),
+        refused(lambda: in_still_water([first], ship, fast)),
+        refused(lambda: in_still_water([first], ship, "tide")),
+        refused(lambda: in_still_water([first], ship, {"north": 0.1})),
+        refused(lambda: in_still_water([columns], ship, {"north": 0.3, "east": -0.5})),
     ]
     found["through the water"] = told(through_water(logged, 0.1, 0.003 * logged.t))
     return found
@@ -515,16 +513,15 @@ def record_wind() -> dict[str, Any]:
             told(measured_wind(trial, BULKER, option))
             for trial in (windy, through, one)
         ]
-    calm = Options(current="none")
     for name, option in {
         "none": "none",
         "auto": "auto",
         "table": {"relative": False},
     }.items():
-        out, report = in_still_water([windy, two], replace(calm, wind=option), BULKER)
+        out, report = in_still_water([windy, two], BULKER, "none", option)
         found[f"still, {name}"] = {"trials": [told(trial) for trial in out], **report}
     unknown = Particulars(length=160.9, speed=7.7)
-    found["not known"] = in_still_water([windy], calm, unknown)[1]
+    found["not known"] = in_still_water([windy], unknown, "none")[1]
     ship = mariner().particulars
     pair = [one.with_(over_ground=False), two.with_(over_ground=False)]
     for name in ("linear-steering", "linear", "nomoto"):
@@ -539,12 +536,8 @@ def record_wind() -> dict[str, Any]:
         refused(lambda: measured_wind(windy, BULKER, {"relativ": True})),
         refused(lambda: measured_wind(windy, BULKER, {"relative": 1})),
         refused(lambda: measured_wind(windy, unknown, "blendermann")),
-        refused(
-            lambda: in_still_water([windy], replace(calm, wind="blendermann"), unknown)
-        ),
-        refused(
-            lambda: in_still_water([one], replace(calm, wind="blendermann"), BULKER)
-        ),
+        refused(lambda: in_still_water([windy], unknown, "none", "blendermann")),
+        refused(lambda: in_still_water([one], BULKER, "none", "blendermann")),
         refused(lambda: constant_wind(pair, samples, "mmg")),
     ]
     return found

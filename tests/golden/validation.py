@@ -26,7 +26,7 @@ from identification import (
 from identification.design.experiment import standard_candidates
 from identification.design.sensitivity import table_of, zigzag_sensitivity
 from identification.estimators.estimator import FitTask
-from identification.estimators.methods import METHODS
+from identification.estimators.methods import get_method, make_method
 from identification.report.comparison import comparison_page
 from identification.simulation_error import (
     formulas,
@@ -39,6 +39,7 @@ from identification.simulation_error.prior import (
     reference_prior,
     virtual_trials,
 )
+from identification.simulation_error.prior_knowledge import PriorKnowledge
 from identification.simulation_error.pulled import with_prior
 from identification.simulation_error.segments import cut
 from identification.simulation_error.shooting import (
@@ -53,6 +54,7 @@ from identification.uncertainty.bootstrap import (
 )
 from identification.uncertainty.covariance import joint_covariance, newey_west
 from identification.uncertainty.model_error import model_error, scale_of, without_trial
+from identification.uncertainty.uncertainty import Uncertainty
 from identification.validation import diagnostics, guard, warnings
 from identification.validation.closed_loop import closed_loop
 from identification.validation.folds import held_out_rows, of_largest_rudder, pieces
@@ -70,6 +72,7 @@ from tests.golden.regression import clean_zigzag
 
 TOLERANCES = {"": 1e-5}
 LEFT_OUT = ("sha256", "software", "version")
+WITHOUT_ERROR = Uncertainty(model_error=False)
 FERRY = Particulars(
     length=120.0,
     beam=21.0,
@@ -199,9 +202,9 @@ def record_priors() -> dict[str, Any]:
     for name, (source, strength, folds, records) in given.items():
         rows = samples.select(samples.trial < len(records))
         task = FitTask(rows, target, records)
-        fits = with_prior(METHODS["ridge"], source, strength, target, folds).fitted(
-            {"alpha": 1e-4}, task
-        )
+        ridge = get_method(make_method("ridge", {"alpha": 1e-4}))
+        knowledge = PriorKnowledge(source, strength, folds)
+        fits = with_prior(ridge, knowledge, target).fitted(task)
         found[name] = {
             q: [one.coef_, one.covariance_, one.prior_] for q, one in fits.items()
         }
@@ -306,7 +309,7 @@ def record_diagnostics() -> dict[str, Any]:
     samples = build_samples(
         wide, get_structure("linear-steering"), mariner().particulars, window=8
     )
-    estimators = METHODS["tls-svm"].fitted({}, FitTask(samples, mariner(), wide))
+    estimators = get_method("tls-svm").fitted(FitTask(samples, mariner(), wide))
     found: dict[str, Any] = {
         "autocorrelation": [
             diagnostics.autocorrelation(series, 7),
@@ -456,7 +459,7 @@ def record_selection() -> dict[str, Any]:
     found: dict[str, Any] = {}
     given = {
         "usual": Options(structure="auto"),
-        "ls": Options(structure="auto", method="ls", C=3.0),
+        "ls": Options(structure="auto", method="ls"),
         "ship": Options(structure="auto", reference_model="tanker"),
     }
     for name, options in given.items():
@@ -504,8 +507,7 @@ def compared() -> Any:
     arguments = {
         "structure": "linear-steering",
         "particulars": mariner().particulars,
-        "forgetting": 0.98,
-        "rank": 3,
+        "settings": {"forgetting": 0.98, "rank": 3},
     }
     return compare_methods(
         list(trials()), ["ls", "tls-svm", "nisg", "rm-svm"], **arguments
@@ -517,7 +519,11 @@ def record_comparison() -> dict[str, Any]:
     known = {"particulars": mariner().particulars}
     fit = [trial.with_(use="fit") for trial in trials()]
     several = compare_methods(
-        fit, ["tls-svm"], ["nomoto", "linear", "mmg"], **known, model_error=False
+        fit,
+        ["tls-svm"],
+        ["nomoto", "linear", "mmg"],
+        **known,
+        uncertainty=WITHOUT_ERROR,
     )
     turns = cross_validate(fit, 2, structure="nomoto", **known)
     one, two = fit[:2]
@@ -529,7 +535,11 @@ def record_comparison() -> dict[str, Any]:
         "refused": [
             refused(lambda: compare_methods([one], ["ls"], **known)),
             refused(lambda: compare_methods([one, two], [], **known)),
-            refused(lambda: compare_methods([one, two], ["ls"], omega=0.3, **known)),
+            refused(
+                lambda: compare_methods(
+                    [one, two], ["ls"], settings={"omega": 0.3}, **known
+                )
+            ),
             refused(lambda: compare_methods([one, two], ["rm-svm"], **known)),
             refused(lambda: cross_validate([one], **known)),
             refused(lambda: cross_validate([one, two], 3, **known)),
@@ -617,7 +627,7 @@ def record_design() -> dict[str, Any]:
             0.01,
             structure="steering7",
             particulars=mariner().particulars,
-            model_error=False,
+            uncertainty=WITHOUT_ERROR,
         )
         found[f"reduced, {direction}"] = (
             reduced.to_dict()

@@ -41,7 +41,7 @@ def coverage(lasting: int, memory: float, seeds: int = 60) -> float:
     hits = []
     for seed in range(seeds):
         samples = regression(np.random.default_rng(seed), lasting)
-        estimators = fit_all(get_method("ls").estimator, samples)
+        estimators = fit_all(get_method("ls").make, samples)
         deviation = np.sqrt(
             np.diag(bootstrap_covariance(estimators, samples, memory, draws=40))
         )
@@ -60,7 +60,7 @@ def test_blocks_as_long_as_the_errors_last_cover_what_single_rows_do_not() -> No
 
 def test_bootstrap_agrees_with_the_formula_for_white_errors() -> None:
     samples = regression(np.random.default_rng(1), n=2000)
-    estimators = fit_all(get_method("ls").estimator, samples)
+    estimators = fit_all(get_method("ls").make, samples)
     analytic = joint_covariance(estimators, samples)
     drawn = bootstrap_covariance(estimators, samples, 0.0, draws=1000)
     np.testing.assert_allclose(np.diag(drawn), np.diag(analytic), rtol=0.2)
@@ -94,7 +94,7 @@ def test_svms_are_fitted_again_with_the_rank_they_had_and_others_take_a_linear_s
     samples = Samples(
         {"u": X}, {"u": y}, t, np.ones(40), np.zeros(40, dtype=np.int64), 1
     )
-    fitted = fit_all(get_method(method).estimator, samples)["u"]
+    fitted = fit_all(get_method(method).make, samples)["u"]
     again = LSSVM(C=1e6, fit_intercept=False, scale=False)
     if method == "tls-svm":
         again = TruncatedLSSVM(rank=fitted.rank_, fit_intercept=False)

@@ -26,8 +26,7 @@ def comparison(noisy_trials: list[Trial], mariner: ShipModel) -> Comparison:
     options = {
         "particulars": mariner.particulars,
         "steering": mariner.steering,
-        "C": 1e4,
-        "rank": 8,
+        "settings": {"C": 1e4, "rank": 8},
     }
     return compare_methods(noisy_trials, methods, **options)
 
@@ -172,10 +171,8 @@ def test_what_cannot_be_compared_is_named(
         compare_methods(noisy_trials, [], **options)
     with pytest.raises(InputError, match="got 1 to fit and none to validate"):
         compare_methods(noisy_trials[:1], ["ls"], **options)
-    with pytest.raises(
-        InputError, match="settings: expected those of the methods ls, got folds"
-    ):
-        compare_methods(noisy_trials, ["ls"], folds=3, **options)
+    with pytest.raises(InputError, match=r"folds: .*one of the methods ls"):
+        compare_methods(noisy_trials, ["ls"], settings={"folds": 3}, **options)
     with pytest.raises(InputError, match="expected structure 'grey-box'"):
         compare_methods(noisy_trials, ["rm-svm"], **options)
 

@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from sklearn.svm import SVR
 from sklearn.utils.estimator_checks import check_estimator
 
 import shipgym
-from identification import IdentificationResult, identify
-from identification.estimators.estimator import FitTask
-from identification.estimators.rm_svm import (
-    ERROR_TOLERANCE,
-    RMSVM,
-    _Tuner,
-    heading_error,
-    most_regularised,
-)
+from identification import RMSVM, IdentificationResult, identify
+from identification.estimators.rm_svm import heading_error, most_regularised
 from identification.regression.grey_box import chosen_box
-from identification.regression.samples import Samples
 from identification.report.choice_figures import search_figure
 from identification.search.pattern_search import pattern_search
 from identification.simulation_error.similarity import (
@@ -188,27 +180,26 @@ def test_a_feature_that_is_zero_throughout_gets_no_correction(regression: str) -
 
 
 @pytest.mark.parametrize(("weight", "band"), [(0.1, 0.1), (1.0, 0.5), (30.0, 0.0)])
-def test_coordinate_descent_and_minimal_optimisation_agree(
-    weight: float, band: float, monkeypatch: pytest.MonkeyPatch
+def test_a_correction_is_an_epsilon_svr_of_standardised_samples(
+    weight: float, band: float
 ) -> None:
+    """With the offset held at zero by the mirror image of the samples, solved by scikit-learn's SVR."""
     rng = np.random.default_rng(1)
-    X = rng.standard_normal((150, 3)) @ [
-        [1.0, 0.5, 0.0],
-        [0.0, 1.0, 0.3],
-        [0.0, 0.0, 1.0],
-    ]
+    mix = [[1.0, 0.5, 0.0], [0.0, 1.0, 0.3], [0.0, 0.0, 1.0]]
+    X = rng.standard_normal((150, 3)) @ mix
     y = X @ [1.0, -2.0, 0.5] + rng.standard_normal(150)
-    quick = RMSVM(C=weight, epsilon=band).fit(X, y)
-    monkeypatch.setattr("identification.estimators.rm_svm.MOST_SWEEPS", 1)
-    exact = RMSVM(C=weight, epsilon=band).fit(X, y)
-    assert quick.coef_ == pytest.approx(exact.coef_, abs=5e-3)
-    assert not np.array_equal(quick.coef_, exact.coef_)
+    scale, size = np.sqrt(np.mean(X**2, axis=0)), np.sqrt(np.mean(y**2))
+    Z, e = X / scale, y / size
+    oracle = SVR(kernel="linear", C=0.5 * weight / 150, epsilon=band)
+    oracle.fit(np.vstack([Z, -Z]), np.append(e, -e))
+    found = RMSVM(C=weight, epsilon=band).fit(X, y).coef_
+    assert found == pytest.approx(oracle.coef_.ravel() * size / scale, abs=5e-3)
 
 
 def test_a_weight_of_zero_is_the_bare_reference_ship(
     target: ShipModel, trials: list[Trial]
 ) -> None:
-    result = fit(target, trials, method="rm-svm", reference_model="kvlcc2", C=0.0)
+    result = fit(target, trials, method=RMSVM(C=0.0), reference_model="kvlcc2")
     assert set(result.coefficients.values()) == {0.0}
     assert result.metrics["trials"] == result.metrics["reference"]["trials"]
 
@@ -232,25 +223,25 @@ def test_the_tanker_as_reference_for_kvlcc2(
 
 
 def test_the_weight_may_be_judged_by_the_largest_rudder(
-    target: ShipModel, trials: list[Trial], monkeypatch: pytest.MonkeyPatch
+    target: ShipModel, trials: list[Trial]
 ) -> None:
-    """The least weight with which a fit of the 10/10s predicts the 20/20 nearly as well as with any."""
-    weights = (0.0, 0.03, 3.0)
-    monkeypatch.setattr("identification.estimators.rm_svm.WEIGHTS", weights)
-    settings = {"method": "rm-svm", "reference_model": "tanker", "regression": "ls-svm"}
-    provenance = (
-        fit(target, trials, **settings, folds="largest-rudder").model.provenance or {}
-    )
-    errors = []
-    for weight in weights:
-        learnt = fit(target, trials, **settings, C=weight, hold_out=["starboard-20"])
-        errors.append(learnt.metrics["trials"]["starboard-20"]["rmse"]["psi"])
-    least = next(
-        w
-        for w, e in zip(weights, errors, strict=True)
-        if e <= ERROR_TOLERANCE * min(errors)
-    )
-    assert provenance["search"]["r"]["C"] == least
+    """No lesser weight lets a fit of the 10/10s predict the 20/20 within a tenth as well."""
+    by_largest = RMSVM(regression="ls-svm", folds="largest-rudder")
+    chosen = fit(target, trials, method=by_largest, reference_model="tanker")
+    least = (chosen.model.provenance or {})["search"]["r"]["C"]
+
+    def error(weight: float) -> float:
+        learnt = fit(
+            target,
+            trials,
+            method=RMSVM(C=weight, regression="ls-svm"),
+            reference_model="tanker",
+            hold_out=["starboard-20"],
+        )
+        return float(learnt.metrics["trials"]["starboard-20"]["rmse"]["psi"])
+
+    assert least > 0.0
+    assert error(least) < min(error(0.0), error(0.1 * least))
 
 
 def test_rudders_within_a_tenth_of_the_largest_are_the_largest() -> None:
@@ -301,14 +292,13 @@ def test_a_free_constant_is_not_penalised(
     """At a weight that leaves no other correction, the constant keeps the mean of what the reference ship
     leaves.
     """
-    given = {
-        "method": "rm-svm",
-        "reference_model": "kvlcc2",
-        "regression": "ls-svm",
-        "C": 1e-12,
-    }
     bound, free = (
-        fit(target, trials, **given, free_constant=is_free).model
+        fit(
+            target,
+            trials,
+            method=RMSVM(C=1e-12, regression="ls-svm", free_constant=is_free),
+            reference_model="kvlcc2",
+        ).model
         for is_free in (False, True)
     )
     constants = {
@@ -388,61 +378,35 @@ def test_the_exact_reference_leaves_nothing_to_learn(
 
 
 @pytest.mark.parametrize(
-    ("settings", "message"),
+    ("structure", "method", "reference", "message"),
     [
-        (
-            {"structure": "abkowitz", "method": "rm-svm"},
-            r"method: 'rm-svm' found with structure 'abkowitz'",
-        ),
-        ({"structure": "grey-box", "method": "rm-svm"}, r"reference_model: None found"),
-        ({"structure": "grey-box", "reference_model": "titanic"}, r"titanic"),
-        (
-            {"structure": "abkowitz", "reference_model": "tanker"},
-            r"reference_model: 'tanker' found with",
-        ),
-        (
-            {"structure": "grey-box", "reference_model": "container"},
-            r"channel 'p' is missing",
-        ),
-        (
-            {"structure": "grey-box", "reference_model": "tanker", "prior": "auto"},
-            r"leave the prior out",
-        ),
-        (
-            {
-                "structure": "grey-box",
-                "method": "rm-svm",
-                "reference_model": "tanker",
-                "C": -1.0,
-            },
-            r"C: expected .*got -1",
-        ),
-        (
-            {
-                "structure": "grey-box",
-                "method": "rm-svm",
-                "reference_model": "tanker",
-                "objective": "luck",
-            },
-            r"objective: expected .*got 'luck'",
-        ),
-        (
-            {
-                "structure": "grey-box",
-                "method": "rm-svm",
-                "reference_model": "tanker",
-                "folds": "luck",
-            },
-            r"folds: expected .*got 'luck'",
-        ),
+        ("abkowitz", "rm-svm", None, r"expected structure 'grey-box'.*'abkowitz'"),
+        ("grey-box", "rm-svm", None, r"reference_model: .*None"),
+        ("grey-box", "ls", "titanic", "titanic"),
+        ("abkowitz", "ls", "tanker", r"reference_model: .*'abkowitz', got 'tanker'"),
+        ("grey-box", "ls", "container", "channel 'p' is missing"),
+        ("grey-box", RMSVM(C=-1.0), "tanker", "C: "),
+        ("grey-box", RMSVM(epsilon=-1.0), "tanker", "epsilon: "),
+        ("grey-box", RMSVM(objective="luck"), "tanker", r"objective: .*'luck'"),
+        ("grey-box", RMSVM(regression="luck"), "tanker", r"regression: .*'luck'"),
+        ("grey-box", RMSVM(folds="luck"), "tanker", r"folds: .*'luck'"),
     ],
 )
 def test_what_does_not_fit_is_refused(
-    target: ShipModel, trials: list[Trial], settings: dict[str, Any], message: str
+    target: ShipModel,
+    trials: list[Trial],
+    structure: str,
+    method: Any,
+    reference: str | None,
+    message: str,
 ) -> None:
     with pytest.raises(InputError, match=message):
         identify(
-            trials, particulars=target.particulars, steering=target.steering, **settings
+            trials,
+            structure,
+            method,
+            particulars=target.particulars,
+            reference_model=reference,
         )
 
 
@@ -458,81 +422,35 @@ def test_a_feature_that_never_moves_is_left_out_of_the_bands() -> None:
     np.testing.assert_allclose(alone.coef_, [1.0, -2.0], atol=0.05)
 
 
-@pytest.mark.parametrize(
-    ("predicted", "rmse", "correlation"),
-    [
-        ([0.0, 1.0, 2.0, 5.0], 0.0, 0.0),
-        ([0.5, 1.5, 2.5, 5.5], 0.5, 0.0),
-        ([0.0, 2.0, 4.0, 10.0], np.sqrt(30.0 / 4.0), 0.0),
-        ([0.0, -1.0, -2.0, -5.0], np.sqrt(120.0 / 4.0), 2.0),
-        (
-            [1.0, 1.0, 1.0, 1.0],
-            np.sqrt(18.0 / 4.0),
-            1.0,
-        ),  # a straight course tells nothing of a zigzag
-        (None, np.inf, np.inf),  # she ran away
-    ],
-)
-def test_the_error_of_a_heading(
-    target: ShipModel,
-    monkeypatch: pytest.MonkeyPatch,
-    predicted: Any,
-    rmse: float,
-    correlation: float,
-) -> None:
-    trial = Trial(np.arange(4.0), {"psi": np.array([0.0, 1.0, 2.0, 5.0])})
-    run = None if predicted is None else {"psi": np.array(predicted)}
-    monkeypatch.setattr(
-        "identification.estimators.rm_svm.predict", lambda model, trial: run
-    )
-    assert heading_error(target, trial, "rmse") == pytest.approx(rmse)
-    assert heading_error(target, trial, "correlation") == pytest.approx(correlation)
-
-
-def tuner(rows: int, **settings: Any) -> _Tuner:
-    """One of a regression of so many rows, for two equations."""
-    features = dict.fromkeys("vr", np.zeros((rows, 1)))
-    samples = Samples(
-        features, dict.fromkeys("vr", np.zeros(rows)), *np.zeros((3, rows)), 1
-    )  # type: ignore[arg-type]
-    return _Tuner(RMSVM(**settings), FitTask(samples, SimpleNamespace(), ()))  # type: ignore[arg-type]
-
-
-def test_a_support_vector_regression_sees_six_hundred_rows_at_most() -> None:
-    assert [tuner(rows).thin for rows in (1, 600, 601, 1200, 1201)] == [1, 1, 2, 2, 3]
-    assert tuner(7).everything.tolist() == [True] * 7
+def test_the_error_of_a_heading(target: ShipModel, trials: list[Trial]) -> None:
+    """The correlation is blind to scale and offset, and a straight course tells nothing of a zigzag."""
+    trial = trials[0]
+    assert heading_error(target, trial, "rmse") < np.radians(0.1)
+    assert heading_error(target, trial, "correlation") == pytest.approx(0.0, abs=1e-5)
+    larger = trial.with_channels({"psi": 1.5 * trial["psi"]})
+    size = np.sqrt(np.mean(trial["psi"] ** 2))
+    assert heading_error(target, larger, "rmse") == pytest.approx(0.5 * size, rel=0.02)
+    assert heading_error(target, larger, "correlation") < 1e-5
+    straight = trial.with_channels({"psi": np.zeros(len(trial))})
+    assert heading_error(target, straight, "correlation") == 1.0
+    wild = shipgym.load_model("mariner-tls-svm")
+    growing = np.array(list((wild.coefficients | {"N_r": 9.0}).values()))
+    lost = wild.with_coefficients(growing)
+    assert heading_error(lost, trial, "rmse") == np.inf
 
 
 def test_bands_are_searched_for_only_where_none_is_given_and_there_is_something_to_correct(
-    monkeypatch: pytest.MonkeyPatch,
+    target: ShipModel, trials: list[Trial]
 ) -> None:
-    """From a tenth of a standard deviation, between 0 and 1; the objective is the mean over the trials."""
-    for settings, weight in (
-        ({"epsilon": 0.3}, 1.0),
-        ({}, 0.0),
-        ({"regression": "ls-svm"}, 1.0),
+    for method in (
+        RMSVM(C=1.0, epsilon=0.3),
+        RMSVM(C=0.0),
+        RMSVM(C=1.0, regression="ls-svm"),
     ):
-        first = [settings.get("epsilon", 0.1)] * 2
-        assert tuner(9, **settings).bands(weight) == (first, None)
-    asked: list[Any] = []
-    searched = tuner(9, objective="correlation")
-    searched.trials = (1.0, 3.0)  # type: ignore[assignment]
-    monkeypatch.setattr(
-        searched, "model", lambda *given: asked.append(given) or np.sum(given[1])
-    )
-    monkeypatch.setattr(
-        "identification.estimators.rm_svm.heading_error",
-        lambda model, trial, objective: (
-            trial * abs(model - 1.25) * (objective == "correlation")
-        ),
-    )
-    bands, search = searched.bands(2.0)
-    assert asked[0][:2] == (2.0, [0.1, 0.1])
-    assert search is not None
-    assert search.history[0] == pytest.approx(2.0 * 1.05)
-    assert sum(bands) == pytest.approx(1.25, abs=1 / 64)
-    assert min(bands) >= 0.0
-    assert np.max([bands for _, bands, _ in asked]) <= 1.0
+        result = fit(target, trials, method=method, reference_model="kvlcc2")
+        assert result.searches == {}
+        chosen = (result.model.provenance or {})["search"]["r"]
+        assert chosen == {"C": method.C, "epsilon": method.epsilon or 0.1}
 
 
 def test_a_correction_without_settings_has_a_weight_of_one_and_a_band_of_a_tenth() -> (

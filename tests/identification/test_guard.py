@@ -236,7 +236,7 @@ def test_a_fit_that_no_penalty_holds_is_marked(
     """A trial that begins at more than half as fast again as at service is that of no ship."""
     fast = cao_zigzag.with_channels({"u": 1.6 * cao_zigzag["u"]})
     task = FitTask(cao_fit.samples, mariner, [fast])
-    fit = guarded_fit(get_method("tls-svm"), {}, task)
+    fit = guarded_fit(get_method("tls-svm"), task)
     assert not fit.stable
     assert fit.report["decision"] == "runs away under every penalty"
     assert fit.report["rejected"]

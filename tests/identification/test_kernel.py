@@ -5,27 +5,26 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
 
-from identification import LSSVM, IdentificationResult, identify
-from identification.estimators import kernel_residual
-from identification.estimators.kernel_residual import (
-    KernelFit,
-    _Search,
-    _thinned,
+from identification import (
+    LSSVM,
+    RMSVM,
+    IdentificationResult,
+    KernelResidual,
+    Options,
+    identify,
+)
+from identification.estimators.kernel_fit import (
     chosen_centres,
-    fit_kernel,
     principal,
-    reference_options,
     stabilised,
 )
-from identification.options import Options
-from identification.regression.samples import Samples
+from identification.pipeline.routes import reference_options
 from identification.report.page import report_page
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
@@ -37,7 +36,6 @@ from shipgym.ships.kernel_boxes import (
     KernelBox,
     gaussians,
     kernel_box,
-    kernel_inputs,
 )
 from shipgym.ships.linear import nomoto
 from shipgym.ships.particulars import Particulars
@@ -115,16 +113,14 @@ def trials(truth: ShipModel) -> list[Trial]:
 
 
 def fit(trials: list[Trial], **settings: Any) -> IdentificationResult:
-    return identify(
-        trials, particulars=SHIP, steering=GEAR, kernel="rbf", centres=32, **settings
-    )
+    given = {"kernel": KernelResidual(centres=32), **settings}
+    return identify(trials, particulars=SHIP, steering=GEAR, **given)
 
 
 @pytest.fixture(scope="module")
 def corrected(trials: list[Trial], reference: ShipModel) -> IdentificationResult:
-    return fit(
-        trials, method="rm-svm", reference_model=reference, kernel_length=2.0, C=1e6
-    )
+    kernel = KernelResidual(centres=32, length=2.0, C=1e6)
+    return fit(trials, method="rm-svm", reference_model=reference, kernel=kernel)
 
 
 def test_the_report_of_a_kernel_ship_is_the_golden_one(
@@ -244,7 +240,7 @@ def test_its_file_holds_numbers_only(
     model.save(path)
     again = ShipModel.load(path)
     assert isinstance(again.table, KernelBox)
-    assert again.vessel is model.vessel
+    assert again.compiled is model.compiled
     np.testing.assert_array_equal(again.ship_numbers(), model.ship_numbers())
     np.testing.assert_array_equal(again.covariance, model.covariance)
     fields = json.loads(path.read_text())
@@ -266,7 +262,7 @@ def test_models_drawn_differ_in_kernel_and_fitted_reference(
     black_box: IdentificationResult,
 ) -> None:
     one, other = black_box.model.sample(2, seed=0)
-    assert one.vessel is black_box.model.vessel
+    assert one.compiled is black_box.model.compiled
     assert one.table.ship.coefficients != other.table.ship.coefficients  # type: ignore[attr-defined]
     assert one.coefficients != other.coefficients
 
@@ -289,24 +285,12 @@ def test_in_environments_it_sails_as_it_is_simulated(
     )
     env = gymnasium.make("shipgym/CourseKeeping-v0", model=model, sea="calm")
     envs.reset(seed=3)
-    single, _ = env.reset(seed=4)
-    engine = envs.unwrapped._engine  # type: ignore[attr-defined]
-    names = ("u", "v", "r", "delta")
-    start = np.array(
-        [engine.read(name)[0] if name in names else 0.0 for name in model.state_names]
-    )
-    rudders = [0.8, 0.8, 0.8, -1.0, -1.0, -1.0, -1.0, 0.3]
-    for rudder in rudders:
+    env.reset(seed=4)
+    for rudder in (0.8, 0.8, 0.8, -1.0, -1.0, -1.0, -1.0, 0.3):
         seen, _, _, _, info = envs.step(np.full((3, 1), rudder, dtype=np.float32))
         single, *_ = env.step(np.array([rudder], dtype=np.float32))
     np.testing.assert_array_equal(single, seen[1])
     assert "extrapolating" in info
-    orders = model.steering.limit * np.array(rudders, dtype=np.float32)[:, None]
-    trial = model.simulate(orders, engine.dt, start)
-    for name in names:
-        assert engine.read(name)[0] == pytest.approx(
-            trial[name][-1], rel=1e-9, abs=1e-12
-        )
 
 
 def test_what_cannot_be(
@@ -319,18 +303,17 @@ def test_what_cannot_be(
         )
     ]
     for given, settings, message in (
+        (trials, {"method": "rls"}, r"method: .*with a kernel, got 'rls'"),
+        (trials, {"method": RMSVM()}, r"method: .*LS-SVM only, got epsilon-SVR"),
         (
             trials,
-            {"method": "rls"},
-            "kernel: 'rbf' found with method 'rls', which has none",
+            {"method": RMSVM(regression="ls-svm", epsilon=0.1)},
+            r"method: .*without epsilon",
         ),
-        (trials, {"regression": "svr", "method": "rm-svm"}, "fitted by LS-SVM only"),
-        (trials, {"centres": 101}, "centres: expected .*got 101"),
-        (trials, {"kernel_length": 0.0}, "kernel_length"),
         (
             short,
             {"method": "rm-svm", "reference_model": reference},
-            "samples found for 32 centres",
+            "different samples for 32 centres",
         ),
         (
             trials,
@@ -339,14 +322,17 @@ def test_what_cannot_be(
         ),
     ):
         with pytest.raises(InputError, match=message):
-            identify(
-                given,
-                particulars=SHIP,
-                steering=GEAR,
-                **{"kernel": "rbf", "centres": 32, **settings},
-            )
-    with pytest.raises(InputError, match="kernel: 'poly' found, expected 'rbf'"):
-        identify(trials, particulars=SHIP, kernel="poly")
+            fit(given, **settings)
+    for wrong in (
+        {"kernel": "poly"},
+        {"centres": 1},
+        {"centres": 101},
+        {"length": 0.0},
+        {"C": 0.0},
+        {"folds": "luck"},
+    ):
+        with pytest.raises(InputError, match=f"{next(iter(wrong))}: "):
+            KernelResidual(**wrong)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"identify\(\.\.\., kernel='rbf'\)"):
         identify(
             trials, structure="linear", particulars=SHIP, method=LSSVM(kernel="rbf")
@@ -355,6 +341,19 @@ def test_what_cannot_be(
         replace(truth.table, kernel=None)
     with pytest.raises(InputError, match="expected a ManoeuvringModel as reference"):
         replace(truth.table, reference=None)
+
+
+def test_errors_are_weighed_over_a_ship_length_in_the_prime_system(
+    corrected: IdentificationResult,
+) -> None:
+    """A weight of 1 is 1 / (L T U^3) of windows of T on average."""
+    window = np.mean(corrected.samples.duration)
+    unit = 1.0 / (SHIP.length * window * SHIP["speed"] ** 3)
+    for estimator in corrected.estimators.values():
+        assert pytest.approx(1e6 * unit) == estimator.C  # type: ignore[attr-defined]
+    report = (corrected.model.provenance or {})["kernel"]
+    assert (report["length"], report["C"], report["centres"]) == (2.0, 1e6, 32)
+    assert report["heading_errors_held_out"].keys() == {"reference"}
 
 
 SIDES = np.array(
@@ -381,7 +380,7 @@ def test_centres_are_those_of_samples_brought_to_one_side_and_the_same_of_the_ot
     assert len(chosen_centres(around[:12], 4)[2]) == 4
     with pytest.raises(
         InputError,
-        match="12 samples found for 5 centres of the kernel, expected at least 3",
+        match="at least 15 different samples for 5 centres of the kernel, got 12",
     ):
         chosen_centres(around[:12], 5)
 
@@ -423,13 +422,13 @@ def test_the_linear_ship_beneath_a_kernel_is_damped_as_little_as_steadies_her() 
         steady_at = [worst_of(ship, damping) < 1.0 for damping in (shift, shift - 0.05)]
         assert steady_at == [True, False]
     with pytest.raises(
-        InputError, match="no damping stabilises the linear ship beneath it"
+        InputError, match="a linear ship beneath it that some damping stabilises"
     ):
         stabilised(linear_ship(c_d=1e4))
     # by 100 in the prime system at most: a turn of 1.2 takes c_d limit / 1.2 of it
     assert stabilised(linear_ship(c_d=190.0)).coefficients["c_r"] < -90.0
     with pytest.raises(
-        InputError, match="no damping stabilises the linear ship beneath it"
+        InputError, match="a linear ship beneath it that some damping stabilises"
     ):
         stabilised(linear_ship(c_d=205.0))
 
@@ -450,185 +449,11 @@ def worst_of(ship: ShipModel, damping: float) -> float:
         ({"method": "ls-svm", "structure": "norrbin"}, "norrbin", "ls-svm"),
         ({"method": "rm-svm", "reference_model": "tanker"}, "grey-box", "rm-svm"),
         ({"method": "rm-svm", "structure": "norrbin"}, "norrbin", "ls-svm"),
-        (
-            {"regression": "ls-svm", "C": 3.0, "centres": 9, "kernel_length": 2.0},
-            "linear",
-            "tls-svm",
-        ),
     ],
 )
 def test_beneath_a_kernel_lies_a_linear_ship_unless_another_is_named(
     asked: dict[str, Any], structure: str, method: str
 ) -> None:
-    found = reference_options(Options(kernel="rbf", **asked))
+    found = reference_options(Options(kernel=KernelResidual(), **asked))
     assert (found.structure, found.method) == (structure, method)
-    assert (found.kernel, found.centres, found.kernel_length, found.C, found.folds) == (
-        None,
-    ) * 5
-
-
-@pytest.mark.parametrize(
-    "band",
-    [{"epsilon": 0.0}, {"epsilon": 0.1, "regression": "ls-svm"}, {"regression": "svr"}],
-)
-def test_a_kernel_has_no_insensitive_band(band: dict[str, Any]) -> None:
-    with pytest.raises(
-        InputError,
-        match="regression: epsilon-SVR found with kernel 'rbf', which is fitted",
-    ):
-        reference_options(Options(kernel="rbf", method="rm-svm", **band))
-
-
-def test_centres_are_sought_among_four_thousand_samples_at_most() -> None:
-    for count, every in ((4000, 1), (4001, 2), (8000, 2), (8001, 3)):
-        x = np.arange(float(count))[:, None]
-        np.testing.assert_array_equal(_thinned(x), x[::every])
-
-
-def two_folds(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A search over a regression of one term: of either trial the coefficient is the error of the other."""
-    X, y = np.array([[1.0], [2.0], [3.0]]), np.array([2.0, 4.0, 3.0])
-    samples = Samples(
-        {"r": X},
-        {"r": y},
-        np.arange(3.0),
-        np.array([1.0, 2.0, 3.0]),
-        np.array([0, 0, 1]),
-        1,
-    )
-    folds = [(samples.trial == k, f"trial {1 - k}") for k in (0, 1)]
-    monkeypatch.setattr(kernel_residual, "held_out_rows", lambda *_: folds)
-    monkeypatch.setattr(
-        kernel_residual, "heading_error", lambda model, held, _: float(model["r"][0])
-    )
-    blank: Any = SimpleNamespace(particulars=SHIP)
-    stage = SimpleNamespace(
-        samples=samples, model=SimpleNamespace(with_accelerations=lambda found: found)
-    )
-    return _Search(blank, (), None, {}, "trials"), stage  # type: ignore[arg-type]
-
-
-def test_errors_are_weighed_over_a_ship_length_in_the_prime_system(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A weight of 1 is 1 / (L T U^3) of windows of T on average; the coefficient is that of a ridge."""
-    search, stage = two_folds(monkeypatch)
-    unit = 1.0 / (7.0 * 2.0 * 1.2**3)
-    assert search.unit(stage.samples) == pytest.approx(unit)
-    for weight in (0.0, 5.0):
-        C = weight * unit
-        errors = [C * 10.0 / (C * 5.0 + 1.0), C * 9.0 / (C * 9.0 + 1.0)]
-        assert search.error(stage, weight) == pytest.approx(np.mean(errors))
-    found = search.fitted(stage, 5.0)
-    C = 5.0 * unit
-    np.testing.assert_allclose(found.model["r"], [C * 19.0 / (C * 14.0 + 1.0)])  # type: ignore[index]
-    np.testing.assert_allclose(
-        found.estimators["r"].inverse_moment_, [[C / (C * 14.0 + 1.0)]]
-    )
-
-
-@pytest.mark.parametrize(
-    ("errors", "chosen", "remarks"),
-    [
-        (
-            (1.09, 1.0, 1.2, 2.0),
-            (2.0, 0.1),
-            [],
-        ),  # the smoothest within a tenth of the best
-        ((1.12, 1.11, 1.2, 1.0), (1.0, 10.0), []),
-        ((1.12, 1.05, 1.2, 1.0), (1.0, 0.1), []),
-        ((3.0, 3.0, 3.0, 3.0), (2.0, 0.1), ["(1.7e+02 and 86 deg rms)"]),
-        ((1.5, 1.5, 1.5, 1.5), (2.0, 0.1), ["(86 and 86 deg rms)"]),
-        ((np.inf,) * 4, (2.0, 0.1), ["(inf and 86 deg rms)"]),
-    ],
-)
-def test_the_smoothest_kernel_nearly_as_good_as_the_best_is_taken_and_one_that_is_no_good_told(
-    errors: tuple[float, ...],
-    chosen: tuple[float, float],
-    remarks: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Of lengths 2 and 1 at weights 0.1 and 10; the reference ship alone misses by 1.5 rad."""
-    table = dict(
-        zip([(2.0, 0.1), (1.0, 0.1), (2.0, 10.0), (1.0, 10.0)], errors, strict=True)
-    )
-    kernels = {
-        one: SimpleNamespace(centres=np.zeros((8, 4)), basis=np.zeros((8, 5)), one=one)
-        for one in (2.0, 1.0)
-    }
-
-    class Search:
-        def __init__(self, *given: Any) -> None:
-            self.folds = given[-1]
-
-        def stage(self, kernel: Any) -> float:
-            return kernel.one
-
-        def error(self, stage: float, weight: float) -> float:
-            return table[stage, weight] if weight else 1.5
-
-        def fitted(self, stage: Any, weight: Any) -> Any:
-            return KernelFit((stage, weight), None)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(kernel_residual, "_Search", Search)
-    monkeypatch.setattr(kernel_residual, "_kernels", lambda *_: kernels)
-    monkeypatch.setattr(kernel_residual, "WEIGHTS", (0.1, 10.0))
-    none: Any = None
-    found = fit_kernel(none, (), none, Options(), {})
-    assert found.model == chosen
-    assert (found.report["length"], found.report["C"]) == chosen
-    assert (found.report["centres"], found.report["features"]) == (8, 5)
-    kernel = table[chosen] if np.isfinite(table[chosen]) else None
-    assert found.report["heading_errors_held_out"] == {
-        "kernel": kernel,
-        "reference": 1.5,
-    }
-    assert [
-        remark.endswith(told)
-        for remark, told in zip(found.report["remarks"], remarks, strict=True)
-    ] == ([True] * len(remarks))
-    kernels.pop(1.0)
-    given = fit_kernel(none, (), none, Options(C=10.0), {})  # nothing is left to choose
-    assert given.model == (2.0, 10.0)
-    assert (given.report["heading_errors_held_out"], given.report["remarks"]) == (
-        {"reference": 1.5},
-        [],
-    )
-
-
-def test_a_kernel_has_two_centres_at_least_and_widths_in_root_mean_squares(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A length of 2 makes the scale twice as large and the centres half as far, in its units."""
-    rng, t = np.random.default_rng(0), np.arange(80.0)
-    sizes = {"u": 0.1, "v": 0.05, "r": 0.02, "delta": 0.3}
-    trial = Trial(
-        t,
-        {c: (c == "u") + s * rng.standard_normal(80) for c, s in sizes.items()},
-        name="random",
-    )
-    blank: Any = SimpleNamespace(particulars=SHIP)
-    search = _Search(blank, [trial], None, {"smooth": False}, "trials")  # type: ignore[arg-type]
-    for wrong, bound in ((1, "at least 2"), (0, "at least 2"), (101, "100")):
-        with pytest.raises(InputError, match=f"centres: expected .*{bound}"):
-            kernel_residual._kernels(search, Options(centres=wrong))
-    kernels = kernel_residual._kernels(search, Options(centres=2))
-    assert list(kernels) == [2.8, 2.0, 1.4, 1.0, 0.7]  # the smoothest first
-    one, two = kernels[1.0], kernels[2.0]
-    np.testing.assert_allclose(two.scale, 2.0 * one.scale)
-    np.testing.assert_allclose(2.0 * two.centres, one.centres)
-    x = kernel_inputs(dict(trial.channels), SHIP)
-    np.testing.assert_allclose(
-        one.scale, np.sqrt(np.mean((x - one.offset) ** 2, axis=0)), rtol=1e-9
-    )
-    assert list(
-        kernel_residual._kernels(search, Options(centres=2, kernel_length=0.9))
-    ) == [0.9]
-    asked: list[int] = []
-    monkeypatch.setattr(
-        kernel_residual,
-        "chosen_centres",
-        lambda x, count: asked.append(count) or chosen_centres(x, 2),
-    )
-    kernel_residual._kernels(search, Options())
-    assert asked == [64]
+    assert found.kernel is None

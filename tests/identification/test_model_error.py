@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from certainty import case
 
-from identification import IdentificationResult, Samples, identify
-from identification.estimators.methods import METHODS, fit_all, get_method
+from identification import IdentificationResult, Samples, Uncertainty, identify
+from identification.estimators.methods import fit_all, get_method
 from identification.estimators.rm_svm import RMSVM
 from identification.regression.grey_box import chosen_box
 from identification.uncertainty.model_error import (
@@ -50,9 +50,9 @@ def test_leaving_a_trial_out_of_the_normal_equations_is_a_fit_without_it(
     method: str,
 ) -> None:
     samples = made_up()
-    found, rest = without_trial(fit_all(METHODS[method].estimator, samples), samples, 1)
+    found, rest = without_trial(fit_all(get_method(method).make, samples), samples, 1)
     anew = fit_all(
-        get_method("ls").estimator if method == "ls" else METHODS[method].estimator,
+        get_method(method).make,
         rest,
     )
     np.testing.assert_allclose(found["r"].coef_, anew["r"].coef_, rtol=1e-4)
@@ -89,7 +89,7 @@ def test_the_covariance_in_the_model_is_the_scaled_one(
 ) -> None:
     given = {"particulars": mariner.particulars, "steering": mariner.steering}
     scaled = identify(noisy_trials, **given)
-    bare = identify(noisy_trials, **given, model_error=False)
+    bare = identify(noisy_trials, **given, uncertainty=Uncertainty(model_error=False))
     error = scaled.model.provenance["model_error"]
     assert 1.0 <= error["factor"] < 4.0  # her own structure
     assert error["trials"] == 3

@@ -1,27 +1,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
+from scipy.ndimage import median_filter
 from scipy.signal import savgol_filter
+from scipy.stats import multivariate_normal
 
 from identification import identify
 from identification.regression.preprocess import (
-    kinematics,
     median,
     noise_level,
     outliers,
-    repair,
     repaired,
     savitzky_golay,
     smooth,
-    smooth_kinematics,
     smoothed_channels,
 )
 from identification.regression.preprocess.filters import Reinsch
+from identification.regression.preprocess.kalman import LinearSystem
+from identification.regression.preprocess.kinematics import (
+    heading_motion,
+    plane_motion,
+    smooth_kinematics,
+)
 from identification.regression.preprocess.noise import is_noisy, noise_ratio
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
@@ -155,41 +159,21 @@ def test_kalman_smoother_makes_velocities_better_and_keeps_the_record(
         assert after < 0.7 * before
 
 
-@pytest.mark.parametrize("channel", ["psi", "r"])
-def test_kalman_smoother_takes_a_heading_or_a_yaw_rate_alone(
-    mariner: ShipModel, record: Callable[..., Trial], channel: str
+@pytest.mark.parametrize(
+    ("recorded", "better"),
+    [("psi", "psi"), ("r", "r"), ("x y psi r", "x y"), ("v psi r", "v")],
+)
+def test_kalman_smoother_takes_the_channels_there_are(
+    mariner: ShipModel, record: Callable[..., Trial], recorded: str, better: str
 ) -> None:
     run = zigzag(mariner, 20, 20, duration=200, dt=0.1)
-    truth, noisy = (
-        Trial(one.t, {channel: one[channel], "delta": one["delta"]}, name="alone")
-        for one in (record(run, 10), record(run, 10, 1.0, 5))
-    )
-    before, after = (
-        np.std(one[channel] - truth[channel])
-        for one in (noisy, smooth_kinematics(noisy))
-    )
-    assert after < 0.7 * before
-
-
-@pytest.mark.parametrize("channels", [("x", "y"), ("v",)])
-def test_kalman_smoother_takes_positions_or_sway_alone(
-    mariner: ShipModel, record: Callable[..., Trial], channels: tuple[str, ...]
-) -> None:
-    run = zigzag(mariner, 20, 20, duration=200, dt=0.1)
-    truth, noisy = (
-        Trial(
-            one.t,
-            {name: one[name] for name in (*channels, "psi", "r", "delta")},
-            name="some",
-        )
-        for one in (record(run, 10), record(run, 10, 1.0, 5))
-    )
-    smoothed = smooth_kinematics(noisy)
-    for channel in channels:
-        before, after = (
-            np.std(trial[channel] - truth[channel]) for trial in (noisy, smoothed)
-        )
-        assert after < 0.7 * before
+    truth = record(run, 10)
+    noisy = record(run, 10, 1.0, 5)
+    channels = {name: noisy[name] for name in (*recorded.split(), "delta")}
+    smoothed = smooth_kinematics(Trial(noisy.t, channels, name="some"))
+    for channel in better.split():
+        before = np.std(noisy[channel] - truth[channel])
+        assert np.std(smoothed[channel] - truth[channel]) < 0.7 * before
 
 
 def test_preprocessing_that_does_not_exist_is_refused(
@@ -214,39 +198,46 @@ def test_noise_is_told_by_the_change_over_a_window() -> None:
     assert not is_noisy(t, [t, 2.0 * t])
 
 
-def test_dropouts_of_up_to_ten_steps_are_filled() -> None:
-    """At the usual step, straight where the channel is; a longer one stays a gap."""
-    t = np.arange(200.0)
-    for missing, filled in ((1, True), (9, True), (10, False)):
-        kept = (t < 50.0) | (t >= 50.0 + missing)
-        found = repaired(Trial(t[kept], {"u": 3.0 + 0.01 * t[kept]}, name="holes"))
-        if filled:
-            np.testing.assert_allclose(found.t, t)
-            np.testing.assert_allclose(found["u"], 3.0 + 0.01 * t)
-            assert found.repaired == {"u": missing}
-        else:
-            assert len(found) == kept.sum()
-
-
-def test_an_outlier_is_six_times_the_noise_away(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize("step", [0.1, 10.0])
+@pytest.mark.parametrize(
+    ("hole", "missing"),
+    [(1.0, 0), (1.45, 0), (1.55, 1), (2.0, 1), (10.0, 9), (10.45, 9), (10.52, 0)],
+)
+def test_steps_of_one_and_a_half_to_ten_and_a_half_usual_ones_are_filled(
+    step: float, hole: float, missing: int
 ) -> None:
-    monkeypatch.setattr(repair, "noise_level", lambda t, values: 0.1)
-    for size, found in ((0.59, []), (0.61, [20]), (-0.61, [20])):
-        values = np.where(np.arange(50) == 20, size, 0.0)
-        assert np.flatnonzero(outliers(np.arange(50.0), values)).tolist() == found
+    """At the usual step, straight where the channel is; a longer one stays a gap."""
+    usual = np.arange(60.0)
+    t = step * np.concatenate([usual, usual + usual[-1] + hole])
+    straight = 3.0 + 0.01 * t
+    found = repaired(Trial(t, {"u": straight}, name="hole"))
+    assert len(found) == len(t) + missing
+    assert set(t) <= set(found.t)
+    assert found.repaired == ({"u": missing} if missing else {})
+    inside = found.t[59 : 61 + missing]
+    np.testing.assert_allclose(np.diff(inside), step * hole / (missing + 1))
+    np.testing.assert_allclose(found["u"], 3.0 + 0.01 * found.t)
 
 
-def test_a_tenth_of_a_channel_may_be_outliers(monkeypatch: pytest.MonkeyPatch) -> None:
+def chequered(t: np.ndarray, noise: float) -> np.ndarray:
+    """A record whose `noise_level` is known: alternating values, of the cubic's weights."""
+    gain = np.sqrt(1.0 + 2.0 * (4.0 / 6.0) ** 2 + 2.0 * (1.0 / 6.0) ** 2)
+    size = noise * 0.6745 * gain / (1.0 + 8.0 / 6.0 + 2.0 / 6.0)
+    return size * (-1.0) ** np.arange(len(t))
+
+
+def test_an_outlier_is_several_times_the_noise_away() -> None:
     t = np.arange(200.0)
-    for count in (20, 21):
-        monkeypatch.setattr(repair, "outliers", lambda *_, n=count, **more: t < n)
-        if count == 20:
-            assert repaired(Trial(t, {"u": t})).repaired == {"u": 20}
-    with pytest.raises(
-        InputError, match="21 of 200 samples of u would be outliers, expected at most a"
-    ):
-        repaired(Trial(t, {"u": t}))
+    record = chequered(t, 0.1)
+    assert noise_level(t, record) == pytest.approx(0.1)
+    usual_step = 2.0 * np.abs(record[0])
+    median = median_filter(record, 7)[20]
+    for threshold in (6.0, 20.0):
+        allowed = 0.1 * threshold + 3.5 * usual_step
+        for size, found in ((0.99, []), (1.01, [20]), (-1.01, [20])):
+            values = record.copy()
+            values[20] = median + size * allowed
+            assert np.flatnonzero(outliers(t, values, threshold)).tolist() == found
 
 
 def test_a_channel_of_outliers_is_refused() -> None:
@@ -263,7 +254,7 @@ def test_a_channel_of_outliers_is_refused() -> None:
         if refused:
             with pytest.raises(
                 InputError,
-                match=r"samples of u would be outliers, expected at most a tenth",
+                match=r"spiked': expected at most a tenth of u to be outliers, got 4",
             ):
                 repaired(trial)
         else:
@@ -293,26 +284,6 @@ def test_channels_are_smoothed_as_named_but_for_the_rudder() -> None:
     )
     with pytest.raises(InputError, match=r"preprocessing: expected .*got 'splines'"):
         smoothed_channels(trial, ["u"], "splines")
-
-
-@pytest.mark.parametrize("step", [0.1, 10.0])
-def test_steps_of_more_than_one_and_a_half_usual_ones_are_dropouts(step: float) -> None:
-    """Up to ten usual ones and a half, whatever the unit of time."""
-    usual = np.arange(60.0)
-    for hole, missing in (
-        (1.0, 0),
-        (1.45, 0),
-        (1.55, 1),
-        (2.0, 1),
-        (10.45, 9),
-        (10.52, 0),
-    ):
-        t = step * np.concatenate([usual, usual + usual[-1] + hole])
-        filled = repair._filled_times(t)
-        assert len(filled) == len(t) + missing, hole
-        assert set(t) <= set(filled)
-        inside = filled[59 : 61 + missing]
-        np.testing.assert_allclose(np.diff(inside), step * hole / (missing + 1))
 
 
 def test_what_is_sound_stays_to_the_bit_beside_what_is_repaired() -> None:
@@ -353,11 +324,10 @@ def test_rounding_is_no_outlier_on_a_channel_without_noise() -> None:
         assert np.flatnonzero(outliers(t, values)).tolist() == found
 
 
-def test_a_sample_may_be_away_by_what_the_channel_moves_in_half_the_median_s_width(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """On a ramp of one a sample, beside the noise: three and a half from the median of seven."""
-    monkeypatch.setattr(repair, "noise_level", lambda t, values: 0.0)
+def test_a_sample_may_be_away_by_what_the_channel_moves_in_half_the_median_s_width() -> (
+    None
+):
+    """On a clean ramp of one a sample: three and a half from the median of seven."""
     t = np.arange(60.0)
     for off, found in ((4.45, []), (4.55, [30]), (-4.45, []), (-4.55, [30])):
         values = t.copy()
@@ -388,24 +358,12 @@ def test_an_end_is_an_outlier_beyond_seven_times_the_largest_step_inside(
         assert not outliers(t, values).any()
 
 
-def test_ends_are_compared_in_records_of_21_samples_and_a_median_takes_seven(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(repair, "noise_level", lambda t, values: 0.1)
+def test_ends_are_compared_in_records_of_21_samples() -> None:
     for count, found in ((20, []), (21, [0])):
         values = 0.01 * np.arange(count) ** 2 / count
         values[0] += 5.0
-        assert (
-            np.flatnonzero(
-                outliers(np.arange(float(count)), values, may_step=False)
-            ).tolist()
-            == found
-        )
-    for count, found in ((6, []), (7, [3])):
-        spike = np.where(np.arange(count) == 3, 5.0, 0.0)
-        assert (
-            np.flatnonzero(outliers(np.arange(float(count)), spike)).tolist() == found
-        )
+        flags = outliers(np.arange(float(count)), values, may_step=False)
+        assert np.flatnonzero(flags).tolist() == found
 
 
 def test_five_samples_tell_noise_and_four_do_not() -> None:
@@ -442,114 +400,99 @@ def test_steps_alike_to_a_thousandth_are_even(unevenness: float, even: bool) -> 
     )
 
 
-def states(trial: Trial, monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, Any]]:
-    """What the smoothers are asked for while a trial is smoothed: rows, and the arguments."""
-    asked: list[tuple[int, Any]] = []
-
-    def smoother(*given: Any) -> tuple[np.ndarray, float]:
-        asked.append((len(given[4]), given))
-        return np.zeros((len(given[4]), len(given[5]))), -1.0
-
-    monkeypatch.setattr(kinematics, "smooth_linear", smoother)
-    smooth_kinematics(trial)
-    return asked
-
-
-def test_the_roughness_of_the_motion_is_found_on_the_first_500_samples(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Within four decades of a guess, its square root: a change in a twentieth of the record."""
-    t = 2.0 * np.arange(701.0)
-    r = 0.3 * np.sin(t / 50.0) + 0.05 * np.random.default_rng(0).standard_normal(701)
-    asked = states(Trial(t, {"r": r}, name="long"), monkeypatch)
-    assert {rows for rows, _ in asked[:-1]} == {500}
-    assert [given[7] for _, given in asked] == [True] * (len(asked) - 1) + [False]
-    assert asked[-1][0] == 701
-    guess = np.ptp(r) ** 2 / (1400.0 / 20.0) ** 3
-    unit = 2.0  # of the acceleration after a step of 2 s
-    decades = [np.log10(given[1][0, 2, 2] / unit / guess) for _, given in asked]
-    assert min(decades) >= -4.0
-    assert max(decades) <= 4.0
-    assert decades[0] == pytest.approx(
-        -4.0 + 8.0 * 0.381966, abs=1e-5
-    )  # golden section
-    *_, observation, variances, _, start, start_variances, _ = asked[-1][1]
-    np.testing.assert_array_equal(observation, [[0.0, 1.0, 0.0]])
-    np.testing.assert_allclose(variances, [noise_level(t, r) ** 2])
-    np.testing.assert_array_equal(start, [0.0, r[0], 0.0])
-    np.testing.assert_array_equal(start_variances, [1.0, 1e-2, 1.0])
-
-
-def test_positions_begin_uncertain_and_accelerations_within_a_metre_per_second_squared(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """On a clean heading; what was not recorded begins at 0, and the roughness follows the way sailed."""
-    t, rng = 1.0 * np.arange(81.0), np.random.default_rng(0)
-    x, y = (5.0 * t + rng.standard_normal(81), 3.0 + rng.standard_normal(81))
-    asked = states(
-        Trial(t, {"psi": 0.01 * t, "x": x, "y": y}, name="track"), monkeypatch
+def linear_system(n: int) -> tuple[LinearSystem, np.ndarray]:
+    """A system of two states and two channels of which one measurement is missing."""
+    rng = np.random.default_rng(5)
+    system = LinearSystem(
+        transitions=np.tile([[1.0, 0.7], [-0.1, 0.95]], (n - 1, 1, 1)),
+        process=np.tile([[0.02, 0.005], [0.005, 0.03]], (n - 1, 1, 1)),
+        observation=np.array([[1.0, 0.2], [0.0, 1.0]]),
+        variances=np.array([0.1, 0.3]),
+        start=np.array([0.4, -0.7]),
+        start_variances=np.array([2.0, 0.5]),
     )
-    _, process, observation, variances, measured, start, start_variances, _ = asked[-1][
-        1
-    ]
-    np.testing.assert_array_equal(observation, np.eye(6)[:2])
-    np.testing.assert_array_equal(start, [x[0], y[0], 0.0, 0.0, 0.0, 0.0])
-    np.testing.assert_array_equal(start_variances, [1e4, 1e4, 1e2, 1e2, 1.0, 1.0])
-    np.testing.assert_array_equal(measured, np.column_stack([x, y]))
-    np.testing.assert_allclose(
-        variances, [noise_level(t, x) ** 2, noise_level(t, y) ** 2]
+    measured = rng.uniform(-1.0, 1.0, (n, 2))
+    measured[3, 1] = np.nan
+    return system, measured
+
+
+def test_the_kalman_smoother_is_the_conditional_mean_of_all_states() -> None:
+    """The joint normal distribution of states and measurements gives the same."""
+    n = 8
+    system, measured = linear_system(n)
+    means, cross = [system.start], np.zeros((n, n, 2, 2))
+    cross[0, 0] = np.diag(system.start_variances)
+    for k in range(1, n):
+        F = system.transitions[k - 1]
+        means.append(F @ means[-1])
+        for i in range(k):
+            cross[k, i] = F @ cross[k - 1, i]
+            cross[i, k] = cross[k, i].T
+        cross[k, k] = F @ cross[k - 1, k - 1] @ F.T + system.process[k - 1]
+    covariance = cross.transpose(0, 2, 1, 3).reshape(2 * n, 2 * n)
+    mean = np.concatenate(means)
+
+    known = np.isfinite(measured.ravel())
+    H = np.kron(np.eye(n), system.observation)[known]
+    expected = H @ mean
+    spread = H @ covariance @ H.T + np.diag(np.tile(system.variances, n)[known])
+    errors = measured.ravel()[known] - expected
+    smoothed = mean + covariance @ H.T @ np.linalg.solve(spread, errors)
+    np.testing.assert_allclose(system.smoothed(measured).ravel(), smoothed)
+    likelihood = system.filtered(measured).log_likelihood
+    constant = 0.5 * len(errors) * np.log(2.0 * np.pi)
+    assert likelihood - constant == pytest.approx(
+        multivariate_normal(cov=spread).logpdf(errors)
     )
-    of_one = (
-        process[0] / process[0, 4, 4]
-    )  # speeds and accelerations, ahead and aside alike
-    expected = np.zeros((6, 6))
-    expected[2:, 2:] = np.kron([[1.0 / 3.0, 0.5], [0.5, 1.0]], np.eye(2))
-    np.testing.assert_allclose(of_one, expected)
-    decade = np.log10(asked[0][1][1][0, 4, 4] / (np.ptp(x) ** 2 / (80.0 / 20.0) ** 3))
-    assert decade == pytest.approx(-4.0 + 8.0 * 0.381966, abs=1e-5)
-
-
-def test_a_channel_has_the_noise_of_its_resolution_at_least(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A ten-thousandth of its range, and a thousand-millionth where it does not change."""
-    t = np.arange(60.0)
-    r = 0.01 * np.random.default_rng(0).standard_normal(60)
-    given = states(Trial(t, {"psi": t, "r": r}, name="ramp"), monkeypatch)[-1][1]
-    np.testing.assert_allclose(given[3], [(1e-4 * 59.0) ** 2, noise_level(t, r) ** 2])
-    still = states(
-        Trial(t, {"psi": np.sin(7.0 * t), "r": 0.0 * t}, name="still"), monkeypatch
-    )[-1][1]
-    assert still[3][1] == pytest.approx(1e-18)
-
-
-def test_a_clean_yaw_rate_alone_gives_the_heading_that_it_turns_through() -> None:
-    t = np.arange(0.0, 60.0, 0.5)
-    r = 0.02 * np.sin(t / 8.0)
-    heading = kinematics._smooth_heading(Trial(t, {"r": r}, name="gyro"))
-    np.testing.assert_allclose(
-        heading["psi"], 0.16 * (1.0 - np.cos(t / 8.0)), atol=2e-4
-    )
-    np.testing.assert_allclose(heading["r"], r, atol=2e-5)
 
 
 def test_a_ship_of_constant_acceleration_goes_where_mechanics_say() -> None:
-    """Ahead on a heading of 30 deg: x by half a t^2; the covariances are the integrals of white noise."""
-    h, psi = np.array([2.0]), np.radians([30.0, 30.0])
-    ahead = kinematics._plane_transitions(h, psi)[0] @ [1.0, 2.0, 3.0, -0.5, 0.2, 0.4]
+    """Ahead on a heading of 30 deg: x by half a t^2."""
+    t, psi = np.array([0.0, 2.0]), np.radians([30.0, 30.0])
+    state = [1.0, 2.0, 3.0, -0.5, 0.2, 0.4]
+    ahead, aside = 3.0 * 2.0 + 0.5 * 0.2 * 4.0, -0.5 * 2.0 + 0.5 * 0.4 * 4.0
     cosine, sine = np.cos(psi[0]), np.sin(psi[0])
-    far = np.array(
-        [3.0 * 2.0 + 0.5 * 0.2 * 4.0, -0.5 * 2.0 + 0.5 * 0.4 * 4.0]
-    )  # ahead and to starboard
-    place = [
-        1.0 + far[0] * cosine - far[1] * sine,
-        2.0 + far[0] * sine + far[1] * cosine,
-    ]
-    np.testing.assert_allclose(ahead, [*place, 3.4, 0.3, 0.2, 0.4])
-    np.testing.assert_allclose(
-        kinematics._integrators(h)[0] @ [1.0, 3.0, 0.2], [7.4, 3.4, 0.2]
-    )
+    x = 1.0 + ahead * cosine - aside * sine
+    y = 2.0 + ahead * sine + aside * cosine
+    moved = plane_motion(t, psi).transitions[0] @ state
+    np.testing.assert_allclose(moved, [x, y, 3.4, 0.3, 0.2, 0.4])
+    turned = heading_motion(t).transitions[0] @ [1.0, 3.0, 0.2]
+    np.testing.assert_allclose(turned, [7.4, 3.4, 0.2])
+
+
+def test_the_covariance_of_a_motion_is_the_integral_of_white_noise() -> None:
+    t = np.array([0.0, 2.0])
     later = np.linspace(0.0, 2.0, 20_001)
     kernel = np.stack([0.5 * later**2, later, np.ones_like(later)])
     expected = np.trapezoid(kernel[:, None] * kernel, later)
-    np.testing.assert_allclose(kinematics._random_walk(h)[0], expected, rtol=1e-6)
+    np.testing.assert_allclose(heading_motion(t).process[0], expected, rtol=1e-6)
+    plane = plane_motion(t, np.zeros(2)).process[0]
+    np.testing.assert_allclose(
+        plane[2:, 2:], np.kron(expected[1:, 1:], np.eye(2)), rtol=1e-6
+    )
+    assert not plane[:2].any()
+
+
+def test_a_clean_yaw_rate_gives_the_heading_at_which_a_ship_moves() -> None:
+    """Positions on a circle are smoothed to that circle without a recorded heading."""
+    t, rng = np.arange(0.0, 120.0), np.random.default_rng(0)
+    psi = 0.02 * t
+    x, y = 250.0 * np.sin(psi), 250.0 * (1.0 - np.cos(psi))
+    noisy_x = x + 2.0 * rng.standard_normal(len(t))
+    noisy_y = y + 2.0 * rng.standard_normal(len(t))
+    channels = {"r": np.full(len(t), 0.02), "x": noisy_x, "y": noisy_y}
+    smoothed = smooth_kinematics(Trial(t, channels, name="gyro"))
+    np.testing.assert_allclose(smoothed["r"], 0.02)
+    assert np.std(smoothed["x"] - x) < 1.0
+    assert np.std(smoothed["y"] - y) < 1.0
+
+
+def test_the_smoother_finds_the_roughness_of_a_long_record() -> None:
+    """The first 500 samples tell; a ship that turns slowly is smoothed more."""
+    t = 2.0 * np.arange(701.0)
+    truth = 0.3 * np.sin(t / 50.0)
+    r = truth + 0.05 * np.random.default_rng(0).standard_normal(701)
+    smoothed = smooth_kinematics(Trial(t, {"r": r}, name="long"))
+    assert np.std(smoothed["r"] - truth) < 0.4 * 0.05
+    with pytest.raises(InputError, match="expected the heading psi or the yaw rate r"):
+        smooth_kinematics(Trial(t, {"u": r}, name="no heading"))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import shipgym
-from identification import IdentificationResult, identify
+from identification import IdentificationResult, PriorKnowledge, identify
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.regression.samples import build_samples
 from identification.simulation_error.formulas import (
@@ -101,7 +101,7 @@ def test_a_strength_of_zero_is_no_prior(
 ) -> None:
     free = fit(target, short_trials, method=method)
     assert values(
-        fit(target, short_trials, method=method, prior=prior, prior_strength=0.0)
+        fit(target, short_trials, method=method, prior=PriorKnowledge(prior, 0.0))
     ) == values(free)
 
 
@@ -109,11 +109,11 @@ def test_an_infinite_strength_is_the_prior_whatever_the_data(
     target: ShipModel, short_trials: list[Trial]
 ) -> None:
     one, other = (
-        values(fit(target, trials, prior="tanker", prior_strength=np.inf))
+        values(fit(target, trials, prior=PriorKnowledge("tanker", np.inf)))
         for trials in (short_trials[:1], short_trials)
     )
     assert one == pytest.approx(other, rel=1e-9, abs=1e-15)
-    strong = values(fit(target, short_trials, prior="tanker", prior_strength=1e6))
+    strong = values(fit(target, short_trials, prior=PriorKnowledge("tanker", 1e6)))
     assert strong == pytest.approx(one, rel=1e-4, abs=1e-7)
 
 
@@ -122,7 +122,7 @@ def test_an_infinite_strength_of_formulas_is_what_they_say(
 ) -> None:
     ship = target.particulars.completed()
     result = fit(
-        target, short_trials, prior="clarke", prior_strength=np.inf, guarded=False
+        target, short_trials, prior=PriorKnowledge("clarke", np.inf), guarded=False
     )
     clarke = clarke_derivatives(ship)
     assert result.coefficients["Y_v"] == pytest.approx(clarke["Y_v"], rel=1e-9)
@@ -227,7 +227,9 @@ def test_the_strength_may_be_judged_by_the_largest_rudder(target: ShipModel) -> 
         )
         for angle in (10, 20)
     )
-    result = fit(target, [small, large], prior="tanker", prior_folds="largest-rudder")
+    result = fit(
+        target, [small, large], prior=PriorKnowledge("tanker", folds="largest-rudder")
+    )
     provenance = result.model.provenance or {}
     prior = reference_prior("tanker", result.model)
     held = build_samples(
@@ -295,7 +297,7 @@ def test_virtual_trials_are_of_both_sides_and_twenty_ship_lengths(
 def test_auto_takes_the_ship_most_alike(
     target: ShipModel, short_trials: list[Trial]
 ) -> None:
-    result = fit(target, short_trials, prior="auto", prior_strength=1.0)
+    result = fit(target, short_trials, prior=PriorKnowledge("auto", 1.0))
     provenance = result.model.provenance or {}
     assert (provenance["prior"], provenance["prior_source"]) == ("auto", "kvlcc2-l7")
     assert provenance["prior_strength"] == 1.0
@@ -314,25 +316,13 @@ def test_auto_takes_the_ship_most_alike(
         ),
         (
             {"structure": "grey-box", "reference_model": "tanker", "prior": "kvlcc2"},
-            r"prior: expected none with structure 'grey-box'",
+            r"prior: .*structure 'grey-box'.*'kvlcc2'",
         ),
         ({"prior": "titanic"}, r"titanic"),
+        ({"prior": PriorKnowledge(strength=1.0)}, r"prior: .* name one"),
         (
-            {"prior": "tanker", "prior_strength": -1.0},
-            r"prior_strength: expected .*got -1",
-        ),
-        ({"prior_strength": 1.0}, r"prior_strength: 1.0 found without a prior"),
-        (
-            {"prior_folds": "largest-rudder"},
-            r"prior_folds: 'largest-rudder' found without a prior",
-        ),
-        (
-            {"prior": "tanker", "prior_folds": "luck"},
-            r"prior_folds: expected .*got 'luck'",
-        ),
-        (
-            {"prior": "tanker", "prior_folds": "largest-rudder"},
-            r"prior_folds: expected some .* got 2 trials that all reach 20",
+            {"prior": PriorKnowledge("tanker", folds="largest-rudder")},
+            r"prior_folds: .*2 trials that all reach 20",
         ),
     ],
 )
@@ -341,6 +331,17 @@ def test_what_does_not_fit_is_refused(
 ) -> None:
     with pytest.raises(InputError, match=message):
         fit(target, short_trials, **settings)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [({"strength": -1.0}, "prior_strength: "), ({"folds": "luck"}, "prior_folds: ")],
+)
+def test_prior_knowledge_that_cannot_be_is_refused(
+    wrong: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        PriorKnowledge("tanker", **wrong)
 
 
 def test_formulas_need_the_rudder_area(

@@ -15,6 +15,7 @@ from real_ships.measures import mean_errors, turns, zigzag_errors
 from real_ships.mmg import CIRCLES, OTHERS, circle, fitted
 from real_ships.section import Section, marks, number, put, table
 
+from identification import PriorKnowledge
 from shipgym import InputError, ShipModel
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import load_model
@@ -99,7 +100,7 @@ def test_the_mmg_form_of_three_zigzags_predicts_the_others_and_the_circle(
 ) -> None:
     """Aims of 0.095 deg/s, 4.3 deg of heading, 4 % of tactical diameter and 1.5 deg of drift to starboard."""
     hsva = data.ship(SHIP, 4)
-    model = fitted(hsva, reference_model="kvlcc2-l7", prior_strength=2.0)
+    model = fitted(hsva, prior=PriorKnowledge("kvlcc2-l7", 2.0))
     yaw_rate, heading, *_ = mean_errors(
         zigzag_errors(model, hsva.runs[name]) for name in OTHERS
     )

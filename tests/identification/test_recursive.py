@@ -10,17 +10,15 @@ import pytest
 from sklearn.exceptions import NotFittedError
 from sklearn.utils.estimator_checks import check_estimator
 
-from identification import identify
-from identification.estimators import recursive_kernels as kernels
-from identification.estimators.coefficient_history import (
+from identification import (
     CoefficientHistory,
-    coefficient_history,
-)
-from identification.estimators.recursive import (
     MultiInnovationLeastSquares,
     RecursiveLeastSquares,
     StochasticGradient,
+    coefficient_history,
+    identify,
 )
+from identification.estimators import recursive_kernels as kernels
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import converted_model, load_model
@@ -281,75 +279,47 @@ def test_identify_knows_the_recursive_methods(method: str) -> None:
 @pytest.mark.parametrize(
     ("estimator", "message"),
     [
-        (RecursiveLeastSquares(forgetting=1.5), "forgetting: expected .*got 1.5"),
-        (RecursiveLeastSquares(C=-1.0), "C: expected .*got -1"),
-        (RecursiveLeastSquares(start_samples=-3), "start_samples: expected .*got -3"),
-        (MultiInnovationLeastSquares(innovations=0), "innovations: expected .*got 0"),
-        (StochasticGradient(omega=-1.0), "omega: expected .*got -1"),
-        (RecursiveLeastSquares(scale=[1.0, 2.0]), "scale: shape"),
+        (RecursiveLeastSquares(forgetting=1.5), "forgetting: "),
+        (RecursiveLeastSquares(forgetting=0.0), "forgetting: "),
+        (RecursiveLeastSquares(C=0.0), "C: "),
+        (RecursiveLeastSquares(start_C=0.0), "start_C: "),
+        (RecursiveLeastSquares(start_samples=-1), "start_samples: "),
+        (RecursiveLeastSquares(start_interval=0), "start_interval: "),
+        (RecursiveLeastSquares(scale=[1.0, 2.0]), "scale: "),
+        (MultiInnovationLeastSquares(innovations=0), "innovations: "),
+        (StochasticGradient(omega=-1.0), "omega: "),
     ],
 )
 def test_settings_out_of_range_are_named(estimator: Any, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        estimator.fit(*regression())
-
-
-def test_samples_that_do_not_fit_are_named() -> None:
     X, y = regression()
-    estimator = RecursiveLeastSquares().update(X, y)
-    with pytest.raises(
-        InputError, match="1 signals of 3 regressors found, expected 1 of 4"
-    ):
-        estimator.update(X[0, :3], 1.0)
-    with pytest.raises(InputError, match="not finite"):
-        estimator.update(X[0], np.nan)
-    with pytest.raises(InputError, match="expected a recursive one"):
-        coefficient_history(
-            hual_trooper("nomoto", {"c_r": -1 / T, "c_d": K / T}),
-            "nomoto",
-            PARTICULARS,
-            "ls",
-        )
+    with pytest.raises(InputError, match=message):
+        estimator.fit(X, y)
+    with pytest.raises(InputError, match=message):
+        estimator.update(X, y)
 
 
 @pytest.mark.parametrize(
     ("phi", "y", "message"),
     [
-        (np.zeros((5, 2)), np.zeros(4), r"shapes \(5, 2\) and \(4,\) found"),
-        (np.zeros((5, 3, 2)), np.zeros((5, 2)), "3 signals found, expected 2 as in y"),
-        (
-            np.zeros((5, 2, 2, 2)),
-            np.zeros(5),
-            "found, expected \\(n_samples, n_features\\)",
-        ),
-        (np.full((5, 2), np.inf), np.zeros(5), "not finite"),
+        (np.zeros((5, 4)), np.zeros(4), r"n_features.*got \(5, 4\) and \(4,\)"),
+        (np.zeros((5, 3, 4)), np.zeros((5, 2)), "2 signals as in y, got 3"),
+        (np.zeros((5, 2, 2, 2)), np.zeros(5), "n_features"),
+        (np.full((5, 4), np.inf), np.zeros(5), "finite numbers"),
+        (np.zeros(3), 1.0, "1 signals of 4 regressors as before, got 1 of 3"),
     ],
 )
 def test_samples_that_do_not_belong_together_are_refused(
     phi: Any, y: Any, message: str
 ) -> None:
+    estimator = RecursiveLeastSquares().update(*regression())
     with pytest.raises(InputError, match=message):
-        RecursiveLeastSquares().update(phi, y)
+        estimator.update(phi, y)
 
 
-def test_settings_reach_to_their_bounds() -> None:
-    for least in (
-        {"start_samples": 0},
-        {"start_interval": 1},
-        {"forgetting": 1.0},
-        {"C": 1e-9},
-    ):
-        assert np.isfinite(
-            RecursiveLeastSquares(**least).fit(*regression()).coef_
-        ).all()
-    for wrong in (
-        {"start_interval": 0},
-        {"forgetting": 0.0},
-        {"C": 0.0},
-        {"start_C": 0.0},
-    ):
-        with pytest.raises(InputError, match=f"{next(iter(wrong))}: expected"):
-            RecursiveLeastSquares(**wrong).fit(*regression())
+def test_a_history_is_that_of_a_recursive_method() -> None:
+    trial = hual_trooper("nomoto", {"c_r": -1 / T, "c_d": K / T})
+    with pytest.raises(InputError, match="method: expected a recursive one"):
+        coefficient_history(trial, "nomoto", PARTICULARS, "ls")
 
 
 def test_what_has_seen_no_sample_has_no_estimate() -> None:
@@ -359,21 +329,6 @@ def test_what_has_seen_no_sample_has_no_estimate() -> None:
                 NotFittedError, match=f"This {type(estimator).__name__} instance is not"
             ):
                 getattr(estimator, name)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"forgetting": 1.1}, "forgetting: expected .*got 1.1"),
-        ({"start_samples": -1}, "start_samples: expected .*got -1"),
-        ({"C": 0.0}, "C: expected .*got 0"),
-    ],
-)
-def test_settings_are_checked_sample_by_sample_too(
-    settings: dict[str, Any], message: str
-) -> None:
-    with pytest.raises(InputError, match=message):
-        RecursiveLeastSquares(**settings).update([[1.0, 2.0]], [3.0])
 
 
 def test_one_sample_of_one_regressor_by_hand() -> None:
@@ -428,10 +383,7 @@ def test_a_history_ends_with_the_estimate_and_knows_its_coefficients() -> None:
     )
     assert found.last == {"a": 2.0, "b": 7.0}
     assert found["b"].tolist() == [5.0, 7.0]
-    with pytest.raises(
-        InputError,
-        match="coefficient history: no coefficient 'c', expected one of a, b",
-    ):
+    with pytest.raises(InputError, match=r"coefficient history: .*'c'"):
         found["c"]
 
 

@@ -135,7 +135,7 @@ def test_the_terms_of_a_virtual_ship_are_found_among_more(direction: str) -> Non
         for a in (10, 20, 35)
     ]
     samples = build_samples(
-        trials, table, PARTICULARS, "integral", window=20, smooth=False
+        trials, table, PARTICULARS, "integral", window=20, smoothing="none"
     )
     for target in samples.targets.values():
         target += 2e-4 * np.std(target) * rng.standard_normal(len(target))

@@ -14,7 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identification import IdentificationResult, Samples, TruncatedLSSVM, identify
+from identification import (
+    RMSVM,
+    IdentificationResult,
+    Samples,
+    TruncatedLSSVM,
+    identify,
+)
 from identification.report.choice_figures import l_curve_figure, search_figure
 from identification.report.choice_figures import truncated as with_a_rank
 from identification.report.coefficient_figure import coefficients_figure
@@ -23,7 +29,7 @@ from identification.report.figures import (
     residual_figure,
     rudder_at_windows,
 )
-from identification.report.page import report_page, setting_text
+from identification.report.page import report_page, settings_rows
 from identification.report.predictions import overview_figure, prediction_figure
 from identification.report.summary import coefficients_table
 from identification.report.tables import (
@@ -102,7 +108,7 @@ def test_settings_hold_the_whole_call(
     assert (settings["structure"], settings["method"], settings["samples"]) == (
         "abkowitz",
         "tls-svm",
-        "spline",
+        {"rule": "spline", "window": None},
     )
     assert settings["steering"]["rudder_rate_deg_s"] == 5.0
     assert [trial["use"] for trial in settings["trials"]] == [
@@ -182,7 +188,7 @@ def test_a_grey_box_tells_of_its_search_where_it_searched(
         "structure": "grey-box",
         "reference_model": "tanker",
     }
-    result = identify(noisy_trials, method="rm-svm", epsilon=epsilon, **options)
+    result = identify(noisy_trials, method=RMSVM(epsilon=epsilon), **options)
     assert result.plots().keys() & {"search", "l-curve"} == figures
     if epsilon is None:
         panels = [trace.xaxis for trace in result.plots()["search"].data]
@@ -559,9 +565,21 @@ def test_less_than_two_decades_are_drawn_in_steps_of_1_2_and_5(
 
 
 def test_settings_are_told_in_words() -> None:
-    given = (True, False, ["a.csv", 3], [], 2.5, "gcv", {1: 2})
-    found = [setting_text(value) for value in given]
-    assert found == ["yes", "no", "a.csv, 3", NONE, "2.5", "gcv", "{1: 2}"]
+    settings = {
+        "guarded": True,
+        "hold_out": ["a.csv", "b.csv"],
+        "samples": {"rule": "euler", "window": None},
+        "preprocessing": {"smoothing": "rts", "repair": False},
+        "name": None,
+        "trials": [],
+    }
+    assert settings_rows(settings) == {
+        "guarded": "yes",
+        "hold out": "a.csv, b.csv",
+        "samples": "rule euler",
+        "preprocessing": "smoothing rts, repair no",
+    }
+    assert settings_rows({"hold_out": []}) == {"hold out": NONE}
 
 
 def test_what_a_trial_did_not_record_is_left_out() -> None:

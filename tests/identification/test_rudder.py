@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.regression import rudder
+from identification.regression.gear_response import GearResponse, goes_on
 from identification.regression.rudder import estimated_gear, rebuild, straight
 from shipgym import ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
@@ -77,28 +77,12 @@ def test_rudder_that_no_gear_explains_is_taken_straight() -> None:
     assert rebuilt(10.25) == pytest.approx(0.75 * delta[10] + 0.25 * delta[11])
 
 
-@pytest.mark.parametrize(("share", "follows"), [(0.86, True), (0.84, False)])
-def test_a_gear_explains_85_per_cent_of_the_intervals(
-    share: float, follows: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    t = np.arange(200.0)
-    monkeypatch.setattr(rudder, "_explained", lambda *_: share)
-    assert (
-        rebuild(
-            t, np.radians(np.interp(t, [50, 60, 120, 140], [0, 10, 10, -10]))
-        ).follows_gear
-        == follows
-    )
-
-
-def test_a_gear_needs_eight_samples_for_each_change_of_order(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(rudder, "_explained", lambda *_: 1.0)
-    t = np.arange(16.0)
-    delta = np.radians(np.interp(t, [3, 5, 8, 10], [0, 2, 2, 0]))
+def test_a_gear_needs_eight_samples_for_each_change_of_order() -> None:
+    t = np.arange(40.0)
+    delta = np.radians(np.interp(t, [3, 13, 18, 28], [0, 10, 10, 0]))
     assert rebuild(t, delta).follows_gear
-    assert not rebuild(t[:15], delta[:15]).follows_gear
+    sawtooth = np.radians(np.interp(t, np.arange(0.0, 40.0, 4.0), [0, 4] * 5))
+    assert not rebuild(t, sawtooth).follows_gear
 
 
 def test_limit_of_an_estimated_gear_is_the_largest_recorded_angle() -> None:
@@ -130,16 +114,14 @@ def test_a_rudder_taken_straight_has_no_gear_and_no_corners() -> None:
 
 def test_four_samples_are_the_fewest_that_a_gear_explains() -> None:
     """A ramp goes on; a rudder that never moved has no gear."""
-    ramp = 0.1 * np.arange(5.0)
-    shares = [
-        rudder._explained(np.arange(float(n)), ramp[:n], 0.1, 0.0) for n in (3, 4, 5)
-    ]
+    ramp, gear = 0.1 * np.arange(5.0), GearResponse(0.1, 0.0)
+    shares = [gear.explained_share(np.arange(float(n)), ramp[:n]) for n in (3, 4, 5)]
     assert shares == [0.0, 1.0, 1.0]
-    assert rudder._explained(np.arange(5.0), ramp, 0.0, 0.0) == 0.0
+    assert GearResponse(0.0, 0.0).explained_share(np.arange(5.0), ramp) == 0.0
 
 
 @pytest.mark.parametrize(
-    ("orders", "delta", "goes_on"),
+    ("orders", "delta", "expected"),
     [
         ([np.inf, np.inf], [0.0, 0.1, 0.2], True),  # one ramp
         ([np.inf, -np.inf], [0.0, 0.1, 0.0], False),
@@ -149,73 +131,43 @@ def test_four_samples_are_the_fewest_that_a_gear_explains() -> None:
         ([-np.inf, -0.15], [0.0, -0.1, -0.15], True),
         ([-np.inf, -0.05], [0.0, -0.1, -0.05], False),
         ([0.1, 0.1009], [0.0, 0.1, 0.1009], True),  # within the tolerance
-        ([0.1, 0.1011], [0.0, 0.1, 0.1011], False),
+        ([0.1, 0.1015], [0.0, 0.1, 0.1015], False),
         ([0.1, np.inf], [0.0, 0.1, 0.2], False),  # from rest to a ramp
         ([0.0, np.inf], [0.0, 0.0, 0.1], False),
     ],
 )
 def test_an_order_goes_on_where_the_rudder_moves_as_before(
-    orders: list[float], delta: list[float], goes_on: bool
+    orders: list[float], delta: list[float], expected: bool
 ) -> None:
-    found = rudder._continues(np.array(orders), np.array(delta), 1e-3)
-    assert found.tolist() == [goes_on]
+    """Orders that differ by a thousandth of the rudder's range are one."""
+    found = goes_on(np.array([*orders, 0.0]), np.array([*delta, delta[0] - 1.0]))
+    assert found.tolist()[0] is expected
 
 
-def test_an_order_changes_when_the_rudder_then_ends_where_it_was_seen() -> None:
-    """Up for x s and down for the rest of 2 s at 0.1 rad/s: 0.1 x - 0.1 (2 - x)."""
-    time = rudder._switch_time(0.0, 0.14, np.inf, -np.inf, 2.0, 0.1, 0.0)
-    assert time == pytest.approx(1.7)
-    assert rudder._switch_time(0.0, 0.25, np.inf, -np.inf, 2.0, 0.1, 0.0) is None
-    assert rudder._switch_time(0.3, 0.3, 0.3, np.inf, 2.0, 0.1, 0.0) == pytest.approx(
-        2.0
-    )
-
-
-@pytest.mark.parametrize(("lag", "begin", "smoothness"), [(0.0, 3.0, 0), (0.4, 2.6, 1)])
-def test_a_ramp_ends_at_its_order_or_where_the_lag_takes_over(
-    lag: float, begin: float, smoothness: int
-) -> None:
-    """0.3 rad away at 0.1 rad/s: 3 s, less the lag; a second order begins in the middle of an interval."""
-    t, none = np.array([10.0, 20.0]), np.array([10.0])
-    one = (t, np.array([0.0, 0.3]), np.array([0.3]), np.array([0.3]), none, 0.1, lag)
-    ((time, kind),) = rudder._ramp_ends(*one)
-    assert (time, kind) == (pytest.approx(10.0 + begin), smoothness)
-    turned = (
-        t,
-        np.array([0.0, 0.2]),
-        np.array([np.inf]),
-        np.array([0.2]),
-        np.array([5.0]),
-        0.1,
-        lag,
-    )
-    ((time, kind),) = rudder._ramp_ends(*turned)
-    assert (time, kind) == (pytest.approx(15.0 + begin), smoothness)
-    early = begin - 0.1  # the order is taken back before the ramp has ended
-    back = (
-        t,
-        np.zeros(2),
-        np.array([0.3]),
-        np.array([0.0]),
-        np.array([early]),
-        0.1,
-        lag,
-    )
-    assert [time for time, _ in rudder._ramp_ends(*back)] == [
-        pytest.approx(10.0 + 2.0 * early - lag)
-    ]
+def test_an_order_changes_within_an_interval_when_the_rudder_ends_where_it_was_seen() -> (
+    None
+):
+    """At rest for 29.7 s, then moving at 0.1 rad/s, seen every 2 s."""
+    t = 2.0 * np.arange(31.0)
+    fine = np.linspace(0.0, 60.0, 601)
+    angles = 0.1 * np.maximum(fine - 29.7, 0.0)
+    found = rebuild(t, np.interp(t, fine, angles))
+    assert found.corners == pytest.approx([29.7], abs=1e-6)
+    assert found.smoothness.tolist() == [0]
+    np.testing.assert_allclose(found(fine), angles, atol=1e-6)
 
 
 def test_a_gear_of_rate_and_lag_ramps_and_then_creeps() -> None:
     """0.1 rad/s and 2 s: from 0 to an order of 0.5 it ramps to 0.3, what is left falls by exp(-t / 2)."""
-    angles = rudder._flow(0.0, 0.5, np.array([1.0, 3.0, 5.0]), 0.1, 2.0)
+    gear = GearResponse(0.1, 2.0)
+    angles = gear.angle(0.0, 0.5, np.array([1.0, 3.0, 5.0]))
     np.testing.assert_allclose(angles, [0.1, 0.3, 0.5 - 0.2 * np.exp(-1.0)])
-    np.testing.assert_allclose(
-        rudder._flow(0.0, -np.inf, np.array([1.0, 9.0]), 0.1, 2.0), [-0.1, -0.9]
-    )
-    np.testing.assert_allclose(rudder._flow(0.2, 0.2, np.array([4.0]), 0.1, 0.0), [0.2])
+    ramping = gear.angle(0.0, -np.inf, np.array([1.0, 9.0]))
+    np.testing.assert_allclose(ramping, [-0.1, -0.9])
+    at_order = GearResponse(0.1, 0.0).angle(0.2, 0.2, np.array([4.0]))
+    np.testing.assert_allclose(at_order, [0.2])
     t = np.array([0.0, 1.0, 3.0, 5.0])
-    orders = rudder._orders(t, rudder._flow(0.0, 0.5, t, 0.1, 2.0), 0.1, 2.0)
+    orders = gear.orders(t, gear.angle(0.0, 0.5, t))
     np.testing.assert_allclose(orders, [np.inf, np.inf, 0.5])
 
 

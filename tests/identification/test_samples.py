@@ -7,17 +7,14 @@ import numpy as np
 import pytest
 
 from identification import IdentificationResult, Samples, build_samples, identify
+from identification.regression.gaps import between_gaps
 from identification.regression.integrals import (
     broken_spline,
     step_integrals,
     twice_integrated,
 )
 from identification.regression.rudder import straight
-from identification.regression.samples import (
-    between_gaps,
-    default_window,
-    without_memory,
-)
+from identification.regression.samples import default_window, without_memory
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.ships.simulate import open_loop
@@ -92,14 +89,14 @@ def test_wrong_arguments_are_named(mariner: ShipModel, cao_zigzag: Trial) -> Non
 
     with pytest.raises(
         InputError,
-        match="samples: 'cubic' found, expected one of euler, integral, spline",
+        match=r"samples: .*'euler', 'integral', 'spline'",
     ):
         build(samples="cubic")
     with pytest.raises(InputError, match=r"window: expected .*got 0"):
         build(window=0)
     with pytest.raises(
         InputError,
-        match="'zigzag_15_15': 1001 samples found, expected more than the window",
+        match="'zigzag_15_15': expected more samples than the window of 1001",
     ):
         build(window=1001)
 
@@ -190,9 +187,7 @@ def test_a_record_of_nothing_but_gaps_is_refused(
     mariner: ShipModel, cao_zigzag: Trial
 ) -> None:
     holes = [(start + 4.0, start + 20.0) for start in np.arange(0.0, 500.0, 20.0)]
-    message = (
-        r"holes\.csv': 2[45] gaps in time found \(the longest from .*nowhere 10 samples"
-    )
+    message = r"holes\.csv': expected 10 samples somewhere .* got 2[45] gaps"
     with pytest.raises(InputError, match=message):
         build_samples([without(cao_zigzag, *holes)], mariner.table, mariner.particulars)
 
@@ -239,14 +234,11 @@ def test_six_long_steps_on_end_are_another_rate_and_five_are_gaps() -> None:
 def test_euler_takes_the_start_of_each_step_and_the_trapezoid_rule_its_mean() -> None:
     """Steps of 1 and 3 s; a moment is the integral times half the step that is left on average."""
     t, channels = np.array([0.0, 1.0, 4.0]), {"u": np.array([2.0, 4.0, 10.0])}
-    for euler, expected in ((True, [2.0, 12.0]), (False, [3.0, 21.0])):
-        integrals, moments = step_integrals(
-            t, channels, ["u"], lambda _, c: c["u"][:, None], euler
-        )
-        np.testing.assert_allclose(integrals["u"][:, 0], expected)
-        np.testing.assert_allclose(
-            moments["u"][:, 0], np.multiply(expected, [0.5, 1.5])
-        )
+    for rule, expected in (("euler", [2.0, 12.0]), ("integral", [3.0, 21.0])):
+        found = step_integrals(t, channels, lambda c: {"u": c["u"][:, None]}, rule)
+        np.testing.assert_allclose(found.terms["u"][:, 0], expected)
+        moments = np.multiply(expected, [0.5, 1.5])
+        np.testing.assert_allclose(found.moments["u"][:, 0], moments)
 
 
 def test_an_integral_is_integrated_again_from_the_first_sample() -> None:
@@ -305,9 +297,7 @@ def test_the_memory_of_a_trial_falls_out_of_one_window_less_the_next() -> None:
         found.targets["r"], [2.0 * (3.0 - 2.0), 2.0 * (1.0 - 3.0)]
     )
     np.testing.assert_array_equal(found.start, [0.0, 1.0])
-    with pytest.raises(
-        InputError, match="window: a trial of 1 windows found, expected at least two"
-    ):
+    with pytest.raises(InputError, match="window: expected at least two windows"):
         without_memory(samples.select(np.arange(3) == 2))
 
 

@@ -10,9 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identification import identify
-from identification.regression import current, still_water
-from identification.regression.still_water import in_still_water, through_water
+from identification import Uncertainty, identify
+from identification.regression.current import (
+    MEAN,
+    Coefficients,
+    Inputs,
+    accelerations,
+    estimate_current,
+)
+from identification.regression.still_water import in_still_water
+from identification.regression.trial_currents import currents_of, wald_probability
+from identification.regression.velocities import through_water
 from identification.regression.wind import measured_wind
 from identification.report.sea import current_text, sea_sentences, track_figure
 from shipgym import ShipModel, Trial
@@ -23,7 +31,6 @@ from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.wind import AIR_DENSITY, wind_curves
 from shipgym.ships.simulate import open_loop
 from shipgym.trials.conventions import Conventions
-from shipgym.trials.identify_table import Options
 from shipgym.trials.midship import to_project_conventions
 from shipgym.trials.resampling import Log
 from tests.golden.texts import flat, same_text
@@ -65,7 +72,7 @@ def test_a_current_is_found_and_taken_out(
     mariner: ShipModel, logs: list[Trial]
 ) -> None:
     """To centimetres per second, of the trial held out too; velocities and track follow."""
-    found, report = in_still_water(logs, Options(), mariner.particulars)
+    found, report = in_still_water(logs, mariner.particulars)
     row = report["currents"]["held out"]
     errors = np.array([row["north"] - NORTH, row["east"] - EAST])
     assert np.hypot(*errors) < 0.03
@@ -105,7 +112,7 @@ def test_each_trial_may_have_a_current_of_its_own(
         mariner, -35.0, 700.0, 0.5, weather=Weather(Current(0.8, 90.0))
     )
     trials = [logs[0], log(other, 5).with_(name="other"), logs[2]]
-    _, report = in_still_water(trials, Options(), mariner.particulars)
+    _, report = in_still_water(trials, mariner.particulars)
     rows = {
         name: (row["north"], row["east"]) for name, row in report["currents"].items()
     }
@@ -118,7 +125,7 @@ def test_each_trial_may_have_a_current_of_its_own(
 def test_still_water_stays_still(mariner: ShipModel) -> None:
     """A current that does not differ from zero is reported and left in, so that the velocities stay."""
     calm = log(turning_circle(mariner, 35.0, 700.0, 0.5))
-    (found,), report = in_still_water([calm], Options(), mariner.particulars)
+    (found,), report = in_still_water([calm], mariner.particulars)
     assert found is calm
     row = report["currents"][calm.name]
     assert np.hypot(row["north"], row["east"]) < 0.05
@@ -128,7 +135,7 @@ def test_still_water_stays_still(mariner: ShipModel) -> None:
 def test_velocities_through_the_water_keep_theirs(mariner: ShipModel) -> None:
     """A logged speed is through the water: a known current is taken out of the track alone."""
     run = zigzag(mariner, 20, 20, duration=300.0, dt=1.0, weather=CURRENT)
-    (found,), report = in_still_water([run], Options(), mariner.particulars)
+    (found,), report = in_still_water([run], mariner.particulars)
     assert report["currents"][run.name]["source"] == "columns"
     np.testing.assert_array_equal(found["u"], run["u"])
     still = zigzag(mariner, 20, 20, duration=300.0, dt=1.0)
@@ -161,36 +168,25 @@ def straight(psi_deg: float) -> Trial:
     return Trial(np.arange(100.0), channels, name="run", over_ground=True)
 
 
-@pytest.mark.parametrize(
-    ("psi_deg", "error", "doubt"),
-    [
-        (32.0, 0.098, ""),  # cos 32 deg is 0.848
-        (31.5, 0.098, "the trials keep to one heading"),  # 0.853
-        (32.0, 0.102, "its standard error is 0.1 m/s"),
-    ],
-)
-def test_a_current_is_known_to_five_per_cent_of_the_speed_by_several_headings(
-    psi_deg: float, error: float, doubt: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    trial, mean, covariance = (
-        straight(psi_deg),
-        np.array([1.0, 0.0]),
-        np.diag([error**2, 1e-6]),
-    )
-    monkeypatch.setattr(
-        still_water, "_currents", lambda *_: [(trial, mean, covariance, "all trials")]
-    )
-    remarks: list[str] = []
-    rows = still_water._take_out_current({"run": trial}, 7.0, 2.0, "auto", remarks)
-    assert rows["run"]["taken_out"] == (not doubt)
-    assert [doubt in remark for remark in remarks] == [True] * bool(doubt)
-
-
 def test_a_current_is_estimated_from_trials_of_five_ship_lengths() -> None:
     """99 s at 2 m/s."""
-    for length, known in ((39.5, True), (39.7, False)):
-        found = list(still_water._currents([straight(40.0)], length, 2.0, "shared"))
-        assert (len(found) == 1) == known
+    for length, is_known in ((39.5, True), (39.7, False)):
+        found = currents_of([straight(40.0)], length, 2.0, "shared")
+        assert ("run" in found) == is_known
+
+
+@pytest.mark.parametrize(
+    ("psi_deg", "one_heading"),
+    [(32.0, False), (31.5, True)],  # cos 32 deg is 0.848, cos 31.5 deg 0.853
+)
+def test_a_current_is_known_by_several_headings(
+    psi_deg: float, one_heading: bool
+) -> None:
+    ship: Any = {"length": 7.0, "speed": 2.0}
+    _, report = in_still_water([straight(psi_deg)], ship)
+    remarks = report.get("sea_remarks", [])
+    keeps = any("the trials keep to one heading" in remark for remark in remarks)
+    assert keeps == one_heading
 
 
 def test_a_current_in_columns_and_one_that_is_given_agree_to_a_decimetre_per_second() -> (
@@ -199,22 +195,24 @@ def test_a_current_in_columns_and_one_that_is_given_agree_to_a_decimetre_per_sec
     logged = straight(40.0).with_channels(
         {"current_north": np.full(100, 0.2), "current_east": np.zeros(100)}
     )
-    still_water._known(logged, {"north": 0.2, "east": 0.099})
+    near: Any = {"north": 0.2, "east": 0.099}
+    assert currents_of([logged], 7.0, 2.0, near)["run"].source == "columns"
+    far: Any = {"north": 0.2, "east": 0.101}
     with pytest.raises(
-        InputError, match=r"have means of 0\.20 and 0\.00 m/s, current = .* was given"
+        InputError, match=r"current_north.*got means of 0\.20 and 0\.00"
     ):
-        still_water._known(logged, {"north": 0.2, "east": 0.101})
+        currents_of([logged], 7.0, 2.0, far)
 
 
 @pytest.mark.parametrize(
     ("option", "which", "said"),
     [
-        ("slack", [0], "expected one of 'auto', 'shared', 'trial', 'none'"),
+        ("slack", [0], r"current: .*'auto', 'shared', 'trial', 'none'"),
         ({"north": 1.0}, [0], "east"),
         (
             {"north": 9.0, "east": 0.0},
             [0],
-            "9 m/s found, expected less than the ship's speed",
+            "expected less than the ship's speed of 7.72 m/s, got 9",
         ),
         ("shared", [1], "the trials keep to one heading; add a turn of a whole circle"),
     ],
@@ -223,9 +221,7 @@ def test_currents_that_cannot_be(
     mariner: ShipModel, logs: list[Trial], option, which, said
 ) -> None:
     with pytest.raises(InputError, match=said):
-        in_still_water(
-            [logs[k] for k in which], Options(current=option), mariner.particulars
-        )
+        in_still_water([logs[k] for k in which], mariner.particulars, option)
 
 
 def test_columns_that_contradict_a_given_current(
@@ -235,19 +231,19 @@ def test_columns_that_contradict_a_given_current(
         name: np.full(len(logs[0]), 0.5) for name in ("current_north", "current_east")
     }
     with pytest.raises(
-        InputError, match=r"have means of 0\.50 and 0\.50 m/s, current = { north = 0\.1"
+        InputError, match=r"current = { north = 0\.1.*means of 0\.50 and 0\.50"
     ):
         in_still_water(
             [logs[0].with_channels(columns)],
-            Options(current={"north": 0.1, "east": 0.0}),
             mariner.particulars,
+            {"north": 0.1, "east": 0.0},
         )
 
 
 def test_one_heading_is_left_as_it_is_with_a_word(
     mariner: ShipModel, logs: list[Trial]
 ) -> None:
-    (found,), report = in_still_water([logs[1]], Options(), mariner.particulars)
+    (found,), report = in_still_water([logs[1]], mariner.particulars)
     assert found is logs[1]
     assert "zigzag: no current is removed: the trials keep" in report["sea_remarks"][0]
     (row,) = report["currents"].values()
@@ -268,7 +264,7 @@ def test_measured_wind_is_taken_out(mariner: ShipModel) -> None:
         dt=0.5,
         weather=Weather(wind=Wind(12.0, 60.0, gust=False)),
     )
-    (windy,), report = in_still_water([run], Options(), mariner.particulars)
+    (windy,), report = in_still_water([run], mariner.particulars)
     assert report["wind"]["mean_speeds"][run.name] == pytest.approx(12.0)
     ahead = windy["u"] + 12.0 * np.cos(run["wind_from"] - run["psi"])
     aside = windy["v"] + 12.0 * np.sin(run["wind_from"] - run["psi"])
@@ -288,7 +284,7 @@ def test_measured_wind_is_taken_out(mariner: ShipModel) -> None:
     fit = {
         "particulars": mariner.particulars,
         "steering": mariner.steering,
-        "model_error": False,
+        "uncertainty": Uncertainty(model_error=False),
     }
     found, left_in = (
         identify([run], wind=wind, **fit).coefficients for wind in ("auto", "none")
@@ -315,7 +311,7 @@ def test_a_constant_wind_of_each_trial(mariner: ShipModel) -> None:
         wind="constant",
         particulars=mariner.particulars,
         steering=mariner.steering,
-        model_error=False,
+        uncertainty=Uncertainty(model_error=False),
     )
     found = fit.model.provenance["wind"]["accelerations"]
     assert found["False"]["wind_rdot"] - found["True"]["wind_rdot"] == pytest.approx(
@@ -334,19 +330,17 @@ def test_wind_without_what_it_needs(mariner: ShipModel) -> None:
     with pytest.raises(
         InputError, match="weather without the particulars it needs: beam"
     ):
-        in_still_water([run], Options(wind="isherwood"), bare)
-    (found,), report = in_still_water([run], Options(), bare)
+        in_still_water([run], bare, wind="isherwood")
+    (found,), report = in_still_water([run], bare)
     assert "wind_udot" not in found
     assert report["sea_remarks"][0].startswith(
         "the logged wind is not removed: weather without"
     )
     with pytest.raises(
-        InputError, match="no trial has the columns wind_speed and wind_from"
+        InputError, match="wind: expected columns wind_speed and wind_from"
     ):
         in_still_water(
-            [zigzag(mariner, 10, 10, duration=200.0, dt=1.0)],
-            Options(wind="isherwood"),
-            bare,
+            [zigzag(mariner, 10, 10, duration=200.0, dt=1.0)], bare, wind="isherwood"
         )
 
 
@@ -380,99 +374,38 @@ def test_the_wind_that_a_ship_feels_is_that_of_her_way_over_ground(
         assert np.abs(felt[0][name]).max() > 0.0
 
 
-def jackknifed(
-    trials: int, shared: bool, residuals: np.ndarray, monkeypatch: pytest.MonkeyPatch
-) -> np.ndarray:
-    """Variance of the northern currents of trials that measure each window by 1, beside `residuals`."""
-    windows = len(residuals)
-    first = current.COEFFICIENTS
-    columns = first + 2 * np.arange(trials)[:, None] * (not shared) + np.arange(2)
-    unknowns = int(columns.max()) + 1
-    slopes, left = (
-        np.zeros((windows, 3, trials, unknowns)),
-        np.zeros((windows, 3, trials)),
-    )
-    for k in range(trials):
-        slopes[:, [0, 1], k, columns[k]] = 1.0
-    left[:, 0] = residuals
-    weights = np.where(np.arange(unknowns) < first, 1.0, 0.0)
-    runs = SimpleNamespace(
-        fitted=lambda: (np.full(unknowns, 0.5), slopes, left),
-        weights=weights,
-        columns=columns,
-        seen=np.zeros((windows, 3, trials)),
-    )
-    monkeypatch.setattr(current, "_Runs", lambda *_: runs)
-    found = current.estimate_current([None] * trials, 7.0, 2.0, shared)  # type: ignore[list-item]
-    np.testing.assert_allclose(found.mean, np.ones(2 * trials))  # by the speed of 2 m/s
-    np.testing.assert_allclose(found.covariance, found.covariance.T)
-    return found.covariance[::2, ::2]
+def test_the_jackknife_is_as_wide_as_estimates_scatter(mariner: ShipModel) -> None:
+    """Of ten logs with noise of their own the errors are of the size that is told."""
+    scaled = []
+    for seed in range(10):
+        run = turning_circle(mariner, 35.0, 500.0, 0.5, weather=CURRENT)
+        found = estimate_current([log(run, seed)], 160.9, 7.7, shared=True)
+        error = found.mean - [NORTH, EAST]
+        scaled.append(error / np.sqrt(np.diag(found.covariance)))
+        np.testing.assert_allclose(found.covariance, found.covariance.T)
+    assert 0.2 < np.sqrt(np.mean(np.square(scaled))) < 2.0
 
 
-def test_of_three_trials_in_one_current_each_is_left_out(
-    monkeypatch: pytest.MonkeyPatch,
+def test_trials_share_a_current_or_have_each_their_own(
+    mariner: ShipModel, logs: list[Trial]
 ) -> None:
-    """Of six windows with a sum of k the mean of the other twelve moves by k / 12."""
-    residuals = np.outer(np.ones(6), [0.3, -0.1, -0.2])
-    changes = residuals.sum(axis=0) / 12.0
-    expected = 2.0**2 * (2.0 / 3.0 * np.sum(changes**2) + 1.0 / 18.0)
-    np.testing.assert_allclose(jackknifed(3, True, residuals, monkeypatch), expected)
-
-
-@pytest.mark.parametrize(
-    ("trials", "shared"), [(1, True), (2, True), (2, False), (3, False)]
-)
-def test_of_fewer_trials_in_one_current_or_of_one_current_each_thirds_are_left_out(
-    trials: int, shared: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    residuals = np.repeat(np.random.default_rng(0).normal(size=(3, trials)), 2, axis=0)
-    together = trials if shared else 1
-    residuals -= residuals.mean() if shared else residuals.mean(axis=0)
-    thirds = residuals[::2].T * 2.0 / (6.0 * together - 2.0)  # a row for each trial
-    n = 3 * trials
-    apart = thirds.ravel() if shared else None
-    for k in range(trials):
-        own = thirds[k] if apart is None else apart
-        expected = 2.0**2 * ((n - 1.0) / n * np.sum(own**2) + 1.0 / (6.0 * together))
-        found = jackknifed(trials, shared, residuals, monkeypatch)[k, k]
-        assert found == pytest.approx(expected)
-
-
-@pytest.mark.parametrize(
-    ("measured", "scale"),
-    [([2.0, 2.0, 2.0], 0.003), ([1.9, 2.0, 2.1], 0.1), ([2.0, 2.0, 2.006], 0.0034641)],
-)
-def test_a_residual_of_a_current_is_three_thousandths_of_the_speed_at_least(
-    measured: list[float], scale: float
-) -> None:
-    """Else the root of the squares by the windows less the unknowns."""
-
-    class Mean(current._Runs):
-        def __init__(self) -> None:
-            self.centre, self.weights = np.zeros(1), np.array([1e-3])
-            self.seen = np.array(measured).reshape(-1, 1, 1)
-
-        def at(self, x: Any) -> tuple[Any, Any]:
-            return self.seen - x[0], np.ones((len(measured), 1, 1, 1))
-
-    x, slopes, residuals = Mean().fitted()
-    assert x == pytest.approx([np.mean(measured)], rel=1e-5)
-    np.testing.assert_allclose(1.0 / slopes, scale, rtol=2e-3)
-    np.testing.assert_allclose(
-        residuals.ravel() * scale, measured - np.mean(measured), atol=2e-5
-    )
+    one = estimate_current(logs[:2], 160.9, 7.7, shared=True)
+    np.testing.assert_array_equal(one.mean[:2], one.mean[2:])
+    each = estimate_current(logs[:2], 160.9, 7.7, shared=False)
+    assert not np.array_equal(each.mean[:2], each.mean[2:])
+    # the coefficients of an estimate are not fitted again
+    known = estimate_current(logs[2:], 160.9, 7.7, True, one.coefficients)
+    np.testing.assert_allclose(known.coefficients, one.coefficients, atol=1e-2)
 
 
 def test_values_differ_from_zero_by_their_covariance() -> None:
     """Of two normal numbers the squared distance is exponential: exp(-d^2 / 2)."""
-    assert still_water._probability(np.zeros(2), np.eye(2)) == 1.0
-    assert still_water._probability(
-        np.array([0.3, 0.0]), 0.01 * np.eye(2)
-    ) == pytest.approx(np.exp(-4.5))
-    alike = np.array([[2.0, 1.0], [1.0, 2.0]])
-    assert still_water._probability(np.array([3.0, 3.0]), alike) == pytest.approx(
-        np.exp(-3.0)
-    )
+    assert wald_probability(np.zeros(2), np.eye(2)) == 1.0
+    near = wald_probability(np.array([0.3, 0.0]), 0.01 * np.eye(2))
+    assert near == pytest.approx(np.exp(-4.5))
+    correlated = np.array([[2.0, 1.0], [1.0, 2.0]])
+    far = wald_probability(np.array([3.0, 3.0]), correlated)
+    assert far == pytest.approx(np.exp(-3.0))
 
 
 def test_captive_trials_and_those_of_unknown_speed_keep_their_current(
@@ -487,62 +420,32 @@ def test_captive_trials_and_those_of_unknown_speed_keep_their_current(
         name="towed",
         kind="captive",
     )
-    (found,), report = in_still_water([towed], Options(), mariner.particulars)
+    (found,), report = in_still_water([towed], mariner.particulars)
     assert found is towed
     assert report == {}
     slow = Trial(t, {**track, **drift}, name="slow")
-    (found,), report = in_still_water([slow], Options(), {"length": 7.0})
+    (found,), report = in_still_water([slow], {"length": 7.0})
     assert found is slow
     assert report == {}
-    (found,), report = in_still_water([slow], Options(), {"length": 7.0, "speed": 2.0})
+    (found,), report = in_still_water([slow], {"length": 7.0, "speed": 2.0})
     np.testing.assert_allclose(found["x"], 4.8 * t)
     assert report["currents"]["slow"]["taken_out"]
 
 
-@pytest.mark.parametrize(
-    ("coefficient", "sign", "row", "left"),
-    [
-        (0, 1.0, 0, 1.0 - 3.0),
-        (0, -1.0, 0, 1.0 + 2.0),
-        (8, 1.0, 1, -2.0),
-        (8, -1.0, 1, 2.0),
-    ],
-)
-def test_ships_tried_sail_no_faster_than_thrice_and_drift_or_go_astern_no_faster_than_twice_the_speed(
-    coefficient: int, sign: float, row: int, left: float
-) -> None:
-    """Of a ship on a steady northern course the rest is her own speed less that of one that runs away."""
-    t = np.arange(41.0)
-    still = np.zeros(41)
-    channels = {"u": 2.0 + still, "v": still, "r": still, "psi": still, "delta": still}
-    steady = Trial(t, channels, over_ground=True)
-    runs = current._Runs([steady], 10.0, 2.0, True, None)
-    assert runs.windows == 8  # of one ship length, 5 s
-    x = np.zeros(len(runs.weights))
-    wanted = (
-        sign * 1e3 * (np.arange(current.COEFFICIENTS) == coefficient)
-    )  # and none of the other forces
-    x[: current.COEFFICIENTS] = (wanted - current.PRIOR[0]) / current.PRIOR[1]
-    residuals, _ = runs.at(x)
-    np.testing.assert_allclose(residuals[1:, row, 0], left)
-    np.testing.assert_array_equal(
-        residuals[:, 2], 0.0
-    )  # no log of the speed through the water
-
-
 def test_what_a_ship_of_the_prior_does_is_the_same_to_both_sides() -> None:
     """Her own neutral helm apart: sway changes its sign with drift, turn, rudder and wind; surge does not."""
-    c = np.random.default_rng(0).normal(size=18)
-    c[8] = 0.0
-    measured = np.array([0.4, 0.3, 1.1, 0.02, 0.05])
-    surge, sway = current._accelerations(0.9, 0.2, measured, c)
-    mirrored = current._accelerations(
-        0.9, -0.2, measured * [-1.0, -1.0, 1.0, 1.0, -1.0], c
-    )
-    assert mirrored == (pytest.approx(surge), pytest.approx(-sway))
+    c = Coefficients(*np.random.default_rng(0).normal(size=len(MEAN)))._replace(Y_0=0.0)
+    at = Inputs(r=0.4, delta=0.3, n=1.1, ahead=0.02, aside=0.05)
+    mirrored = at._replace(r=-0.4, delta=-0.3, aside=-0.05)
+    surge, sway = accelerations(0.9, 0.2, at, c)
+    expected = (pytest.approx(surge), pytest.approx(-sway))
+    assert accelerations(0.9, -0.2, mirrored, c) == expected
     # at her speed ahead on a straight course only the propeller and the wind act
-    steady = current._accelerations(1.1, 0.0, np.array([0.0, 0.0, 1.1, 0.02, 0.05]), c)
-    assert steady == (pytest.approx(c[0] + 0.02 * c[17]), pytest.approx(0.05 * c[17]))
+    straight_on = accelerations(1.1, 0.0, at._replace(r=0.0, delta=0.0), c)
+    assert straight_on == (
+        pytest.approx(c.X_0 + 0.02 * c.wind),
+        pytest.approx(0.05 * c.wind),
+    )
 
 
 @pytest.mark.parametrize(

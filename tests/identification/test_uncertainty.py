@@ -59,7 +59,7 @@ def coverage(
     estimates, covariances, hits = [], [], []
     for _ in range(200):
         samples = draw(exact, truth, MIXING, rng, memory_rows)
-        estimators = fit_all(ls.estimator, samples)
+        estimators = fit_all(ls.make, samples)
         covariance = coefficient_covariance(
             joint_covariance(estimators, samples, memory_s), matrix
         )
@@ -137,7 +137,7 @@ def test_without_memory_the_covariance_is_that_of_the_textbook() -> None:
     samples = Samples(
         {"v": X}, {"v": y}, time, np.ones(40), np.repeat([0, 1], [30, 10]), 1
     )
-    fitted = fit_all(get_method("ls").estimator, samples)
+    fitted = fit_all(get_method("ls").make, samples)
     errors, inverse = y - X @ np.linalg.lstsq(X, y)[0], np.linalg.inv(X.T @ X)
     assert effective_freedom(fitted["v"], X) == pytest.approx(37.0)
     np.testing.assert_allclose(
@@ -165,7 +165,7 @@ def test_memory_of_each_trial_is_counted_in_its_own_steps_and_a_short_one_is_no_
     time = np.concatenate([np.arange(30.0), np.arange(8.0), [0.0, 5.0], [0.0]])
     trial = np.repeat([0, 1, 2, 3], [30, 8, 2, 1])
     samples = Samples({"v": X}, {"v": y}, time, np.ones(41), trial, 1)
-    fitted = fit_all(get_method("ls").estimator, samples)
+    fitted = fit_all(get_method("ls").make, samples)
     inverse = np.linalg.inv(X.T @ X)
     scores = X * (y - X @ inverse @ X.T @ y)[:, None] * np.sqrt(41.0 / 39.0)
     for memory, lags in ((2.0, (2, 2, 0, 0)), (0.05, (0, 0, 0, 0))):
@@ -187,6 +187,4 @@ def test_as_many_terms_as_samples_leave_one_degree_of_freedom() -> None:
         np.zeros(3, dtype=np.int64),
         1,
     )
-    assert (
-        effective_freedom(fit_all(get_method("ls").estimator, samples)["v"], X) == 1.0
-    )
+    assert effective_freedom(fit_all(get_method("ls").make, samples)["v"], X) == 1.0

@@ -16,6 +16,9 @@ from shipgym.engine.mathematics import (
     nearest,
     pick,
     power_of_two,
+    sin_cos,
+    small_cosine,
+    small_sin_cos,
     turn_sin_cos,
     two_to,
     wrap,
@@ -96,7 +99,7 @@ def test_a_ship_in_a_batch_sails_as_it_does_alone(name, shared):
         rudders.reshape(tiles, -1),
         model.service_shaft_speed,
     )
-    advance = ship_loop(model.vessel, "alike" if shared else "fleet")
+    advance = ship_loop(model.compiled, "shared_ship" if shared else "per_ship")
     ships = np.repeat(model.ship_numbers(), 1 if shared else LANES)
     advance(states, commands.reshape(tiles, -1), h, steps, ships[None])
     lanes = (
@@ -154,3 +157,27 @@ def test_angles_at_the_seam_are_wrapped_to_minus_half_a_turn():
         assert wrap(2 * turns * math.pi + 0.25) == pytest.approx(0.25, abs=1e-12)
     assert wrap(math.pi) == -math.pi
     assert wrap(-math.pi) == -math.pi
+
+
+def test_sine_and_cosine_to_the_last_digits():
+    angles = np.linspace(-500.0, 500.0, 20001)
+    found = np.array([sin_cos(angle) for angle in angles])
+    expected = np.stack([np.sin(angles), np.cos(angles)], axis=1)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=5e-15)
+
+
+def test_small_angles_have_the_sine_and_cosine_of_the_library():
+    x = np.linspace(-np.pi / 2, np.pi / 2, 2001)
+    found = np.array([small_sin_cos(angle) for angle in x])
+    expected = np.stack([np.sin(x), np.cos(x)], axis=1)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=4e-16)
+    cosines = [small_cosine(angle) for angle in x]
+    np.testing.assert_allclose(cosines, np.cos(x), rtol=0.0, atol=4e-16)
+    assert small_sin_cos(np.pi) == pytest.approx((0.0, -1.0), abs=3e-9)
+
+
+def test_wrapped_angles_are_the_same_direction():
+    angles = np.linspace(-30.0, 30.0, 997)
+    wrapped = np.array([wrap(angle) for angle in angles])
+    assert np.all((wrapped >= -np.pi) & (wrapped < np.pi))
+    np.testing.assert_allclose(np.exp(1j * wrapped), np.exp(1j * angles), atol=1e-12)

@@ -4,14 +4,13 @@ import json
 import os
 import pickle
 import re
-import signal
 import stat
 import subprocess
 import sys
 import tempfile
 import warnings
+from hashlib import sha256
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from filelock import FileLock, Timeout
@@ -19,31 +18,37 @@ from platformdirs import user_cache_path
 
 import shipgym
 from shipgym.drafts import draft_name
-from shipgym.engine import cache_folder, compiling
-from shipgym.engine.disk_cache import DiskCache
-from shipgym.engine.voyages import Voyages
+from shipgym.engine import cache_folder
+from shipgym.engine.compiling import compiled
+from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import shipped_sensors
 from shipgym.tasks.definition import read_definition
 
 VECTOR = r"<\d+ x double>"  # as LLVM writes it
-WORKER = """
-import os, sys
-from shipgym.engine import compiling, places
-def tell(what, folder):
-    print("compiles", flush=True)
-    {while_compiling}
-compiling._announce = tell
+TWICE = """
+import sys
+import numpy as np
+from shipgym.engine.compiling import compiled
+
+sys.modules["ipykernel"] = None  # a notebook, where somebody waits
+
 def twice(numbers):
     for i in range(len(numbers)):
         numbers[i] *= 2.0
-compiling.compiled(twice, "void(float64[::1])", {{}}, "twice")
-print("done")
+
+numbers = np.ones(1)
+compiled(twice, "void(float64[::1])", {}, "twice")(numbers)
+print(numbers[0])
 """
 OTHER_USER = """
-import json, os, sys, warnings
+import io, json, os, sys, warnings
 import numpy as np
-from shipgym.engine import cache_folder, compiling
+from shipgym.drafts import draft_name
+from shipgym.engine import cache_folder
+from shipgym.engine.compiling import compiled
+
+sys.modules["ipykernel"] = None
 
 def twice(numbers):
     for i in range(len(numbers)):
@@ -53,18 +58,16 @@ def thrice(numbers):
     for i in range(len(numbers)):
         numbers[i] *= 3.0
 
-announced = []
-compiling._announce = lambda what, folder: announced.append(what)
-
 def attempt(function):
-    announced.clear()
     cache_folder.usable_folder.cache_clear()
+    sys.stderr = io.StringIO()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        loop = compiling.compiled(function, "void(float64[::1])", {}, "loop")
+        loop = compiled(function, "void(float64[::1])", {}, "loop")
+    announced = sys.stderr.getvalue().count("compiling loop")
     numbers = np.ones(1)
     loop(numbers)
-    return [numbers[0], len(announced), [str(one.message) for one in caught]]
+    return [numbers[0], announced, [str(one.message) for one in caught]]
 
 folder, closed = sys.argv[1:]
 found = {"before": attempt(twice)}
@@ -82,57 +85,60 @@ print(json.dumps(found))
 """
 
 
-def start(code, *arguments, cache, errors=None):
+def start(code, *arguments, cache):
     return subprocess.Popen(
         [sys.executable, "-c", code, *arguments],
         env={**os.environ, "SHIPGYM_CACHE": str(cache)},
         stdout=subprocess.PIPE,
-        stderr=errors,
+        stderr=subprocess.PIPE,
         text=True,
     )
 
 
+def compiles(cache):
+    """Run `twice` in a process; return what it says, but for its answer."""
+    answer, said = start(TWICE, cache=cache).communicate(timeout=120)
+    assert answer == "2.0\n"
+    return said
+
+
 def test_of_processes_that_start_at_once_one_compiles(tmp_path):
-    workers = [
-        start(WORKER.format(while_compiling="pass"), cache=tmp_path) for _ in range(4)
-    ]
-    answers = [worker.communicate()[0].split() for worker in workers]
-    assert sorted(answers) == [["compiles", "done"]] + [["done"]] * 3
+    workers = [start(TWICE, cache=tmp_path) for _ in range(4)]
+    answers, said = zip(*[worker.communicate() for worker in workers], strict=True)
+    assert answers == ("2.0\n",) * 4
+    assert "".join(said).count("compiling twice") == 1
     assert len(list(tmp_path.glob("*.loop"))) == 1
     assert not list(tmp_path.glob("*.draft"))
 
 
 @pytest.mark.skipif(os.name == "nt", reason="there is no such signal")
 def test_a_process_that_is_killed_while_it_compiles_blocks_nobody(tmp_path):
-    killed = start(
-        WORKER.format(while_compiling=f"os.kill(os.getpid(), {int(signal.SIGKILL)})"),
-        cache=tmp_path,
-    )
-    assert killed.communicate()[0].split() == ["compiles"]
+    killed = start(TWICE, cache=tmp_path)
+    assert "compiling twice" in killed.stderr.readline()
+    killed.kill()
+    killed.communicate()
     assert list(tmp_path.glob("*.lock"))
-    after = start(WORKER.format(while_compiling="pass"), cache=tmp_path)
-    assert after.communicate(timeout=120)[0].split() == ["compiles", "done"]
+    assert not list(tmp_path.glob("*.loop"))
+    assert "compiling twice" in compiles(tmp_path)
 
 
 @pytest.mark.parametrize(
     "damage",
-    [lambda whole: b"", lambda whole: whole[:-100], lambda whole: whole[:-1] + b"?"],
+    [
+        lambda whole: b"",
+        lambda whole: whole[:-100],
+        lambda whole: whole[:-1] + b"?",
+        lambda whole: sha256(b"no pickle").digest() + b"no pickle",
+    ],
 )
 def test_a_damaged_file_is_compiled_anew(tmp_path, damage):
-    code = WORKER.format(while_compiling="pass")
-    assert start(code, cache=tmp_path).communicate()[0].split() == ["compiles", "done"]
+    assert "compiling twice" in compiles(tmp_path)
     (file,) = tmp_path.glob("*.loop")
-    whole = file.read_bytes()
-    file.write_bytes(damage(whole))
-    told, said = start(code, cache=tmp_path, errors=subprocess.PIPE).communicate()
-    assert told.split() == ["compiles", "done"]
-    assert (
-        said.count(f"{tmp_path}: a compiled loop is damaged; it is compiled again") == 1
-    )
-    assert start(code, cache=tmp_path, errors=subprocess.PIPE).communicate() == (
-        "done\n",
-        "",
-    )
+    file.write_bytes(damage(file.read_bytes()))
+    said = compiles(tmp_path)
+    assert "compiling twice" in said
+    assert said.count("CacheWarning") == said.count("it is compiled again") == 1
+    assert compiles(tmp_path) == ""
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has other permissions")
@@ -255,42 +261,33 @@ class Planted:
         return os.system, ("touch PLANTED",)
 
 
+def twice(numbers):
+    for i in range(len(numbers)):
+        numbers[i] *= 2.0
+
+
 @posix
 @pytest.mark.parametrize("change", ["owner", "group", "others", "link"])
 def test_a_file_that_another_user_could_have_written_is_not_run(
     folder, give, monkeypatch, change
 ):
     monkeypatch.chdir(folder)
-    cache = DiskCache(folder, "tag", "void()")
-    cache_folder.write_loop(pickle.dumps(Planted()), cache.path)
+    compiled(twice, "void(float64[::1])", {}, "twice")
+    (path,) = folder.glob("*.loop")
+    cache_folder.write_loop(pickle.dumps(Planted()), path)
     if change == "owner":
-        give(cache.path)
+        give(path)
     elif change == "link":
-        cache.path.rename(folder / "elsewhere")
-        cache.path.symlink_to(folder / "elsewhere")
+        path.rename(folder / "elsewhere")
+        path.symlink_to(folder / "elsewhere")
     else:
-        cache.path.chmod(0o664 if change == "group" else 0o646)
+        path.chmod(0o664 if change == "group" else 0o646)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        assert not cache.ready()
-        assert not cache.ready()
+        compiled(twice, "void(float64[::1])", {}, "twice")
+        compiled(twice, "void(float64[::1])", {}, "twice")
     assert len(said) == (change != "link")  # a link is no file of ours
-    assert cache.load_overload(None, None) is None
     assert not Path("PLANTED").exists()
-    monkeypatch.setattr(os, "geteuid", os.getuid)
-    cache_folder.write_loop(b"anew", cache.path)
-    assert cache_folder.read_loop(cache.path) == b"anew"
-
-
-def test_what_cannot_be_loaded_is_said_and_compiled_anew(folder):
-    cache = DiskCache(folder, "tag", "void()")
-    cache_folder.write_loop(b"no pickle", cache.path)
-    assert cache.ready()
-    with pytest.warns(
-        UserWarning,
-        match=r"cannot be loaded \(UnpicklingError: .*; it is compiled again",
-    ):
-        assert cache.load_overload(None, SimpleNamespace(refresh=lambda: None)) is None
 
 
 def test_drafts_of_killed_processes_are_removed_by_the_next_one(folder):
@@ -312,12 +309,8 @@ def test_drafts_of_killed_processes_are_removed_by_the_next_one(folder):
 @posix
 def test_a_full_disk_is_said_once_and_nothing_is_left(tmp_path):
     full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))\n"
-    told, said = start(
-        full + WORKER.format(while_compiling="pass"),
-        cache=tmp_path,
-        errors=subprocess.PIPE,
-    ).communicate()
-    assert told.split() == ["compiles", "done"]
+    told, said = start(full + TWICE, cache=tmp_path).communicate()
+    assert told == "2.0\n"
     assert (
         said.count("CacheWarning")
         == said.count("cannot be written (File too large)")
@@ -335,36 +328,34 @@ def test_a_cache_that_cannot_be_made_is_said_and_survived(tmp_path, monkeypatch)
     cache_folder.usable_folder.cache_clear()
 
 
-def test_who_waits_at_a_terminal_sees_one_line(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    compiling._announce("CourseKeeping for 'mariner'", tmp_path)
-    line = capsys.readouterr().err
-    assert line.count("\n") == 1
-    for told in (
-        "CourseKeeping for 'mariner'",
-        "once",
-        "about",
-        str(tmp_path),
-        "shipgym warm",
-    ):
-        assert told in line
-    monkeypatch.setattr("sys.stderr.isatty", lambda: False)
-    compiling._announce("it", tmp_path)
-    assert capsys.readouterr().err == ""
+@pytest.mark.parametrize(
+    ("terminal", "notebook", "lines"),
+    [(True, False, 1), (False, True, 1), (False, False, 0)],
+)
+def test_who_waits_sees_one_line(
+    folder, monkeypatch, capsys, terminal, notebook, lines
+):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: terminal)
+    if notebook:
+        monkeypatch.setitem(sys.modules, "ipykernel", None)
+    else:
+        monkeypatch.delitem(sys.modules, "ipykernel", raising=False)
+    compiled(twice, "void(float64[::1])", {}, "a ship")
+    said = capsys.readouterr().err
+    assert said.count("\n") == lines
+    line = "shipgym: compiling a ship, once, about .* s; kept in .* .*shipgym warm"
+    assert bool(re.search(line, said)) == bool(lines)
+    assert (str(folder) in said) == bool(lines)
 
 
-@pytest.mark.parametrize("task", ["CourseKeeping", "PathFollowing"])
-def test_loops_over_ships_are_vectorised(task, monkeypatch):
-    monkeypatch.setattr(
-        compiling, "usable_folder", lambda: None
-    )  # what comes from the cache tells no code
-    vessel = shipgym.load_model("mariner-tls-svm").vessel
-    sensors = shipped_sensors(False, False, False)
-    (code,) = (
-        Voyages(vessel, read_definition(task), sensors, False, True)
-        .run.inspect_llvm()
-        .values()
-    )
+@pytest.mark.parametrize(
+    ("task", "windy"), [("CourseKeeping", True), ("PathFollowing", False)]
+)
+def test_loops_over_ships_are_vectorised(folder, task, windy):
+    ship = shipgym.load_model("mariner-tls-svm").compiled
+    sensors = shipped_sensors(windy, False, False)
+    program = EpisodeProgram(ship, read_definition(task), sensors, windy, shared=True)
+    (code,) = program.run.inspect_llvm().values()
     counts = [
         [
             len(re.findall(rf" = f(?:mul|add|sub) (?:contract )?{kind}", block))
@@ -373,16 +364,13 @@ def test_loops_over_ships_are_vectorised(task, monkeypatch):
         for block in re.split(r"\n\n|\n}\n", code)
     ]
     (sailing, alone), (concluding, alone_too), *_ = sorted(counts, reverse=True)
-    assert (
-        sailing > 300
-    )  # the Runge-Kutta step with the ship's 40 terms; on any processor, however wide
+    assert sailing > 300  # the Runge-Kutta step with the ship's 40 terms
     assert concluding > 60  # reward and observations
     assert alone == alone_too == 0
 
 
 PRINTS = """
-import sys
-from shipgym.engine import compiling
+from shipgym.engine.compiling import compiled
 def told(numbers):
     print(numbers[0])
 def tell(numbers):
@@ -392,7 +380,7 @@ def tell_twice(numbers):
     told(numbers)
 import numpy as np
 for loop in (tell, tell_twice):
-    compiling.compiled(loop, "void(float64[::1])", {}, "it")(np.array([1.5]))
+    compiled(loop, "void(float64[::1])", {}, "it")(np.array([1.5]))
 """
 
 
@@ -485,44 +473,6 @@ def test_a_lock_is_held_while_a_loop_is_compiled_and_free_afterwards(folder):
     assert [path.name for path in folder.iterdir() if path.suffix != ".lock"] == []
 
 
-def test_a_loop_is_given_once_and_only_while_its_file_is_there(folder):
-    cache = DiskCache(folder, "tag", "void()")
-    assert cache.load_overload(None, None) is None
-    assert not cache.ready()
-    cache_folder.write_loop(b"content", cache.path)
-    assert cache.ready()
-    cache.path.unlink()
-    assert not cache.ready()
-    assert cache.load_overload(None, None) is None
-
-
-def test_arguments_of_another_kind_have_a_file_of_their_own(folder):
-    paths = {
-        DiskCache(folder, tag, of).path
-        for tag in ("one", "two")
-        for of in ("void()", "void(int64)")
-    }
-    assert len(paths) == 4
-    assert all(path.parent == folder for path in paths)
-    assert all(
-        re.fullmatch(r"(one|two)-[0-9a-f]{8}\.loop", path.name) for path in paths
-    )
-
-
-def test_code_that_names_places_of_this_process_is_not_kept(folder):
-    cache = DiskCache(folder, "tag", "void()")
-    library = SimpleNamespace(has_dynamic_globals=True)
-    cache.save_overload(
-        None, SimpleNamespace(library=library, _reduce=lambda: ("code",))
-    )
-    assert not cache.path.exists()
-    library.has_dynamic_globals = False
-    cache.save_overload(
-        None, SimpleNamespace(library=library, _reduce=lambda: ("code",))
-    )
-    assert pickle.loads(cache_folder.read_loop(cache.path)) == ("code",)
-
-
 def test_a_warning_of_the_cache_names_folder_reason_and_remedy(tmp_path):
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -534,22 +484,3 @@ def test_a_warning_of_the_cache_names_folder_reason_and_remedy(tmp_path):
         " in each process. Set SHIPGYM_CACHE to a folder that can."
         for name, reason in (("a", "No space left on device"), ("b", "no place"))
     ]
-
-
-@pytest.mark.parametrize(
-    ("folder", "kept"),
-    [
-        (Path("/c"), "kept in /c (beforehand: shipgym warm)"),
-        (None, "kept in memory only"),
-    ],
-)
-def test_who_waits_in_a_notebook_sees_where_loops_are_kept(
-    monkeypatch, capsys, folder, kept
-):
-    monkeypatch.setattr("sys.stderr.isatty", lambda: False)
-    monkeypatch.setitem(sys.modules, "ipykernel", None)
-    compiling._announce("a ship", folder)
-    assert (
-        capsys.readouterr().err
-        == f"shipgym: compiling a ship, once, about 4 s; {kept}\n"
-    )

@@ -135,15 +135,15 @@ def test_states_that_do_not_fit_are_refused_and_change_nothing():
         (
             states[0],
             (
-                "state: task 'CourseKeeping' found, expected 'PathFollowing': .*"
+                "state: task: expected 'PathFollowing', got 'CourseKeeping': .*"
                 " same version"
             ),
         ),
-        (states[1], "state: model 'mariner-tls-svm' found, expected 'mariner'"),
-        (states[2], "state: states of shape"),
+        (states[1], "state: model: expected 'mariner', got 'mariner-tls-svm'"),
+        (states[2], "state: states: expected shape"),
         (states[3], "state: unknown key 'some_over'"),
-        (broken, "state: motion.x in row 0 is not finite"),
-        (blind, "state: observations are not finite"),
+        (broken, "state: motion.x: expected finite numbers, got none in row 0"),
+        (blind, "state: observations: expected finite"),
         (
             {**state, "engine": {**state["engine"], "made_for": 3}},
             "state: made_for: expected a table",
@@ -240,17 +240,17 @@ def test_a_refused_action_leaves_what_was_shown():
     shown = [
         engine.observations,
         engine.info("heading_error").copy(),
-        engine.shown.outcomes[0].copy(),
+        engine.outputs.outcomes[0].copy(),
     ]
     with pytest.raises(
         InputError,
-        match=r"^actions: inf found in lane 1, expected numbers in \[-1, 1\]$",
+        match=r"^actions: expected numbers in \[-1, 1\], got inf in lane 1$",
     ):
         env.step(np.array([[0.0], [np.inf], [np.nan]], np.float32))
     assert shown[2].all()  # costs
     for before, now in zip(
         shown,
-        [engine.observations, engine.info("heading_error"), engine.shown.outcomes[0]],
+        [engine.observations, engine.info("heading_error"), engine.outputs.outcomes[0]],
         strict=True,
     ):
         np.testing.assert_array_equal(now, before)
@@ -264,7 +264,7 @@ def test_the_first_reward_that_is_no_number_is_named():
     engine.reset([1, 2, 3])
     engine.step(np.zeros((3, 1)))
     own = engine.task.definition.reward_source
-    engine.shown.outcomes[0, 1] = (
+    engine.outputs.outcomes[0, 1] = (
         np.inf
     )  # a sum beyond all numbers, of parts that are within
     with pytest.raises(InputError) as caught:
@@ -293,7 +293,7 @@ def test_a_state_tells_which_number_of_which_ship_is_none():
         wrong["engine"]["states"].reshape(-1, 64)[row, 2] = np.inf
         with pytest.raises(
             InputError,
-            match=f"^state: {name} in row 2 is not finite, expected a number$",
+            match=f"^state: {name}: expected finite numbers, got none in row 2$",
         ):
             env.set_state(wrong)
     first[:, 3:] = np.nan  # lanes without a ship
@@ -308,14 +308,14 @@ def test_a_state_of_another_ship_by_the_same_name_is_refused():
         each.reset(seed=0)
     with pytest.raises(
         InputError,
-        match=r"^state: of another ship than this 'mariner', expected the same$",
+        match=r"^state: expected that of this 'mariner', got another ship's$",
     ):
         env.set_state(another.get_state())
     short = env.get_state()
     short["engine"]["keys"] = short["engine"]["keys"][:, :2]
     with pytest.raises(
         InputError,
-        match=r"^state: keys of shape \(1, 2, 64\) found, expected \(1, 3, 64\)$",
+        match=r"^state: keys: expected shape \(1, 3, 64\), got \(1, 2, 64\)$",
     ):
         env.set_state(short)
 
@@ -344,7 +344,7 @@ def test_lengths_of_a_path_are_in_metres_where_there_is_one():
     assert path.path_metres("turn_radius") == pytest.approx(4.0 * 160.93)
     assert course.path_metres("corridor") is None
     assert course.waypoints() is None
-    plan = course._voyages.state.n_rows
+    plan = course.program.state_rows.n_rows
     course._states = np.zeros((1, (plan + 4) * 64))  # a plan that is none of waypoints
     assert course.waypoints() is None
 

@@ -1,14 +1,16 @@
 """Orders out of range, ships that blow up, and what a simulated trial records of its shaft."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 import shipgym
 from shipgym import InputError, UnstableModelError, load_model, manoeuvres
-from shipgym.engine import trajectories
+from shipgym.engine import steered, trajectories
 from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.specialise import Specialisation
 from shipgym.ships.simulate import open_loop
 
 pytestmark = pytest.mark.interpreted
@@ -166,19 +168,21 @@ def test_a_ship_is_changed_in_what_is_asked_for_alone():
 
 
 @pytest.mark.parametrize("command", [0.3, -0.3])
-def test_a_rudder_reverses_within_a_step_at_the_very_heading(monkeypatch, command):
+def test_a_rudder_reverses_within_a_step_at_the_very_heading(command):
     """Heading 0.3 t + 0.1 t^3 to the side of the order: it passes 0.07 at 0.2293 s of 2 s."""
     asked = []
 
-    def advanced(motion, command, n, h, *more):
+    def turned(asked, motion, command, n, h, *more):
         asked.append((command, h))
         return motion._replace(
             psi=motion.psi + command * h * (1.0 + h * h / 3.0), x=motion.x + h
         )
 
-    monkeypatch.setattr(trajectories, "advanced", advanced)
+    switched = Specialisation({"sail_step": partial(turned, asked)}).copy(
+        steered.switched
+    )
     start = Motion(*[0.0] * 11)
-    after = trajectories.switched(start, command, 0.07, 1.0, 2.0, None, None, None)
+    after = switched(start, command, 0.07, 1.0, 2.0, None, None, None)
     time = np.roots([0.1, 0.0, 0.3, -0.07])
     time = float(time[np.isreal(time)][0].real)
     side = np.sign(command)

@@ -403,7 +403,7 @@ def test_a_bearing_is_shown_as_on_a_compass(angle_deg, shown):
 class Voyage:
     """Stands for an engine of two lanes, the second of which is looked at."""
 
-    model, shown = (
+    model, outputs = (
         load_model("mariner"),
         SimpleNamespace(outcomes=np.array([[-9.0, -0.1234]])),
     )

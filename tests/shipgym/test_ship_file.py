@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from shipgym.errors import InputError
 from shipgym.ships.steering import SteeringGear
-from shipgym.trials.identify_table import check_options
 from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
 
@@ -270,8 +269,6 @@ def test_repair_may_be_asked_for_the_whole_file_or_one_trial(folder):
             'rudder_positive = "right"',
             ": [[trials]] 2 rudder_positive: 'right'",
         ),
-        ('structure = "abkowitz"', "structure = 3", ": [identify] structure: "),
-        ("structure =", "structur =", ": [identify]: unknown key 'structur'"),
         (
             'structure = "abkowitz"',
             'reference_model = "ship.py"',
@@ -445,16 +442,3 @@ def test_earth_fixed_velocities_that_are_not_declared_are_noticed(run):
     body = Trial.from_csv(DATA / run, columns | {"u": "u", "v": "v"})
     np.testing.assert_allclose(earth["u"], body["u"], atol=0.01)
     np.testing.assert_allclose(earth["v"], body["v"], atol=0.01)
-
-
-def test_a_number_without_bound_above_may_be_infinite():
-    """C = inf is least squares; a share of the variance is at most 1."""
-    assert check_options({"C": float("inf"), "explained_variance": 1.0}, "[identify]")[
-        "C"
-    ] == float("inf")
-    for wrong in (float("inf"), 1.05, 0.0):
-        with pytest.raises(InputError, match=r"\[identify\] explained_variance: "):
-            check_options({"explained_variance": wrong}, "[identify]")
-    for wrong in (float("nan"), -0.1, -float("inf")):
-        with pytest.raises(InputError, match=r"\[identify\] C: "):
-            check_options({"C": wrong}, "[identify]")

@@ -138,8 +138,8 @@ def test_accelerations_of_every_structure_are_written_from_its_features(name):
     ship = Ship(
         160.93, 7.7175, 0.6, 0.1, 1.0, model.service_shaft_speed, np.inf, 7.7175
     )
-    plain = model.vessel.functions["accelerations"].function
-    found = plain(motion, model.vessel.coefficients(*theta), ship)
+    plain = model.compiled.functions["accelerations"]
+    found = plain(motion, model.compiled.coefficients(*theta), ship)
     np.testing.assert_allclose(
         found, [expected.get(q, 0.0) for q in "uvrpq"], rtol=1e-12
     )
@@ -255,7 +255,7 @@ def test_every_table_survives_its_model_file(name, tmp_path):
     model.save(tmp_path / "model.json")
     again = ShipModel.load(tmp_path / "model.json")
     assert again.table == table
-    assert again.vessel is model.vessel
+    assert again.compiled is model.compiled
 
 
 def test_forces_in_units_of_service_speed_meet_the_inertia_of_their_axis():

@@ -263,7 +263,7 @@ def test_waves_roll_a_ship_that_can_roll():
 
 
 def test_numbers_of_the_generator_are_normal():
-    stream, normal = outer(random.stream), outer(random.normal)
+    stream, normal = outer(random.rng_state), outer(random.normal)
     words = [np.uint64(stream(np.uint64(7), np.uint64(k))) for k in range(4)]
     z = np.array([normal(word, draw) for word in words for draw in random.DRAW])
     assert len(set(z.tolist())) == len(z)
@@ -452,7 +452,7 @@ def test_a_sea_begins_and_goes_on_as_it_always_was():
     begun, later = [], []
     with np.errstate(over="ignore"):
         for key in range(n):
-            word = random.stream(np.uint64(key), np.uint64(0))
+            word = random.rng_state(np.uint64(key), np.uint64(0))
             begun.append(open_sea.begin_sea(motion, word, p))
             after = word + random.BEGIN_WORDS
             later.append(open_sea.evolve(motion, 2.0, begun[-1], after, p))
@@ -691,5 +691,5 @@ def test_wrong_weather(mariner):
 def test_calm_water_is_a_sea_of_zeros_that_takes_no_rows():
     state, parameters = (Layout(sea=kind) for kind in open_sea.sea_records(windy=False))
     assert state.n_rows == parameters.n_rows == 0
-    calm = open_sea.sea_parts(windy=False, lanes=1)
-    assert calm["load_sea"].function(np.zeros(0), 0) == Sea(*[0.0] * len(Sea._fields))
+    calm = open_sea.sea_hooks(windy=False, lanes=1)
+    assert calm["load_sea"](np.zeros(0), 0) == Sea(*[0.0] * len(Sea._fields))

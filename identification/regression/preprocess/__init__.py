@@ -1,9 +1,9 @@
-"""From a noisy record to channels that can be differentiated: noise, filters, smoothers, repair."""
+"""From a noisy record to channels that can be differentiated."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from identification.regression.preprocess.filters import median, savitzky_golay, smooth
-from identification.regression.preprocess.kinematics import smooth_kinematics
 from identification.regression.preprocess.noise import (
     NOISY,
     is_noisy,
@@ -13,7 +13,7 @@ from identification.regression.preprocess.noise import (
 from identification.regression.preprocess.repair import outliers, repaired
 from shipgym import Trial
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice
+from shipgym.checks import check_choice, check_flag
 
 #: Filters of single channels by name.
 FILTERS: dict[str, Callable[[Floats, Floats], Floats]] = {
@@ -26,28 +26,49 @@ FILTERS: dict[str, Callable[[Floats, Floats], Floats]] = {
 PREPROCESSING = (*FILTERS, "rts", "none")
 
 
-def smoothed_channels(
-    trial: Trial, names: Sequence[str], preprocessing: str | bool = True
-) -> dict[str, Floats]:
-    """Some channels of a trial, smoothed; the rudder, which has corners, is left as it is.
+@dataclass(frozen=True)
+class Preprocessing:
+    """Smoothing of noisy channels before the regression.
 
-    By one of `PREPROCESSING`: smoothing spline, also for True, Savitzky-Golay filter,
-    running median, Kalman smoother of the kinematics (the shaft speed by a spline), or
-    nothing, also for False.
+    Parameters
+    ----------
+    smoothing : {"spline", "savgol", "median", "rts", "none"}
+        Smoothing splines fitted to the noise level; Savitzky-Golay filter; running
+        median; Kalman filter and Rauch-Tung-Striebel smoother, with position and
+        heading; or channels as recorded.
+    repair : bool
+        Whether outliers are replaced and dropouts of up to 10 steps filled first; the
+        provenance counts them.
     """
-    if isinstance(preprocessing, bool):
-        preprocessing = "spline" if preprocessing else "none"
-    check_choice(preprocessing, PREPROCESSING, "preprocessing")
-    if preprocessing == "none":
-        return {name: trial[name] for name in names}
-    source = smooth_kinematics(trial) if preprocessing == "rts" else trial
-    one = FILTERS.get(preprocessing, smooth)
-    done = (
-        "delta",
-        *(("x", "y", "psi", "u", "v", "r") if preprocessing == "rts" else ()),
-    )
+
+    smoothing: str = "spline"
+    repair: bool = False
+
+    def __post_init__(self) -> None:
+        check_choice(self.smoothing, PREPROCESSING, "preprocessing")
+        check_flag(self.repair, "repair")
+
+
+def smoothed_channels(
+    trial: Trial, names: Sequence[str], smoothing: str = "spline"
+) -> dict[str, Floats]:
+    """Some channels of a trial, smoothed (`Preprocessing`).
+
+    The rudder, which has corners, is left as it is; "rts" smooths a shaft speed by a
+    spline.
+    """
+    check_choice(smoothing, PREPROCESSING, "preprocessing")
+    kept = {"delta"}
+    if smoothing == "none":
+        kept = set(names)
+    if smoothing == "rts":
+        from identification.regression.preprocess import kinematics
+
+        trial = kinematics.smooth_kinematics(trial)
+        kept |= {*kinematics.HEADING, *kinematics.PLANE}
+    one_channel = FILTERS.get(smoothing, smooth)
     return {
-        name: source[name] if name in done else one(source.t, source[name])
+        name: trial[name] if name in kept else one_channel(trial.t, trial[name])
         for name in names
     }
 
@@ -56,6 +77,7 @@ __all__ = [
     "FILTERS",
     "NOISY",
     "PREPROCESSING",
+    "Preprocessing",
     "is_noisy",
     "median",
     "noise_level",
@@ -64,6 +86,5 @@ __all__ = [
     "repaired",
     "savitzky_golay",
     "smooth",
-    "smooth_kinematics",
     "smoothed_channels",
 ]

@@ -9,16 +9,12 @@ from scipy.signal import savgol_coeffs, savgol_filter
 from identification.regression.preprocess.noise import NOISY, noise_ratio
 from shipgym.arrays import Floats
 
-MEDIAN_WIDTH = 5  # samples
 ORDER = 3  # of the local polynomials
-LONGEST_FILTER = 0.2  # of the record
-# relative difference of time steps beyond which a record is filtered on an even grid
-UNEVEN = 1e-3
 #: Decades of stiffness tried, of a spline on knots a unit apart.
 STIFFNESSES = tuple(float(stiffness) for stiffness in np.arange(-2.0, 8.01, 0.25))
 
 
-def median(t: ArrayLike, values: ArrayLike, width: int = MEDIAN_WIDTH) -> Floats:
+def median(t: ArrayLike, values: ArrayLike, width: int = 5) -> Floats:
     """Running median of `width` samples, odd; takes away spikes of up to half its width and keeps steps."""
     return median_filter(np.asarray(values, dtype=float), width, mode="nearest")
 
@@ -27,34 +23,46 @@ def savitzky_golay(t: ArrayLike, values: ArrayLike, width: int | None = None) ->
     """Local cubic polynomials by least squares (Savitzky & Golay 1964, Analytical Chemistry 36(8)).
 
     Records with uneven steps are filtered on an even grid with as many samples.
-    `width`: samples, odd, at least 5; by default the one that generalised
-    cross-validation picks, of at most a fifth of the record. Without a width, values
-    that are free of noise (`noise.NOISY`) or fewer than 25 are returned as they are.
+
+    Parameters
+    ----------
+    t, values : array-like of shape (n_samples,)
+        Times, s, and the channel.
+    width : int, optional
+        Samples, odd, at least 5; by default the one that generalised cross-validation
+        picks, of at most a fifth of the record. Without a width, values that are free
+        of noise (`noise.NOISY`) or fewer than 25 are returned as they are.
     """
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
-    longest = int(LONGEST_FILTER * len(t))
-    if width is None and (longest < ORDER + 2 or noise_ratio(t, values) < NOISY):
-        return values
-    uneven = np.ptp(np.diff(t)) > UNEVEN * np.median(np.diff(t))
+    longest = len(t) // 5
+    if width is None:
+        is_short = longest < ORDER + 2
+        if is_short or noise_ratio(t, values) < NOISY:
+            return values
+
+    steps = np.diff(t)
+    is_even = np.ptp(steps) <= 1e-3 * np.median(steps)
     grid = np.linspace(t[0], t[-1], len(t))
-    on_grid = np.interp(grid, t, values) if uneven else values
-    chosen = _best_width(on_grid, longest) if width is None else width
-    filtered: Floats = savgol_filter(on_grid, chosen, ORDER)
-    return np.interp(t, grid, filtered) if uneven else filtered
+    sampled: Floats = values if is_even else np.interp(grid, t, values)
+    if width is None:
+        width = _best_width(sampled, longest)
+    filtered: Floats = savgol_filter(sampled, width, ORDER)
+    return filtered if is_even else np.interp(t, grid, filtered)
 
 
 def _best_width(values: Floats, longest: int) -> int:
     """Width of least generalised cross-validation; widths grow by about a fifth."""
-    sizes = np.geomspace(ORDER + 2, max(longest, ORDER + 2), 24)
+    shortest = ORDER + 2
+    sizes = np.geomspace(shortest, max(longest, shortest), 24)
     widths = np.unique(2 * (sizes.astype(int) // 2) + 1)
-    widths = widths[widths <= len(values)]
 
     def criterion(width: int) -> float:
         left_out = values - savgol_filter(values, width, ORDER)
-        freedom = 1.0 - float(savgol_coeffs(width, ORDER)[width // 2])
+        own_share = savgol_coeffs(width, ORDER)[width // 2]
+        freedom = 1.0 - float(own_share)
         return float(np.mean(left_out**2)) / freedom**2
 
-    return int(min(widths.tolist(), key=criterion))
+    return int(min(widths[widths <= len(values)].tolist(), key=criterion))
 
 
 def smooth(t: ArrayLike, values: ArrayLike) -> Floats:
@@ -69,48 +77,57 @@ def smooth(t: ArrayLike, values: ArrayLike) -> Floats:
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
     if len(t) < 5 or noise_ratio(t, values) < NOISY:
         return values
-    spline = Reinsch(t / np.median(np.diff(t)))
+    usual_step = np.median(np.diff(t))
+    spline = Reinsch(t / usual_step)
     signs = np.random.default_rng(0).choice([-1.0, 1.0], len(t))
-
     both = np.stack([values, signs])
 
     def criterion(stiffness: float) -> float:
         left_out, rest = both - spline.smoothed(both, 10.0**stiffness)
-        freedom = float(signs @ rest)
-        return float(left_out @ left_out) / max(freedom, 1.0) ** 2
+        freedom = max(float(signs @ rest), 1.0)
+        return float(left_out @ left_out) / freedom**2
 
-    return spline.smoothed(values, 10.0 ** min(STIFFNESSES, key=criterion))
+    best = min(STIFFNESSES, key=criterion)
+    return spline.smoothed(values, 10.0**best)
 
 
 class Reinsch:
-    """Natural cubic smoothing splines on given knots, by banded matrices."""
+    """Natural cubic smoothing splines on given knots, by banded matrices (Reinsch 1967).
+
+    With Q' the second divided differences of the values y at the knots, T the Gram
+    matrix of the spline's second derivative, and a stiffness s, the second derivatives
+    at the inner knots are (T + s Q'Q)^-1 Q'y, and the smoothed values y - s Q of these.
+    """
 
     def __init__(self, t: Floats) -> None:
         h = np.diff(t)
-        self.left, self.right = 1.0 / h[:-1], 1.0 / h[1:]
+        # the three diagonals of Q'
+        self.left = 1.0 / h[:-1]
+        self.right = 1.0 / h[1:]
         self.middle = -self.left - self.right
-        self.curvature = np.zeros(
-            (3, len(h) - 1)
-        )  # upper bands, as scipy.linalg.solveh_banded wants them
-        self.curvature[2] = (h[:-1] + h[1:]) / 3.0
-        self.curvature[1, 1:] = h[1:-1] / 6.0
-        self.roughness = np.zeros_like(self.curvature)
-        self.roughness[2] = self.left**2 + self.middle**2 + self.right**2
-        self.roughness[1, 1:] = (
-            self.middle[:-1] * self.left[1:] + self.right[:-1] * self.middle[1:]
-        )
-        self.roughness[0, 2:] = self.right[:-2] * self.left[2:]
+
+        # upper bands, the diagonal last, as scipy.linalg.solveh_banded wants them
+        n_inner = len(h) - 1
+        self.gram = np.zeros((3, n_inner))
+        self.gram[2] = (h[:-1] + h[1:]) / 3.0
+        self.gram[1, 1:] = h[1:-1] / 6.0
+        self.square = np.zeros((3, n_inner))  # Q'Q
+        self.square[2] = self.left**2 + self.middle**2 + self.right**2
+        next_left = self.middle[:-1] * self.left[1:]
+        next_middle = self.right[:-1] * self.middle[1:]
+        self.square[1, 1:] = next_left + next_middle
+        self.square[0, 2:] = self.right[:-2] * self.left[2:]
 
     def smoothed(self, values: Floats, stiffness: float) -> Floats:
         """Values of the spline at the knots, shape (n_knots,) or (n_splines, n_knots)."""
-        bends = (
-            self.left * values[..., :-2]
-            + self.middle * values[..., 1:-1]
-            + self.right * values[..., 2:]
-        )
-        forces = solveh_banded(self.curvature + stiffness * self.roughness, bends.T).T
+        differences = self.left * values[..., :-2]
+        differences += self.middle * values[..., 1:-1]
+        differences += self.right * values[..., 2:]
+        bands = self.gram + stiffness * self.square
+        curvature = solveh_banded(bands, differences.T).T
+
         pull = np.zeros_like(values)
-        pull[..., :-2] += self.left * forces
-        pull[..., 1:-1] += self.middle * forces
-        pull[..., 2:] += self.right * forces
+        pull[..., :-2] += self.left * curvature
+        pull[..., 1:-1] += self.middle * curvature
+        pull[..., 2:] += self.right * curvature
         return values - stiffness * pull

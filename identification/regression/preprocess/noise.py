@@ -5,6 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from identification.arrays import root_mean_square
+
 #: Noise beyond this part of what a channel changes by from one sample to the next makes
 #: it noisy.
 NOISY = 0.02
@@ -18,27 +20,39 @@ def noise_level(t: ArrayLike, values: ArrayLike) -> float:
     than five samples.
     """
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
-    if len(t) < 5:
+    n_compared = len(t) - 4
+    if n_compared < 1:
         return 0.0
-    around = (0, 1, 3, 4)
-    times = {i: t[i : len(t) - 4 + i] for i in range(5)}
-    expected, gain = np.zeros(len(t) - 4), np.ones(len(t) - 4)
-    for i in around:
-        others = [times[j] for j in around if j != i]
-        weight = np.prod(
-            [(times[2] - other) / (times[i] - other) for other in others], axis=0
-        )
-        expected += weight * values[i : len(t) - 4 + i]
+
+    neighbours = (0, 1, 3, 4)
+    times = [t[i : i + n_compared] for i in range(5)]
+    middle = times[2]
+    expected = np.zeros(n_compared)
+    gain = np.ones(n_compared)  # of the variance of a difference by that of a sample
+    for i in neighbours:
+        # Lagrange's polynomial of this neighbour in the middle
+        weight = np.ones(n_compared)
+        for j in neighbours:
+            if j != i:
+                weight *= (middle - times[j]) / (times[i] - times[j])
+        expected += weight * values[i : i + n_compared]
         gain += weight**2
-    return float(np.median(np.abs(values[2:-2] - expected) / np.sqrt(gain)) / 0.6745)
+
+    scaled = (values[2:-2] - expected) / np.sqrt(gain)
+    quartile_of_normal = 0.6745
+    return float(np.median(np.abs(scaled)) / quartile_of_normal)
 
 
 def noise_ratio(t: ArrayLike, values: ArrayLike, window: int = 1) -> float:
     """Noise of the change over a window of steps relative to the change itself (root mean squares)."""
     values = np.asarray(values, dtype=float)
     change = values[window:] - values[:-window]
-    size = float(np.sqrt(np.mean(change**2))) if len(change) else 0.0
-    return np.sqrt(2.0) * noise_level(t, values) / size if size > 0.0 else 0.0
+    size = root_mean_square(change) if len(change) else 0.0
+    if size == 0.0:
+        return 0.0
+    noise_of_change = np.sqrt(2.0) * noise_level(t, values)
+    ratio: float = noise_of_change / size
+    return ratio
 
 
 def is_noisy(t: ArrayLike, channels: Iterable[ArrayLike]) -> bool:

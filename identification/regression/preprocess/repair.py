@@ -12,11 +12,6 @@ from shipgym.checks import check_number
 
 WIDTH = 7  # samples of the running median
 OUTLYING = 6.0  # times the noise
-LONGEST_HOLE = 10.0  # usual time steps; longer ones stay gaps
-MOST_OUTLIERS = 0.1  # of a channel
-FEWEST_FOR_ENDS = (
-    3 * WIDTH
-)  # samples of a record whose ends are compared with what it moves inside
 MEASURED = ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n")
 STEPPING = ("delta", "n")  # without the inertia of a ship
 
@@ -27,32 +22,56 @@ def outliers(
     """Samples away from the running median by several times the noise (Hampel 1974, JASA 69), as flags.
 
     What the signal itself moves from sample to sample is allowed for by the running
-    median's own steps, so that corners of a clean signal are no outliers. The first and
-    the last sample are compared with the next one, unless the signal `may_step`, as a
-    rudder does, which may have just moved there. The threshold is in standard
-    deviations of the noise.
+    median's own steps, so that corners of a clean signal are no outliers.
+
+    Parameters
+    ----------
+    t, values : array-like of shape (n_samples,)
+        Times, s, and the channel.
+    threshold : float
+        In standard deviations of the noise.
+    may_step : bool
+        Whether the signal may have just moved at its ends, as a rudder does; if not,
+        the first and the last sample are compared with the next one.
     """
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
     if len(values) < WIDTH:
         return np.zeros(len(values), dtype=bool)
     middle = median_filter(values, WIDTH, mode="nearest")
-    steps = np.abs(np.diff(middle, append=middle[-1]))
-    moves = median_filter(np.maximum(steps, np.roll(steps, 1)), WIDTH, mode="nearest")
     least = threshold * noise_level(t, values) + 1e-9 * np.ptp(middle)
-    found: Flags = np.abs(values - middle) > least + 0.5 * WIDTH * moves
-    if not may_step and len(values) >= FEWEST_FOR_ENDS:
-        ends, inside = (
-            np.array([0, -1]),
-            np.abs(np.diff(middle[WIDTH // 2 : -(WIDTH // 2)])),
-        )
-        longer = np.maximum(
-            np.diff(t)[ends] / np.median(np.diff(t)), 1.0
-        )  # beside a gap it moves further
-        jumps = np.abs(np.diff(values))[ends] > (least + WIDTH * inside.max()) * longer
-        found[ends] = (
-            jumps & ~found[[1, -2]]
-        )  # from an outlier it is not the end that jumps
+    allowed = least + 0.5 * WIDTH * _usual_steps(middle)
+    found: Flags = np.abs(values - middle) > allowed
+
+    if not may_step and len(values) >= 3 * WIDTH:
+        first, last = _ends_that_jump(t, values, middle, least)
+        # beside an outlier it is not the end that jumps
+        found[0] = first and not found[1]
+        found[-1] = last and not found[-2]
     return found
+
+
+def _usual_steps(middle: Floats) -> Floats:
+    """Largest of the running median's steps to either side, in the median around each sample."""
+    forward = np.abs(np.diff(middle, append=middle[-1]))
+    backward = np.roll(forward, 1)
+    return median_filter(np.maximum(forward, backward), WIDTH, mode="nearest")
+
+
+def _ends_that_jump(
+    t: Floats, values: Floats, middle: Floats, least: float
+) -> tuple[bool, bool]:
+    """Whether first and last sample are further from the next one than the signal moves inside."""
+    inside = middle[WIDTH // 2 : -(WIDTH // 2)]
+    largest_move = np.abs(np.diff(inside)).max()
+    steps = np.diff(t)
+    jumps = np.abs(np.diff(values))
+
+    def is_jump(end: int) -> bool:
+        # beside a gap the signal moves further
+        longer = max(steps[end] / np.median(steps), 1.0)
+        return bool(jumps[end] > (least + WIDTH * largest_move) * longer)
+
+    return is_jump(0), is_jump(-1)
 
 
 def repaired(trial: Trial, threshold: float = OUTLYING) -> Trial:
@@ -64,43 +83,52 @@ def repaired(trial: Trial, threshold: float = OUTLYING) -> Trial:
     the number of values that were filled by channel, and `raw`, the trial as it was.
     Raises InputError where more than a tenth of a channel would be outliers.
     """
-    check_number(
-        threshold, "threshold", above=0.0, hint="in standard deviations of the noise"
-    )
+    hint = "in standard deviations of the noise"
+    check_number(threshold, "threshold", above=0.0, hint=hint)
     times = _filled_times(trial.t)
-    kept = np.isin(times, trial.t)
+    is_recorded = np.isin(times, trial.t)
     channels, counts = {}, {}
     for name, values in trial.channels.items():
-        wrong = np.zeros(len(trial), dtype=bool)
-        if name in MEASURED:
-            wrong = outliers(trial.t, values, threshold, may_step=name in STEPPING)
-        if wrong.mean() > MOST_OUTLIERS:
-            raise InputError(
-                f"trial {trial.name!r}: {wrong.sum()} of {len(trial)} samples of {name}"
-                " would be outliers, expected at most a tenth; check the channel, or"
-                f" give a threshold above {threshold:g}"
-            )
-        sound = kept.copy()
-        sound[kept] = ~wrong
+        wrong = _outliers_of(trial, name, threshold)
+        sound = is_recorded.copy()
+        sound[is_recorded] = ~wrong
         channels[name] = values
-        if not sound.all():
-            known, good = trial.t[~wrong], values[~wrong]
-            channels[name] = PchipInterpolator(known, good)(
-                np.clip(times, known[0], known[-1])
-            )
-            channels[name][sound] = good  # to the bit as they were
-            counts[name] = int((~sound).sum())
-    return trial.with_channels(channels, t=times, repaired=counts) if counts else trial
+        if sound.all():
+            continue
+
+        known, good = trial.t[~wrong], values[~wrong]
+        between = np.clip(times, known[0], known[-1])
+        channels[name] = PchipInterpolator(known, good)(between)
+        channels[name][sound] = good  # to the bit as they were
+        counts[name] = int((~sound).sum())
+    if not counts:
+        return trial
+    return trial.with_channels(channels, t=times, repaired=counts)
+
+
+def _outliers_of(trial: Trial, name: str, threshold: float) -> Flags:
+    """Outliers of a channel; of one that is not measured none."""
+    if name not in MEASURED:
+        return np.zeros(len(trial), dtype=bool)
+    may_step = name in STEPPING
+    wrong = outliers(trial.t, trial[name], threshold, may_step)
+    if wrong.mean() > 0.1:
+        raise InputError(
+            f"trial {trial.name!r}: expected at most a tenth of {name} to be outliers,"
+            f" got {wrong.sum()} of {len(trial)} samples; check the channel, or give a"
+            f" threshold above {threshold:g}"
+        )
+    return wrong
 
 
 def _filled_times(t: Floats) -> Floats:
     """The times with those that are missing in short dropouts."""
     steps = np.diff(t)
     usual = float(np.median(steps))
-    extra = [
-        np.linspace(t[k], t[k + 1], round(steps[k] / usual) + 1)[1:-1]
-        for k in np.flatnonzero(
-            (steps > 1.5 * usual) & (steps <= (LONGEST_HOLE + 0.5) * usual)
-        )
-    ]
-    return np.union1d(t, np.concatenate(extra)) if extra else np.array(t)
+    is_dropout = (steps > 1.5 * usual) & (steps <= 10.5 * usual)
+    times = [t]
+    for k in np.flatnonzero(is_dropout):
+        n_steps = round(steps[k] / usual)
+        filled = np.linspace(t[k], t[k + 1], n_steps + 1)
+        times.append(filled[1:-1])
+    return np.unique(np.concatenate(times))

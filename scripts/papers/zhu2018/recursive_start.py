@@ -169,12 +169,12 @@ def at_best() -> Floats:
     model = identify(
         [zigzag_trial(noisy=True)],
         STRUCTURE,
-        "rls",
+        RecursiveLeastSquares(
+            start_samples=START_SAMPLES, start_interval=START_INTERVAL
+        ),
         particulars=ship().particulars,
         steering=ship().steering,
         guarded=False,
-        start_samples=START_SAMPLES,
-        start_interval=START_INTERVAL,
     ).model
     return np.asarray(np.array(list(model.coefficients.values())) * TO_STARBOARD)
 
@@ -207,7 +207,7 @@ def spline_rows(noisy: bool) -> dict[str, tuple[Floats, Floats]]:
         ship().particulars,
         window=1,
         gear=ship().steering,
-        smooth=False,
+        smoothing="none",
     )
     return {q: (samples.features[q], samples.targets[q]) for q in table.regressed}
 

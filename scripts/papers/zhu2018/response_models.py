@@ -15,6 +15,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from identification import Preprocessing, Sampling
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.tuned import TunedLSSVM
 from identification.pipeline import identify
@@ -145,14 +146,12 @@ def at_best(trial: Trial, form: str) -> Form:
     model = identify(
         [trial],
         "nomoto" if form == "linear" else "norrbin",
-        "ls-svm",
+        LSSVM(robust=True),
+        Sampling(window=WINDOW),
         particulars=ship(LEARNED[2]).particulars,
         steering=ship(LEARNED[2]).steering,
-        smooth=False,
-        window=WINDOW,
-        repair=True,
+        preprocessing=Preprocessing("none", repair=True),
         guarded=False,
-        robust=True,
     ).model
     c = model.coefficients
     return Form(-c["c_d"] / c["c_r"], -1.0 / c["c_r"], c.get("c_r3", 0.0) / c["c_r"])

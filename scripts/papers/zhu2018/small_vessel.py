@@ -15,6 +15,7 @@ from functools import cache
 import numpy as np
 from scipy.ndimage import median_filter
 
+from identification import Refinement
 from identification.pipeline import identify
 from identification.validation.prediction import predict
 from papers.row import Row
@@ -123,12 +124,12 @@ def at_best(trial: Trial) -> ShipModel:
     return identify(
         [trial],
         STRUCTURE,
-        "output-error",
+        Refinement(
+            segment_lengths=SAMPLES * INTERVAL * SPEED / LENGTH, staggered=False
+        ),
         particulars=ship().particulars,
         steering=ship().steering,
         guarded=False,
-        segment_lengths=SAMPLES * INTERVAL * SPEED / LENGTH,
-        staggered=False,
     ).model
 
 

@@ -1,0 +1,282 @@
+"""Fixed-size LS-SVM with an RBF kernel on what a reference ship leaves of the accelerations.
+
+Source: Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares
+support vector machines, chapter 6: the kernel is approximated on a few centres, here of
+k-means in mirrored pairs, and the ridge regression solved in the primal, in the leading
+principal components of the data in feature space.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh
+from sklearn.cluster import KMeans
+
+from identification.arrays import column_rms
+from identification.estimators.estimator import Estimators
+from identification.estimators.kernel_residual import KernelResidual
+from identification.estimators.lssvm import LSSVM
+from identification.estimators.rm_svm import heading_error, most_regularised
+from identification.regression.samples import Samples
+from identification.validation.folds import held_out_rows
+from shipgym import InputError, ShipModel, Trial
+from shipgym.arrays import Floats, finite
+from shipgym.ships import GreyBox, Structure
+from shipgym.ships.kernel_boxes import (
+    Kernel,
+    gaussians,
+    kernel_box,
+    kernel_inputs,
+)
+
+#: Lengths of the functions tried, in root mean squares of the inputs; the smoothest
+#: first.
+LENGTHS = (2.8, 2.0, 1.4, 1.0, 0.7)
+#: Weights tried, of squared errors over a ship length.
+WEIGHTS = tuple(np.geomspace(0.1, 1e4, 6).tolist())
+MIRROR = np.array([-1.0, -1.0, -1.0, 1.0])  # of the inputs, port to starboard
+INPUT_CHANNELS = ("u", "v", "r", "delta")
+
+
+@dataclass(frozen=True, eq=False)
+class KernelFit:
+    """A kernel on what a reference ship leaves; before its fit without estimators."""
+
+    model: ShipModel
+    samples: Samples
+    estimators: Estimators = field(default_factory=dict)
+    report: dict[str, Any] = field(default_factory=dict)  # for the provenance
+
+
+def stabilised(model: ShipModel) -> ShipModel:
+    """The linear model beneath a black box, damped until a hard turn keeps within bounds.
+
+    Where the kernel fades the ship is linear: she must be stable, and neither drift nor
+    turn beyond any ship.
+    """
+    c = dict(model.coefficients)
+    shift = _least_damping(c, model.steering.limit)
+    # surge must be damped too, in the prime system
+    surge_damping = min(c["a_du"], -0.05 - 2.0 * c["a_0"])
+    damped = {"b_v": c["b_v"] - shift, "c_r": c["c_r"] - shift, "a_du": surge_damping}
+    return replace(model, coefficients=c | damped)
+
+
+def _least_damping(c: dict[str, float], rudder_limit: float) -> float:
+    """Least damping of sway and yaw, prime system, that keeps a linear ship within bounds.
+
+    These are the eigenvalues of steering, and drift and turn with the rudder hard over.
+    """
+    A = np.array([[c["b_v"], c["b_r"]], [c["c_v"], c["c_r"]]])
+    rudder = rudder_limit * np.array([c["b_d"], c["c_d"]])
+    for step in range(2000):
+        shift = 0.05 * step
+        damped = A - shift * np.eye(2)
+        drift, turn = np.abs(np.linalg.solve(damped, rudder))
+        slowest = np.linalg.eigvals(damped).real.max()
+        if slowest < -0.2 and drift < 0.5 and turn < 1.2:
+            return float(shift)
+    raise InputError(
+        "kernel: expected a linear ship beneath it that some damping stabilises, got"
+        " none; check rudder and yaw rate, or name a reference_model"
+    )
+
+
+def fit_kernel(
+    asked: KernelResidual,
+    blank: ShipModel,
+    trials: Sequence[Trial],
+    box: GreyBox,
+    inputs: Floats,
+    build_rows: Callable[[Structure], Samples],
+) -> KernelFit:
+    """Fit a kernel to what the reference ship of a grey box leaves, length and weight of the errors chosen.
+
+    Where not given these are the smoothest whose simulated headings of the trials held
+    out are within a tenth of the best; a fitted reference ship knows these trials.
+
+    Parameters
+    ----------
+    asked : KernelResidual
+        Settings.
+    blank : ShipModel
+        The ship; its structure is not used.
+    trials : sequence of Trial
+        To fit.
+    box : GreyBox
+        Its reference ship is beneath the kernel.
+    inputs : array of shape (n_samples, 4)
+        Inputs of the kernel in the trials (`inputs_of`).
+    build_rows : callable
+        The regression of the trials with a structure.
+
+    Raises
+    ------
+    InputError
+        For too few samples.
+    """
+    search = _Search(blank, trials, box, build_rows, asked.folds)
+    lengths = LENGTHS if asked.length is None else (float(asked.length),)
+    weights = WEIGHTS if asked.C is None else (float(asked.C),)
+    kernels = _kernels(inputs, asked.centres, lengths)
+    stages = {length: search.stage(kernel) for length, kernel in kernels.items()}
+
+    # the smoothest first
+    pairs = [(length, weight) for weight in weights for length in lengths]
+    length, weight = pairs[0]
+    errors = {}
+    if len(pairs) > 1:
+        tried = [search.error(stages[length], weight) for length, weight in pairs]
+        length, weight = most_regularised(pairs, tried)
+        errors["kernel"] = tried[pairs.index((length, weight))]
+    errors["reference"] = search.error(stages[length], 0.0)
+
+    kernel = kernels[length]
+    report = {
+        "kind": asked.kernel,
+        "centres": len(kernel.centres),
+        "features": kernel.basis.shape[1],
+        "length": length,
+        "C": weight,
+        "remarks": _remarks(errors),
+        "heading_errors_held_out": {k: finite(e) for k, e in errors.items()},
+    }
+    return replace(search.fitted(stages[length], weight), report=report)
+
+
+def _kernels(
+    inputs: Floats, number: int, lengths: Sequence[float]
+) -> dict[float, Kernel]:
+    """Kernels by their length, on centres among the samples."""
+    offset, scale, centres = chosen_centres(inputs, number)
+    basis = np.eye(len(centres))
+    kernels = {}
+    for length in lengths:
+        kernel = Kernel(offset, scale * length, centres / length, basis)
+        kernels[length] = principal(kernel, inputs)
+    return kernels
+
+
+def _remarks(errors: dict[str, float]) -> list[str]:
+    """What a user has to know of the errors on held-out trials."""
+    if "kernel" not in errors or errors["kernel"] < errors["reference"]:
+        return []
+    kernel = np.degrees(errors["kernel"])
+    reference = np.degrees(errors["reference"])
+    return [
+        "on held-out trials the kernel predicts the heading no better than its"
+        f" reference ship alone ({kernel:.2g} and {reference:.2g} deg rms)"
+    ]
+
+
+def chosen_centres(
+    x: Floats, number: int, most_samples: int = 4000
+) -> tuple[Floats, Floats, Floats]:
+    """Offset and scale of inputs x, shape (n_samples, 4), and centres in these, mirrored in pairs.
+
+    Centres are those of k-means of all samples brought to one side. Raises InputError
+    for too few samples.
+    """
+    offset = np.array([0.0, 0.0, 0.0, x[:, 3].mean()])
+    size = column_rms(x - offset)
+    scale = np.maximum(size, 0.02)  # an input may hardly change
+    z = (x - offset) / scale
+    drifts_to_port = z[:, 1:2] < 0.0
+    folded = z * np.where(drifts_to_port, MIRROR, 1.0)
+
+    needed = 3 * number
+    if len(np.unique(folded, axis=0)) < needed:
+        raise InputError(
+            f"trials: expected at least {needed} different samples for {number} centres"
+            f" of the kernel, got {len(x)} samples; add trials, or give fewer centres"
+        )
+    clusters = KMeans(number // 2, n_init=1, random_state=0)
+    means = clusters.fit(_thinned(folded, most_samples)).cluster_centers_
+    return offset, scale, np.concatenate([means, means * MIRROR])
+
+
+def principal(
+    kernel: Kernel, x: Floats, most_features: int = 40, most_samples: int = 4000
+) -> Kernel:
+    """The kernel with the leading principal components of the samples x in feature space as features.
+
+    They are few, so that the covariance of their coefficients stays small.
+    """
+    z = _thinned((x - kernel.offset) / kernel.scale, most_samples)
+    values = gaussians(np.concatenate([z, z * MIRROR]), kernel.centres)
+    moment = values.T @ values / len(values)
+    among_centres = gaussians(kernel.centres, kernel.centres)
+    jitter = 1e-9 * np.eye(len(among_centres))
+    _, vectors = eigh(moment, among_centres + jitter)
+    leading_first = vectors[:, ::-1]
+    basis = np.ascontiguousarray(leading_first[:, :most_features])
+    return replace(kernel, basis=basis)
+
+
+def inputs_of(channels: Sequence[dict[str, Floats]], ship: Any) -> Floats:
+    """Inputs of the kernel over several trials, by their channels, shape (n_samples, 4)."""
+    return np.concatenate([kernel_inputs(one, ship) for one in channels])
+
+
+def _thinned(x: Floats, most: int) -> Floats:
+    every = max(1, -(-len(x) // most))
+    return x[::every]
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Fits with different kernels and weights of the errors, and what they predict."""
+
+    blank: ShipModel
+    trials: Sequence[Trial]
+    box: GreyBox
+    build_rows: Callable[[Structure], Samples]
+    folds: str
+
+    def stage(self, kernel: Kernel) -> KernelFit:
+        """The regression, and the model but for its coefficients."""
+        table = kernel_box(self.box, kernel)
+        blank = replace(
+            self.blank,
+            structure=table.name,
+            dynamics=table,
+            covariance=None,
+            provenance=None,
+            coefficients=dict.fromkeys(table.coefficient_names, 0.0),
+        )
+        return KernelFit(blank, self.build_rows(table))
+
+    def unit(self, samples: Samples) -> float:
+        """SI units, by row, of a weight of the errors by ship length in the prime system."""
+        ship = self.blank.particulars
+        window = np.mean(samples.duration)
+        return float(1.0 / (ship["length"] * window * ship["speed"] ** 3))
+
+    def error(self, stage: KernelFit, weight: float) -> float:
+        """Mean error of the simulated headings of what is held out; weight 0: of the reference ship."""
+        C = weight * self.unit(stage.samples)
+        errors = []
+        for rows, held in held_out_rows(self.trials, stage.samples, self.folds):
+            fitted = stage.samples.select(rows)
+            found: dict[str, Floats] = {}
+            for q, X in fitted.features.items():
+                moment = X.T @ X * C + np.eye(X.shape[1])
+                solution = np.linalg.solve(moment, C * (X.T @ fitted.targets[q]))
+                found[q] = np.asarray(solution, dtype=float)
+            model = stage.model.with_accelerations(found)
+            errors.append(heading_error(model, held, "rmse"))
+        return float(np.mean(errors))
+
+    def fitted(self, stage: KernelFit, weight: float) -> KernelFit:
+        """The fit to all rows."""
+        samples = stage.samples
+        C = weight * self.unit(samples)
+        estimators: Estimators = {}
+        for q, X in samples.features.items():
+            estimator = LSSVM(C=C, scale=False, fit_intercept=False)
+            estimators[q] = estimator.fit(X, samples.targets[q])
+        coefficients = {q: one.coef_ for q, one in estimators.items()}
+        model = stage.model.with_accelerations(coefficients)
+        return KernelFit(model, samples, estimators)

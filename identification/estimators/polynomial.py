@@ -1,0 +1,63 @@
+"""The polynomial that an LS-SVM with polynomial kernel is."""
+
+from itertools import combinations_with_replacement
+from math import factorial
+
+import numpy as np
+from sklearn.utils.validation import check_is_fitted
+
+from identification.estimators.lssvm import LSSVM
+from shipgym import InputError
+
+
+def polynomial_coefficients(estimator: LSSVM) -> dict[tuple[int, ...], float]:
+    """Coefficients of a fitted LS-SVM with polynomial kernel (Zhu 2018, eq. 5.5-5.7).
+
+    The kernel (gamma x_i.x + coef0)^d is multiplied out and summed over the samples.
+
+    Parameters
+    ----------
+    estimator : LSSVM
+        Fitted, with kernel "poly".
+
+    Returns
+    -------
+    dict of tuple of int to float
+        Coefficients by the powers of the features as given: (2, 1) is that of x0^2 x1.
+
+    Raises
+    ------
+    InputError
+        For another kernel.
+    """
+    if estimator.kernel != "poly":
+        raise InputError(
+            "kernel: expected 'poly', whose estimate is a polynomial, got"
+            f" {estimator.kernel!r}"
+        )
+    check_is_fitted(estimator)
+    degree = int(estimator.degree)
+    n_features = estimator.n_features_in_
+    gamma = 1.0 / n_features if estimator.gamma is None else estimator.gamma
+    slope = gamma * estimator.support_ / estimator.scale_  # of features as given
+    constant = estimator.coef0 - slope @ estimator.centre_
+
+    found = {}
+    for total in range(degree + 1):
+        for chosen in combinations_with_replacement(range(n_features), total):
+            powers = tuple(chosen.count(j) for j in range(n_features))
+            products = np.prod(slope ** np.array(powers), axis=1)
+            by_sample = products * constant ** (degree - total)
+            sum_over_samples = float(estimator.dual_coef_ @ by_sample)
+            found[powers] = _multinomial(degree, powers) * sum_over_samples
+
+    found[(0,) * n_features] += estimator.intercept_
+    return found
+
+
+def _multinomial(degree: int, powers: tuple[int, ...]) -> float:
+    """Number of ways in which a product of these powers arises from that of `degree` sums."""
+    ways = factorial(degree) / factorial(degree - sum(powers))
+    for power in powers:
+        ways /= factorial(power)
+    return ways

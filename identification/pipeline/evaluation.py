@@ -1,0 +1,213 @@
+"""An identified model: how it came about, how certain it is, and how well it predicts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import shipgym
+from identification.options import Options, name_of, provenance_settings
+from identification.regression.grey_box import bare_metrics
+from identification.regression.problem import Problem
+from identification.regression.samples import Samples
+from identification.result import IdentificationResult
+from identification.uncertainty.bootstrap import (
+    bootstrap_covariance,
+    influence_covariance,
+)
+from identification.uncertainty.covariance import (
+    coefficient_covariance,
+    joint_covariance,
+)
+from identification.uncertainty.model_error import (
+    FEWEST_TRIALS,
+    model_error,
+    without_trial,
+)
+from identification.uncertainty.uncertainty import Uncertainty
+from identification.validation.diagnostics import diagnose
+from identification.validation.guard import GuardedFit, with_coefficients
+from identification.validation.prediction import predict, trial_metrics
+from shipgym import ShipModel, Trial
+from shipgym.arrays import Floats
+from shipgym.ships import GreyBox
+
+if TYPE_CHECKING:
+    from identification.simulation_error.refine import Refined
+
+MEMORY = 1.0  # of residuals, in the time to sail one ship length
+
+
+def provenance_of(
+    options: Options, method: str, fit: GuardedFit, problem: Problem
+) -> dict[str, Any]:
+    """How a model came about, for its file."""
+    further: dict[str, Any] = {}
+    if isinstance(problem.table, GreyBox):
+        further["reference"] = {
+            "name": problem.table.ship.name,
+            "similarity": problem.similarity,
+            "shaft": problem.table.shaft,
+        }
+    searched = {}
+    ranks = {}
+    for q, estimator in fit.estimators.items():
+        if hasattr(estimator, "chosen_"):
+            searched[q] = estimator.chosen_
+        ranks[q] = int(getattr(estimator, "rank_", len(estimator.coef_)))
+    if searched:
+        further["search"] = searched
+    return {
+        "structure": name_of(options.structure),
+        "method": method,
+        "samples": options.samples.rule,
+        "settings": provenance_settings(options),
+        **further,
+        "software": f"shipgym {shipgym.__version__}",
+        "steps_per_window": problem.samples.window,
+        "ranks": ranks,
+        "guard": fit.report,
+        "stable": fit.stable,
+        "trials": [_trial_record(trial) for trial in problem.used],
+    }
+
+
+def _trial_record(trial: Trial) -> dict[str, Any]:
+    """A fitted trial for the provenance."""
+    record: dict[str, Any] = {
+        "name": trial.name,
+        "sha256": trial.raw.sha256,
+        "derived": sorted(trial.derived),
+    }
+    if trial.repaired:
+        record["repaired"] = dict(trial.repaired)
+    return record
+
+
+def scaled_covariance(
+    asked: Uncertainty, fit: GuardedFit, refined: Refined | None, problem: Problem
+) -> tuple[Floats, dict[str, Any]]:
+    """Covariance of the coefficients, scaled by the model error, and the report on that error."""
+    covariance = unscaled_covariance(
+        asked.covariance, fit, refined, problem.samples, problem.blank
+    )
+    if not asked.model_error:
+        return covariance, {}
+    own = replace(fit.model, covariance=covariance)
+    left_out = left_out_models(fit, problem, refined, covariance)
+    error = model_error(own, left_out, problem.used)
+    factor: float = error["factor"]
+    return factor**2 * covariance, error
+
+
+def unscaled_covariance(
+    kind: str,
+    fit: GuardedFit,
+    refined: Refined | None,
+    samples: Samples,
+    blank: ShipModel,
+) -> Floats:
+    """Covariance of the coefficients, with errors correlated over the time to sail one ship length."""
+    memory = MEMORY * blank.travel_time
+    if refined is None or refined.covariance is None:
+        if kind == "bootstrap":
+            covariance = bootstrap_covariance(fit.estimators, samples, memory)
+        else:
+            covariance = joint_covariance(fit.estimators, samples, memory)
+    elif kind == "bootstrap":
+        block = max(round(memory / refined.width), 1)
+        covariance = influence_covariance(refined.influences, block)
+    else:
+        covariance = refined.covariance
+    return coefficient_covariance(covariance, blank.acceleration_matrix)
+
+
+def left_out_models(
+    fit: GuardedFit, problem: Problem, refined: Refined | None, covariance: Floats
+) -> list[ShipModel]:
+    """The models, with covariance, that the fit would have given without each of the trials."""
+    if len(problem.used) < FEWEST_TRIALS:
+        return []
+    if refined is None or refined.covariance is None:
+        return [_without(k, fit, problem) for k in range(len(problem.used))]
+
+    # each trial moved the refined coefficients by its influence
+    n_trials = len(problem.used)
+    inflation = n_trials / (n_trials - 1)
+    values = np.array(list(fit.model.coefficients.values()))
+    models = []
+    for influence in refined.influences:
+        matrix = problem.blank.acceleration_matrix
+        change = np.linalg.solve(matrix, influence.sum(axis=0))
+        model = fit.model.with_coefficients(values - inflation * change)
+        models.append(replace(model, covariance=inflation * covariance))
+    return models
+
+
+def _without(trial: int, fit: GuardedFit, problem: Problem) -> ShipModel:
+    """The model, with covariance, of a regression without one of its trials."""
+    estimators, rows = without_trial(fit.estimators, problem.samples, trial)
+    partial_fit = replace(fit, estimators=estimators)
+    covariance = unscaled_covariance("analytic", partial_fit, None, rows, problem.blank)
+    model = with_coefficients(fit.model, estimators)
+    return replace(model, covariance=covariance)
+
+
+def evaluated(
+    model: ShipModel,
+    fit: GuardedFit,
+    problem: Problem,
+    provenance: Mapping[str, Any],
+    call: dict[str, Any],
+) -> IdentificationResult:
+    """The model with its provenance, its predictions of all trials that are not skipped, and diagnostics.
+
+    `call`: the arguments of `identify`, for settings.json.
+    """
+    trials = tuple(trial for trial in problem.trials if trial.use != "skip")
+    predictions = {trial.name: predict(model, trial) for trial in trials}
+    lost = [name for name, predicted in predictions.items() if predicted is None]
+
+    complete = {**provenance, **problem.sea}
+    complete["steering"] = "estimated" if call["steering"] is None else "given"
+    if lost:
+        complete |= {"stable": False, "runs_away_on": lost}
+    model = replace(model, provenance=complete)
+    stable = bool(complete["stable"])
+    metrics: dict[str, Any] = {
+        "stable": stable,
+        "instability": None if stable else _instability(complete, lost),
+        "trials": {
+            trial.name: trial_metrics(model, trial, predictions[trial.name])
+            for trial in trials
+        },
+    }
+    if isinstance(problem.table, GreyBox):
+        metrics["reference"] = bare_metrics(model, trials)
+    searches = {
+        q: estimator.search_
+        for q, estimator in fit.estimators.items()
+        if hasattr(estimator, "search_")
+    }
+    return IdentificationResult(
+        model=model,
+        stable=stable,
+        metrics=metrics,
+        predictions=predictions,
+        trials=trials,
+        diagnostics=diagnose(fit.estimators, problem.samples, problem.table),
+        samples=problem.samples,
+        estimators=fit.estimators,
+        settings=call,
+        searches=searches,
+    )
+
+
+def _instability(provenance: Mapping[str, Any], lost: list[str]) -> str:
+    """What an unstable model runs away in."""
+    reasons = [f"trial {name!r}, open loop" for name in lost]
+    reasons = reasons or provenance["guard"].get("rejected", [])
+    return f"runs away: {'; '.join(reasons)}"

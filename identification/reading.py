@@ -1,0 +1,211 @@
+"""Options of `identify` read from tables of names and values: a ship file's [identify], the command line.
+
+An option has the name of an argument of `identify`, such as `structure`, or that of a
+setting of a stage, such as `samples.window`. The stage may be left out (`window`), or
+be written with an underscore (`prior_strength`). Of a setting that several stages have,
+`C` and `folds`, the name alone is the kernel's where there is one, else the method's.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from typing import Any
+
+from identification.estimators.kernel_residual import KernelResidual
+from identification.estimators.methods import METHODS, make_method, method_options
+from identification.options import DEFAULT_METHOD, MAP, Options
+from identification.regression.preprocess import Preprocessing
+from identification.regression.samples import Sampling
+from identification.simulation_error.prior_knowledge import PriorKnowledge
+from identification.simulation_error.refinement import Refinement
+from identification.uncertainty.uncertainty import Uncertainty
+from shipgym import InputError
+from shipgym.checks import check_choice, check_table, check_text, did_you_mean, placed
+
+#: Stages of an identification that are one object each.
+STAGES: dict[str, type] = {
+    "samples": Sampling,
+    "preprocessing": Preprocessing,
+    "kernel": KernelResidual,
+    "prior": PriorKnowledge,
+    "uncertainty": Uncertainty,
+}
+#: The setting of each stage that its name alone stands for.
+WORDS = {name: fields(kind)[0].name for name, kind in STAGES.items()}
+WORDS["method"] = "name"
+#: Arguments of `identify` that are no stage, and come from such a table.
+ARGUMENTS = tuple(
+    item.name
+    for item in fields(Options)
+    if item.name not in (*WORDS, "particulars", "steering")
+)
+#: Settings that are lists of names.
+LISTS = ("hold_out", "method.extra_trials")
+
+
+def stage_settings() -> dict[str, list[str]]:
+    """Names of the settings of each stage but for the one that its name stands for."""
+    found = {
+        stage: [item.name for item in fields(kind)[1:]]
+        for stage, kind in STAGES.items()
+    }
+    of_methods = [option for name in METHODS for option in method_options(name)]
+    return found | {"method": list(dict.fromkeys(of_methods))}
+
+
+def read_table(
+    table: Any, where: str, with_kernel: bool | None = None
+) -> dict[str, Any]:
+    """Values of a table of options by their full names, each checked.
+
+    Parameters
+    ----------
+    table : mapping
+        Values by name; a stage may be a table of its settings.
+    where : str
+        Begins messages, such as ``"ship.toml: [identify]"``.
+    with_kernel : bool, optional
+        Whether the identification has a kernel; by default whether the table says so.
+
+    Raises
+    ------
+    InputError
+        For an unknown option, or a value that it cannot have.
+    """
+    options = dict(_flattened(check_table(table, where)))
+    if with_kernel is None:
+        with_kernel = "kernel" in options
+    found: dict[str, Any] = {}
+    for name, value in options.items():
+        full = full_name(name, where, with_kernel)
+        with placed(where):
+            check_value(full, value, options.get("method"))
+        found[full] = value
+    return found
+
+
+def _flattened(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    for name, value in table.items():
+        if name in WORDS and isinstance(value, Mapping):
+            for setting, own in value.items():
+                word = setting == WORDS[name]
+                yield (name if word else f"{name}.{setting}"), own
+        else:
+            yield name, value
+
+
+def full_name(name: str, where: str, with_kernel: bool = False) -> str:
+    """Full name of an option; InputError, which begins with `where`, for one that does not exist."""
+    if name in ARGUMENTS or name in WORDS:
+        return name
+    known = stage_settings()
+    if "." in name:
+        stage, _, setting = name.partition(".")
+        if setting == WORDS.get(stage):
+            return stage
+        if setting in known.get(stage, ()):
+            return name
+
+    owners = []
+    for stage, settings in known.items():
+        if name in settings:
+            owners.append(stage)
+        for setting in settings:
+            if name == f"{stage}_{setting}":
+                return f"{stage}.{setting}"
+    if len(owners) == 1:
+        return f"{owners[0]}.{name}"
+    if owners:
+        stage = "kernel" if with_kernel and "kernel" in owners else "method"
+        return f"{stage}.{name}"
+
+    names = [*ARGUMENTS, *WORDS, *(one for own in known.values() for one in own)]
+    raise InputError(
+        f"{where} {name}: expected an option of identify, got an unknown one."
+        f"{did_you_mean(name, names)}"
+    )
+
+
+def check_value(name: str, value: Any, method: Any = None) -> None:
+    """Refuse a value that an option, by its full name, cannot have with any method.
+
+    The message is that of the `method` named.
+    """
+    if name in LISTS:
+        _check_names(value, name.rpartition(".")[2])
+        return
+
+    stage, _, setting = name.partition(".")
+    if name == "method":
+        check_choice(value, (*METHODS, MAP), "method")
+    elif name in ARGUMENTS:
+        Options(**{name: value})
+    elif stage == "method":
+        _check_setting(setting, value, method)
+    else:
+        STAGES[stage](**{setting or WORDS[stage]: value})
+
+
+def _check_setting(setting: str, value: Any, method: Any) -> None:
+    """Refuse a value of a setting that no method can have; the message is that of the method named."""
+    refusals = []
+    for name in sorted(METHODS, key=lambda name: name != method):
+        if setting not in method_options(name):
+            continue
+        try:
+            checked_method(name, {setting: value})
+            return
+        except InputError as error:
+            refusals.append(error)
+    raise refusals[0]
+
+
+def _check_names(value: Any, where: str) -> None:
+    if not isinstance(value, list):
+        raise InputError(f"{where}: expected a list of names of trials, got {value!r}")
+    for name in value:
+        check_text(name, where)
+
+
+def checked_method(name: str, settings: Mapping[str, Any]) -> Any:
+    """The estimator or refinement of a name, its settings checked."""
+    made = make_method(name, settings)
+    estimator = made.start if isinstance(made, Refinement) else made
+    estimator.check()
+    return made
+
+
+def identify_arguments(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of `identify` from options by their full names.
+
+    Raises InputError for options that do not belong together.
+    """
+    arguments = {name: values[name] for name in ARGUMENTS if name in values}
+    for stage, kind in STAGES.items():
+        settings = settings_of(values, stage)
+        if stage == "kernel" and settings and "kernel" not in values:
+            raise InputError(
+                f"{', '.join(settings)}: expected a kernel that this is a setting of,"
+                ' got none; give kernel = "rbf"'
+            )
+        if stage in values:
+            settings[WORDS[stage]] = values[stage]
+        if settings:
+            arguments[stage] = kind(**settings)
+
+    settings = settings_of(values, "method")
+    method = values.get("method", DEFAULT_METHOD)
+    if settings:
+        arguments["method"] = checked_method(method, settings)
+    elif "method" in values:
+        arguments["method"] = method
+    return arguments
+
+
+def settings_of(values: Mapping[str, Any], stage: str) -> dict[str, Any]:
+    """The settings of a stage among options by their full names."""
+    prefix = f"{stage}."
+    return {
+        name.removeprefix(prefix): value
+        for name, value in values.items()
+        if name.startswith(prefix)
+    }

@@ -1,0 +1,123 @@
+"""How a rudder answers to its orders: the ramp of its gear, then the lag.
+
+A rudder far from its order moves at the gear's rate; where its gear has a lag, the last
+of the way, rate times lag, decays exponentially.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.special import lambertw
+
+from shipgym.arrays import Flags, Floats
+
+RAMP = 1e-4  # a rate within this part of the gear's rate is the gear's rate
+TOLERANCE = 1e-3  # of the rudder's range: orders closer than this are one order
+
+
+class GearResponse(NamedTuple):
+    """Rate and lag of a steering gear."""
+
+    rate: float  # rad/s; 0 for a rudder that never moved
+    lag: float  # time constant, s; 0 for a gear of constant rate
+
+    def angle(self, start: Any, order: Any, elapsed: Any) -> Floats:
+        """Rudder a time after `start` under one order, rad (infinite: still ramping)."""
+        distance = np.abs(order - start)
+        side = np.sign(order - start)
+        by_lag = np.minimum(distance, self.rate * self.lag)
+        ramping = np.minimum(elapsed, (distance - by_lag) / self.rate)
+
+        decayed = 1.0
+        if self.lag > 0.0:
+            decayed = 1.0 - np.exp(-(elapsed - ramping) / self.lag)
+        crept = np.where(ramping < elapsed, by_lag * decayed, 0.0)
+        return np.asarray(start + side * (self.rate * ramping + crept))
+
+    def orders(self, t: Floats, delta: Floats) -> Floats:
+        """The single order that explains each interval between samples, rad.
+
+        Infinite where the rudder ramps all the way. Shape (n_samples - 1,).
+        """
+        steps, moves = np.diff(t), np.diff(delta)
+        sizes = np.abs(moves)
+        ramps_throughout = sizes >= (1.0 - RAMP) * self.rate * steps
+        distances = self._distances(steps, sizes)
+        finite = delta[:-1] + np.sign(moves) * distances
+        return np.where(ramps_throughout, np.copysign(np.inf, moves), finite)
+
+    def _distances(self, steps: Floats, sizes: Floats) -> Floats:
+        """Distance to the order at the start of intervals, from their lengths and moves."""
+        if self.lag == 0.0:
+            return sizes
+        distances = sizes / -np.expm1(-steps / self.lag)
+        far = distances > self.rate * self.lag
+        if np.any(far):
+            # the ramp lasts x s, of x - lag exp((x - step) / lag) = size / rate - lag
+            short = sizes[far] / self.rate - self.lag
+            exponent = np.minimum((short - steps[far]) / self.lag, -1.0)
+            ramping = short - self.lag * lambertw(-np.exp(exponent), 0).real
+            distances[far] = self.rate * (ramping + self.lag)
+        return distances
+
+    def explained_share(self, t: Floats, delta: Floats) -> float:
+        """Share of the intervals that go on under the order before them."""
+        if self.rate == 0.0 or len(t) < 4:
+            return 0.0
+        return float(np.mean(goes_on(self.orders(t, delta), delta)))
+
+
+def goes_on(orders: Floats, delta: Floats) -> Flags:
+    """Whether each interval but the first can be under the order of the one before it.
+
+    Shape (n_samples - 2,), of orders of shape (n_samples - 1,).
+    """
+    before, now = orders[:-1], orders[1:]
+    angle = delta[1:-1]  # where the intervals meet
+    was_ramping, is_ramping = np.isinf(before), np.isinf(now)
+    with np.errstate(invalid="ignore"):  # between two ramps
+        is_near = np.abs(now - before) <= TOLERANCE * np.ptp(delta)
+
+    same_ramp = is_ramping & (now == before)
+    ahead = np.sign(now - angle) * np.sign(before) >= 0.0
+    arrives = was_ramping & ~is_ramping & ahead
+    same_order = ~was_ramping & ~is_ramping & is_near
+    continues: Flags = same_ramp | arrives | same_order
+    return continues
+
+
+def estimate_gear(t: Floats, delta: Floats) -> GearResponse:
+    """Rate and lag of a gear from exact samples of its rudder, s and rad.
+
+    The rate is the largest that occurs; the lag, 0 for a gear of constant rate, the one
+    for which the order is steadiest.
+    """
+    steps = np.diff(t)
+    rates = np.abs(np.diff(delta)) / steps
+    fastest = float(rates.max())
+    if fastest == 0.0:
+        return GearResponse(0.0, 0.0)
+    rate = float(np.median(rates[rates >= (1.0 - RAMP) * fastest]))
+
+    largest_jump = 10.0 * TOLERANCE * np.ptp(delta)
+
+    def unsteadiness(lag: float) -> float:
+        orders = GearResponse(rate, lag).orders(t, delta)
+        with np.errstate(invalid="ignore"):  # between two ramps
+            jumps = np.abs(np.diff(orders))
+        jumps = np.where(np.isfinite(jumps), jumps, 0.0)
+        return float(np.minimum(jumps, largest_jump).sum())
+
+    usual_step = float(np.median(steps))
+    lags = np.geomspace(0.1, 20.0, 48) * usual_step
+    best = int(np.argmin([unsteadiness(lag) for lag in lags]))
+    low, high = lags[max(best - 1, 0)], lags[min(best + 1, len(lags) - 1)]
+    refined = minimize_scalar(
+        unsteadiness,
+        bounds=(low, high),
+        method="bounded",
+        options={"xatol": 1e-10 * high},
+    )
+    needs_no_lag = unsteadiness(0.0) <= 1.01 * refined.fun
+    return GearResponse(rate, 0.0 if needs_no_lag else float(refined.x))

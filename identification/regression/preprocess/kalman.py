@@ -1,0 +1,109 @@
+"""Kalman filter and smoother of a linear system."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipgym.arrays import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Filtered:
+    """States of a linear system at each sample, by the measurements up to it.
+
+    Attributes
+    ----------
+    predicted, states : array of shape (n_samples, n_states)
+        Before and after the measurements of the sample are taken in.
+    predicted_covariances, covariances : array of shape (n_samples, n_states, n_states)
+        Their covariances.
+    log_likelihood : float
+        Of the measurements, but for a constant.
+    """
+
+    predicted: Floats
+    predicted_covariances: Floats
+    states: Floats
+    covariances: Floats
+    log_likelihood: float
+
+
+@dataclass(frozen=True, eq=False)
+class LinearSystem:
+    """x_k+1 = F_k x_k + w_k, of which y_k = H x_k + e_k is measured.
+
+    Attributes
+    ----------
+    transitions : array of shape (n_samples - 1, n_states, n_states)
+        F.
+    process : array of shape (n_samples - 1, n_states, n_states)
+        Covariance of w.
+    observation : array of shape (n_channels, n_states)
+        H.
+    variances : array of shape (n_channels,)
+        Of e, whose components are independent.
+    start, start_variances : array of shape (n_states,)
+        Expected first state, and its variances.
+    """
+
+    transitions: Floats
+    process: Floats
+    observation: Floats
+    variances: Floats
+    start: Floats
+    start_variances: Floats
+
+    def filtered(self, measured: Floats) -> Filtered:
+        """Kalman filter over measurements, shape (n_samples, n_channels).
+
+        Those that are not finite are missing. Measurements are taken in one at a time,
+        in Joseph's form, so that nothing is inverted.
+        """
+        n_samples, n_states = len(measured), len(self.start)
+        predicted = np.empty((n_samples, n_states))
+        predicted_covariances = np.empty((n_samples, n_states, n_states))
+        states = np.empty_like(predicted)
+        covariances = np.empty_like(predicted_covariances)
+
+        x = self.start
+        P = np.diag(self.start_variances)
+        log_likelihood = 0.0
+        for k in range(n_samples):
+            if k > 0:
+                F = self.transitions[k - 1]
+                x = F @ x
+                P = F @ P @ F.T + self.process[k - 1]
+            predicted[k] = x
+            predicted_covariances[k] = P
+
+            channels = zip(self.observation, self.variances, measured[k], strict=True)
+            for h, variance, y in channels:
+                if not np.isfinite(y):
+                    continue
+                Ph = P @ h
+                innovation = y - float(h @ x)
+                innovation_variance = float(h @ Ph) + variance
+                gain = Ph / innovation_variance
+                x = x + gain * innovation
+                left = np.eye(n_states) - np.outer(gain, h)
+                P = left @ P @ left.T + variance * np.outer(gain, gain)
+                misfit = innovation * innovation / innovation_variance
+                log_likelihood -= 0.5 * (np.log(innovation_variance) + misfit)
+            states[k] = x
+            covariances[k] = P
+        return Filtered(
+            predicted, predicted_covariances, states, covariances, log_likelihood
+        )
+
+    def smoothed(self, measured: Floats) -> Floats:
+        """States by all measurements, shape (n_samples, n_states).
+
+        Source: Rauch, Tung & Striebel 1965, AIAA Journal 3(8).
+        """
+        found = self.filtered(measured)
+        states = found.states.copy()
+        for k in reversed(range(len(measured) - 1)):
+            ahead = self.transitions[k] @ found.covariances[k]
+            gain = np.linalg.solve(found.predicted_covariances[k + 1], ahead).T
+            states[k] += gain @ (states[k + 1] - found.predicted[k + 1])
+        return states

@@ -1,0 +1,237 @@
+"""The current of each trial, which is known or estimated, and how sure it is."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from identification.regression.current import estimate_current
+from identification.regression.velocities import (
+    CURRENT_COLUMNS,
+    SIGNIFICANT,
+    through_water,
+)
+from shipgym import InputError, Trial
+from shipgym.arrays import Floats
+
+REMEDY = (
+    "add a turn of a whole circle, or runs on other headings at the same shaft speed,"
+    " give the current (current = { north = 0.2, east = -0.1 }, m/s), or take none out"
+    ' (current = "none")'
+)
+
+
+@dataclass(frozen=True, eq=False)
+class TrialCurrent:
+    """The current of one trial.
+
+    Attributes
+    ----------
+    velocity : array of shape (2,) or (2, n_samples)
+        Towards north and east, m/s.
+    covariance : array of shape (2, 2) or None
+        None for one that is known.
+    source : str
+        "columns", "given", "all trials" or "trial".
+    """
+
+    velocity: Floats
+    covariance: Floats | None
+    source: str
+
+    @property
+    def mean(self) -> Floats:
+        """Mean over the trial, m/s, shape (2,)."""
+        return np.asarray(np.reshape(self.velocity, (2, -1)).mean(axis=1))
+
+    @property
+    def probability(self) -> float:
+        """Probability of a current as far from zero by chance; 0 for one that is known."""
+        if self.covariance is None:
+            return 0.0
+        return wald_probability(self.mean, self.covariance)
+
+
+def without_current(
+    found: dict[str, Trial],
+    length: float,
+    speed: float,
+    option: Any,
+    remarks: list[str],
+) -> dict[str, Any]:
+    """Take the current out of trials, by name, where it is known or asked for.
+
+    Returns a report on each; `remarks` get those that were doubtful.
+    """
+    one_heading = _keep_to_one_heading(found.values())
+    currents = currents_of(list(found.values()), length, speed, option)
+    rows: dict[str, Any] = {}
+    doubtful: dict[str, list[str]] = {}
+    for name, current in currents.items():
+        row = _row(current)
+        if current.covariance is not None and not one_heading:
+            errors = np.sqrt(np.diag(current.covariance))
+            row["standard_errors"] = errors.tolist()
+            row["probability"] = current.probability
+        doubt = _doubt(current, speed, one_heading)
+        if doubt and (option != "auto" or current.covariance is None):
+            _refuse(name, doubt, current)
+        if doubt:
+            doubtful.setdefault(doubt, []).append(PurePath(name).name)
+
+        is_chance = option == "auto" and current.probability > SIGNIFICANT
+        row["taken_out"] = not doubt and not is_chance
+        if row["taken_out"]:
+            found[name] = through_water(found[name], *current.velocity)
+        rows[name] = row
+
+    for doubt, names in doubtful.items():
+        remarks.append(f"{', '.join(names)}: no current is removed: {doubt}; {REMEDY}")
+    return rows
+
+
+def _row(current: TrialCurrent) -> dict[str, Any]:
+    """A current for the provenance."""
+    north, east = current.mean.tolist()
+    return {"north": north, "east": east, "source": current.source, "taken_out": True}
+
+
+def _refuse(name: str, doubt: str, current: TrialCurrent) -> None:
+    remedy = REMEDY
+    if current.covariance is None:
+        remedy = "give it in m/s, towards north and east"
+    raise InputError(f"trial {name!r}: no current can be removed: {doubt}; {remedy}")
+
+
+def _doubt(current: TrialCurrent, speed: float, one_heading: bool) -> str:
+    """Why a current cannot be removed; empty where it can."""
+    if current.covariance is not None:
+        # drift by the current and drift by the ship's own neutral helm look the same
+        if one_heading:
+            return "the trials keep to one heading"
+        largest_error = np.sqrt(np.diag(current.covariance)).max()
+        if largest_error > 0.05 * speed:
+            return f"its standard error is {largest_error:.2g} m/s"
+
+    size = np.hypot(*current.mean)
+    if size > speed:
+        return f"expected less than the ship's speed of {speed:.3g} m/s, got {size:.2g}"
+    return ""
+
+
+def _keep_to_one_heading(trials: Iterable[Trial]) -> bool:
+    """Whether trials over ground keep so near to one heading that speed hides the current."""
+    headings = [
+        trial["psi"]
+        for trial in trials
+        if trial.over_ground and trial.use == "fit" and "psi" in trial
+    ]
+    if not headings:
+        return False
+    mean_direction = np.exp(1j * np.concatenate(headings)).mean()
+    return bool(abs(mean_direction) > 0.85)
+
+
+def currents_of(
+    trials: Sequence[Trial], length: float, speed: float, option: Any
+) -> dict[str, TrialCurrent]:
+    """The current of each trial, by name, whose current is known or can be estimated.
+
+    The trials to fit have one current unless they contradict it or are asked one by
+    one. That of a trial held out is theirs, or is found by their coefficients. A
+    current is estimated from trials of at least five ship lengths.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        None of them skipped.
+    length, speed : float
+        Of the ship, m and m/s.
+    option : str or mapping
+        As of `Options.current`.
+    """
+    found: dict[str, TrialCurrent] = {}
+    unknown = []
+    shortest = 5.0 * length / speed
+    for trial in trials:
+        known = _known_current(trial, option)
+        if known is not None:
+            source = "columns" if CURRENT_COLUMNS[0] in trial else "given"
+            found[trial.name] = TrialCurrent(known, None, source)
+        elif _shows_current(trial) and trial.duration > shortest:
+            unknown.append(trial)
+    return found | _estimated_currents(unknown, length, speed, option)
+
+
+def _shows_current(trial: Trial) -> bool:
+    needed = {"psi", "u", "v", "r", "delta"}
+    return trial.over_ground and trial.channels.keys() >= needed
+
+
+def _estimated_currents(
+    trials: Sequence[Trial], length: float, speed: float, option: Any
+) -> dict[str, TrialCurrent]:
+    fitted = [trial for trial in trials if trial.use == "fit"]
+    if not fitted:
+        return {}
+    shared = option != "trial"
+    estimate = estimate_current(fitted, length, speed, shared)
+    if option == "auto" and len(fitted) > 1:
+        each = estimate_current(fitted, length, speed, False)
+        if _contradict(each.mean, each.covariance):
+            estimate, shared = each, False
+
+    found: dict[str, TrialCurrent] = {}
+    for trial in trials:
+        own, k = estimate, 0
+        if not shared and trial.use == "fit":
+            k = fitted.index(trial)
+        elif not shared:
+            own = estimate_current([trial], length, speed, True, estimate.coefficients)
+        part = slice(2 * k, 2 * k + 2)
+        source = "all trials" if shared else "trial"
+        found[trial.name] = TrialCurrent(
+            own.mean[part], own.covariance[part, part], source
+        )
+    return found
+
+
+def _contradict(currents: Floats, covariance: Floats, chance: float = 1e-6) -> bool:
+    """Whether the currents of trials differ by more than chance; their covariance is of few blocks."""
+    n_trials = len(currents) // 2
+    from_first = np.eye(n_trials)[1:] - np.eye(n_trials)[0]
+    apart = np.kron(from_first, np.eye(2))
+    probability = wald_probability(apart @ currents, apart @ covariance @ apart.T)
+    return probability < chance
+
+
+def _known_current(
+    trial: Trial, option: Any, contradiction: float = 0.1
+) -> Floats | None:
+    """North and east of a current in columns or given, shape (2,) or (2, n_samples); None where unknown."""
+    given = None
+    if isinstance(option, Mapping):
+        given = np.array([option["north"], option["east"]], dtype=float)
+    if not trial.channels.keys() >= set(CURRENT_COLUMNS):
+        return given if trial.over_ground else None
+
+    columns = np.array([trial[name] for name in CURRENT_COLUMNS])
+    if given is None:
+        return columns
+    north, east = columns.mean(axis=1)
+    if np.hypot(north - given[0], east - given[1]) > contradiction:
+        raise InputError(
+            f"trial {trial.name!r}: expected columns current_north and current_east to"
+            f" agree with current = {{ north = {given[0]:g}, east = {given[1]:g} }},"
+            f" got means of {north:.2f} and {east:.2f} m/s; leave one of them out"
+        )
+    return columns
+
+
+def wald_probability(mean: Floats, covariance: Floats) -> float:
+    """Probability of values as far from zero by chance (Wald's test)."""
+    statistic = mean @ np.linalg.solve(covariance, mean)
+    return float(chi2.sf(statistic, len(mean)))

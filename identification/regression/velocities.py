@@ -1,0 +1,52 @@
+"""Velocities of a ship over ground and through the water, which a current parts."""
+
+from typing import Any
+
+import numpy as np
+
+from shipgym import Trial
+from shipgym.arrays import Floats, integral
+from shipgym.trials.derivatives import time_derivative
+from shipgym.trials.navigation import rotate_to_body
+
+#: Probability of a current as large by chance below which it differs from zero.
+SIGNIFICANT = 0.01
+CURRENT_COLUMNS = ("current_north", "current_east")
+
+
+def over_ground(trial: Trial) -> tuple[Floats, Floats]:
+    """Velocity of midship over ground, ahead and to starboard, m/s.
+
+    The trial has velocities over ground, or one of them derived from its track.
+    """
+    derived = {"u", "v"} & trial.derived
+    if len(derived) != 1:
+        return trial["u"], trial["v"]
+    # the other one was logged, and is through the water
+    north = time_derivative(trial.t, trial["x"])
+    east = time_derivative(trial.t, trial["y"])
+    return rotate_to_body(north, east, trial["psi"])
+
+
+def through_water(trial: Trial, north: Any, east: Any) -> Trial:
+    """The trial without a current, m/s, each a number or of shape (n_samples,).
+
+    Its track starts where it did; velocities over ground, but for one logged, become
+    those through the water.
+    """
+    north = np.broadcast_to(np.asarray(north, dtype=float), trial.t.shape)
+    east = np.broadcast_to(np.asarray(east, dtype=float), trial.t.shape)
+    channels = dict(zip(CURRENT_COLUMNS, (north, east), strict=True))
+    for name, speed in (("x", north), ("y", east)):
+        if name in trial:
+            channels[name] = trial[name] - integral(trial.t, speed)
+
+    if trial.over_ground and trial.channels.keys() >= {"u", "v", "psi"}:
+        any_derived = bool(trial.derived & {"u", "v"})
+        ground = over_ground(trial)
+        drift = rotate_to_body(north, east, trial["psi"])
+        for axis, name in enumerate(("u", "v")):
+            is_logged = any_derived and name not in trial.derived
+            if not is_logged:
+                channels[name] = ground[axis] - drift[axis]
+    return trial.with_channels(channels).with_(over_ground=False)

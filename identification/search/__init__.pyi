@@ -1,0 +1,10 @@
+from .by_name import OPTIMISERS as OPTIMISERS
+from .by_name import get_optimiser as get_optimiser
+from .by_name import minimise as minimise
+from .optimisers import ArtificialBeeColony as ArtificialBeeColony
+from .optimisers import DifferentialEvolution as DifferentialEvolution
+from .optimisers import GridSearch as GridSearch
+from .optimisers import ParticleSwarm as ParticleSwarm
+from .search import Objective as Objective
+from .search import Optimiser as Optimiser
+from .search import SearchResult as SearchResult

@@ -1,0 +1,179 @@
+"""Episodes compiled for a ship, a sea, a sensor set and a task."""
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any
+
+from shipgym.engine import episodes, sailing, stages, tiles
+from shipgym.engine.compiled_ship import CompiledShip
+from shipgym.engine.compiling import compiled, plain_python
+from shipgym.engine.envelope import Envelope
+from shipgym.engine.lane_records import (
+    Commands,
+    EpisodeCounters,
+    Outcome,
+    Rules,
+    SeaRandom,
+)
+from shipgym.engine.memory import Arguments
+from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.record_code import clipped_storer, loader, storer, summed, zeros
+from shipgym.engine.records import LANES, Layout
+from shipgym.instruments.sensor_set import SensorSet
+from shipgym.sea import open_sea
+from shipgym.tasks.contract import Random
+from shipgym.tasks.definition import TaskDefinition
+
+
+@dataclass(frozen=True, eq=False)
+class EpisodeProgram:
+    """Episodes of one task with ships that differ in numbers only.
+
+    Attributes
+    ----------
+    ship : CompiledShip
+    task : TaskDefinition
+    sensors : SensorSet
+    windy : bool
+        Whether there is current, wind or waves.
+    shared : bool
+        Whether all lanes have the same ship and sea.
+    """
+
+    ship: CompiledShip
+    task: TaskDefinition
+    sensors: SensorSet
+    windy: bool
+    shared: bool
+
+    @cached_property
+    def state_rows(self) -> Layout:
+        """Rows of a tile of states; behind them the plan of an episode."""
+        return Layout(
+            motion=(Motion, self.ship.state_names),
+            sea=open_sea.sea_records(self.windy)[0],
+            commands=Commands,
+            counters=EpisodeCounters,
+            memory=self.sensors.Memory,
+            task_state=self.task.State,
+        )
+
+    @cached_property
+    def result_rows(self) -> Layout:
+        """Rows of the results of an interval in one tile."""
+        return Layout(
+            outcome=Outcome,
+            reward=self.task.Reward,
+            reported=(self.task.State, self.task.reported),
+            observation=self.task.Observation,
+            **(stages.BETWEEN_STAGES if self.ship.staged else {}),
+        )
+
+    @cached_property
+    def ship_rows(self) -> Layout:
+        """Rows of the numbers of a ship."""
+        return Layout(
+            ship=Ship,
+            coefficients=self.ship.coefficients,
+            envelope=Envelope,
+            sea_parameters=open_sea.sea_records(self.windy)[1],
+            scale=self.task.Observation,
+        )
+
+    @cached_property
+    def random_rows(self) -> Layout:
+        """Rows of a tile of random numbers."""
+        return Layout(random=Random, sea_random=SeaRandom)
+
+    @cached_property
+    def settings_rows(self) -> Layout:
+        """Rows of the settings of engine, sensor set and task."""
+        return Layout(
+            rules=Rules,
+            sensor_settings=self.sensors.Settings,
+            task_settings=self.task.Settings,
+        )
+
+    def row(self, name: str) -> int:
+        """Row of a number of the state by its name: `u`, `course`, `steps`."""
+        for record in ("motion", "commands", "counters", "task_state", "sea"):
+            rows = self.state_rows[record]
+            if name in rows.present:
+                return rows.row(name)
+        raise KeyError(name)
+
+    def info_row(self, name: str) -> int:
+        """Row of an entry of `info` among the results."""
+        rows = self.result_rows
+        part = name.removeprefix("reward_")
+        if name in self.task.reported:
+            return rows["reported"].row(name)
+        if name in Outcome._fields or part == "end":
+            return rows["outcome"].row(part)
+        parts = self.task.reward_names
+        return rows["reward"].first + parts.index(part)
+
+    @cached_property
+    def hooks(self) -> dict[str, Any]:
+        """What takes the place of hooks and constants of loops, by name."""
+        of_ships = 1 if self.shared else LANES
+        return {
+            "GROUP": 1 if plain_python() else tiles.GROUP,
+            "SHARED_SHIP": self.shared,
+            "PLAN_ROW": self.state_rows.n_rows,
+            **_loaders(self.state_rows, LANES),
+            **_storers(self.state_rows, LANES),
+            **_loaders(self.result_rows, LANES),
+            **_storers(self.result_rows, LANES),
+            **_loaders(self.random_rows, LANES),
+            **_storers(self.random_rows, LANES),
+            **_loaders(self.ship_rows, of_ships),
+            **_loaders(self.settings_rows, 1),
+            **_loaders(Layout(arguments=Arguments), 1),
+            **self._task_hooks(),
+            "measure": self.sensors.measure,
+            "readings": self.sensors.readings,
+            "HAS_NOISE": self.sensors.noise,
+            "HAS_FILTER": self.sensors.filter,
+            "sail_lanes": sailing.sail_in_one_loop,
+            **self.ship.hooks(shared=self.shared),
+            **self.ship.staged,
+            **open_sea.sea_functions(self.windy),
+        }
+
+    def _task_hooks(self) -> dict[str, Any]:
+        """Functions of the task, and what its records are used for."""
+        task = self.task
+        bounds = {path: (seen.low, seen.high) for path, seen in task.seen.items()}
+        return {
+            "task_begin": task.begin,
+            "task_step": task.step,
+            "observe": task.observe,
+            "due": task.due,
+            "on_event": task.on_event,
+            "worst_cost": task.worst_cost,
+            "no_reward": zeros(task.Reward),
+            "total_reward": summed(task.Reward),
+            "store_observation": clipped_storer(
+                self.result_rows["observation"], bounds
+            ),
+        }
+
+    @cached_property
+    def run(self) -> Any:
+        """The loop `shipgym.engine.episodes.run`."""
+        what = f"{self.task.name} for {self.ship.name!r}"
+        return compiled(episodes.run, episodes.SIGNATURE, self.hooks, what)
+
+
+episode_program = cache(EpisodeProgram)  # compiled once in a process
+
+
+def _loaders(layout: Layout, lanes: int) -> dict[str, Any]:
+    """Functions that load the records of a layout, by the names of hooks."""
+    return {f"load_{name}": loader(rows, lanes) for name, rows in layout.rows.items()}
+
+
+def _storers(layout: Layout, lanes: int) -> dict[str, Any]:
+    """Functions that store the records of a layout, by the names of hooks."""
+    return {f"store_{name}": storer(rows, lanes) for name, rows in layout.rows.items()}

@@ -1,0 +1,161 @@
+"""A hash of all that the machine code of a loop depends on.
+
+The loop and all functions that it names are followed to their bytecode, defaults and
+globals. An object counts by what Numba compiles of it, not by its text, which may leave
+out the middle of a long array, or everything but a name.
+"""
+
+import hashlib
+import platform
+from collections.abc import Iterable
+from enum import EnumType
+from functools import cache
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+
+from shipgym.engine.records import is_record
+from shipgym.engine.specialise import (
+    Hooks,
+    captured_globals,
+    is_inlined,
+    is_plain,
+    named_globals,
+    nested_code,
+)
+
+#: Modules that decide how machine code is written.
+COMPILER = ("compiling", "specialise")
+
+
+def fingerprint(function: Any, hooks: Hooks) -> str:
+    """Hash a function with its hooks filled."""
+    return traced(function, hooks)[0]
+
+
+def traced(function: Any, hooks: Hooks) -> tuple[str, tuple[Any, ...]]:
+    """Hash a function with its hooks filled; also return the records that it names."""
+    trace = _Trace(hooks)
+    trace.add(_compiler())
+    trace.visit(function)
+    digest = trace.digest.hexdigest()
+    return digest[:24], tuple(trace.records)
+
+
+class _Trace:
+    """The hash on the way from a function to all that it names."""
+
+    def __init__(self, hooks: Hooks) -> None:
+        self.hooks = hooks
+        self.digest = hashlib.sha256()
+        self.records: list[Any] = []
+        self._numbers: dict[Any, int] = {}  # of functions and modules seen so far
+
+    def add(self, value: object) -> None:
+        """Take a value by its text."""
+        self.digest.update(repr(value).encode() + b"\0")
+
+    def visit(self, value: Any, attributes: tuple[str, ...] = ()) -> None:
+        """Take a value, and of modules what is called by one of the `attributes`."""
+        if isinstance(value, np.ndarray):
+            self.add((value.dtype, value.shape, value.strides, value.tobytes()))
+        elif isinstance(value, ModuleType):
+            self._visit_module(value, attributes)
+        elif isinstance(value, tuple | list):
+            self.add((type(value).__qualname__, getattr(value, "_fields", len(value))))
+            self._visit_all(value, attributes)
+        elif is_record(value):
+            self.add((value.__name__, value._fields))
+            self._visit_all(value._field_defaults.items())
+            self.records.append(value)
+        elif isinstance(value, EnumType):
+            self.add((value.__qualname__, dict(value.__members__)))
+        elif isinstance(value, FunctionType):
+            self._visit_function(value)
+        elif isinstance(value, type) or callable(value):
+            self._visit_compiled(value)
+        else:
+            self.add(value)
+
+    def _visit_all(
+        self, values: Iterable[Any], attributes: tuple[str, ...] = ()
+    ) -> None:
+        for value in values:
+            self.visit(value, attributes)
+
+    def _visit_module(self, module: ModuleType, attributes: tuple[str, ...]) -> None:
+        self.add(module.__name__)
+        if self._is_new((module, attributes)):
+            named = [vars(module).get(name) for name in attributes]
+            self._visit_all(named, attributes)
+
+    def _visit_function(self, function: FunctionType) -> None:
+        self.add(is_inlined(function))
+        if not is_plain(function):  # one of Numba's or NumPy's
+            self.add(function.__qualname__)
+            return
+        named_globals(function, self.hooks)  # refuses variables of a function around it
+        self._visit_python(function)
+
+    def _visit_compiled(self, value: Any) -> None:
+        """Take what Numba compiles, or knows by its name."""
+        value = getattr(value, "_dispatcher", value)  # of `numba.vectorize`
+        python = getattr(value, "py_func", None) or getattr(value, "_defn", None)
+        jitclass = getattr(value, "class_type", None)
+        if python is not None:  # of `numba.njit`, or an intrinsic
+            self.add((type(value).__name__, getattr(value, "targetoptions", None)))
+            self._visit_python(python)
+        elif jitclass is not None:
+            self.add(jitclass.struct)
+            self._visit_all(jitclass.jit_methods.values())
+            self._visit_all(jitclass.jit_static_methods.values())
+        else:
+            self.add(getattr(value, "__qualname__", str(type(value))))
+
+    def _visit_python(self, function: Any) -> None:
+        """Take bytecode, defaults and globals of a function."""
+        if not self._is_new(function):
+            return
+        self._visit_code(function.__code__, function.__doc__)
+        self.visit(function.__defaults__)
+        self._visit_all((function.__kwdefaults__ or {}).items())
+        attributes: list[str] = []
+        for code in nested_code(function.__code__):
+            attributes += code.co_names
+        for name, value in captured_globals(function, self.hooks):
+            self.add(name)
+            self.add(is_inlined(function.__globals__.get(name)))  # a hook may say so
+            self.visit(value, tuple(attributes))
+
+    def _visit_code(self, code: CodeType, doc: str | None) -> None:
+        self.digest.update(code.co_code)
+        self.add((code.co_names, code.co_varnames))
+        for constant in code.co_consts:
+            if isinstance(constant, CodeType):
+                self._visit_code(constant, None)
+            elif doc is None or constant != doc:
+                self.add(constant)
+
+    def _is_new(self, value: Any) -> bool:
+        """Return whether a value was not seen before; take which one it is."""
+        new = value not in self._numbers
+        self.add(self._numbers.setdefault(value, len(self._numbers)))
+        return new
+
+
+@cache
+def _compiler() -> str:
+    """Versions and settings of what writes machine code, and the processor."""
+    import numba
+    from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
+
+    sources = hashlib.sha256()
+    for name in COMPILER:
+        sources.update(Path(__file__).with_name(f"{name}.py").read_bytes())
+    config = numba.config
+    versions = (sources.hexdigest(), platform.python_version(), numba.__version__)
+    settings = (config.OPT, config.CPU_NAME, config.CPU_FEATURES)
+    host = (get_host_cpu_name(), get_host_cpu_features().flatten())
+    return repr((*versions, *settings, *host))

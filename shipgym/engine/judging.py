@@ -1,0 +1,269 @@
+"""Many ships after an interval: what the task makes of it, and what is seen then.
+
+What every interval needs is one loop over lanes, which is vectorised (see
+`shipgym.engine.sailing`). What is rare, such as a new set-point, is done afterwards,
+lane by lane.
+"""
+
+from typing import Any, NamedTuple
+
+from shipgym.engine.envelope import Envelope, envelope_distance, outside_range
+from shipgym.engine.hooks import (
+    due,
+    encounter_frequency,
+    load_commands,
+    load_counters,
+    load_envelope,
+    load_memory,
+    load_motion,
+    load_outcome,
+    load_random,
+    load_rules,
+    load_scale,
+    load_sea,
+    load_sea_parameters,
+    load_sensor_settings,
+    load_ship,
+    load_task_settings,
+    load_task_state,
+    measure,
+    no_reward,
+    observe,
+    on_event,
+    readings,
+    store_counters,
+    store_memory,
+    store_observation,
+    store_outcome,
+    store_reported,
+    store_reward,
+    store_task_state,
+    task_step,
+    total_reward,
+    worst_cost,
+)
+from shipgym.engine.lane_records import EpisodeCounters, Outcome, Rules
+from shipgym.engine.mathematics import pick
+from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.specialise import called
+from shipgym.engine.tiles import FIRST_LANE, GROUP, SHARED_SHIP, Tile, plan_of
+from shipgym.tasks.contract import Interval
+
+
+class LaneView(NamedTuple):
+    """A ship, the data of her model, and the scales of what is seen of her."""
+
+    ship: Ship
+    data: Envelope
+    scale: Any  # an `Observation` of factors
+
+
+class AllSettings(NamedTuple):
+    """Settings of the engine, the sensor set and the task."""
+
+    rules: Rules
+    sensors: Any
+    task: Any
+
+
+def view_of(tile: Tile, lane: int) -> LaneView:
+    """Return the view of a lane."""
+    return LaneView(
+        ship=load_ship(tile.ships, lane),
+        data=load_envelope(tile.ships, lane),
+        scale=load_scale(tile.ships, lane),
+    )
+
+
+def settings_of(tile: Tile) -> AllSettings:
+    """Return the settings of all ships."""
+    return AllSettings(
+        rules=load_rules(tile.settings),
+        sensors=load_sensor_settings(tile.settings),
+        task=load_task_settings(tile.settings),
+    )
+
+
+@called
+def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
+    """Reward, measure and observe an interval that is over.
+
+    Returns in how many lanes of the tile an event is due, and how many episodes have
+    just ended; lanes beyond them, up to so many groups, fill vectors.
+    """
+    state = tile.state
+    settings = settings_of(tile)
+    shared = view_of(tile, FIRST_LANE)
+    n_due = 0
+    n_ended = 0
+    for lane in range(groups * GROUP):
+        ship, data, scale = shared if SHARED_SHIP else view_of(tile, lane)
+        motion = load_motion(state, lane)
+        over = load_counters(state, lane).ended != 0.0
+        interval = past_interval(tile, lane, motion, data, settings.rules)
+
+        task_state, just_ended = judge(tile, lane, motion, interval, ship, settings)
+        memory = sample(tile, lane, motion, interval, settings)
+        memory = pick(over, load_memory(state, lane), memory)
+        store_memory(state, lane, memory)
+        seen = readings(motion, load_sea(state, lane), memory)
+        observation = observe(seen, task_state, interval, ship, settings.task)
+        store_observation(tile.result, lane, observation, scale)
+
+        real = lane < tile.lanes
+        is_due = due(motion, task_state, interval, ship, settings.task)
+        goes_on = not (over | just_ended)
+        n_due += 1 if is_due & goes_on & real else 0
+        n_ended += 1 if just_ended & real else 0
+    return n_due, n_ended
+
+
+def past_interval(
+    tile: Tile, lane: int, motion: Motion, data: Envelope, rules: Rules
+) -> Interval:
+    """Return the interval that is over, with how far the ship is from known data."""
+    commands = load_commands(tile.state, lane)
+    distance = envelope_distance(motion, data)
+    extrapolating = outside_range(motion, data) | (distance > 1.0)
+    return Interval(
+        dt=rules.dt,
+        steps=load_counters(tile.state, lane).steps,
+        rudder_before=commands.rudder_before,
+        rudder_command=commands.rudder_command,
+        shaft_command=commands.shaft_command,
+        envelope_distance=distance,
+        extrapolating=pick(extrapolating, 1.0, 0.0),
+    )
+
+
+def judge(
+    tile: Tile,
+    lane: int,
+    motion: Motion,
+    interval: Interval,
+    ship: Ship,
+    settings: AllSettings,
+) -> tuple[Any, bool]:
+    """Let the task reward an interval, and end the episode if it is over.
+
+    Returns the state of the task, and whether the episode has just ended. A lane whose
+    episode was over before stays as it is and earns nothing.
+    """
+    counters = load_counters(tile.state, lane)
+    over = counters.ended != 0.0
+    before = load_task_state(tile.state, lane)
+    after, reward, failed, arrived = task_step(
+        motion, before, interval, ship, settings.task
+    )
+    task_state = pick(over, before, after)
+    reward = pick(over, no_reward(), reward)
+    earned = total_reward(reward)
+    outcome = outcome_of(interval, counters, failed, arrived, earned, settings)
+
+    just_ended = outcome.terminated + outcome.truncated > 0.0
+    ended = pick(just_ended, 1.0, counters.ended)
+    counters = EpisodeCounters(counters.steps, ended, counters.ran_away)
+    store_counters(tile.state, lane, counters)
+    store_outcome(tile.result, lane, outcome)
+    store_reward(tile.result, lane, reward)
+    store_task(tile, lane, task_state)
+    return task_state, just_ended
+
+
+def outcome_of(
+    interval: Interval,
+    counters: EpisodeCounters,
+    failed: bool,
+    arrived: bool,
+    earned: float,
+    settings: AllSettings,
+) -> Outcome:
+    """Return what comes of an interval, from what the task says of it.
+
+    An episode that fails pays the largest cost for each of the intervals that are left.
+    """
+    rules = settings.rules
+    going = 1.0 - counters.ended
+    lost = failed | (interval.envelope_distance > rules.largest_distance)
+    wrecked = going * pick(lost, 1.0, counters.ran_away)
+    terminated = max(wrecked, going * pick(arrived, 1.0, 0.0))
+    late = pick(counters.steps >= rules.time_limit, going, 0.0)
+    steps_left = rules.time_limit - counters.steps
+    end = -(wrecked * worst_cost(settings.task) * steps_left)
+    return Outcome(
+        reward=earned + end,
+        terminated=terminated,
+        truncated=late * (1.0 - terminated),
+        envelope_distance=interval.envelope_distance,
+        extrapolating=interval.extrapolating,
+        end=end,
+    )
+
+
+def store_task(tile: Tile, lane: int, task_state: Any) -> None:
+    """Store the state of the task, and report the fields that users see."""
+    store_task_state(tile.state, lane, task_state)
+    store_reported(tile.result, lane, task_state)
+
+
+def sample(
+    tile: Tile, lane: int, motion: Motion, interval: Interval, settings: AllSettings
+) -> Any:
+    """Return the memory of the instruments after a sample."""
+    memory = load_memory(tile.state, lane)
+    sea = load_sea(tile.state, lane)
+    parameters = load_sea_parameters(tile.ships, lane)
+    frequency = encounter_frequency(motion, sea, parameters)
+    random = load_random(tile.random, lane)
+    return measure(motion, sea, memory, frequency, interval, settings.sensors, random)
+
+
+@called
+def take_events(tile: Tile) -> None:
+    """Take events, such as a new set-point, in the lanes in which one is due."""
+    state = tile.state
+    settings = load_task_settings(tile.settings)
+    for lane in range(tile.lanes):
+        ship = load_ship(tile.ships, lane)
+        motion = load_motion(state, lane)
+        before = load_task_state(state, lane)
+        interval = last_interval(tile, lane)
+        going = load_counters(state, lane).ended == 0.0
+        if going and due(motion, before, interval, ship, settings):
+            random = load_random(tile.random, lane)
+            plan = plan_of(state, lane)
+            after = on_event(motion, before, interval, ship, settings, random, plan)
+            store_task(tile, lane, after)
+            observe_lane(tile, lane)
+
+
+def last_interval(tile: Tile, lane: int) -> Interval:
+    """Return the interval of a lane as it was concluded; of a new episode zeros."""
+    commands = load_commands(tile.state, lane)
+    outcome = load_outcome(tile.result, lane)
+    return Interval(
+        dt=load_rules(tile.settings).dt,
+        steps=load_counters(tile.state, lane).steps,
+        rudder_before=commands.rudder_before,
+        rudder_command=commands.rudder_command,
+        shaft_command=commands.shaft_command,
+        envelope_distance=outcome.envelope_distance,
+        extrapolating=outcome.extrapolating,
+    )
+
+
+@called
+def observe_lane(tile: Tile, lane: int) -> None:
+    """Observe a lane whose task has changed."""
+    state = tile.state
+    motion = load_motion(state, lane)
+    sea = load_sea(state, lane)
+    memory = load_memory(state, lane)
+    task_state = load_task_state(state, lane)
+
+    ship, _, scale = view_of(tile, lane)
+    settings = load_task_settings(tile.settings)
+    interval = last_interval(tile, lane)
+    seen = readings(motion, sea, memory)
+    observation = observe(seen, task_state, interval, ship, settings)
+    store_observation(tile.result, lane, observation, scale)

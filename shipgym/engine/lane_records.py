@@ -1,0 +1,94 @@
+"""Records that loops keep of a lane beside those of ship, sea, sensors and task."""
+
+from typing import Any, NamedTuple
+
+
+class Rules(NamedTuple):
+    """Settings of the engine."""
+
+    dt: float  # s, control interval
+    substeps: float  # of the integration in it
+    time_limit: float  # control intervals
+    largest_distance: float  # from the data of the model at which an episode ends
+    least_shaft: float  # least command of the shaft, part of service speed
+
+
+class Commands(NamedTuple):
+    """What is ordered in a lane."""
+
+    rudder_command: float  # part of the limit
+    shaft_command: float  # part of the shaft speed at service speed
+    rudder_before: float  # rad, rudder at the beginning of the interval
+
+
+class EpisodeCounters(NamedTuple):
+    """How far the episode of a lane has come."""
+
+    steps: float  # control intervals so far
+    ended: float  # 1 once the episode is over
+    ran_away: float  # 1 if the ship left every physical range in the interval
+
+
+class Outcome(NamedTuple):
+    """What comes of an interval beside the task's own."""
+
+    reward: float
+    terminated: float  # 1 or 0
+    truncated: float
+    envelope_distance: float
+    extrapolating: float  # 1 or 0
+    end: float  # part of the reward: the rest of an episode that failed
+
+
+class SeaRandom(NamedTuple):
+    """Generator of the random numbers of a lane's sea."""
+
+    rng_state: Any  # uint64
+
+
+class Point(NamedTuple):
+    """Where a ship is in the coordinates of her table."""
+
+    a: float
+    b: float
+    c: float
+    d: float
+    half: float  # half the squared distance from the origin
+
+
+class Sums(NamedTuple):
+    """Sums over the rows of the table, of surge, sway and yaw."""
+
+    u: float
+    v: float
+    r: float
+
+
+class WindAccelerations(NamedTuple):
+    """Accelerations by measured wind, m/s^2 and rad/s^2."""
+
+    surge: float
+    sway: float
+    yaw: float
+
+
+class Inputs(NamedTuple):
+    """A point of a measured trial, of which the inputs are straight between points."""
+
+    time: float  # s
+    rudder: float  # rad
+    shaft: float  # 1/s
+    wind: WindAccelerations
+
+
+class SeaChannels(NamedTuple):
+    """What is recorded of the sea beside the state."""
+
+    psi_wave: float  # rad, first-order motion in heading
+    r_wave: float  # rad/s, in yaw rate
+    phi_wave: float  # rad, in heel
+    p_wave: float  # rad/s, in roll rate
+    current_north: float  # m/s
+    current_east: float  # m/s
+    wind_speed: float  # m/s
+    wind_from: float  # rad

@@ -1,0 +1,118 @@
+"""Ships tile by tile: the arrays of 64 of them, and what is shown of all."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from shipgym.engine.memory import (
+    Arguments,
+    bool_in,
+    float32_in,
+    int64_row_in,
+    row_in,
+    uint64_row_in,
+)
+from shipgym.engine.records import LANES
+from shipgym.engine.specialise import called
+
+# Lanes are sailed in whole vectors, whose arithmetic may be contracted otherwise than
+# that of a single lane, so that results do not depend on the number of ships.
+GROUP = 16
+# typed, since Numba compiles a function once more for a literal that it is called with
+FIRST_LANE: Any = np.int64(0)
+
+# Set when a loop is compiled, like hooks.
+PLAN_ROW = 0  # first row of the plans of episodes
+# whether all lanes have the same ship, which is then read before a loop and not in it
+SHARED_SHIP = True
+
+
+class Tile(NamedTuple):
+    """Arrays of 64 ships."""
+
+    state: Any  # float64 (n_rows * 64,), at its end the plans of episodes
+    result: Any  # float64 (n_result_rows * 64,): of the interval, shared by tiles
+    random: Any  # uint64 (3 * 64,): `Random` and `SeaRandom`
+    # float64 (n_ship_rows * 64,), or (n_ship_rows,) where all lanes share a ship
+    ships: Any
+    pool: Any  # float64 (n_pool * n_ship_rows,), of which each episode draws a ship
+    settings: Any  # float64: of the engine, the sensor set and the task
+    first: int  # number of its first ship
+    lanes: int  # how many ships there are
+
+
+class OutputTables(NamedTuple):
+    """Tables that users are given, row after row, and where their rows come from."""
+
+    observations: Any  # float32 (n_ships * n_observations,)
+    outcomes: Any  # float64 (n_outcomes * n_ships,)
+    flags: Any  # bool (n_flags * n_ships,)
+    observed: Any  # int64 (n_observations,): entries of results where rows begin
+    informed: Any  # int64 (n_outcomes,)
+    flagged: Any  # int64 (n_flags,)
+    n_ships: int
+
+
+def tile_of(memory: Any, at: Arguments, share: int, number: int) -> Tile:
+    """Return one tile, with the room of a share for its results."""
+    first = number * LANES
+    return Tile(
+        state=row_in(memory, at.states, number),
+        result=row_in(memory, at.results, share),
+        random=uint64_row_in(memory, at.random, number),
+        ships=row_in(memory, at.ships, number % at.ships.rows),
+        pool=row_in(memory, at.pool, 0),
+        settings=row_in(memory, at.settings, 0),
+        first=first,
+        lanes=min(at.actions.columns - first, LANES),
+    )
+
+
+def outputs_in(memory: Any, output_memory: Any, at: Arguments) -> OutputTables:
+    """Return the tables of outputs."""
+    return OutputTables(
+        observations=float32_in(output_memory, at.observations),
+        outcomes=output_memory[at.outcomes.first :],
+        flags=bool_in(output_memory, at.flags),
+        observed=int64_row_in(memory, at.observed, 0),
+        informed=int64_row_in(memory, at.informed, 0),
+        flagged=int64_row_in(memory, at.flagged, 0),
+        n_ships=at.observations.rows,
+    )
+
+
+def plan_of(state: Any, lane: int) -> Any:
+    """Return the plan of a lane's episode, an array that writes into the tile."""
+    return state[PLAN_ROW * LANES + lane :: LANES]
+
+
+@called
+def write_outputs(tile: Tile, outputs: OutputTables, begin: int, end: int) -> None:
+    """Copy results of some lanes into the users' arrays."""
+    first = tile.first
+    result = tile.result
+    observations = outputs.observations
+    outcomes = outputs.outcomes
+    flags = outputs.flags
+    n_ships = outputs.n_ships
+    width = len(outputs.observed)
+    for column in range(width):
+        source = outputs.observed[column]
+        target = first * width + column
+        for lane in range(begin, end):
+            entry = np.uintp(target + lane * width)
+            observations[entry] = result[np.uintp(source + lane)]
+
+    for row in range(len(outputs.informed)):
+        source = outputs.informed[row]
+        target = first + row * n_ships
+        for lane in range(begin, end):
+            entry = np.uintp(target + lane)
+            outcomes[entry] = result[np.uintp(source + lane)]
+
+    for row in range(len(outputs.flagged)):
+        source = outputs.flagged[row]
+        target = first + row * n_ships
+        for lane in range(begin, end):
+            entry = np.uintp(target + lane)
+            flags[entry] = result[np.uintp(source + lane)] > 0.0

@@ -1,0 +1,164 @@
+"""Options by name, as a ship file and the command line have them, become the objects of `identify`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from identification import (
+    LSSVM,
+    KernelResidual,
+    Preprocessing,
+    PriorKnowledge,
+    Refinement,
+    Sampling,
+    TruncatedLSSVM,
+    Uncertainty,
+)
+from identification.estimators.methods import METHODS, method_options
+from identification.reading import (
+    ARGUMENTS,
+    STAGES,
+    full_name,
+    identify_arguments,
+    read_table,
+    stage_settings,
+)
+from shipgym import InputError
+
+WHERE = "ship.toml: [identify]"
+
+
+def read(table: dict[str, Any]) -> dict[str, Any]:
+    return identify_arguments(read_table(table, WHERE))
+
+
+@pytest.mark.parametrize(
+    ("table", "name", "expected"),
+    [
+        ({"samples": "euler"}, "samples", Sampling("euler")),
+        ({"window": 3}, "samples", Sampling(window=3)),
+        (
+            {"samples": {"rule": "integral", "window": 3}},
+            "samples",
+            Sampling("integral", 3),
+        ),
+        ({"samples.window": 3}, "samples", Sampling(window=3)),
+        ({"repair": True}, "preprocessing", Preprocessing(repair=True)),
+        ({"preprocessing": "rts"}, "preprocessing", Preprocessing("rts")),
+        ({"uncertainty": "bootstrap"}, "uncertainty", Uncertainty("bootstrap")),
+        ({"model_error": False}, "uncertainty", Uncertainty(model_error=False)),
+        (
+            {"kernel": "rbf", "centres": 9, "C": 3.0, "kernel_length": 2.0},
+            "kernel",
+            KernelResidual(centres=9, C=3.0, length=2.0),
+        ),
+        ({"structure": "nomoto"}, "structure", "nomoto"),
+        ({"method": "ls"}, "method", "ls"),
+        ({"hold_out": ["a.csv"]}, "hold_out", ["a.csv"]),
+        (
+            {"current": {"north": 0.1, "east": 0.2}},
+            "current",
+            {"north": 0.1, "east": 0.2},
+        ),
+    ],
+)
+def test_a_stage_is_its_word_its_settings_or_a_table(
+    table: dict[str, Any], name: str, expected: Any
+) -> None:
+    assert read(table)[name] == expected
+
+
+def test_a_prior_has_a_strength_and_folds_of_its_own() -> None:
+    table = {"prior": "tanker", "prior_strength": 0.1, "prior.folds": "largest-rudder"}
+    found = read(table)["prior"]
+    assert isinstance(found, PriorKnowledge)
+    assert (found.source, found.strength, found.folds) == (
+        "tanker",
+        0.1,
+        "largest-rudder",
+    )
+
+
+def test_settings_are_those_of_the_method_that_is_named() -> None:
+    usual = read({"rank": 12, "C": np.inf})["method"]
+    assert isinstance(usual, TruncatedLSSVM)
+    assert (usual.rank, usual.C) == (12, np.inf)
+    named = read({"method": "ls-svm", "robust": True, "method.C": 3.0})["method"]
+    assert isinstance(named, LSSVM)
+    assert (named.robust, named.C) == (True, 3.0)
+    table = {"name": "output-error", "pull": 0.1, "rank": 3, "extra_trials": ["t.csv"]}
+    refined = read({"method": table})["method"]
+    assert isinstance(refined, Refinement)
+    assert (refined.pull, refined.start.rank) == (0.1, 3)
+    assert refined.extra_trials == ["t.csv"]
+
+
+def test_every_setting_of_every_method_is_an_option_by_its_own_name() -> None:
+    known = stage_settings()
+    for name in METHODS:
+        for option in method_options(name):
+            assert full_name(option, WHERE) == f"method.{option}"
+    assert full_name("folds", WHERE, with_kernel=True) == "kernel.folds"
+    for stage in STAGES:
+        assert full_name(stage, WHERE) == stage
+        for setting in known[stage]:
+            assert full_name(f"{stage}.{setting}", WHERE) == f"{stage}.{setting}"
+            assert full_name(f"{stage}_{setting}", WHERE) == f"{stage}.{setting}"
+    assert {"structure", "reference_model", "hold_out", "current"} <= set(ARGUMENTS)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"rnak": 3}, r"rnak: .*Did you mean 'rank'\?"),
+        ({"preprocesing": "rts"}, r"Did you mean 'preprocessing'\?"),
+        ({"samples.rank": 3}, r"samples\.rank: "),
+        ({"rank": 3.5}, r"rank: .*3.5"),
+        ({"C": "1e6"}, r"C: .*'1e6'"),
+        ({"scale": "yes"}, r"scale: .*'yes'"),
+        ({"repair": 1}, "repair: "),
+        ({"window": 0}, "window: "),
+        ({"bounds": [1.0]}, r"bounds: .*such as"),
+        ({"folds": 2.5}, r"folds: .*2.5"),
+        ({"optimiser": 3}, "optimiser: "),
+        ({"optimiser": {"name": "abc", "round": 3}}, r"optimiser: .*round"),
+        ({"seed": -1}, "seed: "),
+        ({"hold_out": "a.csv"}, r"hold_out: .*a list of names"),
+        ({"extra_trials": [3]}, "extra_trials: "),
+        ({"structure": 3}, r"structure: .*3"),
+        ({"name": " "}, "name: "),
+        ({"method": "lsq"}, r"method: .*'lsq'"),
+        ({"current": "tide"}, r"current: .*'tide'"),
+        ({"prior_strength": -1.0}, "prior_strength: "),
+        ({"centres": 101}, "centres: "),
+        ({"model_error": "no"}, "model_error: "),
+        ({"segment_start": "x"}, r"segment_start: .*'free'"),
+    ],
+)
+def test_a_wrong_option_is_named_with_its_place(
+    table: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError, match=message) as error:
+        read_table(table, WHERE)
+    assert str(error.value).startswith(WHERE)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"epsilon": 0.1}, r"epsilon: .*'tls-svm'"),
+        ({"method": "ls", "C": 1.0}, r"C: .*'ls'"),
+        ({"method": "map", "C": 1.0}, r"C: .*'map'"),
+        ({"centres": 9}, r"centres: .*kernel"),
+        ({"objective": "rmse", "method": "abc-lssvr"}, r"objective: .*'rmse'"),
+    ],
+)
+def test_options_that_do_not_belong_together_are_refused(
+    table: dict[str, Any], message: str
+) -> None:
+    values = read_table(table, WHERE)
+    with pytest.raises(InputError, match=message):
+        identify_arguments(values)
