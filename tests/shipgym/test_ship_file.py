@@ -275,10 +275,7 @@ def test_repair_may_be_asked_for_the_whole_file_or_one_trial(folder):
         (
             'structure = "abkowitz"',
             'reference_model = "ship.py"',
-            (
-                ": [identify].reference_model: 'ship.py' found, which is code: no file"
-                " makes shipgym run another"
-            ),
+            ": [identify].reference_model: expected data, got 'ship.py', which is code",
         ),
         ('kind = "zigzag"', 'kind = "zig zag"', ": [[trials]] 1 kind: "),
         ('use = "validate"', 'use = "valid"', ": [[trials]] 2 use: "),
@@ -328,7 +325,8 @@ def test_a_missing_ship_file_a_folder_and_binary_content_are_refused(tmp_path):
         ShipFile.load(tmp_path)
     (tmp_path / "ship.toml").write_bytes(b"[ship]\nname = \xff\x00")
     with pytest.raises(
-        InputError, match=r"line 2 holds byte 0xff, .* expected a ship file \(TOML\)"
+        InputError,
+        match=r"line 2: expected a ship file \(TOML\) in UTF-8, got byte 0xff",
     ):
         ShipFile.load(tmp_path / "ship.toml")
 
