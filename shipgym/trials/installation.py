@@ -47,13 +47,13 @@ class Installation:
         if clocks is not None:
             check_choice(clocks, ("correct", "keep"), f"{where} clock_offsets")
         antenna = table.get("gnss_antenna", {})
-        forward, starboard = _antenna(antenna, f"{where} gnss_antenna", ship)
+        check_table(antenna, f"{where} gnss_antenna", ("forward", "starboard"))
         return cls(
-            forward,
-            starboard,
-            _offset(table, "heading_offset_deg", where),
-            _offset(table, "rudder_offset_deg", where),
-            clocks,
+            forward=_distance(antenna, "forward", f"{where} gnss_antenna", ship),
+            starboard=_distance(antenna, "starboard", f"{where} gnss_antenna", ship),
+            heading_offset=_offset(table, "heading_offset_deg", where),
+            rudder_offset=_offset(table, "rudder_offset_deg", where),
+            clock_offsets=clocks,
         )
 
     @property
@@ -62,29 +62,25 @@ class Installation:
         return self.forward == 0.0 and self.starboard == 0.0
 
 
-def _antenna(table: Any, where: str, ship: Particulars | None) -> tuple[float, float]:
-    """Distances of the antenna from midship, forward and to starboard, m."""
-    check_table(table, where, ("forward", "starboard"))
-    distances = []
-    for name in ("forward", "starboard"):
-        place = f"{where}.{name}"
-        distance = check_number(table.get(name, 0.0), place)
-        if ship is not None:
-            size = ship.beam if name == "starboard" else None
-            _check_aboard(distance, size or ship.length, ship, place)
-        distances.append(distance)
-    forward, starboard = distances
-    return forward, starboard
-
-
-def _check_aboard(distance: float, size: float, ship: Particulars, where: str) -> None:
+def _distance(
+    table: Mapping[str, Any], name: str, where: str, ship: Particulars | None
+) -> float:
+    """Distance of the antenna from midship, forward or to starboard, m."""
+    place = f"{where}.{name}"
+    distance = check_number(table.get(name, 0.0), place)
+    if ship is None:
+        return distance
+    size = ship.length
+    if name == "starboard" and ship.beam:
+        size = ship.beam
     limit = 0.6 * size
     if abs(distance) > limit:
         raise InputError(
-            f"{where}: expected at most {limit:.4g} m from midship, got {distance:g} m,"
+            f"{place}: expected at most {limit:.4g} m from midship, got {distance:g} m,"
             f" outside the ship of {ship.length:g} m; measured from the aft"
             f" perpendicular take off {ship.length / 2:g}"
         )
+    return distance
 
 
 def _offset(table: Mapping[str, Any], key: str, where: str) -> float | str:
@@ -93,7 +89,11 @@ def _offset(table: Mapping[str, Any], key: str, where: str) -> float | str:
     if value == "estimate":
         return "estimate"
     degrees = check_number(
-        value, f"{where} {key}", at_least=-180.0, at_most=180.0, hint='or "estimate"'
+        value,
+        f"{where} {key}",
+        at_least=-180.0,
+        at_most=180.0,
+        hint='or "estimate"',
     )
     return DEGREE * degrees
 

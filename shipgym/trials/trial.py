@@ -24,13 +24,14 @@ from shipgym.checks import (
 )
 from shipgym.errors import InputError
 from shipgym.files import write_text
+from shipgym.trials.columns import parse_columns
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.cuts import cut_log
 from shipgym.trials.installation import Installation
 from shipgym.trials.readers.frames import read_frame
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
-from shipgym.trials.resampling import FEWEST_SAMPLES
+from shipgym.trials.resampling import FEWEST_SAMPLES, Log
 from shipgym.trials.trial_import import import_tables
 from shipgym.trials.units import CHANNELS, check_channel
 
@@ -306,14 +307,21 @@ class Trial:
         """
         table = read_log(path)
         where = f"{table.path}:"
-        installation = Installation.from_mapping(sensors or {}, f"{where} sensors")
+        chosen = None
+        if columns is not None:
+            chosen = parse_columns(columns, f"{where} columns")
         conventions = Conventions(
-            rudder_positive, velocity_frame, origin, xg, repair, where, installation
+            rudder_positive=rudder_positive,
+            velocity_frame=velocity_frame,
+            origin=origin,
+            xg=xg,
+            repair=repair,
+            where=where,
+            installation=Installation.from_mapping(sensors or {}, f"{where} sensors"),
         )
-        facts = {"kind": kind, "use": use, "length": length}
+        log = import_tables([table], chosen, conventions)
         own_name = table.path.name if name is None else name
-        (trial,) = read_trials([table], columns, conventions, name=own_name, **facts)
-        return trial
+        return trial_of(log, own_name, kind=kind, use=use, length=length)
 
     @classmethod
     def from_frame(
@@ -345,39 +353,30 @@ class Trial:
         write_text(f"{text}\n", Path(path))
 
 
-def read_trials(
-    tables: Sequence[LogTable],
-    columns: Mapping[str, Any] | None,
-    conventions: Conventions,
-    cut: Any = None,
-    *,
-    name: str,
-    **facts: Any,
-) -> list[Trial]:
-    """Read the trials in the tables of one log: one, or those that `cut` makes of it (:func:`.cut_log`).
+def trial_of(log: Log, name: str, samples: slice = slice(None), **facts: Any) -> Trial:
+    """Make the trial in some of the samples of a log; `facts` are its kind, use and length."""
+    channels = {}
+    for channel, values in log.channels.items():
+        channels[channel] = values[samples]
+    return Trial(
+        log.t[samples],
+        channels,
+        name=name,
+        derived=log.derived,
+        repaired=log.repaired,
+        over_ground=log.over_ground,
+        notes=log.notes,
+        **facts,
+    )
 
-    `name`, `kind`, `use` and `length` are as in :class:`Trial`; a part is named by its
-    seconds.
-    """
-    log = import_tables(tables, columns, conventions)
+
+def cut_trials(cut: Any, log: Log, name: str, where: str, **facts: Any) -> list[Trial]:
+    """Make the trials into which a log is cut (:func:`.cut_log`), each named by its seconds."""
     trials = []
-    for part in cut_log(cut, log, conventions.where):
-        t = log.t[part]
-        part_name = name
-        if cut is not None:
-            first, last = t[0], t[-1]
-            part_name = f"{name} {first:.0f}-{last:.0f} s"
-        trial = Trial(
-            t,
-            {channel: values[part] for channel, values in log.channels.items()},
-            name=part_name,
-            derived=log.derived,
-            repaired=log.repaired,
-            over_ground=log.over_ground,
-            notes=log.notes,
-            **facts,
-        )
-        trials.append(trial)
+    for samples in cut_log(cut, log, where):
+        first, *_, last = log.t[samples]
+        part = f"{name} {first:.0f}-{last:.0f} s"
+        trials.append(trial_of(log, part, samples, **facts))
     return trials
 
 

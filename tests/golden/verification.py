@@ -14,9 +14,9 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from agents.jobs import HERE
 
 from agents import LQ, PID, WheelOver
+from agents.jobs import HERE
 from agents.verification import chain, steered
 from agents.verification import standards as asked
 from agents.verification.figures import (

@@ -297,7 +297,7 @@ def test_tanks_that_cannot_be_are_refused(name, beyond, least):
 
 
 def test_motions_that_cannot_be_towed_are_refused(mariner):
-    with pytest.raises(InputError, match="hold_s: expected .* got 0"):
+    with pytest.raises(InputError, match=r"hold_s: expected .* got 0"):
         towing_tank.static_drift(mariner, [5.0], hold_s=0.0)
     with pytest.raises(InputError, match=r"drift_deg\[1\]: expected .* got 181"):
         towing_tank.static_drift(mariner, [5.0, 181.0])
@@ -306,5 +306,5 @@ def test_motions_that_cannot_be_towed_are_refused(mariner):
     for motion in (towing_tank.pure_surge, towing_tank.pure_sway, towing_tank.pure_yaw):
         with pytest.raises(InputError, match=r"amplitude.*: expected .* got 0"):
             motion(mariner, 0.0)
-        with pytest.raises(InputError, match="period_s: expected .* got 0"):
+        with pytest.raises(InputError, match=r"period_s: expected .* got 0"):
             motion(mariner, 0.1, 0.0)
