@@ -235,7 +235,7 @@ def _local_track(locator: Locator, t: Floats, repair: str | None) -> _Track:
         check_outliers(lat, lon, is_far, here)
     north[rows[~is_far]] = x[~is_far]
     east[rows[~is_far]] = y[~is_far]
-    return _Track(north, east, outliers=np.count_nonzero(is_far))
+    return _Track(north, east, outliers=int(is_far.sum()))
 
 
 def _own_signal(channel: str, t: Floats, values: Floats, locator: Locator) -> Signal:

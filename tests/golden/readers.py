@@ -719,7 +719,7 @@ def kinds_of_files() -> Answers:
     Path("empty.mat").write_bytes(b" " * 124 + b"\0\1IM")
     found["empty"] = asked(lambda: read_log("empty.mat"))
     found["missing"] = asked(lambda: read_log("none.xlsx"))
-    texts = LogTable.of_columns(
+    texts = LogTable(
         Path("cells"),
         {"a": np.array(["1,5", " NA ", "", "2.25", "n/a"], dtype=object)},
         range(5),
@@ -842,11 +842,9 @@ def guessed() -> Answers:
     csv("nothing.csv", {"a": s["t"], "b": s["t"]})
 
     def sizes(name: str, limit: float) -> list[str]:
-        made = LogTable.of_columns(Path("t"), {name: np.zeros(3)}, range(3))
+        made = LogTable(Path("t"), {name: np.zeros(3)}, range(3))
         return [
-            guess_columns(replace(made, cells=lambda _, size=size: np.full(3, -size)))[
-                0
-            ].unit
+            guess_columns(replace(made, cells={name: np.full(3, -size)}))[0].unit
             for size in (0.93 * limit, limit, 1.04 * limit)
         ]
 

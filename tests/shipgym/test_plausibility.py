@@ -43,7 +43,9 @@ UNITS = {
 def locator(n=1000, **changed):
     """Samples in the rows of log.csv from line 2 on, each channel in a column of its name."""
     columns = {name: Column(name, unit) for name, unit in (UNITS | changed).items()}
-    table = LogTable(Path("log.csv"), tuple(columns), {}.__getitem__, range(2, n + 2))
+    cells = dict.fromkeys(columns, ())
+    words = "line {line} (data row {row})"
+    table = LogTable(Path("log.csv"), cells, range(2, n + 2), words)
     return Locator(table, columns, np.arange(n))
 
 

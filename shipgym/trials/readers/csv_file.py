@@ -28,32 +28,38 @@ def read_csv(path: str | Path) -> LogTable:
 
     unquoted = re.sub('"[^"]*"', "", lines[first])
     delimiter = max(",;\t", key=unquoted.count)
-    names = _cells(lines[first], delimiter)
-    header = tuple(name.strip() for name in names)
+    header = [name.strip() for name in _cells(lines[first], delimiter)]
     _check_header(path, header, first + 1)
 
-    blank = delimiter + " \t"
     rows, line_numbers = [], []
+    blank = delimiter + " \t"
     for number, line in enumerate(lines[first + 1 :], start=first + 2):
-        if line.strip(blank):
-            rows.append(line)
-            line_numbers.append(number)
-
-    def column(name: str) -> list[str]:
-        index = header.index(name)
-        return [_cells(row, delimiter, index + 1)[index] for row in rows]
-
-    table = LogTable(path, header, column, line_numbers, decimal_comma=delimiter != ",")
-    _check_rows(table, rows, delimiter)
-    return table
+        if not line.strip(blank):
+            continue
+        row = _cells(line, delimiter)
+        line_numbers.append(number)
+        rows.append(row)
+        if len(row) != len(header):
+            raise InputError(
+                f"{path}: line {number} (data row {len(rows)}): expected"
+                f" {len(header)} cells as in the header, got {len(row)}; complete or"
+                " remove the row"
+            )
+    return LogTable(
+        path=path,
+        cells={name: [row[k] for row in rows] for k, name in enumerate(header)},
+        rows=line_numbers,
+        place_words="line {line} (data row {row})",
+        decimal_comma=delimiter != ",",
+    )
 
 
 def read_lines(path: Path, what: str) -> list[str]:
     """Lines of a text file, at most a million; `what` is expected there, as "CSV file"."""
-    most = 1_000_000
     text = read_text(path, what, LARGEST_CSV, latin=True)
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
-    lines = text.split("\n")
+    unix = text.replace("\r\n", "\n").replace("\r", "\n")
+    lines = unix.split("\n")
+    most = 1_000_000
     if len(lines) > most:
         raise InputError(
             f"{path}: expected at most {most} lines, got {len(lines)}; split the file"
@@ -61,11 +67,10 @@ def read_lines(path: Path, what: str) -> list[str]:
     return lines
 
 
-def _cells(line: str, delimiter: str, most: int = -1) -> list[str]:
-    """Cells of a line; of one without quotes the rest beyond `most` stays together."""
+def _cells(line: str, delimiter: str) -> list[str]:
     if '"' in line:
         return next(csv.reader([line], delimiter=delimiter))
-    return line.split(delimiter, most)
+    return line.split(delimiter)
 
 
 def _check_lines(path: Path, lines: list[str]) -> None:
@@ -83,7 +88,7 @@ def _check_lines(path: Path, lines: list[str]) -> None:
         )
 
 
-def _check_header(path: Path, header: tuple[str, ...], line: int) -> None:
+def _check_header(path: Path, header: list[str], line: int) -> None:
     most = 1000
     where = f"{path}: line {line}"
     if len(header) > most:
@@ -107,16 +112,3 @@ def _check_header(path: Path, header: tuple[str, ...], line: int) -> None:
             f"{where}: expected a header with column names such as t,psi,u,v,r,delta,"
             " got only numbers"
         )
-
-
-def _check_rows(table: LogTable, rows: list[str], delimiter: str) -> None:
-    expected = len(table.header)
-    for k, row in enumerate(rows):
-        count = row.count(delimiter) + 1
-        if '"' in row:
-            count = len(_cells(row, delimiter))
-        if count != expected:
-            raise InputError(
-                f"{table.path}: {table.place(k)}: expected {expected} cells as in the"
-                f" header, got {count}; complete or remove the row"
-            )

@@ -28,10 +28,10 @@ def read_frame(frame: Any, name: str | Path = "frame", first: int = 0) -> LogTab
             f" {len(frame.columns)} columns of {len(frame)} rows; split the file, or"
             " leave out columns"
         )
-    columns = {}
+    cells = {}
     for label, column in frame.items():
-        numeric = column.dtype.kind in "fiub"
-        columns[str(label).strip()] = (
-            column.to_numpy() if numeric else column.to_numpy(object)
-        )
-    return LogTable.of_columns(Path(name), columns, range(first, first + len(frame)))
+        is_numeric = column.dtype.kind in "fiub"
+        kind = column.dtype if is_numeric else object
+        cells[str(label).strip()] = column.to_numpy(kind)
+    rows = range(first, first + len(frame))
+    return LogTable(Path(name), cells, rows)

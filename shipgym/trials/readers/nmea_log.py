@@ -258,7 +258,7 @@ def _table(path: Path, tracks: dict[str, _Track], notes: list[str]) -> LogTable:
         columns[channel] = np.full(t.size, np.nan)
         columns[channel][rows] = track.values
         lines[rows] = track.lines
-    return LogTable.of_columns(
+    return LogTable(
         path,
         columns,
         lines.tolist(),
