@@ -3,6 +3,7 @@
 import csv
 import re
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 
 from shipgym.errors import InputError
@@ -19,55 +20,57 @@ def read_csv(path: str | Path) -> LogTable:
     path = Path(path)
     lines = read_lines(path, "CSV file")
     _check_lines(path, lines)
-    first = next((k for k, line in enumerate(lines) if line.strip()), None)
-    if first is None:
+    numbered = enumerate(lines, start=1)
+    header_at, header_line = next(filter(_has_text, numbered), (0, ""))
+    if not header_line:
         raise InputError(
             f"{path}: expected a header line with column names and rows below, got an"
             " empty file"
         )
 
-    unquoted = re.sub('"[^"]*"', "", lines[first])
+    unquoted = re.sub('"[^"]*"', "", header_line)
     delimiter = max(",;\t", key=unquoted.count)
-    header = [name.strip() for name in _cells(lines[first], delimiter)]
-    _check_header(path, header, first + 1)
+    header = [name.strip() for name in _split(header_line, delimiter)]
+    _check_header(path, header, header_at)
 
-    rows, line_numbers = [], []
+    rows = {}  # by the number of their line
     blank = delimiter + " \t"
-    for number, line in enumerate(lines[first + 1 :], start=first + 2):
-        if not line.strip(blank):
-            continue
-        row = _cells(line, delimiter)
-        line_numbers.append(number)
-        rows.append(row)
-        if len(row) != len(header):
-            raise InputError(
-                f"{path}: line {number} (data row {len(rows)}): expected"
-                f" {len(header)} cells as in the header, got {len(row)}; complete or"
-                " remove the row"
-            )
+    for number, line in numbered:
+        if line.strip(blank):
+            rows[number] = _split(line, delimiter)
+    _check_rows(path, rows, len(header))
+    columns = zip(*rows.values(), strict=True) if rows else [()] * len(header)
     return LogTable(
         path=path,
-        cells={name: [row[k] for row in rows] for k, name in enumerate(header)},
-        rows=line_numbers,
+        cells=dict(zip(header, columns, strict=True)),
+        rows=list(rows),
         place_words="line {line} (data row {row})",
         decimal_comma=delimiter != ",",
     )
 
 
+def _has_text(numbered: tuple[int, str]) -> bool:
+    _, line = numbered
+    return bool(line.strip())
+
+
 def read_lines(path: Path, what: str) -> list[str]:
     """Lines of a text file, at most a million; `what` is expected there, as "CSV file"."""
     text = read_text(path, what, LARGEST_CSV, latin=True)
-    unix = text.replace("\r\n", "\n").replace("\r", "\n")
-    lines = unix.split("\n")
+    text = text.replace("\r\n", "\n")
+    text = text.replace("\r", "\n")
+    lines = text.split("\n")
+    count = len(lines)
     most = 1_000_000
-    if len(lines) > most:
+    if count > most:
         raise InputError(
-            f"{path}: expected at most {most} lines, got {len(lines)}; split the file"
+            f"{path}: expected at most {most} lines, got {count}; split the file"
         )
     return lines
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
+def _split(line: str, delimiter: str) -> list[str]:
+    """Cells of a line."""
     if '"' in line:
         return next(csv.reader([line], delimiter=delimiter))
     return line.split(delimiter)
@@ -112,3 +115,13 @@ def _check_header(path: Path, header: list[str], line: int) -> None:
             f"{where}: expected a header with column names such as t,psi,u,v,r,delta,"
             " got only numbers"
         )
+
+
+def _check_rows(path: Path, rows: Mapping[int, list[str]], expected: int) -> None:
+    for k, (line, row) in enumerate(rows.items(), start=1):
+        count = len(row)
+        if count != expected:
+            raise InputError(
+                f"{path}: line {line} (data row {k}): expected {expected} cells as in"
+                f" the header, got {count}; complete or remove the row"
+            )

@@ -39,9 +39,11 @@ def recognise_kind(path: Path) -> str:
         return _ENDINGS[ending]
     content = read_bytes(path, "CSV file", LARGEST_CSV)
     beginning = content[:4096].decode("latin-1")
-    lines = beginning.replace("\r", "\n")
-    sentences = _NMEA_LINE.findall(lines)
-    return "nmea" if len(sentences) >= 2 else "csv"
+    beginning = beginning.replace("\r", "\n")
+    sentences = _NMEA_LINE.findall(beginning)
+    if len(sentences) >= 2:
+        return "nmea"
+    return "csv"
 
 
 def read_log(path: str | Path | LogTable) -> LogTable:

@@ -75,7 +75,7 @@ class LogTable:
         """Cells of a column as texts without blanks around them, empty where there is no value."""
         texts = []
         for cell in self.column(name):
-            text = "" if cell is None else str(cell).strip()
+            text = str(cell).strip()
             is_missing = text.lower() in _MISSING_WORDS
             texts.append("" if is_missing else text)
         return texts

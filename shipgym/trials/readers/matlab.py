@@ -81,7 +81,11 @@ def read_matlab(path: Path) -> LogTable:
     for name, values in vectors.items():
         if values.size == length:
             columns[name] = values
-    return LogTable(path, columns, rows=range(1, length + 1))
+    return LogTable(
+        path=path,
+        cells=columns,
+        rows=range(1, length + 1),
+    )
 
 
 def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:
