@@ -66,9 +66,11 @@ def parse_columns(
     another quantity.
     """
     parsed = {}
-    for channel, entry in check_table(columns, where).items():
+    check_table(columns, where)
+    for channel, entry in columns.items():
         check_channel(channel, where)
-        parsed[channel] = _parse_column(channel, entry, f"{where} {channel}")
+        place = f"{where} {channel}"
+        parsed[channel] = _parse_column(channel, entry, place)
     return parsed
 
 
@@ -104,9 +106,11 @@ def choose_columns(
         columns = _named_like_channels(table)
     chosen = {}
     for channel, column in {"t": Column("t"), **columns}.items():
-        if part and channel != "t" and column.name not in table.header:
+        is_elsewhere = part and column.name not in table.cells
+        if is_elsewhere and channel != "t":
             continue
-        unit = column.unit or table.units.get(column.name, si_unit(channel))
+        known_unit = table.units.get(column.name, si_unit(channel))
+        unit = column.unit or known_unit
         chosen[channel] = replace(column, unit=unit)
     if len(chosen) == 1:
         raise InputError(
@@ -117,7 +121,10 @@ def choose_columns(
 
 
 def _named_like_channels(table: LogTable) -> dict[str, Column]:
-    columns = {name: Column(name) for name in QUANTITIES if name in table.header}
+    columns = {}
+    for name in QUANTITIES:
+        if name in table.cells:
+            columns[name] = Column(name)
     if not columns.keys() - {"t"}:
         raise InputError(
             f"{table.path}: no column is named like a channel ({quoted(QUANTITIES)})."

@@ -46,11 +46,12 @@ class Installation:
         clocks = table.get("clock_offsets")
         if clocks is not None:
             check_choice(clocks, ("correct", "keep"), f"{where} clock_offsets")
+        place = f"{where} gnss_antenna"
         antenna = table.get("gnss_antenna", {})
-        check_table(antenna, f"{where} gnss_antenna", ("forward", "starboard"))
+        check_table(antenna, place, ("forward", "starboard"))
         return cls(
-            forward=_distance(antenna, "forward", f"{where} gnss_antenna", ship),
-            starboard=_distance(antenna, "starboard", f"{where} gnss_antenna", ship),
+            forward=_distance(antenna, "forward", place, ship),
+            starboard=_distance(antenna, "starboard", place, ship),
             heading_offset=_offset(table, "heading_offset_deg", where),
             rudder_offset=_offset(table, "rudder_offset_deg", where),
             clock_offsets=clocks,
@@ -73,6 +74,7 @@ def _distance(
     size = ship.length
     if name == "starboard" and ship.beam:
         size = ship.beam
+    # a little more than half: antennas stand on bows and bridge wings
     limit = 0.6 * size
     if abs(distance) > limit:
         raise InputError(

@@ -74,16 +74,19 @@ def _heading_from_start(log: Log) -> Floats:
 def _earth_to_body(log: Log) -> None:
     """Turn north and east velocities by the recorded heading."""
     for name in ("u", "v", "psi"):
-        if not log.has(name) or name in log.derived:
+        is_recorded = log.has(name) and name not in log.derived
+        if not is_recorded:
             raise InputError(
                 f'{log.where}: velocity_frame = "earth": expected u (north), v (east)'
                 f" and the heading psi, got no recorded {name}; name their columns, or"
                 " leave u and v out"
             )
     channels = log.channels
-    north, east = channels["u"], channels["v"]
-    u, v = rotate_to_body(north, east, channels["psi"])
-    channels["u"], channels["v"] = u, v
+    channels["u"], channels["v"] = rotate_to_body(
+        north=channels["u"],
+        east=channels["v"],
+        psi=channels["psi"],
+    )
 
 
 def _cg_to_midship(log: Log, xg: float) -> None:
@@ -130,6 +133,7 @@ def to_midship(log: Log, installation: Installation) -> None:
         return
     u, v = velocity
     if water is not None:
+        # leeway is what is left of the sway without the current
         v = _sway_through_water(log, water, u, v)
     if not log.has("u"):
         log.derive("u", u)

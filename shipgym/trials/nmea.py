@@ -72,12 +72,13 @@ class NmeaQuantity:
 def _with_letters(entry: Mapping[str, Any]) -> dict[str, Any]:
     """An entry of the table whose tables of letters are by place."""
     fields = dict(entry)
-    for key in ("valid", "degraded", "letters", "only_if"):
-        if key in entry:
-            by_place = {}
-            for at, letters in entry[key].items():
-                by_place[int(at)] = frozenset(letters)
-            fields[key] = by_place
+    of_letters = {"valid", "degraded", "letters", "only_if"}
+    for key in of_letters & entry.keys():
+        by_place = {}
+        for at, letters in entry[key].items():
+            place = int(at)
+            by_place[place] = frozenset(letters)
+        fields[key] = by_place
     return fields
 
 
@@ -85,7 +86,8 @@ def _sentence_kind(entry: Mapping[str, Any]) -> SentenceKind:
     kind = _with_letters(entry)
     numbers = {}
     for quantity, place in entry["fields"].items():
-        numbers[quantity] = NumberField(**_with_letters(place))
+        place = _with_letters(place)
+        numbers[quantity] = NumberField(**place)
     kind["fields"] = numbers
     return SentenceKind(**kind)
 
@@ -206,7 +208,8 @@ def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float
     value = float(text)
     unit = place.unit
     if place.unit_at is not None:
-        unit = _SPEED_UNITS[fields[place.unit_at]]
+        letter = fields[place.unit_at]
+        unit = _SPEED_UNITS[letter]
     if unit == "ddmm.mm":  # 5430.5 is 54 degrees and 30.5 minutes
         degrees, minutes = divmod(value, 100.0)
         value, unit = degrees + minutes / 60.0, "deg"
@@ -214,4 +217,5 @@ def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float
 
     if place.side is None:
         return value
-    return copysign(value, _SIGNS[fields[place.side]])
+    side = fields[place.side]
+    return copysign(value, _SIGNS[side])

@@ -81,9 +81,14 @@ def _read(
     columns = {}
     for channel, guess in guesses.items():
         columns[channel] = Column(guess.column, guess.unit)
-    words: dict[str, Any] = {one.name: one.value for one in conventions.values()}
-    where = f"{table.path}:"
-    log = import_tables([table], columns or None, Conventions(**words, where=where))
+    words: dict[str, Any] = {"where": f"{table.path}:"}
+    for one in conventions.values():
+        words[one.name] = one.value
+    log = import_tables(
+        [table],
+        columns or None,
+        Conventions(**words),
+    )
     return trial_of(log, table.path.name)
 
 
@@ -93,9 +98,10 @@ def _next_proposal(
     """The first proposal of a refusal that was not tried yet, and is no unit that a name tells."""
     for name, value in error.instead:
         proposal = Proposal(name, value)
-        is_convention = name not in QUANTITIES
-        is_guess = name in columns and columns[name].reason != "from its name"
-        if proposal not in tried and (is_convention or is_guess):
+        may_be_tried = name not in QUANTITIES  # a convention
+        if name in columns:
+            may_be_tried = columns[name].reason != "from its name"
+        if may_be_tried and proposal not in tried:
             return proposal
     return None
 
