@@ -32,32 +32,40 @@ def read_angles(texts: Sequence[str], minutes: bool = False) -> Floats:
         match = _ANGLE.fullmatch(text)
         if text and match is None:
             raise ValueError(text)
-        matches.append(match if text else None)
+        matches.append(match)
 
-    with_minutes = minutes or any(_is_ddmm(match) for match in matches)
-    return np.array([_degrees(match, with_minutes) for match in matches], dtype=float)
+    with_minutes = minutes or any(map(_is_ddmm, matches))
+    angles = [_degrees(match, with_minutes) for match in matches]
+    return np.array(angles, dtype=float)
 
 
 def _is_ddmm(match: re.Match[str] | None) -> bool:
     if match is None:
         return False
-    whole = match["degrees"].replace(",", ".").partition(".")[0]
-    return len(whole) >= _PLAIN_DIGITS
+    whole = re.match(r"\d+", match["degrees"])
+    return whole is not None and len(whole[0]) >= _PLAIN_DIGITS
+
+
+def _number(match: re.Match[str], name: str) -> float:
+    """A part of an angle, with a decimal point or comma; 0 where it is not there."""
+    text = match[name] or "0"
+    return float(text.replace(",", "."))
 
 
 def _degrees(match: re.Match[str] | None, with_minutes: bool) -> float:
     if match is None:
         return np.nan
-    degrees, minutes, seconds = (
-        float((match[name] or "0").replace(",", "."))
-        for name in ("degrees", "minutes", "seconds")
-    )
+    degrees = _number(match, "degrees")
+    minutes = _number(match, "minutes")
+    seconds = _number(match, "seconds")
     if with_minutes and match["minutes"] is None:
         degrees, minutes = divmod(degrees, 100.0)
     if minutes >= 60.0 or seconds >= 60.0:
         raise ValueError(match[0])
 
     size = degrees + minutes / 60.0 + seconds / 3600.0
-    side = (match["before"] or match["after"] or "N").upper()
-    is_negative = (side in "SW") != (match["sign"] == "-")
+    side = match["before"] or match["after"] or "N"
+    is_southwest = side.upper() in "SW"
+    has_minus = match["sign"] == "-"
+    is_negative = is_southwest != has_minus
     return -size if is_negative else size

@@ -50,14 +50,7 @@ class _DelayFit(NamedTuple):
 
     gain: float
     residual: Floats
-    squares: float  # of the residual
-
-
-class _Minimum(NamedTuple):
-    """Least value of a parabola through three neighbours."""
-
-    place: float  # in steps from the first value
-    curvature: float
+    squares: float  # of the residual, never zero
 
 
 def clock_offset(
@@ -89,19 +82,31 @@ def clock_offset(
 
     step = 0.25
     delays = np.arange(-LONGEST_DELAY_S, LONGEST_DELAY_S + 0.1, step)
-    squares = [fit(delay).squares for delay in delays]
-    minimum = _minimum(squares)
-    power = float(change @ change)
-    if minimum is None or minimum.curvature <= 1e-12 * power:
+    squares = np.array([fit(delay).squares for delay in delays])
+    k = int(np.argmin(squares))
+    if k in (0, delays.size - 1):
         return None
 
-    delay = step * minimum.place - LONGEST_DELAY_S
+    # the parabola through the least squares and those before and after
+    around = slice(k - 1, k + 2)
+    half_curvature, slope, _ = np.polyfit(
+        delays[around] - delays[k], squares[around], 2
+    )
+    curvature = 2.0 * float(half_curvature)
+    power = float(change @ change)
+    if curvature * step**2 <= 1e-12 * power:  # no more than rounding
+        return None
+
+    delay = float(delays[k] - slope / curvature)
     best = fit(delay)
     free = _independent_samples(best)
-    curvature = minimum.curvature / step**2
-    error = math.sqrt(2.0 * best.squares / free / curvature)
     explained = max(power / best.squares - 1.0, 0.0)
-    return ClockOffset(delay, error, best.gain, math.sqrt(free * explained))
+    return ClockOffset(
+        late=delay,
+        error=math.sqrt(2.0 * best.squares / free / curvature),
+        gain=best.gain,
+        certainty=math.sqrt(free * explained),
+    )
 
 
 def _windows(t: Floats) -> _Windows | None:
@@ -140,23 +145,11 @@ def _unexplained(values: Floats, directions: Floats) -> Floats:
 
 def _fit(change: Floats, regressor: Floats) -> _DelayFit:
     tiny = 1e-300  # in place of zero, by which is divided
-    power = max(float(regressor @ regressor), tiny)
-    gain = float(regressor @ change) / power
+    power = float(regressor @ regressor)
+    gain = float(regressor @ change) / max(power, tiny)
     residual = change - gain * regressor
     squares = float(residual @ residual)
     return _DelayFit(gain, residual, max(squares, tiny))
-
-
-def _minimum(values: list[float]) -> _Minimum | None:
-    """Parabola through the least value and those before and after it; None where it is at an end."""
-    k = values.index(min(values))
-    if k in (0, len(values) - 1):
-        return None
-    before, least, after = values[k - 1 : k + 2]
-    curvature = before - 2.0 * least + after
-    if curvature <= 0.0:
-        return None
-    return _Minimum(k + 0.5 * (before - after) / curvature, curvature)
 
 
 def _independent_samples(fit: _DelayFit) -> float:
@@ -170,11 +163,13 @@ def _independent_samples(fit: _DelayFit) -> float:
 
 def rudder_clock_offset(t: Floats, r: Floats, delta: Floats) -> ClockOffset | None:
     """How late the rudder is against the yaw acceleration, given yaw rate and the history of both."""
-    others = {"r": r, "r3": r**3}
-    for memory in (20.0, 80.0):
-        others[f"r, {memory:g} s"] = _remembered(t, r, memory)
-        others[f"delta, {memory:g} s"] = _remembered(t, delta, memory)
-    return clock_offset(t, r, delta, others)
+    history = {
+        "r, 20 s": _remembered(t, r, memory=20.0),
+        "delta, 20 s": _remembered(t, delta, memory=20.0),
+        "r, 80 s": _remembered(t, r, memory=80.0),
+        "delta, 80 s": _remembered(t, delta, memory=80.0),
+    }
+    return clock_offset(t, r, delta, {"r": r, "r3": r**3, **history})
 
 
 def _remembered(t: Floats, values: Floats, memory: float) -> Floats:
@@ -196,5 +191,5 @@ def reverses(values: Floats, least: float = 0.0) -> bool:
     from_middle = values - 0.5 * (low + high)
     is_far = np.abs(from_middle) > 0.25 * span
     sides = np.sign(from_middle[is_far])
-    reversals = np.count_nonzero(np.diff(sides))
-    return bool(span > least and reversals >= 3)
+    reversals = np.diff(sides) != 0.0
+    return bool(span > least and reversals.sum() >= 3)

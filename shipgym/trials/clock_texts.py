@@ -44,14 +44,15 @@ def read_clock(texts: Sequence[str]) -> Clock:
     of_day = _TIME_OF_DAY.fullmatch(first) is not None
     series = _series(texts)
     seconds = _times_of_day(series) if of_day else _dated_times(series, first)
-
-    wrong = np.isnan(seconds) & series.notna().to_numpy()
-    if wrong.any():
-        raise ValueError(texts[int(wrong.argmax())])
+    is_known = np.isfinite(seconds)
+    has_text = series.notna().to_numpy()
+    is_wrong = has_text & ~is_known
+    if is_wrong.any():
+        row = int(is_wrong.argmax())
+        raise ValueError(texts[row])
     if of_day:
-        known = np.isfinite(seconds)
-        seconds[known] = np.unwrap(seconds[known], period=DAY)
-    return Clock(seconds, not of_day)
+        seconds[is_known] = np.unwrap(seconds[is_known], period=DAY)
+    return Clock(seconds, dated=not of_day)
 
 
 def _series(texts: Sequence[str]) -> Any:
@@ -66,25 +67,32 @@ def _times_of_day(series: Any) -> Floats:
     """Seconds since midnight, nan for what is no time."""
     import pandas as pd
 
-    is_whole = series.str.count(":") == 2
-    with_seconds = series.where(is_whole, series + ":00")
+    colons = series.str.count(":")
+    with_seconds = series.where(colons == 2, series + ":00")
     times = pd.to_timedelta(with_seconds, errors="coerce")
-    return np.array(times.dt.total_seconds(), dtype=np.float64)
+    seconds = times.dt.total_seconds()
+    return np.array(seconds, dtype=np.float64)
 
 
 def _dated_times(series: Any, first: str) -> Floats:
     """Seconds since 1970, nan for what is no date; of two orders of day and month the likelier."""
     import pandas as pd
 
-    orders = (False,) if first[:4].isdigit() else (True, False)
+    begins_with_year = first[:4].isdigit()
+    orders = (False,) if begins_with_year else (True, False)
     candidates = []
     for day_first in orders:
         moments = pd.to_datetime(
-            series, utc=True, format="mixed", dayfirst=day_first, errors="coerce"
+            series,
+            utc=True,
+            format="mixed",
+            dayfirst=day_first,
+            errors="coerce",
         )
         since_1970 = moments - pd.Timestamp(0, tz="UTC")
         candidates.append(since_1970.dt.total_seconds())
-    return np.array(min(candidates, key=_implausibility), dtype=np.float64)
+    likelier = min(candidates, key=_implausibility)
+    return np.array(likelier, dtype=np.float64)
 
 
 def _implausibility(seconds: Any) -> tuple[int, float]:
@@ -97,6 +105,7 @@ def _implausibility(seconds: Any) -> tuple[int, float]:
 def clock_text(seconds: float) -> str:
     """Write a time since 1970, or of the day, as ISO 8601 does."""
     moment = datetime.fromtimestamp(round(seconds, 1), UTC)
-    if seconds < 2.0 * DAY:
+    is_of_day = seconds < 2.0 * DAY
+    if is_of_day:
         return moment.strftime("%H:%M:%S")
     return moment.strftime("%Y-%m-%d %H:%M:%S")

@@ -1,7 +1,7 @@
 """Which column of a file holds which channel, in which unit, and where its values stand in the file."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, SupportsIndex
 
 import numpy as np
@@ -19,7 +19,7 @@ class Column:
     """Where a channel stands in a file."""
 
     name: str  # of the column
-    unit: str
+    unit: str = ""  # none: as the reader knows it, else the SI unit
     date: str | None = None  # column of the date, with a time of the day
     zone: str = "UTC"  # how far the clock is ahead of UTC, as "+02:00"
 
@@ -56,77 +56,79 @@ class Locator:
 
 
 def parse_columns(
-    columns: Mapping[str, Any],
-    where: str = "columns",
-    units: Mapping[str, str] | None = None,
+    columns: Mapping[str, Any], where: str = "columns"
 ) -> dict[str, Column]:
     """Check a table of columns by channel.
 
     Each entry is the name of a column or ``{"column": name, "unit": unit}``, of the
-    time also ``"date"``, the column of the date, and ``"zone"``. Where no unit is
-    named, that in `units`, by column, is taken, else the SI unit. `where` begins the
+    time also ``"date"``, the column of the date, and ``"zone"``. `where` begins the
     messages. Raises InputError for an unknown channel, key or unit, and for a unit of
     another quantity.
     """
-    known = units or {}
     parsed = {}
-    for channel, entry in check_table(columns, where).items():
+    check_table(columns, where)
+    for channel, entry in columns.items():
         check_channel(channel, where)
-        parsed[channel] = _parse_column(channel, entry, known, f"{where} {channel}")
+        place = f"{where} {channel}"
+        parsed[channel] = _parse_column(channel, entry, place)
     return parsed
 
 
-def _parse_column(
-    channel: str, entry: Any, units: Mapping[str, str], where: str
-) -> Column:
-    fields = entry if isinstance(entry, Mapping) else {"column": entry}
-    clock_keys = ("date", "zone") if channel == "t" else ()
-    check_keys(fields, ("column", "unit", *clock_keys), where)
-    name = fields.get("column")
+def _parse_column(channel: str, entry: Any, where: str) -> Column:
+    fields = dict(entry) if isinstance(entry, Mapping) else {"column": entry}
+    keys = ("column", "unit", "date", "zone") if channel == "t" else ("column", "unit")
+    check_keys(fields, keys, where)
+    name = fields.pop("column", None)
     if not isinstance(name, str):
         example = f'{{ column = "name", unit = "{si_unit(channel)}" }}'
         raise InputError(
             f"{where}: expected the name of a column or {example}, got {entry!r}"
         )
-    name = check_text(name, where).strip()
-    unit = fields.get("unit", units.get(name, si_unit(channel)))
-    si_factor(channel, unit, where)
-
-    clock = {key: check_text(fields[key], where) for key in clock_keys if key in fields}
-    if "zone" in clock:
-        zone_seconds(clock["zone"], f"{where} zone")
-    return Column(name, unit, **clock)
+    if "unit" in fields:
+        si_factor(channel, fields["unit"], where)
+    for key in fields:
+        check_text(fields[key], where)
+    if "zone" in fields:
+        zone_seconds(fields["zone"], f"{where} zone")
+    return Column(check_text(name, where).strip(), **fields)
 
 
 def choose_columns(
-    table: LogTable, columns: Mapping[str, Any] | None, *, part: bool = False
+    table: LogTable, columns: Mapping[str, Column] | None, *, part: bool = False
 ) -> dict[str, Column]:
-    """Columns to read from a file by channel, ``t`` first.
+    """Columns to read from a file by channel, each with its unit, ``t`` first.
 
-    The table of columns is as :func:`parse_columns` takes it, ``t`` being column "t"
-    where it is not named; None stands for every column that is named like a channel. Of
-    a `part` of a log, columns that are not there are left out; else they are an
-    InputError.
+    The time is column "t" where it is not named; None stands for every column that is
+    named like a channel. Of a `part` of a log, columns that are not there are left out;
+    else they are an InputError.
     """
-    where = f"{table.path}: columns"
     if columns is None:
-        columns = {name: name for name in QUANTITIES if name in table.header}
-        if not columns.keys() - {"t"}:
-            raise InputError(
-                f"{table.path}: no column is named like a channel"
-                f" ({quoted(QUANTITIES)}). Columns present: {quoted(table.header)}."
-                " Name the column of each channel in [columns] (or columns=...)"
-            )
-    named = {"t": "t", **check_table(columns, where)}
-    chosen = parse_columns(named, where, table.units)
-    if part:
-        chosen = {
-            channel: column
-            for channel, column in chosen.items()
-            if channel == "t" or column.name in table.header
-        }
+        columns = _named_like_channels(table)
+    chosen = {}
+    for channel, column in {"t": Column("t"), **columns}.items():
+        is_elsewhere = part and column.name not in table.cells
+        if is_elsewhere and channel != "t":
+            continue
+        known_unit = table.units.get(column.name, si_unit(channel))
+        unit = column.unit or known_unit
+        chosen[channel] = replace(column, unit=unit)
     if len(chosen) == 1:
         raise InputError(
-            f"{where}: expected some of {quoted(QUANTITIES)}, got time alone"
+            f"{table.path}: columns: expected some of {quoted(QUANTITIES)}, got time"
+            " alone"
         )
     return chosen
+
+
+def _named_like_channels(table: LogTable) -> dict[str, Column]:
+    columns = {}
+    for name in QUANTITIES:
+        if name in table.cells:
+            columns[name] = Column(name)
+    if not columns.keys() - {"t"}:
+        raise InputError(
+            f"{table.path}: no column is named like a channel ({quoted(QUANTITIES)})."
+            f" Columns present: {quoted(table.header)}. Name the column of each channel"
+            " in [columns] (or columns=...)"
+        )
+    return columns

@@ -6,6 +6,13 @@ from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.trials.installation import AS_LOGGED, Installation
 
+_WORDS = {
+    "rudder_positive": ("starboard", "port"),
+    "velocity_frame": ("body", "earth"),
+    "origin": ("midship", "cg"),
+    "repair": ("interpolate",),
+}
+
 
 @dataclass(frozen=True)
 class Conventions:
@@ -25,11 +32,10 @@ class Conventions:
     installation: Installation = AS_LOGGED
 
     def __post_init__(self) -> None:
-        self._check_word("rudder_positive", "starboard", "port")
-        self._check_word("velocity_frame", "body", "earth")
-        self._check_word("origin", "midship", "cg")
-        if self.repair is not None:
-            self._check_word("repair", "interpolate")
+        for name, known in _WORDS.items():
+            word = getattr(self, name)
+            if word is not None or name != "repair":
+                check_choice(word, known, f"{self.where} {name}")
         if self.xg is not None:
             check_number(self.xg, f"{self.where} xg")
         elif self.origin == "cg":
@@ -38,6 +44,3 @@ class Conventions:
                 " gravity forward of midship, m, with 'cg', got none; give xg, or"
                 ' origin = "midship"'
             )
-
-    def _check_word(self, name: str, *words: str) -> None:
-        check_choice(getattr(self, name), words, f"{self.where} {name}")

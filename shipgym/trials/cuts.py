@@ -24,13 +24,12 @@ class Stretch(NamedTuple):
 
 
 def check_cut(cut: Any, where: str) -> None:
-    """InputError unless this is None, "rudder" or a list of pairs of numbers or texts."""
-    if cut is None or cut == "rudder":
+    """Refuse a cut that is neither "rudder" nor a list of pairs of numbers or texts."""
+    if cut == "rudder":
         return
     pairs = cut if isinstance(cut, list) and cut else [None]
-    for pair in pairs:
-        if not _is_stretch(pair):
-            raise InputError(f"{where} cut: {_EXPECTED}, got {shown(cut)}")
+    if not all(_is_stretch(pair) for pair in pairs):
+        raise InputError(f"{where} cut: {_EXPECTED}, got {shown(cut)}")
 
 
 def _is_stretch(pair: Any) -> bool:
@@ -40,13 +39,11 @@ def _is_stretch(pair: Any) -> bool:
 
 
 def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
-    """Samples of each part, in order of time; all of them where `cut` is None.
+    """Samples of each part, in order of time.
 
     Raises InputError for a part without samples, and for clock times of a log without a
     clock.
     """
-    if cut is None:
-        return [slice(0, log.t.size)]
     if cut == "rudder":
         stretches = _active_stretches(log, where)
     else:
@@ -57,14 +54,14 @@ def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
 def _samples(stretch: Stretch, log: Log, where: str) -> slice:
     first = _seconds(stretch.first, log, where)
     last = _seconds(stretch.last, log, where)
-    begin = int(np.searchsorted(log.t, first))
-    end = int(np.searchsorted(log.t, last, side="right"))
+    begin = np.searchsorted(log.t, first)
+    end = np.searchsorted(log.t, last, side="right")
     if end - begin < FEWEST_SAMPLES:
         raise InputError(
             f"{where} cut: expected stretches of the log, which goes from {_span(log)},"
             f" got {stretch.first} to {stretch.last}, which holds no trial"
         )
-    return slice(begin, end)
+    return slice(int(begin), int(end))
 
 
 def _span(log: Log) -> str:

@@ -46,14 +46,15 @@ class Installation:
         clocks = table.get("clock_offsets")
         if clocks is not None:
             check_choice(clocks, ("correct", "keep"), f"{where} clock_offsets")
+        place = f"{where} gnss_antenna"
         antenna = table.get("gnss_antenna", {})
-        forward, starboard = _antenna(antenna, f"{where} gnss_antenna", ship)
+        check_table(antenna, place, ("forward", "starboard"))
         return cls(
-            forward,
-            starboard,
-            _offset(table, "heading_offset_deg", where),
-            _offset(table, "rudder_offset_deg", where),
-            clocks,
+            forward=_distance(antenna, "forward", place, ship),
+            starboard=_distance(antenna, "starboard", place, ship),
+            heading_offset=_offset(table, "heading_offset_deg", where),
+            rudder_offset=_offset(table, "rudder_offset_deg", where),
+            clock_offsets=clocks,
         )
 
     @property
@@ -62,29 +63,26 @@ class Installation:
         return self.forward == 0.0 and self.starboard == 0.0
 
 
-def _antenna(table: Any, where: str, ship: Particulars | None) -> tuple[float, float]:
-    """Distances of the antenna from midship, forward and to starboard, m."""
-    check_table(table, where, ("forward", "starboard"))
-    distances = []
-    for name in ("forward", "starboard"):
-        place = f"{where}.{name}"
-        distance = check_number(table.get(name, 0.0), place)
-        if ship is not None:
-            size = ship.beam if name == "starboard" else None
-            _check_aboard(distance, size or ship.length, ship, place)
-        distances.append(distance)
-    forward, starboard = distances
-    return forward, starboard
-
-
-def _check_aboard(distance: float, size: float, ship: Particulars, where: str) -> None:
+def _distance(
+    table: Mapping[str, Any], name: str, where: str, ship: Particulars | None
+) -> float:
+    """Distance of the antenna from midship, forward or to starboard, m."""
+    place = f"{where}.{name}"
+    distance = check_number(table.get(name, 0.0), place)
+    if ship is None:
+        return distance
+    size = ship.length
+    if name == "starboard" and ship.beam:
+        size = ship.beam
+    # a little more than half: antennas stand on bows and bridge wings
     limit = 0.6 * size
     if abs(distance) > limit:
         raise InputError(
-            f"{where}: expected at most {limit:.4g} m from midship, got {distance:g} m,"
+            f"{place}: expected at most {limit:.4g} m from midship, got {distance:g} m,"
             f" outside the ship of {ship.length:g} m; measured from the aft"
             f" perpendicular take off {ship.length / 2:g}"
         )
+    return distance
 
 
 def _offset(table: Mapping[str, Any], key: str, where: str) -> float | str:
@@ -93,7 +91,11 @@ def _offset(table: Mapping[str, Any], key: str, where: str) -> float | str:
     if value == "estimate":
         return "estimate"
     degrees = check_number(
-        value, f"{where} {key}", at_least=-180.0, at_most=180.0, hint='or "estimate"'
+        value,
+        f"{where} {key}",
+        at_least=-180.0,
+        at_most=180.0,
+        hint='or "estimate"',
     )
     return DEGREE * degrees
 

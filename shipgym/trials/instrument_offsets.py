@@ -124,13 +124,14 @@ def correct_offsets(log: Log, installation: Installation) -> None:
     Raises InputError where one cannot be estimated.
     """
     channels = log.channels
-    if "psi" in channels and installation.heading_offset:
-        offset = installation.heading_offset
+    offset = installation.heading_offset
+    if offset and log.has("psi"):
         if isinstance(offset, str):
             offset = _estimated_heading_offset(log)
         channels["psi"] = channels["psi"] - offset
-    if "delta" in channels and installation.rudder_offset:
-        offset = installation.rudder_offset
+
+    offset = installation.rudder_offset
+    if offset and log.has("delta"):
         if isinstance(offset, str):
             offset = _estimated_rudder_offset(log)
         channels["delta"] = channels["delta"] - offset
@@ -155,13 +156,15 @@ def _estimated_rudder_offset(log: Log) -> float:
 
 
 def _not_estimated(key: str, needed: str, log: Log) -> InputError:
+    where = f'{log.where}: {key} = "estimate"'
     return InputError(
-        f'{log.where}: {key} = "estimate": expected straight parts of {STRAIGHT_S:g} s'
-        f" {needed}, got none; give {key} in degrees, or leave it out"
+        f"{where}: expected straight parts of {STRAIGHT_S:g} s {needed}, got none; give"
+        f" {key} in degrees, or leave it out"
     )
 
 
 def _note_estimate(key: str, offset: float, log: Log) -> None:
+    offset_deg = offset / DEGREE
     log.notes.append(
-        f"{key} {offset / DEGREE:.2f}, estimated from straight parts and removed"
+        f"{key} {offset_deg:.2f}, estimated from straight parts and removed"
     )

@@ -1,12 +1,10 @@
 """Late yaw rate and rudder in a log, and a rudder of the wrong sign: found, refused or to be corrected."""
 
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.trials.clock_offsets import (
     ClockOffset,
@@ -15,7 +13,7 @@ from shipgym.trials.clock_offsets import (
     rudder_clock_offset,
 )
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.plausibility.finding import LogFinding, Proposal, settle
+from shipgym.trials.plausibility.refusal import Proposal, implausible
 from shipgym.trials.resampling import Log
 from shipgym.trials.units import DEGREE
 
@@ -67,10 +65,12 @@ def find_late_channels(log: Log) -> list[LateChannel]:
     where this does not contradict the heading.
     """
     significant = 2.5  # standard errors
+    rate = _rate_offset(log)
     late = []
-    for channel, offset in _offsets(log).items():
-        dynamics = _COMPARISONS[channel].dynamics_s
-        error = math.hypot(offset.error, dynamics)
+    for channel, offset in (("r", rate), ("delta", _rudder_offset(log, rate))):
+        if offset is None:
+            continue
+        error = math.hypot(offset.error, _COMPARISONS[channel].dynamics_s)
         is_significant = abs(offset.late) >= significant * error
         if is_significant and offset.certainty >= CERTAIN:
             late.append(LateChannel(channel, offset.late, error))
@@ -97,39 +97,37 @@ def is_corrected(
     )
 
 
-def _offsets(log: Log) -> dict[str, ClockOffset]:
-    """How late yaw rate and rudder are, where a log tells it; InputError for a rudder of the wrong sign."""
-    channels = log.channels
-    offsets = {}
-    rate = rudder = None
-    if {"psi", "r"} <= channels.keys() and reverses(channels["r"]):
-        rate = clock_offset(log.t, channels["psi"], channels["r"], {})
-    if rate is not None:
-        offsets["r"] = rate
-
-    if "delta" in channels and {"psi", "r"} & channels.keys():
-        if reverses(channels["delta"], least=2.0 * DEGREE):
-            rudder = _rudder_offset(log, rate)
-        elif "psi" in channels:
-            settle(check_circle(log))
-    if rudder is not None:
-        offsets["delta"] = rudder
-    return offsets
+def _rate_offset(log: Log) -> ClockOffset | None:
+    """How late the yaw rate is against the heading, where a log tells it."""
+    psi, r = log.channels.get("psi"), log.channels.get("r")
+    if psi is None or r is None or not reverses(r):
+        return None
+    return clock_offset(log.t, psi, r, {})
 
 
 def _rudder_offset(log: Log, rate: ClockOffset | None) -> ClockOffset | None:
-    """How late the rudder is against the yaw rate on the clock of the heading."""
-    t, delta = log.t, log.channels["delta"]
-    if "r" in log.channels:
+    """How late the rudder is against the yaw rate on the clock of the heading, where a log tells it.
+
+    InputError for a rudder of the wrong sign.
+    """
+    t, channels = log.t, log.channels
+    delta = channels.get("delta")
+    if delta is None or not {"psi", "r"} & channels.keys():
+        return None
+    if not reverses(delta, least=2.0 * DEGREE):
+        check_circle(log)
+        return None
+
+    if "r" in channels:
         delay = 0.0 if rate is None else rate.late
-        r = np.interp(t + delay, t, log.channels["r"])
+        r = np.interp(t + delay, t, channels["r"])
     else:
-        r = time_derivative(t, log.channels["psi"])
+        r = time_derivative(t, channels["psi"])
     rudder = rudder_clock_offset(t, r, delta)
     if _is_against(rudder) and not _is_against(rate):
         without_history = clock_offset(t, r, delta, {"r": r})
         if _is_against(without_history):
-            settle([_wrong_sign(log, "a yaw acceleration that follows the rudder")])
+            raise _wrong_sign(log, "a yaw acceleration that follows the rudder")
     return rudder
 
 
@@ -138,32 +136,26 @@ def _is_against(offset: ClockOffset | None) -> bool:
     return offset is not None and offset.gain < 0.0 and offset.certainty > CERTAIN
 
 
-def check_circle(log: Log) -> Iterator[LogFinding]:
-    """Find a rudder that stays on one side and turns the ship to the other, as in a circle."""
-    if _turns_away(log.channels["psi"], log.channels["delta"]):
-        yield _wrong_sign(log, "a ship that turns away from the rudder,")
-
-
-def _turns_away(psi: Floats, delta: Floats) -> bool:
+def check_circle(log: Log) -> None:
+    """Refuse a rudder that stays on one side and turns the ship to the other, as in a circle."""
+    if "psi" not in log.channels:
+        return
+    psi, delta = log.channels["psi"], log.channels["delta"]
     rudder = np.median(delta)
     side = np.sign(rudder)
     is_laid = abs(rudder) > 8.0 * DEGREE
     stays_there = np.quantile(side * delta, 0.1) > 0.0
     turned = side * (psi[-1] - psi[0])
-    turns_away = turned < -60.0 * DEGREE
-    return bool(is_laid and stays_there and turns_away)
+    if is_laid and stays_there and turned < -60.0 * DEGREE:
+        raise _wrong_sign(log, "a ship that turns away from the rudder,")
 
 
-def _wrong_sign(log: Log, found: str) -> LogFinding:
-    return LogFinding(
-        where=log.where,
-        evidence=(
-            f"expected a positive rudder to turn the bow to starboard, got {found} with"
-            " the opposite sign"
-        ),
-        remedy=(
-            'write rudder_positive = "port" in [conventions], or take it out if it'
-            " stands there"
-        ),
-        proposals=(Proposal("rudder_positive", "port"),),
+def _wrong_sign(log: Log, found: str) -> InputError:
+    return implausible(
+        log.where,
+        f"expected a positive rudder to turn the bow to starboard, got {found} with the"
+        " opposite sign",
+        'write rudder_positive = "port" in [conventions], or take it out if it stands'
+        " there",
+        Proposal("rudder_positive", "port"),
     )

@@ -24,76 +24,89 @@ def to_project_conventions(log: Log, conventions: Conventions) -> None:
     over ground or position, the heading (relative to the start) from the yaw rate where
     no position is recorded. Raises InputError where a channel is missing.
     """
-    channels = log.channels
     installation = conventions.installation
     is_earth = conventions.velocity_frame == "earth"
-    if "stw" in channels:
+    if log.has("stw"):
         log.over_ground = False
-    elif is_earth and "u" in channels:
+    elif is_earth and log.has("u"):
         log.over_ground = True
+
     if installation != AS_LOGGED:
         correct_offsets(log, installation)
-    if "psi" in channels and "r" not in channels:
-        log.derive("r", time_derivative(log.t, channels["psi"]))
-    elif "r" in channels and not {"psi", "x", "y"} & channels.keys():
-        log.derive("psi", _heading_from_start(log))
-
-    if is_earth and {"u", "v"} & channels.keys():
+    _derive_turning(log)
+    if is_earth and (log.has("u") or log.has("v")):
         _earth_to_body(log)
     if conventions.origin == "cg":
         _cg_to_midship(log, conventions.xg or 0.0)
-    is_complete = {"u", "v"} <= channels.keys()
-    has_gnss = "ground_north" in channels or not installation.is_at_midship
-    if has_gnss or "stw" in channels or not is_complete:
+    if not log.has("u", "v") or _needs_moving(log, installation):
         to_midship(log, installation)
+
+
+def _needs_moving(log: Log, installation: Installation) -> bool:
+    """Whether velocities are made of what GNSS and a speed log show."""
+    is_elsewhere = not installation.is_at_midship
+    return is_elsewhere or log.has("ground_north") or log.has("stw")
+
+
+def _derive_turning(log: Log) -> None:
+    """Derive the yaw rate from the heading, or, without positions, the heading from the yaw rate."""
+    if log.has("psi"):
+        if not log.has("r"):
+            log.derive("r", time_derivative(log.t, log.channels["psi"]))
+        return
+    if log.has("r") and not log.has("x") and not log.has("y"):
+        log.derive("psi", _heading_from_start(log))
 
 
 def _heading_from_start(log: Log) -> Floats:
     """Integral of the yaw rate by a spline, rad."""
     from scipy.interpolate import make_interp_spline
 
-    degree = min(3, log.t.size - 1)
-    rate = make_interp_spline(log.t, log.channels["r"], k=degree)
-    heading = rate.antiderivative()(log.t)
+    t = log.t
+    degree = min(3, t.size - 1)
+    rate = make_interp_spline(t, log.channels["r"], k=degree)
+    turned = rate.antiderivative()
+    heading = turned(t)
     from_start: Floats = heading - heading[0]
     return from_start
 
 
 def _earth_to_body(log: Log) -> None:
     """Turn north and east velocities by the recorded heading."""
-    channels = log.channels
     for name in ("u", "v", "psi"):
-        if name not in channels or name in log.derived:
+        is_recorded = log.has(name) and name not in log.derived
+        if not is_recorded:
             raise InputError(
                 f'{log.where}: velocity_frame = "earth": expected u (north), v (east)'
                 f" and the heading psi, got no recorded {name}; name their columns, or"
                 " leave u and v out"
             )
-    u, v, psi = (channels[name] for name in ("u", "v", "psi"))
-    channels["u"], channels["v"] = rotate_to_body(u, v, psi)
+    channels = log.channels
+    channels["u"], channels["v"] = rotate_to_body(
+        north=channels["u"],
+        east=channels["v"],
+        psi=channels["psi"],
+    )
 
 
 def _cg_to_midship(log: Log, xg: float) -> None:
     """Move position, sway and yaw moment from the centre of gravity, `xg` forward of midship, to midship."""
-    channels = log.channels
     needed = {"v": "r", "x": "psi", "y": "psi", "N": "Y"}
     for name, other in needed.items():
-        if name in channels and other not in channels:
+        if log.has(name) and not log.has(other):
             raise InputError(
                 f'{log.where}: origin = "cg": expected {other} to move {name} to'
                 " midship, got none; name its column"
             )
-    changes = {}
-    if "v" in channels:
-        changes["v"] = -channels["r"]
-    if "x" in channels:
-        changes["x"] = -np.cos(channels["psi"])
-    if "y" in channels:
-        changes["y"] = -np.sin(channels["psi"])
-    if "N" in channels:
-        changes["N"] = channels["Y"]
-    for name, change in changes.items():
-        channels[name] = channels[name] + xg * change
+    channels = log.channels
+    if log.has("v"):
+        channels["v"] = channels["v"] - xg * channels["r"]
+    if log.has("x"):
+        channels["x"] = channels["x"] - xg * np.cos(channels["psi"])
+    if log.has("y"):
+        channels["y"] = channels["y"] - xg * np.sin(channels["psi"])
+    if log.has("N"):
+        channels["N"] = channels["N"] + xg * channels["Y"]
 
 
 def to_midship(log: Log, installation: Installation) -> None:
@@ -103,35 +116,39 @@ def to_midship(log: Log, installation: Installation) -> None:
     the place of u, and the current that it shows is taken out of v. Raises InputError
     for GNSS without a heading.
     """
-    channels = log.channels
-    has_gnss = "ground_north" in channels or not installation.is_at_midship
-    if has_gnss and "psi" not in channels:
+    is_elsewhere = not installation.is_at_midship
+    if not log.has("psi") and (is_elsewhere or log.has("ground_north")):
         raise InputError(
             f"{log.where}: expected a column psi, the heading, with positions or"
             " velocities of GNSS, got none"
         )
-    if not installation.is_at_midship and {"x", "y"} <= channels.keys():
-        _move_positions(channels, installation)
+    if is_elsewhere and log.has("x", "y"):
+        _move_positions(log.channels, installation)
 
     velocity = _velocity(log, installation)
-    water = channels.pop("stw", None)
+    water = log.channels.pop("stw", None)
     if water is not None:
-        channels["u"] = water
+        log.channels["u"] = water
     if velocity is None:
         return
     u, v = velocity
     if water is not None:
-        u, v = water, _sway_through_water(log, water, u, v)
-    for name, values in (("u", u), ("v", v)):
-        if name not in channels:
-            log.derive(name, values)
+        # leeway is what is left of the sway without the current
+        v = _sway_through_water(log, water, u, v)
+    if not log.has("u"):
+        log.derive("u", u)
+    if not log.has("v"):
+        log.derive("v", v)
 
 
 def _move_positions(channels: dict[str, Floats], installation: Installation) -> None:
     """Move positions from the antenna to midship."""
-    forward, starboard = installation.forward, installation.starboard
     to_earth = -channels["psi"]
-    north, east = rotate_to_body(forward, starboard, to_earth)
+    north, east = rotate_to_body(
+        installation.forward,
+        installation.starboard,
+        to_earth,
+    )
     channels["x"] = channels["x"] - north
     channels["y"] = channels["y"] - east
 
@@ -142,29 +159,29 @@ def _velocity(log: Log, installation: Installation) -> tuple[Floats, Floats] | N
     None without a heading, and where both were logged.
     """
     channels = log.channels
-    north = channels.pop("ground_north", None)
-    east = channels.pop("ground_east", None)
-    if "psi" not in channels:
-        return None
-    psi = channels["psi"]
-    if north is not None and east is not None:
-        u, v = rotate_to_body(north, east, psi)
+    if log.has("ground_north"):
+        north = channels.pop("ground_north")
+        east = channels.pop("ground_east")
         r = channels["r"]
+        u, v = rotate_to_body(north, east, channels["psi"])
         return u + installation.starboard * r, v - installation.forward * r
-    are_logged = {"u", "v"} <= channels.keys()
-    if are_logged or not {"x", "y"} <= channels.keys():
+    if log.has("u", "v") or not log.has("x", "y", "psi"):
         return None
     north = time_derivative(log.t, channels["x"])
     east = time_derivative(log.t, channels["y"])
-    return rotate_to_body(north, east, psi)
+    return rotate_to_body(north, east, channels["psi"])
 
 
 def _sway_through_water(log: Log, water: Floats, u: Floats, v: Floats) -> Floats:
     """Sway over ground less the current that a speed log shows, which a note tells."""
     psi = log.channels["psi"]
-    current = set_and_drift(psi, water, (u, v))
+    current = set_and_drift(psi, water, u, v)
     log.notes.append(current.note)
-    _, across = rotate_to_body(current.north, current.east, psi)
+    _, across = rotate_to_body(
+        current.north,
+        current.east,
+        psi,
+    )
     return np.asarray(v - across)
 
 
@@ -179,25 +196,26 @@ class SetAndDrift(NamedTuple):
     def note(self) -> str:
         """The current in words."""
         speed = math.hypot(self.north, self.east)
-        toward = math.degrees(math.atan2(self.east, self.north)) % 360.0
+        knots = speed / KNOT
+        direction = math.atan2(self.east, self.north)
+        toward = math.degrees(direction) % 360.0
         return (
             f"set and drift by the speed log against the ground: {speed:.2f} m/s"
-            f" ({speed / KNOT:.2f} kn) toward {toward:03.0f} deg,"
-            f" {self.unexplained:.2f} m/s unexplained; removed from the sway"
+            f" ({knots:.2f} kn) toward {toward:03.0f} deg, {self.unexplained:.2f} m/s"
+            " unexplained; removed from the sway"
         )
 
 
 def set_and_drift(
-    psi: Floats, water: Floats, ground: tuple[Floats, Floats]
+    psi: Floats, water: Floats, surge: Floats, sway: Floats
 ) -> SetAndDrift:
     """Current that a speed through the water shows against surge and sway over ground, m/s.
 
     It explains best the difference of both along the ship; on nearly one course the
     part across is taken from the mean sway, as if there were no leeway.
     """
-    surge, sway = ground
-    c, s = np.cos(psi), np.sin(psi)
     # along the ship, and on one course across her too
+    c, s = np.cos(psi), np.sin(psi)
     rows = np.column_stack([c, s])
     values = surge - water
     if np.ptp(psi) < DISTINCT_COURSES:

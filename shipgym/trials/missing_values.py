@@ -35,17 +35,18 @@ def check_time(t: Floats, locator: Locator) -> None:
     nanosecond = 1e-9
     stands_still = np.diff(t) <= nanosecond
     if stands_still.any():
-        k = int(np.argmax(stands_still))
-        place = locator.place(k + 1, "t")
-        _refuse_time(t[k], t[k + 1], place, locator)
+        row = int(np.argmax(stands_still)) + 1
+        _refuse_time(t, row, locator)
 
 
-def _refuse_time(before: float, after: float, place: str, locator: Locator) -> None:
+def _refuse_time(t: Floats, row: int, locator: Locator) -> None:
+    before, after = t[row - 1], t[row]
     later = locator.in_file("t", after, digits=10)
     change = f"stands still at {later}"
     if after < before:
         earlier = locator.in_file("t", before, digits=10)
         change = f"goes back from {earlier} to {later}"
+    place = locator.place(row, "t")
     raise InputError(
         f"{place}: expected time to increase from row to row, got one that {change};"
         " sort the rows, remove the repeated ones, or split the file into one per run"
@@ -110,11 +111,13 @@ def _whole_rows(
     present = [np.isfinite(values) for values in channels.values()]
     is_whole = np.all(present, axis=0)
     rows = np.flatnonzero(is_whole)
-    if rows.size < max(FEWEST_SAMPLES, is_whole.size // 2):
+    n_rows, n_whole = is_whole.size, rows.size
+    fewest = max(FEWEST_SAMPLES, n_rows // 2)
+    if n_whole < fewest:
         raise InputError(
-            f"{locator.path}: expected at least half of the {is_whole.size} rows, and"
+            f"{locator.path}: expected at least half of the {n_rows} rows, and"
             f" {FEWEST_SAMPLES}, without missing values to interpolate from, got only"
-            f" {rows.size}; leave out the column that is mostly empty"
+            f" {n_whole}; leave out the column that is mostly empty"
         )
     return rows
 

@@ -5,6 +5,7 @@ after commas, and ``*`` with the checksum: the exclusive or of all characters be
 """
 
 import re
+from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
@@ -68,29 +69,27 @@ class NmeaQuantity:
     channel: str | None  # of a log
 
 
-def _units_in_si() -> dict[str, float]:
-    units: dict[str, float] = {}
-    for quantity in _QUANTITIES_IN_SI:
-        units |= UNITS[quantity]
-    return units
-
-
 def _with_letters(entry: Mapping[str, Any]) -> dict[str, Any]:
     """An entry of the table whose tables of letters are by place."""
-    return {
-        key: {int(at): frozenset(letters) for at, letters in value.items()}
-        if key in ("valid", "degraded", "letters", "only_if")
-        else value
-        for key, value in entry.items()
-    }
+    fields = dict(entry)
+    of_letters = {"valid", "degraded", "letters", "only_if"}
+    for key in of_letters & entry.keys():
+        by_place = {}
+        for at, letters in entry[key].items():
+            place = int(at)
+            by_place[place] = frozenset(letters)
+        fields[key] = by_place
+    return fields
 
 
 def _sentence_kind(entry: Mapping[str, Any]) -> SentenceKind:
-    fields = {
-        quantity: NumberField(**_with_letters(place))
-        for quantity, place in entry["fields"].items()
-    }
-    return SentenceKind(**{**_with_letters(entry), "fields": fields})
+    kind = _with_letters(entry)
+    numbers = {}
+    for quantity, place in entry["fields"].items():
+        place = _with_letters(place)
+        numbers[quantity] = NumberField(**place)
+    kind["fields"] = numbers
+    return SentenceKind(**kind)
 
 
 def _quantity(entry: Mapping[str, Any]) -> NmeaQuantity:
@@ -103,7 +102,7 @@ def _si(number: float, unit: str) -> float:
     return float(number * _TO_SI[unit])
 
 
-_TO_SI = _units_in_si()
+_TO_SI = dict(ChainMap(*(UNITS[quantity] for quantity in _QUANTITIES_IN_SI)))
 _TABLE = shipped_toml("shipgym.trials", "nmea.toml")
 
 #: What each kind of sentence says, by its three letters.
@@ -131,16 +130,17 @@ def parse_sentence(line: str) -> Sentence:
     match = _SENTENCE.fullmatch(line)
     if match is None:
         raise ValueError(f"expected a sentence with a checksum, got {line!r}")
-    expected, found = checksum(match["text"]), match["checksum"]
+    expected = checksum(match["text"])
+    found = match["checksum"]
     if expected != found.upper():
         raise ValueError(f"expected the checksum {expected}, got {found}")
 
-    address, fields = match["address"], match["fields"]
+    address = match["address"]
     letters = 1 if address.startswith("P") else 2
     return Sentence(
         talker=address[:letters],
         kind=address[letters:],
-        fields=fields.split(","),
+        fields=match["fields"].split(","),
     )
 
 
@@ -158,7 +158,8 @@ def steering_numbers(sentence: Sentence) -> dict[str, float]:
     for quantity, place in kind.fields.items():
         needed = {**kind.valid, **place.letters, **place.only_if}
         value = _number(place, sentence.fields, needed)
-        if value is not None and abs(value) <= NMEA_QUANTITIES[quantity].largest:
+        largest = NMEA_QUANTITIES[quantity].largest
+        if value is not None and abs(value) <= largest:
             numbers[quantity] = value
     return numbers
 
@@ -172,21 +173,24 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
     """
     kind = NMEA_SENTENCES[sentence.kind]
     fields = sentence.fields + [""] * 20  # those at the end may be missing
-    valid = {
-        at: letters | kind.degraded.get(at, frozenset())
-        for at, letters in kind.valid.items()
-    }
+    valid = dict(kind.valid)
+    for at, letters in kind.degraded.items():
+        valid[at] |= letters
+
     numbers = {}
     for quantity, place in kind.fields.items():
-        present = {at: one for at, one in place.letters.items() if fields[at]}
-        needed = {**valid, **present, **place.only_if}
+        needed = {**valid, **place.only_if}
+        for at, letters in place.letters.items():
+            if fields[at]:
+                needed[at] = letters
         if place.side is not None:
             needed[place.side] = frozenset(_SIGNS)
         value = _number(place, fields, needed)
-        if value is not None and not isfinite(value):
+        if value is None:
+            continue
+        if not isfinite(value):
             raise ValueError(f"expected a finite number, got {value}")
-        if value is not None:
-            numbers[quantity] = value
+        numbers[quantity] = value
     return numbers
 
 
@@ -204,7 +208,8 @@ def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float
     value = float(text)
     unit = place.unit
     if place.unit_at is not None:
-        unit = _SPEED_UNITS[fields[place.unit_at]]
+        letter = fields[place.unit_at]
+        unit = _SPEED_UNITS[letter]
     if unit == "ddmm.mm":  # 5430.5 is 54 degrees and 30.5 minutes
         degrees, minutes = divmod(value, 100.0)
         value, unit = degrees + minutes / 60.0, "deg"
@@ -212,4 +217,5 @@ def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float
 
     if place.side is None:
         return value
-    return copysign(value, _SIGNS[fields[place.side]])
+    side = fields[place.side]
+    return copysign(value, _SIGNS[side])

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from shipgym.trials.clock_texts import read_clock, zone_seconds
 from shipgym.trials.columns import Column, Locator, choose_columns
 from shipgym.trials.missing_values import check_time, fill_missing
 from shipgym.trials.navigation import local_metres
-from shipgym.trials.plausibility.finding import settle
 from shipgym.trials.plausibility.headings import check_heading
 from shipgym.trials.plausibility.positions import (
     check_outliers,
@@ -55,11 +54,6 @@ class Recording:
     filled: Mapping[str, int]
     start: float | None
 
-    @property
-    def has_positions(self) -> bool:
-        """Whether x and y are positions of GNSS."""
-        return "lat" in self.locator.columns
-
 
 class _Times(NamedTuple):
     """Times of the rows of a table."""
@@ -79,7 +73,7 @@ class _Track(NamedTuple):
 
 def read_recording(
     table: LogTable,
-    columns: Mapping[str, Any] | None,
+    columns: Mapping[str, Column] | None,
     repair: str | None,
     *,
     part: bool = False,
@@ -90,7 +84,8 @@ def read_recording(
     wrong with a file is an InputError that names line, column, value and remedy.
     """
     chosen = choose_columns(table, columns, part=part)
-    _check_pairs(table, chosen)
+    if _PAIRS.keys() & chosen.keys():
+        _check_pairs(table, chosen)
     times = _read_times(table, chosen["t"])
     chosen["t"] = replace(chosen["t"], unit=times.unit)
     locator = Locator(table, chosen, np.arange(times.t.size))
@@ -111,32 +106,9 @@ def read_recording(
     return Recording(signals, locator, filled, times.start)
 
 
-def _signals(
-    t: Floats, channels: dict[str, Floats], locator: Locator, repair: str | None
-) -> tuple[Signals, Locator, dict[str, int]]:
-    """Channels on the clock of the rows, what is missing filled and counted, or each on a clock of its own."""
-    filled: dict[str, int] = {}
-    present = [np.isfinite(values) for values in (t, *channels.values())]
-    is_whole = np.all(present)
-    has_own_clocks = not is_whole and have_own_clocks(t, channels)
-    if is_whole:
-        check_time(t, locator)
-    elif not has_own_clocks:
-        t, channels, locator, filled = fill_missing(t, channels, locator, repair)
-
-    settle(check_ranges({"t": t, **channels}, locator))
-    make_signal = _own_signal if has_own_clocks else _signal
-    signals = {
-        channel: make_signal(channel, t, values, locator)
-        for channel, values in channels.items()
-    }
-    return signals, locator, filled
-
-
 def _check_pairs(table: LogTable, chosen: Mapping[str, Column]) -> None:
-    for name in chosen:
-        other = _PAIRS.get(name, name)
-        if other not in chosen:
+    for name, other in _PAIRS.items():
+        if name in chosen and other not in chosen:
             raise InputError(
                 f"{table.path}: columns: expected {name} and {other}, got {name} alone;"
                 " name the column of the other"
@@ -149,8 +121,44 @@ def _read_numbers(locator: Locator) -> dict[str, Floats]:
     for channel, column in locator.columns.items():
         if channel not in ("t", "lat", "lon"):
             numbers = locator.table.numbers(column.name)
-            channels[channel] = si_factor(channel, column.unit) * numbers
+            factor = si_factor(channel, column.unit)
+            channels[channel] = factor * numbers
     return channels
+
+
+def _signals(
+    t: Floats, channels: dict[str, Floats], locator: Locator, repair: str | None
+) -> tuple[Signals, Locator, dict[str, int]]:
+    """Channels on the clock of the rows, what is missing filled and counted, or each on a clock of its own."""
+    filled: dict[str, int] = {}
+    table = {"t": t, **channels}
+    is_whole = all(np.isfinite(values).all() for values in table.values())
+    if not is_whole and have_own_clocks(t, channels):
+        check_ranges(table, locator)
+        own = {}
+        for channel, values in channels.items():
+            own[channel] = _own_signal(channel, t, values, locator)
+        return own, locator, filled
+
+    if is_whole:
+        check_time(t, locator)
+    else:
+        t, channels, locator, filled = fill_missing(t, channels, locator, repair)
+    check_ranges({"t": t, **channels}, locator)
+    signals = {}
+    for channel, values in channels.items():
+        signals[channel] = Signal(t, _continuous(channel, t, values, locator))
+    return signals, locator, filled
+
+
+def _continuous(channel: str, t: Floats, values: Floats, locator: Locator) -> Floats:
+    """Values of a channel, headings and directions of the wind without jumps."""
+    if channel not in ("psi", "wind_from"):
+        return values
+    unwrapped = np.unwrap(values)
+    if channel == "psi":
+        check_heading(t, unwrapped, values, locator)
+    return unwrapped
 
 
 def _read_times(table: LogTable, column: Column) -> _Times:
@@ -161,7 +169,7 @@ def _read_times(table: LogTable, column: Column) -> _Times:
         pairs = zip(dates, cells, strict=True)
         cells = [f"{date} {time}".strip() for date, time in pairs]
 
-    first = next((cell for cell in cells if cell), "0")
+    first = next(filter(None, cells), "0")
     if is_number(first.replace(",", ".")):
         numbers = table.numbers(column.name)
         clock = si_factor("t", column.unit) * numbers
@@ -211,33 +219,23 @@ def _local_track(locator: Locator, t: Floats, repair: str | None) -> _Track:
     """Positions by north and east of the first one; outliers are refused unless they are to be filled."""
     lat = _read_position(locator, "lat")
     lon = _read_position(locator, "lon")
-    settle(check_ranges({"lat": lat, "lon": lon}, locator))
+    check_ranges({"lat": lat, "lon": lon}, locator)
+    north, east = np.full_like(t, np.nan), np.full_like(t, np.nan)
     is_known = np.isfinite(lat) & np.isfinite(lon) & np.isfinite(t)
     rows = np.flatnonzero(is_known)
-    north, east = np.full((2, t.size), np.nan)
     if not rows.size:
-        return _Track(north, east, 0)
+        return _Track(north, east, outliers=0)
 
-    origin = lat[rows[0]], lon[rows[0]]
-    x, y = local_metres(lat[rows], lon[rows], origin)
     here = replace(locator, rows=rows)
-    settle(check_track(t[rows], x, y, here))
-    is_far = find_outliers(t[rows], x, y)
+    lat, lon, clock = lat[rows], lon[rows], t[rows]
+    x, y = local_metres(lat, lon, origin=(lat[0], lon[0]))
+    check_track(clock, x, y, here)
+    is_far = find_outliers(clock, x, y)
     if repair is None:
-        settle(check_outliers(lat[rows], lon[rows], is_far, here))
-    north[rows] = np.where(is_far, np.nan, x)
-    east[rows] = np.where(is_far, np.nan, y)
-    return _Track(north, east, int(is_far.sum()))
-
-
-def _signal(channel: str, t: Floats, values: Floats, locator: Locator) -> Signal:
-    """A channel on the clock of the rows, headings and directions of the wind without jumps."""
-    if channel not in ("psi", "wind_from"):
-        return Signal(t, values)
-    unwrapped = np.unwrap(values)
-    if channel == "psi":
-        settle(check_heading(t, unwrapped, values, locator))
-    return Signal(t, unwrapped)
+        check_outliers(lat, lon, is_far, here)
+    north[rows[~is_far]] = x[~is_far]
+    east[rows[~is_far]] = y[~is_far]
+    return _Track(north, east, outliers=int(is_far.sum()))
 
 
 def _own_signal(channel: str, t: Floats, values: Floats, locator: Locator) -> Signal:
@@ -260,7 +258,7 @@ def _own_signal(channel: str, t: Floats, values: Floats, locator: Locator) -> Si
             f" '{column}', got {before:.10g} and then {after:.10g} s; sort the rows, or,"
             " where two ships or receivers are in the file, keep those of one"
         )
-    return _signal(channel, clock, values[rows], here)
+    return Signal(clock, _continuous(channel, clock, values[rows], here))
 
 
 def _make_velocity(signals: Signals, locator: Locator) -> None:

@@ -57,6 +57,10 @@ class Log:
     over_ground: bool | None = None
     start: float | None = None
 
+    def has(self, *channels: str) -> bool:
+        """Whether the log has all of these channels."""
+        return all(channel in self.channels for channel in channels)
+
     def derive(self, channel: str, values: Floats) -> None:
         """Add a channel that follows from others."""
         self.channels[channel] = values
@@ -76,7 +80,8 @@ def have_own_clocks(t: Floats, channels: Mapping[str, Floats]) -> bool:
     """
     present = [np.isfinite(values) for values in channels.values()]
     has_value = np.any(present, axis=0)
-    if not (np.isfinite(t) & has_value).all():
+    has_time = np.isfinite(t)
+    if not np.all(has_time & has_value):
         return False
     for is_present in present:
         rows = np.flatnonzero(is_present)
@@ -103,39 +108,47 @@ def on_one_clock(signals: Mapping[str, Signal], where: str) -> Log:
         return _resampled(signals, where)
     channels = {}
     for name, signal in signals.items():
-        t, channels[name] = signal
-    return Log(t, channels, where, [])
+        channels[name] = signal.values
+        t = signal.t
+    return Log(t, channels, where, notes=[])
 
 
 def _resampled(signals: Mapping[str, Signal], where: str) -> Log:
-    # the slowest of these, so that nothing of the motion is invented between samples
-    motion = {"x", "ground_north", "u", "psi", "r", "delta"}
-    names = [name for name in signals if name in motion] or list(signals)
-    clocks = {name: signals[name].t for name in names}
-    steps = {name: usual_step(clock) for name, clock in clocks.items()}
-    slowest = max(steps, key=steps.__getitem__)
-    t = clocks[slowest]
-    longest_step = 6.0 * steps[slowest]  # a longer one is a hole
+    clocks = _motion_clocks(signals)
+    t = max(clocks.values(), key=usual_step)
+    longest_step = 6.0 * usual_step(t)  # a longer one is a hole
 
     is_known = np.ones(t.size, dtype=bool)
     notes = []
     for name, clock in clocks.items():
-        is_hole = np.diff(clock) > longest_step
+        steps = np.diff(clock)
+        is_hole = steps > longest_step
         is_known &= _inside(t, clock, is_hole)
         if is_hole.any():
             notes.append(
-                f"{name} has {is_hole.sum()} holes, of up to"
-                f" {np.diff(clock).max():.4g} s; nothing is put there"
+                f"{name} has {is_hole.sum()} holes, of up to {steps.max():.4g} s;"
+                " nothing is put there"
             )
 
     t = t[is_known]
     if t.size < FEWEST_SAMPLES:
+        names = ", ".join(clocks)
         raise InputError(
             f"{where}: expected channels of one time, got {t.size} moments that"
-            f" {', '.join(clocks)} have in common; check their clocks"
+            f" {names} have in common; check their clocks"
         )
-    channels = {name: np.interp(t, *signal) for name, signal in signals.items()}
+    channels = {}
+    for name, signal in signals.items():
+        channels[name] = np.interp(t, signal.t, signal.values)
     return Log(t, channels, where, notes)
+
+
+def _motion_clocks(signals: Mapping[str, Signal]) -> dict[str, Floats]:
+    """Clocks of the channels of the motion, so that nothing of it is invented between samples; else all."""
+    motion = {"x", "ground_north", "u", "psi", "r", "delta"}
+    clocks = {name: signal.t for name, signal in signals.items()}
+    of_motion = {name: clock for name, clock in clocks.items() if name in motion}
+    return of_motion or clocks
 
 
 def _inside(t: Floats, clock: Floats, is_hole: Flags) -> Flags:
@@ -143,8 +156,10 @@ def _inside(t: Floats, clock: Floats, is_hole: Flags) -> Flags:
     after = np.searchsorted(clock, t)
     after = np.clip(after, 1, clock.size - 1)
     before = after - 1
-    is_between = (t > clock[before]) & (t < clock[after])
+    begin, end = clock[before], clock[after]
+    is_between = (t > begin) & (t < end)
     in_hole = is_between & is_hole[before]
-    in_span = (t >= clock[0]) & (t <= clock[-1])
+    first, last = clock[0], clock[-1]
+    in_span = (t >= first) & (t <= last)
     inside: Flags = in_span & ~in_hole
     return inside

@@ -51,8 +51,9 @@ class Sensor:
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            value = getattr(self, item.name)
-            check_number(value, f"sensor {item.name}", at_least=0.0)
+            name = item.name
+            value = getattr(self, name)
+            check_number(value, f"sensor {name}", at_least=0.0)
         check_number(self.drift_time_s, "sensor drift_time_s", above=0.0)
         probability = self.outlier_probability
         check_number(probability, "sensor outlier_probability", at_most=1.0)
@@ -146,8 +147,12 @@ class Sensors:
                 )
         if self.sampling_s is not None:
             check_number(self.sampling_s, "sensors sampling_s", above=0.0)
-        where = "sensors dropout_probability"
-        check_number(self.dropout_probability, where, at_least=0.0, below=1.0)
+        check_number(
+            self.dropout_probability,
+            "sensors dropout_probability",
+            at_least=0.0,
+            below=1.0,
+        )
         check_number(self.dropout_samples, "sensors dropout_samples", at_least=1.0)
         object.__setattr__(self, "by_channel", MappingProxyType(dict(self.by_channel)))
 
@@ -169,10 +174,15 @@ class Sensors:
                 f" outside the gaps, got {logged.sum()} of {t.size}; give a smaller"
                 " dropout_probability"
             )
-        readings = {
-            name: self._read(name, t, trial.t, values, seed)[logged]
-            for name, values in _measurable(trial).items()
-        }
+        readings = {}
+        for name, values in _measurable(trial).items():
+            if name in ("delta_command", "n_command"):
+                reading = orders_at(t, trial.t, values)
+            else:
+                sensor = self.by_channel.get(name, Sensor())
+                rng = _random(seed, name)
+                reading = sensor.read(t, trial.t, values, rng)
+            readings[name] = reading[logged]
         return Trial(
             t[logged],
             readings,
@@ -184,26 +194,20 @@ class Sensors:
             over_ground=trial.over_ground,
         )
 
-    def _read(
-        self, channel: str, times: Floats, t: Floats, signal: Floats, seed: int
-    ) -> Floats:
-        if channel in ("delta_command", "n_command"):
-            return orders_at(times, t, signal)
-        sensor = self.by_channel.get(channel, Sensor())
-        return sensor.read(times, t, signal, _random(seed, channel))
-
     def _logged_times(self, trial: Trial) -> Floats:
         """Times at which the logger asks the sensors, s."""
         if self.sampling_s is None:
             return trial.t.copy()
-        steps = trial.duration / self.sampling_s * (1.0 + 1e-12)
-        count = int(np.floor(steps)) + 1
+        rounding = 1.0 + 1e-12
+        steps = rounding * trial.duration / self.sampling_s
+        count = int(steps) + 1
         if count < FEWEST_SAMPLES:
             raise InputError(
                 f"sensors sampling_s: expected at most half of the {trial.duration:g} s"
                 f" of trial {trial.name!r}, got {self.sampling_s:g} s"
             )
-        times: Floats = trial.t[0] + self.sampling_s * np.arange(count)
+        since_start = self.sampling_s * np.arange(count)
+        times: Floats = trial.t[0] + since_start
         return times
 
     def _outside_gaps(self, count: int, seed: int) -> Flags:
@@ -227,9 +231,12 @@ def _measurable(trial: Trial) -> dict[str, Floats]:
     """Channels that there are to measure: first-order motion in waves added, the weather left out."""
     measurable = {}
     for name, values in trial.channels.items():
-        if name not in SEA_CHANNELS:  # known of a simulation, to no instrument
-            wave = trial.channels.get(f"{name}_wave")
-            measurable[name] = values if wave is None else values + wave
+        if name in SEA_CHANNELS:  # known of a simulation, to no instrument
+            continue
+        in_waves = f"{name}_wave"
+        if in_waves in trial:
+            values = values + trial[in_waves]
+        measurable[name] = values
     return measurable
 
 

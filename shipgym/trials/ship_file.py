@@ -14,8 +14,9 @@ from shipgym.ships.structures import own_structure
 from shipgym.ships.term_table import Structure
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.scale import check_scale
-from shipgym.trials.trial import USES, Trial, read_trials
+from shipgym.trials.trial import USES, Trial, cut_trials, trial_of
 from shipgym.trials.trial_entries import TrialEntry, read_entries
+from shipgym.trials.trial_import import import_tables
 
 _SECTIONS = (
     "ship",
@@ -96,12 +97,12 @@ class ShipFile:
 
         In the order of the file. Raises InputError for anything wrong with a log.
         """
-        uses: tuple[str, ...] = ("fit", "validate")
         if use is not None:
-            uses = (check_choice(use, USES, f"{self.path}: trials(use)"),)
+            check_choice(use, USES, f"{self.path}: trials(use)")
         trials = []
         for entry in self.entries:
-            if entry.use in uses:
+            is_wanted = entry.use != "skip" if use is None else entry.use == use
+            if is_wanted:
                 trials += self._read(entry)
         return trials
 
@@ -109,20 +110,23 @@ class ShipFile:
         """Read one trial by its ``file`` (of a log that is cut, the first), whatever its use."""
         files = [entry.file for entry in self.entries]
         check_choice(file, files, f"{self.path}: trial")
-        return self._read(self.entries[files.index(file)])[0]
+        entry = self.entries[files.index(file)]
+        return self._read(entry)[0]
 
     def _read(self, entry: TrialEntry) -> list[Trial]:
+        """Trials of a log: one, or those that it is cut into."""
+        facts: dict[str, Any] = {
+            "kind": entry.kind,
+            "use": entry.use,
+            "length": self.particulars.length,
+        }
         with placed(entry.where):
-            trials = read_trials(
-                [read_log(path) for path in entry.paths],
-                entry.columns,
-                entry.conventions,
-                entry.cut,
-                name=entry.file,
-                kind=entry.kind,
-                use=entry.use,
-                length=self.particulars.length,
-            )
+            tables = [read_log(path) for path in entry.paths]
+            log = import_tables(tables, entry.columns, entry.conventions)
+            if entry.cut is None:
+                trials = [trial_of(log, entry.file, **facts)]
+            else:
+                trials = cut_trials(entry.cut, log, entry.file, entry.where, **facts)
         for trial in trials:
             check_scale(trial, self.particulars, f"{entry.where}: {entry.paths[0]}")
         return trials

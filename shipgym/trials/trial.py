@@ -24,13 +24,14 @@ from shipgym.checks import (
 )
 from shipgym.errors import InputError
 from shipgym.files import write_text
+from shipgym.trials.columns import parse_columns
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.cuts import cut_log
 from shipgym.trials.installation import Installation
 from shipgym.trials.readers.frames import read_frame
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
-from shipgym.trials.resampling import FEWEST_SAMPLES
+from shipgym.trials.resampling import FEWEST_SAMPLES, Log
 from shipgym.trials.trial_import import import_tables
 from shipgym.trials.units import CHANNELS, check_channel
 
@@ -175,8 +176,10 @@ class Trial:
         """Hash of time and channels, independent of the file's formatting and of name, kind and use."""
         digest = hashlib.sha256()
         for channel in ("t", *sorted(self.channels)):
-            digest.update(channel.encode() + b"\0")
-            digest.update(self[channel].astype("<f8").tobytes())
+            values = self[channel].astype("<f8")
+            digest.update(channel.encode())
+            digest.update(b"\0")
+            digest.update(values.tobytes())
         return digest.hexdigest()
 
     def __len__(self) -> int:
@@ -197,36 +200,46 @@ class Trial:
 
     def _no_channel(self, channel: str) -> InputError:
         hint = did_you_mean(str(channel), self.channels)
+        present = quoted(self.channels)
         return InputError(
             f"trial '{self.name}': no channel '{channel}'.{hint} Channels present:"
-            f" {quoted(self.channels)}"
+            f" {present}"
         )
 
     def __repr__(self) -> str:
+        channels = list(self.channels)
+        count = len(self)
         return (
             f"Trial(name={self.name!r}, kind={self.kind!r}, use={self.use!r},"
-            f" samples={len(self)}, duration={self.duration:g} s,"
-            f" channels={list(self.channels)})"
+            f" samples={count}, duration={self.duration:g} s, channels={channels})"
         )
 
     def _settings(self) -> dict[str, Any]:
         """The keyword arguments that make this trial of its channels."""
-        names = ("name", "kind", "use", "derived", "length", "over_ground", "notes")
-        settings = {name: getattr(self, name) for name in names}
-        settings["repaired"] = dict(self.repaired)
-        settings["raw"] = vars(self)["_raw"]
-        return settings
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "use": self.use,
+            "derived": self.derived,
+            "length": self.length,
+            "repaired": dict(self.repaired),
+            "raw": vars(self)["_raw"],
+            "over_ground": self.over_ground,
+            "notes": self.notes,
+        }
 
     def with_(self, **changes: Any) -> Trial:
         """Return a copy with another ``name``, ``kind``, ``use``, ``length`` or ``over_ground``."""
         known = ("name", "kind", "use", "length", "over_ground")
         unknown = sorted(changes.keys() - set(known))
         if unknown:
+            names = ", ".join(known)
             raise InputError(
-                f"trial '{self.name}': cannot change {quoted(unknown)}, only"
-                f" {', '.join(known)}"
+                f"trial '{self.name}': cannot change {quoted(unknown)}, only {names}"
             )
-        return Trial(self.t, self.channels, **(self._settings() | changes))
+        settings = self._settings()
+        settings |= changes
+        return Trial(self.t, self.channels, **settings)
 
     def with_channels(
         self,
@@ -240,18 +253,21 @@ class Trial:
         With other times `t`, s, all channels are given. `repaired` counts filled values
         by channel, on top of those filled before. Raises InputError as for a new trial.
         """
-        counts = Counter(self.repaired) + Counter(repaired or {})
-        settings = self._settings() | {"repaired": counts, "raw": self}
+        settings = self._settings()
+        settings["repaired"] = Counter(self.repaired) + Counter(repaired or {})
+        settings["raw"] = self
         times = self.t if t is None else t
-        return Trial(times, {**self.channels, **channels}, **settings)
+        changed = {**self.channels, **channels}
+        return Trial(times, changed, **settings)
 
     def part(self, rows: slice, name: str | None = None) -> Trial:
         """Trial of some of the samples, which are no manoeuvre any more, by the same name or another."""
         channels = {}
         for channel, values in self.channels.items():
             channels[channel] = values[rows]
-        own_name = self.name if name is None else name
-        return Trial(self.t[rows], channels, name=own_name)
+        if name is None:
+            name = self.name
+        return Trial(self.t[rows], channels, name=name)
 
     @classmethod
     def from_csv(
@@ -306,14 +322,21 @@ class Trial:
         """
         table = read_log(path)
         where = f"{table.path}:"
-        installation = Installation.from_mapping(sensors or {}, f"{where} sensors")
+        chosen = None
+        if columns is not None:
+            chosen = parse_columns(columns, f"{where} columns")
         conventions = Conventions(
-            rudder_positive, velocity_frame, origin, xg, repair, where, installation
+            rudder_positive=rudder_positive,
+            velocity_frame=velocity_frame,
+            origin=origin,
+            xg=xg,
+            repair=repair,
+            where=where,
+            installation=Installation.from_mapping(sensors or {}, f"{where} sensors"),
         )
-        facts = {"kind": kind, "use": use, "length": length}
+        log = import_tables([table], chosen, conventions)
         own_name = table.path.name if name is None else name
-        (trial,) = read_trials([table], columns, conventions, name=own_name, **facts)
-        return trial
+        return trial_of(log, own_name, kind=kind, use=use, length=length)
 
     @classmethod
     def from_frame(
@@ -340,44 +363,36 @@ class Trial:
         lines = [",".join(names)]
         for row in zip(*columns, strict=True):
             cells = map(repr, row)
-            lines.append(",".join(cells))
-        text = "\n".join(lines)
-        write_text(f"{text}\n", Path(path))
+            line = ",".join(cells)
+            lines.append(line)
+        lines.append("")
+        write_text("\n".join(lines), Path(path))
 
 
-def read_trials(
-    tables: Sequence[LogTable],
-    columns: Mapping[str, Any] | None,
-    conventions: Conventions,
-    cut: Any = None,
-    *,
-    name: str,
-    **facts: Any,
-) -> list[Trial]:
-    """Read the trials in the tables of one log: one, or those that `cut` makes of it (:func:`.cut_log`).
+def trial_of(log: Log, name: str, samples: slice = slice(None), **facts: Any) -> Trial:
+    """Make the trial in some of the samples of a log; `facts` are its kind, use and length."""
+    channels = {}
+    for channel, values in log.channels.items():
+        channels[channel] = values[samples]
+    return Trial(
+        log.t[samples],
+        channels,
+        name=name,
+        derived=log.derived,
+        repaired=log.repaired,
+        over_ground=log.over_ground,
+        notes=log.notes,
+        **facts,
+    )
 
-    `name`, `kind`, `use` and `length` are as in :class:`Trial`; a part is named by its
-    seconds.
-    """
-    log = import_tables(tables, columns, conventions)
+
+def cut_trials(cut: Any, log: Log, name: str, where: str, **facts: Any) -> list[Trial]:
+    """Make the trials into which a log is cut (:func:`.cut_log`), each named by its seconds."""
     trials = []
-    for part in cut_log(cut, log, conventions.where):
-        t = log.t[part]
-        part_name = name
-        if cut is not None:
-            first, last = t[0], t[-1]
-            part_name = f"{name} {first:.0f}-{last:.0f} s"
-        trial = Trial(
-            t,
-            {channel: values[part] for channel, values in log.channels.items()},
-            name=part_name,
-            derived=log.derived,
-            repaired=log.repaired,
-            over_ground=log.over_ground,
-            notes=log.notes,
-            **facts,
-        )
-        trials.append(trial)
+    for samples in cut_log(cut, log, where):
+        trial = trial_of(log, name, samples, **facts)
+        first, last = trial.t[0], trial.t[-1]
+        trials.append(trial.with_(name=f"{name} {first:.0f}-{last:.0f} s"))
     return trials
 
 
@@ -392,11 +407,12 @@ def _frozen_channels(
     arrays = {}
     for channel, values in channels.items():
         check_channel(channel, where, time=False)
-        arrays[channel] = _frozen_array(values, f"{where}: {channel}")
-        if arrays[channel].shape != shape:
+        array = _frozen_array(values, f"{where}: {channel}")
+        arrays[channel] = array
+        if array.shape != shape:
             raise InputError(
                 f"{where}: {channel}: expected {shape[0]} samples as in t, got"
-                f" {arrays[channel].size}"
+                f" {array.size}"
             )
     return arrays
 
@@ -419,8 +435,9 @@ def _check_time(t: Floats, where: str) -> None:
         )
     stands_still = np.diff(t) <= 0.0
     if stands_still.any():
-        k = int(np.argmax(stands_still))
+        sample = int(np.argmax(stands_still)) + 1
+        before, time = t[sample - 1], t[sample]
         raise InputError(
-            f"{where}: sample {k + 1}: expected strictly increasing time, got"
-            f" {t[k + 1]:g} after {t[k]:g} s"
+            f"{where}: sample {sample}: expected strictly increasing time, got {time:g}"
+            f" after {before:g} s"
         )

@@ -6,16 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shipgym.checks import (
-    check_choice,
-    check_table,
-    check_text,
-    placed,
-)
+from shipgym.checks import check_choice, check_table, check_text, placed
 from shipgym.errors import InputError
 from shipgym.files import check_readable
 from shipgym.ships.particulars import Particulars
-from shipgym.trials.columns import parse_columns
+from shipgym.trials.columns import Column, parse_columns
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.cuts import check_cut
 from shipgym.trials.installation import AS_LOGGED, Installation
@@ -35,14 +30,14 @@ class TrialEntry:
         As written, of several joined by " + "; the trial's name.
     paths : tuple of Path
         Of the file, or of the files that were logged at the same time.
-    cut : "rudder", list or None
-        Stretches that are trials each; None: the whole log.
-    kind : str or None
-        The manoeuvre.
     use : str
         What the trial is for.
+    kind : str or None
+        The manoeuvre.
+    cut : "rudder", list or None
+        Stretches that are trials each; None: the whole log.
     columns : mapping or None
-        By channel as written; None: those named like channels.
+        By channel; None: those named like channels.
     conventions : Conventions
         Signs, frame and origin.
     where : str
@@ -51,28 +46,23 @@ class TrialEntry:
 
     file: str
     paths: tuple[Path, ...]
-    cut: Any
-    kind: str | None
     use: str
-    columns: Mapping[str, Any] | None
+    kind: str | None
+    cut: Any
+    columns: Mapping[str, Column] | None
     conventions: Conventions
     where: str
-
-    @property
-    def log_part(self) -> tuple[str, ...]:
-        """What no two entries share: the files and how they are cut."""
-        return (*map(os.path.normpath, self.paths), str(self.cut))
 
 
 @dataclass(frozen=True)
 class _Shared:
     """What a ship file has for all of its trials."""
 
-    path: Path
     ship: Particulars
-    columns: Mapping[str, Any]
-    conventions: Mapping[str, Any]
+    columns: Mapping[str, Column]
+    words: Mapping[str, Any]
     sensors: Mapping[str, Any]
+    conventions: Conventions
 
 
 def read_entries(
@@ -95,58 +85,56 @@ def read_entries(
             " none"
         )
     shared = _read_shared(path, data, ship)
-    entries = [
-        _read_entry(table, f"{path}: [[trials]] {number}", shared)
-        for number, table in enumerate(tables, start=1)
-    ]
+    entries = []
+    for number, table in enumerate(tables, start=1):
+        where = f"{path}: [[trials]] {number}"
+        entries.append(_read_entry(table, path.parent, where, shared))
     _check_entries(path, entries)
     return tuple(entries)
 
 
 def _read_shared(path: Path, data: Mapping[str, Any], ship: Particulars) -> _Shared:
-    columns = check_table(data.get("columns", {}), f"{path}: [columns]")
-    parse_columns(columns, f"{path}: [columns]")
+    columns = parse_columns(data.get("columns", {}), f"{path}: [columns]")
     where = f"{path}: [conventions]"
-    conventions = data.get("conventions", {})
-    check_table(conventions, where, _CONVENTIONS)
-    Conventions(**conventions, xg=ship.xg, where=where)
+    words = check_table(data.get("conventions", {}), where, _CONVENTIONS)
     sensors = check_table(data.get("sensors", {}), f"{path}: [sensors]")
+    installation = AS_LOGGED
     if sensors:
-        Installation.from_mapping(sensors, f"{path}: [sensors]", ship)
-    return _Shared(
-        path=path,
-        ship=ship,
-        columns=columns,
-        conventions=conventions,
-        sensors=sensors,
+        installation = Installation.from_mapping(sensors, f"{path}: [sensors]", ship)
+    conventions = Conventions(
+        **words, xg=ship.xg, where=where, installation=installation
     )
+    return _Shared(ship, columns, words, sensors, conventions)
 
 
-def _read_entry(table: Any, where: str, shared: _Shared) -> TrialEntry:
+def _read_entry(table: Any, folder: Path, where: str, shared: _Shared) -> TrialEntry:
     check_table(table, where, _KEYS)
     files = _files(table, where)
-    paths = tuple(shared.path.parent / file for file in files)
+    paths = tuple(folder / file for file in files)
     use = check_choice(table.get("use", "fit"), USES, f"{where} use")
     if use != "skip":
         with placed(f"{where} file"):
             for path in paths:
                 check_readable(path, "CSV file")
 
-    kind = table.get("kind")
-    if kind is not None:
-        check_choice(kind, KINDS, f"{where} kind")
-    cut = table.get("cut")
-    check_cut(cut, where)
-    columns = check_table(table.get("columns", {}), f"{where} columns")
-    parse_columns(columns, f"{where} columns")
+    if "kind" in table:
+        check_choice(table["kind"], KINDS, f"{where} kind")
+    if "cut" in table:
+        check_cut(table["cut"], where)
+    columns = shared.columns
+    if "columns" in table:
+        columns = {**columns, **parse_columns(table["columns"], f"{where} columns")}
+    conventions = shared.conventions
+    if not table.keys().isdisjoint((*_CONVENTIONS, "sensors")):
+        conventions = _own_conventions(table, where, shared)
     return TrialEntry(
         file=" + ".join(files),
         paths=paths,
-        cut=cut,
-        kind=kind,
         use=use,
-        columns={**shared.columns, **columns} or None,
-        conventions=_conventions(table, where, shared),
+        kind=table.get("kind"),
+        cut=table.get("cut"),
+        columns=columns or None,
+        conventions=conventions,
         where=where,
     )
 
@@ -160,35 +148,36 @@ def _files(table: Mapping[str, Any], where: str) -> list[str]:
     return [check_text(file, f"{where} file") for file in files]
 
 
-def _conventions(table: Mapping[str, Any], where: str, shared: _Shared) -> Conventions:
-    """Conventions of an entry, where nothing else stands those of the file."""
+def _own_conventions(
+    table: Mapping[str, Any], where: str, shared: _Shared
+) -> Conventions:
+    """Conventions of an entry; where it has no word of its own, that of the file."""
     own = {key: table[key] for key in _CONVENTIONS if key in table}
+    installation = shared.conventions.installation
+    if "sensors" in table:
+        own_sensors = check_table(table["sensors"], f"{where} sensors")
+        sensors = {**shared.sensors, **own_sensors}
+        installation = Installation.from_mapping(
+            sensors, f"{where} sensors", shared.ship
+        )
     return Conventions(
-        **{**shared.conventions, **own},
+        **{**shared.words, **own},
         xg=shared.ship.xg,
         where=where,
-        installation=_installation(table, where, shared),
+        installation=installation,
     )
 
 
-def _installation(
-    table: Mapping[str, Any], where: str, shared: _Shared
-) -> Installation:
-    own = check_table(table.get("sensors", {}), f"{where} sensors")
-    sensors = {**shared.sensors, **own}
-    if not sensors:
-        return AS_LOGGED
-    return Installation.from_mapping(sensors, f"{where} sensors", shared.ship)
-
-
 def _check_entries(path: Path, entries: Sequence[TrialEntry]) -> None:
+    """Refuse a file that is listed again with the same cut, and a file without trials to fit."""
     listed = set()
     for entry in entries:
-        if entry.log_part in listed:
+        part = (*map(os.path.normpath, entry.paths), str(entry.cut))
+        if part in listed:
             raise InputError(
                 f"{entry.where} file: expected each file once, got '{entry.file}' again"
             )
-        listed.add(entry.log_part)
+        listed.add(part)
     if all(entry.use == "skip" for entry in entries):
         raise InputError(
             f'{path}: expected at least one trial to fit, got use = "skip" for all; set'

@@ -38,21 +38,19 @@ def si_factor(channel: str, unit: str, where: str = "unit") -> float:
     `where` begins the InputError about a unit that is not known, or of another
     quantity.
     """
-    fitting = UNITS[QUANTITIES[channel]]
-    if not isinstance(unit, str) or unit not in fitting:
-        raise InputError(
-            f"{where}: expected a unit of {QUANTITIES[channel]} ({quoted(fitting)}),"
-            f" got {unit!r}.{_unit_hint(unit, channel)}"
-        )
-    return fitting[unit]
-
-
-def _unit_hint(unit: object, channel: str) -> str:
-    """The quantity of which an unfitting unit is one, or the unit that was likely meant."""
-    for quantity, units in UNITS.items():
-        if isinstance(unit, str) and unit in units:
-            return f" '{unit}' is a unit of {quantity}"
-    return did_you_mean(str(unit), UNITS[QUANTITIES[channel]])
+    quantity = QUANTITIES[channel]
+    fitting = UNITS[quantity]
+    if isinstance(unit, str) and unit in fitting:
+        return fitting[unit]
+    hint = did_you_mean(str(unit), fitting)
+    for other, units in UNITS.items():
+        if str(unit) in units:
+            hint = f" '{unit}' is a unit of {other}"
+            break
+    raise InputError(
+        f"{where}: expected a unit of {quantity} ({quoted(fitting)}), got"
+        f" {unit!r}.{hint}"
+    )
 
 
 #: Largest magnitude of each channel that can be a ship's, or a small model's; SI units.
@@ -64,6 +62,7 @@ LARGEST_MAGNITUDES: dict[str, float] = {
 
 def check_channel(name: str, where: str, *, time: bool = True) -> str:
     """Return `name`, which must be a channel of a file, ``t`` included, or of a trial where not `time`."""
+    # time is a column of a file, and no channel of a trial
     known = tuple(QUANTITIES) if time else CHANNELS
     if name not in known:
         hint = did_you_mean(str(name), known)

@@ -185,7 +185,7 @@ def test_columns_that_are_not_used_are_listed(log, monkeypatch, capsys):
 )
 def test_a_name_is_a_channels_where_its_unit_is_one_of_it(name, channel, unit):
     found = guess_columns(
-        LogTable.of_columns(Path("log"), {name: np.zeros(3)}, range(3))
+        LogTable(Path("log"), {name: np.zeros(3)}, range(3))
     )
     assert [(one.channel, one.unit) for one in found] == (
         [(channel, unit)] if channel else []
@@ -204,7 +204,7 @@ def test_a_name_is_a_channels_where_its_unit_is_one_of_it(name, channel, unit):
 )
 def test_times_since_1970_are_known_by_their_name_and_size(name, largest, unit):
     (found,) = guess_columns(
-        LogTable.of_columns(Path("log"), {name: np.array([largest] * 3)}, range(3))
+        LogTable(Path("log"), {name: np.array([largest] * 3)}, range(3))
     )
     assert found.unit == unit
 

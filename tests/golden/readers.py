@@ -20,6 +20,7 @@ from shipgym.trials import (
     sensors,
     units,
 )
+from shipgym.trials.columns import parse_columns
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.guesses import guess_columns, guess_trial
@@ -445,7 +446,7 @@ def clocks() -> Answers:
     zone = {"t": {"column": "time", "date": "date", "zone": "+03:30"}, "u": "u"}
 
     def started(path: str, given: dict[str, Any]) -> Any:
-        log = import_tables([read_log(path)], given, Conventions())
+        log = import_tables([read_log(path)], parse_columns(given), Conventions())
         return log.t, log.start
 
     def angle_error(values: list[str]) -> Any:
@@ -717,7 +718,7 @@ def kinds_of_files() -> Answers:
     Path("empty.mat").write_bytes(b" " * 124 + b"\0\1IM")
     found["empty"] = asked(lambda: read_log("empty.mat"))
     found["missing"] = asked(lambda: read_log("none.xlsx"))
-    texts = LogTable.of_columns(
+    texts = LogTable(
         Path("cells"),
         {"a": np.array(["1,5", " NA ", "", "2.25", "n/a"], dtype=object)},
         range(5),
@@ -840,11 +841,9 @@ def guessed() -> Answers:
     csv("nothing.csv", {"a": s["t"], "b": s["t"]})
 
     def sizes(name: str, limit: float) -> list[str]:
-        made = LogTable.of_columns(Path("t"), {name: np.zeros(3)}, range(3))
+        made = LogTable(Path("t"), {name: np.zeros(3)}, range(3))
         return [
-            guess_columns(replace(made, cells=lambda _, size=size: np.full(3, -size)))[
-                0
-            ].unit
+            guess_columns(replace(made, cells={name: np.full(3, -size)}))[0].unit
             for size in (0.93 * limit, limit, 1.04 * limit)
         ]
 
@@ -883,6 +882,13 @@ def guessed() -> Answers:
     }
 
 
+def _as_written(columns: Any) -> dict[str, Any]:
+    return {
+        channel: {"column": one.name, "unit": one.unit} if one.unit else one.name
+        for channel, one in columns.items()
+    }
+
+
 def parts() -> Answers:
     """Stretches of a log, by seconds, clock and rudder."""
     t = np.arange(0.0, 900.0, 0.5)
@@ -903,7 +909,7 @@ def parts() -> Answers:
 
     morning = 1_717_147_800.0
     return {
-        "whole": lambda: cut(None),
+        "whole": lambda: [[0, t.size]],
         "seconds": lambda: cut([[60, 120.25], [300.5, 899]]),
         "clock": lambda: cut(
             [["09:31:00", "09:40:30"], ["2024-05-31T09:32:00Z", 200]], morning
@@ -1060,7 +1066,8 @@ def ship_files() -> Answers:
         "use": lambda: ship.trials("test"),
         "trial": lambda: ship.trial("d.csv"),
         "entries": lambda: [
-            [e.file, e.cut, e.kind, e.use, e.columns, e.where] for e in ship.entries
+            [e.file, e.cut, e.kind, e.use, _as_written(e.columns), e.where]
+            for e in ship.entries
         ],
         "wrong": found,
         "corpus": (

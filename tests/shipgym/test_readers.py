@@ -127,9 +127,9 @@ def test_decimal_commas_are_read_where_the_delimiter_leaves_no_doubt(tmp_path):
         (b"", "got an empty file"),
         (b"\n \n", "got an empty file"),
         (b"PK\x03\x04\x14\x00\x06\x00", "line 1: expected text of at most"),
-        (b"\x89PNG\r\n\x1a\n", "byte 0x89, which is not UTF-8"),
-        (b"t,u\n0,1\n1,\xff\n", "line 3 holds byte 0xff"),
-        ("t,u\n0,1\n".encode("utf-16"), "the file is in UTF-16"),
+        (b"\x89PNG\r\n\x1a\n", "line 1: expected a CSV file in UTF-8, got byte 0x89"),
+        (b"t,u\n0,1\n1,\xff\n", "line 3: expected a CSV file in UTF-8, got byte 0xff"),
+        ("t,u\n0,1\n".encode("utf-16"), "got UTF-16"),
         (b"\x01\x02\x03\n", "line 1: expected column names, got"),
         (b"t,u,u\n0,1,1\n", "line 1: expected each column once, got 'u' 2 times"),
         (b"0,1,2\n1,1,1\n", "got only numbers"),
@@ -155,7 +155,7 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path):
     (tmp_path / "run_1.csv").write_text("t,u\n")
     assert "Did you mean 'run_1.csv'?" in refusal(tmp_path / "run1.csv")
     assert "no such CSV file" in refusal(tmp_path / "nowhere" / "run.csv")
-    assert "this is a folder" in refusal(tmp_path)
+    assert "got a folder" in refusal(tmp_path)
 
 
 # --- frames, Excel, Parquet and MATLAB

@@ -233,13 +233,19 @@ def test_a_balance_at_the_centre_of_gravity_is_moved_to_midship(mariner, tmp_pat
             lambda m: towing_tank.static_drift(m, []),
             "drift_deg: expected at least one angle",
         ),
-        (lambda m: towing_tank.static_drift(m, [200.0]), r"drift_deg\[0\]: 200 found"),
-        (lambda m: towing_tank.pure_surge(m, 20.0), "amplitude: 20 found"),
-        (lambda m: towing_tank.pure_sway(m, 0.5, period_s=-1.0), "period_s: -1 found"),
-        (lambda m: towing_tank.pure_yaw(m, 0.0), "amplitude_deg_s: 0 found"),
+        (
+            lambda m: towing_tank.static_drift(m, [200.0]),
+            r"drift_deg\[0\]: expected .* got 200",
+        ),
+        (lambda m: towing_tank.pure_surge(m, 20.0), "amplitude: expected .* got 20"),
+        (
+            lambda m: towing_tank.pure_sway(m, 0.5, period_s=-1.0),
+            "period_s: expected .* got -1",
+        ),
+        (lambda m: towing_tank.pure_yaw(m, 0.0), "amplitude_deg_s: expected .* got 0"),
         (
             lambda m: towing_tank.pure_sway(m, 0.5, tank=Tank(rudder_deg=80.0)),
-            "tank rudder_deg: 80 found",
+            "tank rudder_deg: expected .* got 80",
         ),
         (
             lambda m: towing_tank.pure_sway(m, 0.5, tank=Tank(shaft_speed=1.0)),
@@ -249,8 +255,8 @@ def test_a_balance_at_the_centre_of_gravity_is_moved_to_midship(mariner, tmp_pat
             lambda m: towing_tank.pure_sway(m, 0.5, tank=Tank(water_depth=20.0)),
             "deep-water model",
         ),
-        (lambda m: Tank(noise=-0.1), "tank noise: -0.1 found"),
-        (lambda m: Tank(samples=2), "tank samples: 2 found"),
+        (lambda m: Tank(noise=-0.1), "tank noise: expected .* got -0.1"),
+        (lambda m: Tank(samples=2), "tank samples: expected .* got 2"),
     ],
 )
 def test_wrong_arguments(mariner, call, message):
@@ -286,19 +292,19 @@ def test_the_track_is_the_integral_of_the_velocity():
 )
 def test_tanks_that_cannot_be_are_refused(name, beyond, least):
     assert getattr(Tank(**{name: least}), name) == least
-    with pytest.raises(InputError, match=rf"tank {name}: .* found, expected"):
+    with pytest.raises(InputError, match=rf"tank {name}: expected .* got"):
         Tank(**{name: beyond})
 
 
 def test_motions_that_cannot_be_towed_are_refused(mariner):
-    with pytest.raises(InputError, match="hold_s: 0 found"):
+    with pytest.raises(InputError, match=r"hold_s: expected .* got 0"):
         towing_tank.static_drift(mariner, [5.0], hold_s=0.0)
-    with pytest.raises(InputError, match=r"drift_deg\[1\]: 181 found"):
+    with pytest.raises(InputError, match=r"drift_deg\[1\]: expected .* got 181"):
         towing_tank.static_drift(mariner, [5.0, 181.0])
     with pytest.raises(InputError, match="drift_deg: expected at least one angle"):
         towing_tank.static_drift(mariner, [])
     for motion in (towing_tank.pure_surge, towing_tank.pure_sway, towing_tank.pure_yaw):
-        with pytest.raises(InputError, match=r"amplitude.*: 0 found"):
+        with pytest.raises(InputError, match=r"amplitude.*: expected .* got 0"):
             motion(mariner, 0.0)
-        with pytest.raises(InputError, match="period_s: 0 found"):
+        with pytest.raises(InputError, match=r"period_s: expected .* got 0"):
             motion(mariner, 0.1, 0.0)

@@ -48,7 +48,8 @@ def _column_names() -> _Names:
     known: dict[str, list[str]] = {}
     for names in languages.values():
         for channel, patterns in names.items():
-            known.setdefault(channel, []).extend(patterns)
+            others = known.get(channel, [])
+            known[channel] = others + patterns
     return _Names(known, with_unit)
 
 
@@ -81,11 +82,14 @@ def _unit_where_fitting(
         return None
     unit = named_unit(units, channel)
 
-    forms = [_plain(text), _plain(re.sub(r"[\[(].*", "", text))]
+    without_brackets = re.sub(r"[\[(].*", "", text)
+    forms = [_plain(text), _plain(without_brackets)]
     if unit is not None:
         forms.append(_plain(bare))
     if _matches(forms, names.known[channel]):
-        return unit or unit_by_size(_numbers(table, column), channel)
+        if unit is not None:
+            return unit
+        return unit_by_size(_numbers(table, column), channel)
     if _matches(forms, names.with_unit.get(channel, [])):
         return unit
     return None

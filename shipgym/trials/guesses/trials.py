@@ -6,12 +6,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from shipgym.errors import InputError
+from shipgym.trials.columns import Column
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.guesses.columns import ColumnGuess, guess_columns
-from shipgym.trials.plausibility.finding import Proposal
+from shipgym.trials.plausibility.refusal import Proposal
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
-from shipgym.trials.trial import Trial, read_trials
+from shipgym.trials.trial import Trial, trial_of
+from shipgym.trials.trial_import import import_tables
 from shipgym.trials.units import QUANTITIES
 
 
@@ -54,36 +56,40 @@ def guess_trial(path: str | Path) -> TrialGuess:
             if proposal is None:
                 raise
         tried.add(proposal)
-        if proposal.name in columns:
-            columns[proposal.name] = _with_unit(columns[proposal.name], proposal.value)
+        name, value = proposal
+        if name in columns:
+            columns[name] = _with_unit(columns[name], value)
         else:
             reason = "without it a log is refused"
-            conventions[proposal.name] = ConventionGuess(*proposal, reason)
+            conventions[name] = ConventionGuess(name, value, reason)
 
-    used = [guess.column for guess in columns.values()] or QUANTITIES
-    unused = [name for name in table.header if name not in used]
-    return TrialGuess(list(columns.values()), list(conventions.values()), trial, unused)
+    used = {guess.column for guess in columns.values()} or QUANTITIES.keys()
+    return TrialGuess(
+        columns=list(columns.values()),
+        conventions=list(conventions.values()),
+        trial=trial,
+        unused=[name for name in table.header if name not in used],
+    )
 
 
 def _read(
     table: LogTable,
-    columns: Mapping[str, ColumnGuess],
+    guesses: Mapping[str, ColumnGuess],
     conventions: Mapping[str, ConventionGuess],
 ) -> Trial:
     """Read a log with the guesses so far."""
-    named = {
-        channel: {"column": guess.column, "unit": guess.unit}
-        for channel, guess in columns.items()
-    }
-    settings: dict[str, Any] = {
-        name: guess.value for name, guess in conventions.items()
-    }
-    return read_trials(
+    columns = {}
+    for channel, guess in guesses.items():
+        columns[channel] = Column(guess.column, guess.unit)
+    words: dict[str, Any] = {"where": f"{table.path}:"}
+    for one in conventions.values():
+        words[one.name] = one.value
+    log = import_tables(
         [table],
-        named or None,
-        Conventions(**settings, where=f"{table.path}:"),
-        name=table.path.name,
-    )[0]
+        columns or None,
+        Conventions(**words),
+    )
+    return trial_of(log, table.path.name)
 
 
 def _next_proposal(
@@ -92,9 +98,10 @@ def _next_proposal(
     """The first proposal of a refusal that was not tried yet, and is no unit that a name tells."""
     for name, value in error.instead:
         proposal = Proposal(name, value)
-        is_convention = name not in QUANTITIES
-        is_guess = name in columns and columns[name].reason != "from its name"
-        if proposal not in tried and (is_convention or is_guess):
+        may_be_tried = name not in QUANTITIES  # a convention
+        if name in columns:
+            may_be_tried = columns[name].reason != "from its name"
+        if may_be_tried and proposal not in tried:
             return proposal
     return None
 

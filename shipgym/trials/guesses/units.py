@@ -43,7 +43,8 @@ class NameEnd(NamedTuple):
 
 def split_unit(name: str) -> NameEnd:
     """Part a column's name, in lower case with blanks for underscores, from the unit with which it ends."""
-    text = name.replace(" per ", "/").rstrip("]) ")
+    text = name.replace(" per ", "/")
+    text = text.rstrip("]) ")
     bare = text
     units: list[str] = []
     for start, before in enumerate(f" {text[:-1]}"):
@@ -51,9 +52,9 @@ def split_unit(name: str) -> NameEnd:
             continue
         spelled = _spelled_units(text[start:])
         if spelled and not units:
-            bare = text[:start].rstrip("[( ")
+            bare = text[:start]
         units += spelled
-    return NameEnd(bare, units)
+    return NameEnd(bare.rstrip("[( "), units)
 
 
 def _spelled_units(text: str) -> list[str]:

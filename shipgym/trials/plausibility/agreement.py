@@ -4,15 +4,15 @@ They are compared over windows in time, so that noise and offsets do not matter.
 """
 
 import math
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from shipgym.arrays import Floats, integral
+from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
-from shipgym.trials.plausibility.finding import LogFinding, Proposal
+from shipgym.trials.plausibility.refusal import Proposal, implausible
 from shipgym.trials.plausibility.sampling import likelier_time_units
 from shipgym.trials.resampling import Log
 from shipgym.trials.units import DEGREE, QUANTITIES, UNITS, si_factor
@@ -25,8 +25,8 @@ class GainFit(NamedTuple):
     misfit: float  # the residual's share of the target's norm
 
 
-def check_yaw_rate(log: Log, locator: Locator) -> Iterator[LogFinding]:
-    """Find a yaw rate that cannot be the heading's, by its sign or its size.
+def check_yaw_rate(log: Log, locator: Locator) -> None:
+    """Refuse a yaw rate that cannot be the heading's, by its sign or its size.
 
     The channels are in SI units, the heading without jumps.
     """
@@ -37,46 +37,35 @@ def check_yaw_rate(log: Log, locator: Locator) -> Iterator[LogFinding]:
     if largest_turn < 2.0 * DEGREE:
         return
 
-    fit = _fit(np.diff(expected), np.diff(turned))
+    fit = _fit_changes(expected, turned)
     gain = fit.gain.real
-    if fit.misfit > 0.5 or 0.2 < gain < 5.0:
+    is_other_motion = fit.misfit > 0.5
+    if is_other_motion or 0.2 < gain < 5.0:
         return
-    if gain < 0.0:
-        yield _opposite_signs(locator)
-    else:
-        yield _other_rate(gain, log.t, locator)
-
-
-def _opposite_signs(locator: Locator) -> LogFinding:
-    return LogFinding(
-        where=locator.path,
-        evidence=(
-            f"expected {_heading_and_rate(locator)} to be positive when the bow turns to"
-            " starboard (clockwise seen from above), got opposite signs"
-        ),
-        remedy="change the sign of the column that is positive to port",
+    heading, rate = locator.columns["psi"].name, locator.columns["r"].name
+    columns = f"columns '{heading}' (heading) and '{rate}' (yaw rate)"
+    if gain > 0.0:
+        raise _other_rate(gain, columns, log.t, locator)
+    raise implausible(
+        locator.path,
+        f"expected {columns} to be positive when the bow turns to starboard (clockwise"
+        " seen from above), got opposite signs",
+        "change the sign of the column that is positive to port",
     )
 
 
-def _other_rate(gain: float, t: Floats, locator: Locator) -> LogFinding:
+def _other_rate(gain: float, columns: str, t: Floats, locator: Locator) -> InputError:
     proposals = _nearest_units(gain, t, locator)
     only_time = all(one.name == "t" for one in proposals)
     wrong = "of time" if only_time else "of one of them"
-    declarations = [locator.declaration(*one) for one in proposals]
-    return LogFinding(
-        where=locator.path,
-        evidence=(
-            f"expected {_heading_and_rate(locator)} to agree, got a heading that changes"
-            f" {gain:.3g} times as fast as the yaw rate says"
-        ),
-        remedy=f"likely a wrong unit {wrong}, declare {' or '.join(declarations)}",
-        proposals=tuple(proposals),
+    declarations = " or ".join(locator.declaration(*one) for one in proposals)
+    return implausible(
+        locator.path,
+        f"expected {columns} to agree, got a heading that changes {gain:.3g} times as"
+        " fast as the yaw rate says",
+        f"likely a wrong unit {wrong}, declare {declarations}",
+        *proposals,
     )
-
-
-def _heading_and_rate(locator: Locator) -> str:
-    heading, rate = locator.columns["psi"], locator.columns["r"]
-    return f"columns '{heading.name}' (heading) and '{rate.name}' (yaw rate)"
 
 
 def _nearest_units(gain: float, t: Floats, locator: Locator) -> list[Proposal]:
@@ -90,17 +79,16 @@ def _nearest_units(gain: float, t: Floats, locator: Locator) -> list[Proposal]:
         gains[Proposal("psi", unit)] = gain * ratio
     for unit, ratio in _other_units("r", locator).items():
         gains[Proposal("r", unit)] = gain / ratio
-    times = {
-        Proposal("t", unit): gain / scale
-        for unit, scale in likelier_time_units(t, locator).items()
-    }
-    gains |= times
+    times = []
+    for unit, scale in likelier_time_units(t, locator).items():
+        times.append(Proposal("t", unit))
+        gains[times[-1]] = gain / scale
 
     distances = {one: abs(math.log(changed)) for one, changed in gains.items()}
     nearest = min(distances.values())
     far = 0.5  # logarithm of the ratio of two rates that are not the same
     if times and nearest > far:
-        return list(times)[:1]
+        return times[:1]
     return [one for one, distance in distances.items() if distance < nearest + 0.01]
 
 
@@ -115,8 +103,8 @@ def _other_units(channel: str, locator: Locator) -> dict[str, float]:
     return ratios
 
 
-def check_velocity(log: Log, frame: str, locator: Locator) -> Iterator[LogFinding]:
-    """Find velocities u and v that cannot be those of the positions, by their frame or their size.
+def check_velocity(log: Log, frame: str, locator: Locator) -> None:
+    """Refuse velocities u and v that cannot be those of the positions, by their frame or their size.
 
     The channels are in SI units, the heading without jumps; `frame`, "body" or "earth",
     is the declared one of u and v.
@@ -124,62 +112,55 @@ def check_velocity(log: Log, frame: str, locator: Locator) -> Iterator[LogFindin
     channels = log.channels
     velocity = channels["u"] + 1j * channels["v"]
     turned = velocity * np.exp(1j * channels["psi"])
-    of_body = _fit_track(log, turned)
-    of_earth = _fit_track(log, velocity)
-    declared, other, other_frame = of_body, of_earth, "earth"
-    if frame == "earth":
-        declared, other, other_frame = of_earth, of_body, "body"
+    fits = {"body": _fit_track(log, turned), "earth": _fit_track(log, velocity)}
+    declared = fits.pop(frame)
+    other_frame, other = fits.popitem()
 
     is_better = other.misfit < 0.2 * declared.misfit
     has_right_size = 0.8 < other.gain.real < 1.25
     gain = abs(declared.gain)
     if declared.misfit > 0.03 and is_better and has_right_size:
-        yield _other_frame(frame, other_frame, locator)
-    elif declared.misfit < 0.2 and not 0.55 < gain < 1.8:
-        yield _other_speed(gain, log.t, locator)
+        raise _other_frame(frame, other_frame, locator)
+    if declared.misfit < 0.2 and not 0.55 < gain < 1.8:
+        raise _other_speed(gain, log.t, locator)
 
 
 def _fit_track(log: Log, velocity: npt.NDArray[np.complex128]) -> GainFit:
     """Fit the change of position, north + i east, by that which a velocity gives."""
-    position = log.channels["x"] + 1j * log.channels["y"]
-    moved = _at_windows(position)
+    north, east = log.channels["x"], log.channels["y"]
+    position = _at_windows(north + 1j * east)
     expected = _at_windows(integral(log.t, velocity))
-    return _fit(np.diff(expected), np.diff(moved))
+    return _fit_changes(expected, position)
 
 
-def _other_frame(frame: str, other: str, locator: Locator) -> LogFinding:
-    u, v = locator.columns["u"], locator.columns["v"]
-    return LogFinding(
-        where=locator.path,
-        evidence=(
-            f"expected columns '{u.name}' and '{v.name}' to follow the positions as"
-            f' velocities in the {frame} frame (velocity_frame = "{frame}"), got'
-            f" velocities in the {other} frame"
-        ),
-        remedy=f'declare velocity_frame = "{other}"',
-        proposals=(Proposal("velocity_frame", other),),
+def _other_frame(frame: str, other: str, locator: Locator) -> InputError:
+    u, v = locator.columns["u"].name, locator.columns["v"].name
+    return implausible(
+        locator.path,
+        f"expected columns '{u}' and '{v}' to follow the positions as velocities in the"
+        f' {frame} frame (velocity_frame = "{frame}"), got velocities in the {other}'
+        " frame",
+        f'declare velocity_frame = "{other}"',
+        Proposal("velocity_frame", other),
     )
 
 
-def _other_speed(gain: float, t: Floats, locator: Locator) -> LogFinding:
-    times = [
-        Proposal("t", unit)
-        for unit, scale in likelier_time_units(t, locator).items()
-        if 0.55 < gain / scale < 1.8
-    ]
+def _other_speed(gain: float, t: Floats, locator: Locator) -> InputError:
+    times = []
+    for unit, scale in likelier_time_units(t, locator).items():
+        if 0.55 < gain / scale < 1.8:
+            times.append(Proposal("t", unit))
     if times:
         wrong = f"time, declare {locator.declaration(*times[0])}"
     else:
         x, y, u, v = (f"'{locator.columns[channel].name}'" for channel in "xyuv")
         wrong = f"{x}, {y} or of {u}, {v} (a knot is 0.514 m/s): declare it"
-    return LogFinding(
-        where=locator.path,
-        evidence=(
-            "expected positions and velocities to agree, got a position that changes"
-            f" {gain:.3g} times as fast as the velocities say"
-        ),
-        remedy=f"likely a wrong unit of {wrong}",
-        proposals=tuple(times),
+    return implausible(
+        locator.path,
+        "expected positions and velocities to agree, got a position that changes"
+        f" {gain:.3g} times as fast as the velocities say",
+        f"likely a wrong unit of {wrong}",
+        *times,
     )
 
 
@@ -194,17 +175,18 @@ def _without_trend(t: Floats, values: Floats) -> Floats:
     """The values at the windows' edges without their straight line: a rate sensor has a bias."""
     time = _at_windows(t - t[0])
     ends = _at_windows(values)
-    slope, level = np.polyfit(time, ends, 1)
-    left: Floats = ends - slope * time - level
+    line = np.polyfit(time, ends, 1)
+    left: Floats = ends - np.polyval(line, time)
     return left
 
 
-def _fit(regressor: npt.NDArray[Any], target: npt.NDArray[Any]) -> GainFit:
-    """Fit target = gain * regressor by least squares."""
-    power = np.vdot(regressor, regressor).real
-    size = np.linalg.norm(target)
+def _fit_changes(regressor: npt.NDArray[Any], target: npt.NDArray[Any]) -> GainFit:
+    """Fit the changes of a target from window to window, as gain times those of the regressor."""
+    known, sought = np.diff(regressor), np.diff(target)
+    power = np.vdot(known, known).real
+    size = np.linalg.norm(sought)
     if power == 0.0 or size == 0.0:
         return GainFit(gain=1.0 + 0.0j, misfit=1.0)
-    gain = complex(np.vdot(regressor, target) / power)
-    residual = np.linalg.norm(target - gain * regressor)
-    return GainFit(gain, float(residual / size))
+    gain = complex(np.vdot(known, sought) / power)
+    residual = np.linalg.norm(sought - gain * known)
+    return GainFit(gain, misfit=float(residual / size))

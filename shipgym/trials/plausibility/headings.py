@@ -1,13 +1,12 @@
 """Headings that turn faster than any ship."""
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
 from shipgym.arrays import Flags, Floats
 from shipgym.trials.columns import Locator
-from shipgym.trials.plausibility.finding import LogFinding, Proposal
+from shipgym.trials.plausibility.refusal import Proposal, implausible
 from shipgym.trials.plausibility.sampling import likelier_time_units
 from shipgym.trials.units import DEGREE
 
@@ -15,10 +14,8 @@ _LARGEST_JUMP = 30.0 * DEGREE  # of a single outlier that passes
 _TURN_AND_JUMP = 2.0 * math.pi + _LARGEST_JUMP
 
 
-def check_heading(
-    t: Floats, psi: Floats, logged: Floats, locator: Locator
-) -> Iterator[LogFinding]:
-    """Find a heading that turns faster than any ship.
+def check_heading(t: Floats, psi: Floats, logged: Floats, locator: Locator) -> None:
+    """Refuse a heading that turns faster than any ship.
 
     Single outliers of a noisy sensor pass; a jump of more than 30 degrees, or steps of
     which many are too fast, do not. Time in s, heading without jumps at north and as
@@ -27,36 +24,30 @@ def check_heading(
     fastest_turn = 60.0 * DEGREE
     steps = np.abs(np.diff(psi))
     is_fast = steps > fastest_turn * np.diff(t)
-    jumps = is_fast & (steps > _LARGEST_JUMP)
     several_turns = np.abs(np.diff(logged)) > _TURN_AND_JUMP
+    jumps = is_fast & (steps > _LARGEST_JUMP)
     if several_turns.any():
-        yield _in_another_unit(t, logged, several_turns, locator)
-    elif is_fast.mean() > 0.05:
-        yield _in_another_unit(t, logged, is_fast, locator)
-    elif jumps.any():
-        yield _jumping(t, logged, jumps, locator)
-
-
-def _in_another_unit(
-    t: Floats, logged: Floats, wrong: Flags, locator: Locator
-) -> LogFinding:
-    proposal = _likelier_unit(t, logged, locator)
-    return LogFinding(
-        where=locator.place(np.argmax(wrong) + 1, "psi"),
-        evidence=_evidence(t, logged, wrong, locator),
-        remedy=f"likely a wrong unit: declare {locator.declaration(*proposal)}",
-        proposals=(proposal,),
-    )
-
-
-def _jumping(t: Floats, logged: Floats, wrong: Flags, locator: Locator) -> LogFinding:
-    return LogFinding(
-        where=locator.place(np.argmax(wrong) + 1, "psi"),
-        evidence=_evidence(t, logged, wrong, locator),
-        remedy=(
+        _refuse_unit(t, logged, several_turns, locator)
+    if is_fast.mean() > 0.05:
+        _refuse_unit(t, logged, is_fast, locator)
+    if jumps.any():
+        raise implausible(
+            locator.place(np.argmax(jumps) + 1, "psi"),
+            _evidence(t, logged, jumps, locator),
             'empty the wrong cells and import with repair = "interpolate", or correct'
-            " them"
-        ),
+            " them",
+        )
+
+
+def _refuse_unit(t: Floats, logged: Floats, wrong: Flags, locator: Locator) -> None:
+    """Refuse a heading that is in another unit, or on a clock in another unit."""
+    proposal = _likelier_unit(t, logged, locator)
+    declaration = locator.declaration(*proposal)
+    raise implausible(
+        locator.place(np.argmax(wrong) + 1, "psi"),
+        _evidence(t, logged, wrong, locator),
+        f"likely a wrong unit: declare {declaration}",
+        proposal,
     )
 
 

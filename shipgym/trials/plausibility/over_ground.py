@@ -1,7 +1,6 @@
 """Heading against the course over ground: a ship at berth, a heading that is none, a compass with an offset."""
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -11,133 +10,108 @@ from shipgym.trials.columns import Locator
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.installation import Installation
 from shipgym.trials.instrument_offsets import heading_offset, straight_parts
-from shipgym.trials.plausibility.finding import LogFinding
+from shipgym.trials.plausibility.refusal import implausible
 from shipgym.trials.resampling import Log
 from shipgym.trials.units import DEGREE
 
 
-def velocity_over_ground(
-    log: Log, *, has_positions: bool
-) -> npt.NDArray[np.complex128] | None:
-    """North + i east velocity, m/s, as GNSS tells it; None where it does not.
-
-    `has_positions`: whether x and y are positions of GNSS.
-    """
+def velocity_over_ground(log: Log) -> npt.NDArray[np.complex128]:
+    """North + i east velocity, m/s, as GNSS tells it by speed and course, or by positions."""
     channels = log.channels
     if "ground_north" in channels:
-        north, east = channels["ground_north"], channels["ground_east"]
-    elif has_positions and "x" in channels:
-        north = time_derivative(log.t, channels["x"])
-        east = time_derivative(log.t, channels["y"])
-    else:
-        return None
+        return channels["ground_north"] + 1j * channels["ground_east"]
+    north = time_derivative(log.t, channels["x"])
+    east = time_derivative(log.t, channels["y"])
     return north + 1j * east
 
 
 def check_over_ground(
-    log: Log,
-    velocity: npt.NDArray[np.complex128],
-    installation: Installation,
-    locator: Locator,
-) -> Iterator[LogFinding]:
-    """Find a ship at berth, and a heading that contradicts the course over ground.
+    log: Log, installation: Installation, locator: Locator
+) -> list[str]:
+    """Refuse a ship at berth, and a heading that contradicts the course over ground.
 
-    The channels are as logged, in SI units, the heading without jumps.
+    The channels are as logged, in SI units, the heading without jumps. Returns remarks
+    on the compass.
     """
-    slowest = 0.3  # m/s, of any manoeuvre
+    velocity = velocity_over_ground(log)
     speed = np.abs(velocity)
     fastest = np.quantile(speed, 0.95)
+    slowest = 0.3  # m/s, of any manoeuvre
     if fastest < slowest:
-        yield LogFinding(
-            where=locator.path,
-            evidence=(
-                f"expected a manoeuvre, got a ship that makes at most {fastest:.2g} m/s"
-                " over ground: she is at berth or at anchor"
-            ),
-            remedy="read another log",
+        raise implausible(
+            locator.path,
+            f"expected a manoeuvre, got a ship that makes at most {fastest:.2g} m/s over"
+            " ground: she is at berth or at anchor",
+            "read another log",
         )
     moving = speed > 0.3 * fastest  # a slow ship has no course
     if "psi" not in log.channels or np.count_nonzero(moving) < 3:
-        return
+        return []
     psi = log.channels["psi"][moving]
     course = np.angle(velocity[moving])
     is_known = bool(installation.heading_offset)
-    yield from check_course(psi, course, locator, offset_is_known=is_known)
-    if not is_known:
-        yield from check_compass(log, locator)
+    check_course(psi, course, locator, offset_is_known=is_known)
+    return [] if is_known else check_compass(log, locator)
 
 
 def check_course(
     psi: Floats, course: Floats, locator: Locator, *, offset_is_known: bool = False
-) -> Iterator[LogFinding]:
-    """Find a heading that is the course over ground, turns the other way, or is far from it.
+) -> None:
+    """Refuse a heading that is the course over ground, turns the other way, or is far from it.
 
     Both are in rad, of shape (n_samples,).
     """
     apart = np.exp(1j * (course - psi))
     mirrored = np.exp(1j * (course + psi))
     mean = apart.mean()
-    agreement = abs(mean)
-    mirrored_agreement = abs(mirrored.mean())
-    offset_deg = -math.degrees(np.angle(mean))
-    drift = np.angle(apart)
-    drift_deg = math.degrees(np.sqrt(np.mean(drift**2)))
+    agreement, mirrored_agreement = abs(mean), abs(mirrored.mean())
+    drift_deg = np.degrees(np.angle(apart))
     turned_deg = math.degrees(np.ptp(psi))
 
     is_turning = turned_deg > 20.0
-    if is_turning and drift_deg < 0.3:
-        yield LogFinding(
-            where=locator.path,
-            evidence=(
-                "expected a heading that differs from the course over ground where a"
-                " ship drifts, got less than 0.3 deg of difference in a turn of"
-                f" {turned_deg:.0f} deg"
-            ),
-            remedy='name the gyro\'s column: psi = { column = "..." }',
+    if is_turning and np.sqrt(np.mean(drift_deg**2)) < 0.3:
+        raise implausible(
+            locator.path,
+            "expected a heading that differs from the course over ground where a ship"
+            " drifts, got less than 0.3 deg of difference in a turn of"
+            f" {turned_deg:.0f} deg",
+            'name the gyro\'s column: psi = { column = "..." }',
         )
     if is_turning and mirrored_agreement > max(0.95, agreement + 0.02):
-        yield LogFinding(
-            where=locator.path,
-            evidence=(
-                "expected a heading clockwise from north, got one that contradicts the"
-                " course over ground: it turns the other way"
-            ),
-            remedy="change the sign of its column",
+        raise implausible(
+            locator.path,
+            "expected a heading clockwise from north, got one that contradicts the"
+            " course over ground: it turns the other way",
+            "change the sign of its column",
         )
+    offset_deg = -math.degrees(np.angle(mean))
     is_far = abs(offset_deg) > 25.0 and agreement > 0.7
     if is_far and not offset_is_known:
-        yield LogFinding(
-            where=locator.path,
-            evidence=(
-                "expected a heading clockwise from north, got one that contradicts the"
-                f" course over ground by {offset_deg:.0f} deg"
-            ),
-            remedy=(
-                "name the right column, or write heading_offset_deg ="
-                f" {offset_deg:.0f} in [sensors]"
-            ),
+        raise implausible(
+            locator.path,
+            "expected a heading clockwise from north, got one that contradicts the"
+            f" course over ground by {offset_deg:.0f} deg",
+            f"name the right column, or write heading_offset_deg = {offset_deg:.0f} in"
+            " [sensors]",
         )
 
 
-def check_compass(log: Log, locator: Locator) -> Iterator[LogFinding]:
+def check_compass(log: Log, locator: Locator) -> list[str]:
     """Remark on a heading that shows too much on every course, or is magnetic by its name."""
     straight = straight_parts(log.t, log.channels)
     found = heading_offset(log.channels, straight)
     if found is not None and found.is_certain:
         offset_deg = f"{found.offset / DEGREE:.1f}"
-        yield LogFinding(
-            where=locator.path,
-            evidence=(
-                f"the heading shows {offset_deg} deg too much on every course, as a"
-                " magnetic compass or a gyro that is not aligned does"
-            ),
-            remedy=f"to remove it write heading_offset_deg = {offset_deg} in [sensors]",
-            is_remark=True,
+        remark = (
+            f"the heading shows {offset_deg} deg too much on every course, as a magnetic"
+            " compass or a gyro that is not aligned does; to remove it write"
+            f" heading_offset_deg = {offset_deg} in [sensors]"
         )
-    elif "mag" in locator.columns["psi"].name.lower():
-        yield LogFinding(
-            where=locator.path,
-            evidence="the heading is magnetic by its name",
-            remedy="write what it shows too much as heading_offset_deg",
-            is_remark=True,
+        return [remark]
+    if "mag" in locator.columns["psi"].name.lower():
+        remark = (
+            "the heading is magnetic by its name; write what it shows too much as"
+            " heading_offset_deg"
         )
+        return [remark]
+    return []

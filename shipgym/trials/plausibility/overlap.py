@@ -1,13 +1,22 @@
 """Files of one log that were not written at one time."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
-from shipgym.trials.plausibility.finding import LogFinding
+from shipgym.trials.plausibility.refusal import implausible
 from shipgym.trials.resampling import Signal
 
-_HALF_HOUR_S = 1800.0
-_LARGEST_ZONE_S = 14.0 * 3600.0
+
+class _Span(NamedTuple):
+    """From when to when channels were logged, s."""
+
+    begin: float
+    end: float
+
+    def overlaps(self, other: "_Span", shift: float = 0.0) -> bool:
+        """Tell whether this span, so much earlier, and another one have a time in common."""
+        return self.begin - shift < other.end and self.end - shift > other.begin
 
 
 def check_overlap(
@@ -15,39 +24,37 @@ def check_overlap(
     others: Mapping[str, Signal],
     path: Path,
     column: str,
-) -> Iterator[LogFinding]:
-    """Find a file that does not overlap in time with the others, all on one clock, s.
+) -> None:
+    """Refuse a file that does not overlap in time with the others, all on one clock, s.
 
     `path` and `column` are that file and its column of the time.
     """
-    first, last = _span(signals)
-    begin, end = _span(others)
-    if begin < last and end > first:
+    own, other = _span(signals), _span(others)
+    if other.overlaps(own):
         return
-    middle_apart = (begin + end - first - last) / 2.0
-    shift = _HALF_HOUR_S * round(middle_apart / _HALF_HOUR_S)
-    would_overlap = begin - shift < last and end - shift > first
+    half_hour, largest_zone = 1800.0, 14.0 * 3600.0
+    middle_apart = (other.begin + other.end - own.begin - own.end) / 2.0
+    shift = half_hour * round(middle_apart / half_hour)
     remedy = "name files that were written at the same time"
-    if would_overlap and abs(shift) <= _LARGEST_ZONE_S:
+    if abs(shift) <= largest_zone and other.overlaps(own, shift):
         remedy = (
             f'likely its clock is in another time zone: write t = {{ column = "{column}",'
             f' zone = "{_zone(shift)}" }}'
         )
-    yield LogFinding(
-        where=str(path),
-        evidence=(
-            "expected a file of the same time as the other of this log, got one that"
-            f" begins {begin - first:.6g} s after it and does not overlap with it"
-        ),
-        remedy=remedy,
+    apart = other.begin - own.begin
+    raise implausible(
+        str(path),
+        "expected a file of the same time as the other of this log, got one that"
+        f" begins {apart:.6g} s after it and does not overlap with it",
+        remedy,
     )
 
 
-def _span(signals: Mapping[str, Signal]) -> tuple[float, float]:
+def _span(signals: Mapping[str, Signal]) -> _Span:
     clocks = [signal.t for signal in signals.values()]
-    first = min(clock[0] for clock in clocks)
-    last = max(clock[-1] for clock in clocks)
-    return float(first), float(last)
+    begin = min(clock[0] for clock in clocks)
+    end = max(clock[-1] for clock in clocks)
+    return _Span(float(begin), float(end))
 
 
 def _zone(shift: float) -> str:

@@ -1,13 +1,11 @@
 """Positions that no ship reaches from those before and after, and tracks of two ships in one log."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from shipgym.arrays import Flags, Floats
 from shipgym.trials.columns import Locator
 from shipgym.trials.missing_values import REPAIR
-from shipgym.trials.plausibility.finding import LogFinding, Proposal
+from shipgym.trials.plausibility.refusal import Proposal, implausible
 
 
 def find_outliers(t: Floats, x: Floats, y: Floats) -> Flags:
@@ -15,59 +13,47 @@ def find_outliers(t: Floats, x: Floats, y: Floats) -> Flags:
 
     Time in s and positions in m, shape (n_positions,).
     """
+    is_outlier = np.zeros(t.size, dtype=bool)
     too_fast = _too_fast(t, x, y)
-    if too_fast.size < 2:
-        return np.zeros(t.size, dtype=bool)
-    before = np.r_[True, too_fast]
-    after = np.r_[too_fast, True]
-    is_outlier: Flags = before & after
+    if too_fast.size >= 2:
+        is_outlier[0] = too_fast[0]
+        is_outlier[1:-1] = too_fast[:-1] & too_fast[1:]
+        is_outlier[-1] = too_fast[-1]
     return is_outlier
 
 
-def check_track(
-    t: Floats, x: Floats, y: Floats, locator: Locator
-) -> Iterator[LogFinding]:
-    """Find a track that jumps so often that two ships must be in the log; units as in `find_outliers`."""
+def check_track(t: Floats, x: Floats, y: Floats, locator: Locator) -> None:
+    """Refuse a track that jumps so often that two ships must be in the log; units as in `find_outliers`."""
     too_fast = _too_fast(t, x, y)
     count = np.count_nonzero(too_fast)
     if too_fast.size < 2 or count <= 0.1 * too_fast.size:
         return
     k = np.argmax(too_fast)
-    distance = np.hypot(np.diff(x), np.diff(y))[k] / 1000.0
-    duration = np.diff(t)[k]
-    yield LogFinding(
-        where=locator.place(k + 1, "lat"),
-        evidence=(
-            f"expected the track of one ship, got a position that jumps"
-            f" {distance:.4g} km within {duration:g} s, as in {count} of"
-            f" {too_fast.size} steps"
-        ),
-        remedy=(
-            "likely two ships are in one log: keep the rows of one, or declare the unit"
-            " of lat and lon"
-        ),
+    distance = np.hypot(x[k + 1] - x[k], y[k + 1] - y[k]) / 1000.0
+    duration = t[k + 1] - t[k]
+    raise implausible(
+        locator.place(k + 1, "lat"),
+        f"expected the track of one ship, got a position that jumps {distance:.4g} km"
+        f" within {duration:g} s, as in {count} of {too_fast.size} steps",
+        "likely two ships are in one log: keep the rows of one, or declare the unit of"
+        " lat and lon",
     )
 
 
 def check_outliers(
     lat: Floats, lon: Floats, is_outlier: Flags, locator: Locator
-) -> Iterator[LogFinding]:
-    """Find outliers of positions, in degrees, that nobody asked to fill."""
+) -> None:
+    """Refuse outliers of positions, in degrees, that nobody asked to fill."""
     if not is_outlier.any():
         return
     k = np.argmax(is_outlier)
-    yield LogFinding(
-        where=locator.place(k, "lat"),
-        evidence=(
-            "expected a position that a ship reaches from those before and after, got"
-            f" {lat[k]:.5f}, {lon[k]:.5f}, one of {is_outlier.sum()} outliers among"
-            f" {is_outlier.size}"
-        ),
-        remedy=(
-            "empty its cells, or leave such rows to be filled with repair ="
-            ' "interpolate"'
-        ),
-        proposals=(Proposal(*REPAIR),),
+    count = np.count_nonzero(is_outlier)
+    raise implausible(
+        locator.place(k, "lat"),
+        "expected a position that a ship reaches from those before and after, got"
+        f" {lat[k]:.5f}, {lon[k]:.5f}, one of {count} outliers among {lat.size}",
+        'empty its cells, or leave such rows to be filled with repair = "interpolate"',
+        Proposal(*REPAIR),
     )
 
 

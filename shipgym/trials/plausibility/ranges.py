@@ -1,63 +1,60 @@
 """Values beyond what any ship does."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from shipgym.arrays import Flags, Floats
+from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
-from shipgym.trials.plausibility.finding import LogFinding, Proposal
+from shipgym.trials.plausibility.refusal import Proposal, implausible
 from shipgym.trials.units import LARGEST_MAGNITUDES, QUANTITIES, UNITS, si_factor
 
-_ROUNDING = 1e-9
 
-
-def check_ranges(
-    channels: Mapping[str, Floats], locator: Locator
-) -> Iterator[LogFinding]:
-    """Find values beyond `LARGEST_MAGNITUDES`, with the units that would make them plausible.
+def check_ranges(channels: Mapping[str, Floats], locator: Locator) -> None:
+    """Refuse values beyond `LARGEST_MAGNITUDES`, with the units that would make them plausible.
 
     The channels are in SI units, of shape (n_samples,), nan where there is none.
     """
+    rounding = 1.0 + 1e-9
     for channel, largest in LARGEST_MAGNITUDES.items():
-        if channel not in channels:
-            continue
-        size = np.abs(channels[channel])
-        too_large = size > largest * (1.0 + _ROUNDING)
-        if too_large.any():
-            yield _out_of_range(channel, channels[channel], too_large, locator)
+        if channel in channels:
+            values = channels[channel]
+            too_large = np.abs(values) > rounding * largest
+            if too_large.any():
+                raise _out_of_range(channel, values, too_large, locator)
 
 
 def _out_of_range(
     channel: str, values: Floats, too_large: Flags, locator: Locator
-) -> LogFinding:
+) -> InputError:
     first = np.argmax(too_large)
-    unit = locator.columns[channel].unit
-    largest = LARGEST_MAGNITUDES[channel]
-    proposals = _smaller_units(channel, unit, np.nanmax(np.abs(values)))
+    declared = locator.columns[channel].unit
+    most = _spelled(LARGEST_MAGNITUDES[channel], channel, declared)
+    found = _spelled(values[first], channel, declared)
+
+    proposals = _smaller_units(channel, declared, np.nanmax(np.abs(values)))
     remedy = "check the column and its unit, or correct the value"
     if proposals:
-        remedy = f"likely a wrong unit: declare {locator.declaration(*proposals[0])}"
-    return LogFinding(
-        where=locator.place(first, channel),
-        evidence=(
-            f"expected {channel} of at most {_spelled(largest, channel, unit)}, got"
-            f" {_spelled(values[first], channel, unit)}"
-        ),
-        remedy=remedy,
-        proposals=tuple(proposals),
+        declaration = locator.declaration(*proposals[0])
+        remedy = f"likely a wrong unit: declare {declaration}"
+    return implausible(
+        locator.place(first, channel),
+        f"expected {channel} of at most {most}, got {found}",
+        remedy,
+        *proposals,
     )
 
 
 def _smaller_units(channel: str, declared: str, size: float) -> list[Proposal]:
     """Units in which the largest value of a channel is no larger than that of a ship."""
-    largest = LARGEST_MAGNITUDES[channel]
     own = si_factor(channel, declared)
+    largest_ratio = LARGEST_MAGNITUDES[channel] / size
     proposals = []
     for unit, factor in UNITS[QUANTITIES[channel]].items():
         ratio = factor / own
-        if ratio < 1.0 and size * ratio <= largest:
+        if ratio < 1.0 and ratio <= largest_ratio:
             proposals.append(Proposal(channel, unit))
     return proposals
 

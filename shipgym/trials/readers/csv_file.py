@@ -3,6 +3,7 @@
 import csv
 import re
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 
 from shipgym.errors import InputError
@@ -19,53 +20,60 @@ def read_csv(path: str | Path) -> LogTable:
     path = Path(path)
     lines = read_lines(path, "CSV file")
     _check_lines(path, lines)
-    first = next((k for k, line in enumerate(lines) if line.strip()), None)
-    if first is None:
+    numbered = enumerate(lines, start=1)
+    header_at, header_line = next(filter(_has_text, numbered), (0, ""))
+    if not header_line:
         raise InputError(
             f"{path}: expected a header line with column names and rows below, got an"
             " empty file"
         )
 
-    unquoted = re.sub('"[^"]*"', "", lines[first])
+    unquoted = re.sub('"[^"]*"', "", header_line)
     delimiter = max(",;\t", key=unquoted.count)
-    names = _cells(lines[first], delimiter)
-    header = tuple(name.strip() for name in names)
-    _check_header(path, header, first + 1)
+    header = [name.strip() for name in _split(header_line, delimiter)]
+    _check_header(path, header, header_at)
 
+    rows = {}  # by the number of their line
     blank = delimiter + " \t"
-    rows, line_numbers = [], []
-    for number, line in enumerate(lines[first + 1 :], start=first + 2):
+    for number, line in numbered:
         if line.strip(blank):
-            rows.append(line)
-            line_numbers.append(number)
+            rows[number] = _split(line, delimiter)
+    _check_rows(path, rows, len(header))
+    columns = zip(*rows.values(), strict=True) if rows else [()] * len(header)
+    return LogTable(
+        path=path,
+        cells=dict(zip(header, columns, strict=True)),
+        rows=list(rows),
+        place_words="line {line} (data row {row})",
+        decimal_comma=delimiter != ",",
+    )
 
-    def column(name: str) -> list[str]:
-        index = header.index(name)
-        return [_cells(row, delimiter, index + 1)[index] for row in rows]
 
-    table = LogTable(path, header, column, line_numbers, decimal_comma=delimiter != ",")
-    _check_rows(table, rows, delimiter)
-    return table
+def _has_text(numbered: tuple[int, str]) -> bool:
+    _, line = numbered
+    return bool(line.strip())
 
 
 def read_lines(path: Path, what: str) -> list[str]:
     """Lines of a text file, at most a million; `what` is expected there, as "CSV file"."""
-    most = 1_000_000
     text = read_text(path, what, LARGEST_CSV, latin=True)
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    text = text.replace("\r\n", "\n")
+    text = text.replace("\r", "\n")
     lines = text.split("\n")
-    if len(lines) > most:
+    count = len(lines)
+    most = 1_000_000
+    if count > most:
         raise InputError(
-            f"{path}: expected at most {most} lines, got {len(lines)}; split the file"
+            f"{path}: expected at most {most} lines, got {count}; split the file"
         )
     return lines
 
 
-def _cells(line: str, delimiter: str, most: int = -1) -> list[str]:
-    """Cells of a line; of one without quotes the rest beyond `most` stays together."""
+def _split(line: str, delimiter: str) -> list[str]:
+    """Cells of a line."""
     if '"' in line:
         return next(csv.reader([line], delimiter=delimiter))
-    return line.split(delimiter, most)
+    return line.split(delimiter)
 
 
 def _check_lines(path: Path, lines: list[str]) -> None:
@@ -83,7 +91,7 @@ def _check_lines(path: Path, lines: list[str]) -> None:
         )
 
 
-def _check_header(path: Path, header: tuple[str, ...], line: int) -> None:
+def _check_header(path: Path, header: list[str], line: int) -> None:
     most = 1000
     where = f"{path}: line {line}"
     if len(header) > most:
@@ -109,14 +117,11 @@ def _check_header(path: Path, header: tuple[str, ...], line: int) -> None:
         )
 
 
-def _check_rows(table: LogTable, rows: list[str], delimiter: str) -> None:
-    expected = len(table.header)
-    for k, row in enumerate(rows):
-        count = row.count(delimiter) + 1
-        if '"' in row:
-            count = len(_cells(row, delimiter))
+def _check_rows(path: Path, rows: Mapping[int, list[str]], expected: int) -> None:
+    for k, (line, row) in enumerate(rows.items(), start=1):
+        count = len(row)
         if count != expected:
             raise InputError(
-                f"{table.path}: {table.place(k)}: expected {expected} cells as in the"
-                f" header, got {count}; complete or remove the row"
+                f"{path}: line {line} (data row {k}): expected {expected} cells as in"
+                f" the header, got {count}; complete or remove the row"
             )

@@ -26,29 +26,25 @@ def read_excel(path: Path) -> LogTable:
     for merged cells, and where a name is missing or repeated.
     """
     content = read_bytes(path, "workbook of Excel", LARGEST_PACKED)
-    remedy = "save the sheet again as .xlsx or as CSV"
-    with damage_reported(path, "Excel (.xlsx)", remedy):
+    with damage_reported(
+        path, "Excel (.xlsx)", "save the sheet again as .xlsx or as CSV"
+    ):
         parts = zipfile.ZipFile(io.BytesIO(content))
         check_unpacked(path, sum(part.file_size for part in parts.infolist()))
-
-        openpyxl = import_module("openpyxl")
-        book = openpyxl.load_workbook(
-            io.BytesIO(content), read_only=True, data_only=True
-        )
-        sheet = book.worksheets[0]
-        _check_sheet(path, sheet, parts)
-
-        pandas = import_module("pandas")
-        frame = pandas.DataFrame(sheet.iter_rows(values_only=True), dtype=object)
+        frame = _sheet(path, content, parts)
         frame = frame.dropna(how="all").dropna(axis=1, how="all")
-        rows = [int(row) + 1 for row in frame.index]
-        names = _column_names(path, frame.iloc[0], rows[0])
-        below = frame.iloc[1:].set_axis(names, axis=1).reset_index(drop=True)
-        return replace(read_frame(below, path), rows=rows[1:])
+        names, below = frame.iloc[0], frame.iloc[1:]
+        below.columns = _column_names(path, names)
+        table = read_frame(below.reset_index(drop=True), path)
+        return replace(table, rows=(below.index + 1).tolist())
 
 
-def _check_sheet(path: Path, sheet: Any, parts: zipfile.ZipFile) -> None:
-    """Refuse a sheet of too many cells, and one with merged cells."""
+def _sheet(path: Path, content: bytes, parts: zipfile.ZipFile) -> Any:
+    """Cells of the first sheet as a pandas frame; InputError for too many or merged ones."""
+    openpyxl = import_module("openpyxl")
+    pandas = import_module("pandas")
+    book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
+    sheet = book.worksheets[0]
     if (sheet.max_row or 0) * (sheet.max_column or 0) > MOST_CELLS:
         raise InputError(
             f"{path}: expected at most {MOST_CELLS} cells, got more; save it as CSV"
@@ -62,14 +58,16 @@ def _check_sheet(path: Path, sheet: Any, parts: zipfile.ZipFile) -> None:
             f" cells {cells}; unmerge them (Home, Merge & Center, Unmerge Cells), or"
             " save the table as CSV"
         )
+    return pandas.DataFrame(sheet.iter_rows(values_only=True), dtype=object)
 
 
-def _column_names(path: Path, cells: Any, row: int) -> list[str]:
+def _column_names(path: Path, cells: Any) -> list[str]:
+    """Names in the first row of a sheet, a pandas series; InputError for none."""
     names = [str(cell).strip() for cell in cells]
     only_numbers = all(isinstance(cell, int | float) for cell in cells)
     if only_numbers or len(set(names)) < len(names):
         raise InputError(
-            f"{path}: row {row}: expected names of columns, each once, got"
+            f"{path}: row {cells.name + 1}: expected names of columns, each once, got"
             f" {quoted(names)[:200]}"
         )
     return names

@@ -22,16 +22,19 @@ def read_frame(frame: Any, name: str | Path = "frame", first: int = 0) -> LogTab
         )
     if type(frame.index).__name__ != "RangeIndex":
         frame = frame.reset_index()
+    n_rows, n_columns = frame.shape
     if not 0 < frame.size <= MOST_CELLS:
         raise InputError(
-            f"{name}: expected a table of at most {MOST_CELLS} values, got"
-            f" {len(frame.columns)} columns of {len(frame)} rows; split the file, or"
-            " leave out columns"
+            f"{name}: expected a table of at most {MOST_CELLS} values, got {n_columns}"
+            f" columns of {n_rows} rows; split the file, or leave out columns"
         )
-    columns = {}
+    cells = {}
     for label, column in frame.items():
-        numeric = column.dtype.kind in "fiub"
-        columns[str(label).strip()] = (
-            column.to_numpy() if numeric else column.to_numpy(object)
-        )
-    return LogTable.of_columns(Path(name), columns, range(first, first + len(frame)))
+        is_numeric = column.dtype.kind in "fiub"
+        kind = column.dtype if is_numeric else object
+        cells[str(label).strip()] = column.to_numpy(kind)
+    return LogTable(
+        path=Path(name),
+        cells=cells,
+        rows=range(first, first + n_rows),
+    )

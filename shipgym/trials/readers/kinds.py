@@ -34,13 +34,13 @@ def recognise_kind(path: Path) -> str:
 
     Raises InputError for a text file that is missing or too large.
     """
-    by_ending = _ENDINGS.get(path.suffix.lower())
-    if by_ending is not None:
-        return by_ending
-
+    ending = path.suffix.lower()
+    if ending in _ENDINGS:
+        return _ENDINGS[ending]
     content = read_bytes(path, "CSV file", LARGEST_CSV)
     beginning = content[:4096].decode("latin-1")
-    sentences = _NMEA_LINE.findall(beginning.replace("\r", "\n"))
+    beginning = beginning.replace("\r", "\n")
+    sentences = _NMEA_LINE.findall(beginning)
     if len(sentences) >= 2:
         return "nmea"
     return "csv"

@@ -1,6 +1,7 @@
 """A log as a table of named columns: what every reader returns, whatever the kind of its file."""
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,11 +26,8 @@ class LogTable:
     ----------
     path : Path
         The file, for messages.
-    header : tuple of str
-        Names of the columns, without blanks around them.
-    cells : callable
-        Of a column's name: its cells, a sequence of texts or other objects, or an array
-        of numbers.
+    cells : mapping of str to sequence
+        Cells of each column: texts or other objects, or an array of numbers.
     rows : sequence of int
         Line or row of the file in which each row of the table stands.
     place_words : str
@@ -43,26 +41,17 @@ class LogTable:
     """
 
     path: Path
-    header: tuple[str, ...]
-    cells: Callable[[str], Any]
+    cells: Mapping[str, Any]
     rows: Sequence[int]
-    place_words: str = "line {line} (data row {row})"
+    place_words: str = "row {line}"
     decimal_comma: bool = False
     units: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
-    @classmethod
-    def of_columns(
-        cls,
-        path: Path,
-        columns: Mapping[str, Any],
-        rows: Sequence[int],
-        place_words: str = "row {line}",
-        **settings: Any,
-    ) -> "LogTable":
-        """Table of whole columns; `settings` are the other fields."""
-        header = tuple(columns)
-        return cls(path, header, columns.__getitem__, rows, place_words, **settings)
+    @property
+    def header(self) -> tuple[str, ...]:
+        """Names of the columns, without blanks around them."""
+        return tuple(self.cells)
 
     def place(self, row: int) -> str:
         """Place of a row, counted from 0, for a message: ``line 12 (data row 11)``."""
@@ -74,20 +63,21 @@ class LogTable:
 
     def column(self, name: str) -> Any:
         """Cells of a column; InputError if there is none of this name."""
-        if name not in self.header:
+        if name not in self.cells:
             raise InputError(
                 f"{self.path}: column '{name}' not"
                 f" found.{did_you_mean(name, self.header)} Columns present:"
                 f" {quoted(self.header)}. Name the column in [columns] (or columns=...)"
             )
-        return self.cells(name)
+        return self.cells[name]
 
     def texts(self, name: str) -> list[str]:
         """Cells of a column as texts without blanks around them, empty where there is no value."""
         texts = []
         for cell in self.column(name):
-            text = "" if cell is None else str(cell).strip()
-            texts.append("" if text.lower() in _MISSING_WORDS else text)
+            text = str(cell).strip()
+            is_missing = text.lower() in _MISSING_WORDS
+            texts.append("" if is_missing else text)
         return texts
 
     def numbers(self, name: str) -> Floats:
@@ -121,10 +111,13 @@ class LogTable:
 
 def plain_numbers(cells: Sequence[Any]) -> Floats:
     """Numbers of cells that are all written plainly or empty, as in most files; ValueError for others."""
-    if "_" in "".join(map(str, cells)):
-        raise ValueError("underscores, which Python reads in a number")
-    numbers = [cell if cell != "" else "nan" for cell in cells]
-    return np.array([float(number) for number in numbers])
+    numbers = []
+    for cell in cells:
+        if "_" in str(cell):
+            raise ValueError("an underscore, which Python reads in a number")
+        number = math.nan if cell == "" else float(cell)
+        numbers.append(number)
+    return np.array(numbers)
 
 
 def is_number(text: str) -> bool:

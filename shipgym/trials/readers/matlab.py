@@ -77,10 +77,15 @@ def read_matlab(path: Path) -> LogTable:
             f"{path}: expected a numeric vector for each channel, got none; a struct is"
             " not read: save('run.mat', '-struct', 'data', '-v7')"
         )
-    columns = {
-        name: values for name, values in vectors.items() if values.size == length
-    }
-    return LogTable.of_columns(path, columns, range(1, length + 1))
+    columns = {}
+    for name, values in vectors.items():
+        if values.size == length:
+            columns[name] = values
+    return LogTable(
+        path=path,
+        cells=columns,
+        rows=range(1, length + 1),
+    )
 
 
 def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:
@@ -107,17 +112,18 @@ def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:
 def _vector(path: Path, matrix: bytes, order: str) -> dict[str, Floats]:
     """Numbers of a matrix by its name, where it is a numeric vector."""
     parts = list(islice(_elements(matrix, order), 4))
-    if len(parts) < 4 or parts[3].type not in _NUMBER_TYPES:
+    if len(parts) < 4 or parts[-1].type not in _NUMBER_TYPES:
         return {}
     flags, shape, name, numbers = parts
+    number_type = order + _NUMBER_TYPES[numbers.type]
+    values = np.frombuffer(numbers.content, number_type)
     sizes = np.frombuffer(shape.content, f"{order}i4")
-    values = np.frombuffer(numbers.content, f"{order}{_NUMBER_TYPES[numbers.type]}")
-    about = struct.unpack(f"{order}I", flags.content[:4])[0]
-
-    has_one_size = np.count_nonzero(sizes != 1) == 1
-    is_vector = has_one_size and sizes.max() == values.size
-    if not is_vector or (about & _CLASS) < _FIRST_NUMERIC:
+    is_vector = np.count_nonzero(sizes != 1) == 1 and sizes.max() == values.size
+    (about,) = struct.unpack(f"{order}I", flags.content[:4])
+    is_numeric = (about & _CLASS) >= _FIRST_NUMERIC
+    if not is_vector or not is_numeric:
         return {}
+
     label = name.content.decode("ascii")
     if about & _COMPLEX:
         raise InputError(
@@ -129,15 +135,18 @@ def _vector(path: Path, matrix: bytes, order: str) -> dict[str, Floats]:
 
 def _elements(content: bytes, order: str) -> Iterator[Element]:
     """Elements one after another, each with a tag of eight bytes: type and size."""
+    tag_bytes = 8
     at = 0
-    while at + 8 <= len(content):
-        kind, size = struct.unpack(f"{order}II", content[at : at + 8])
+    while at + tag_bytes <= len(content):
+        kind, size = struct.unpack_from(f"{order}II", content, at)
         small_size = kind >> 16  # of an element within its own tag
         if small_size:
-            kind, size = kind & 0xFFFF, 0
-            begin, end = at + 4, at + 4 + min(small_size, 4)
-        else:
-            begin, end = at + 8, at + 8 + size
+            begin = at + 4
+            yield Element(kind & 0xFFFF, content[begin : begin + min(small_size, 4)])
+            at += tag_bytes
+            continue
+        begin = at + tag_bytes
+        end = begin + size
         yield Element(kind, content[begin:end])
-        padding = 0 if kind == _COMPRESSED else -size % 8
-        at += 8 + size + padding
+        # compressed ones are not padded to eight bytes
+        at = end if kind == _COMPRESSED else end + -size % 8

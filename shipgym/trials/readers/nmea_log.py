@@ -33,8 +33,8 @@ _WINDS = ("wind_angle", "wind_speed", "apparent_wind_angle", "apparent_wind_spee
 #: Kinds of sentences that hold a channel.
 _KINDS = [
     kind
-    for kind, told in NMEA_SENTENCES.items()
-    if any(NMEA_QUANTITIES[quantity].channel for quantity in told.fields)
+    for kind, sentence in NMEA_SENTENCES.items()
+    if any(NMEA_QUANTITIES[quantity].channel for quantity in sentence.fields)
 ]
 _SENTENCE = re.compile(rf"\$[A-Z]{{2}}(?:{'|'.join(_KINDS)}),.*")
 _TIME = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d(?:\.\d*)?)")
@@ -59,13 +59,17 @@ class _Track(NamedTuple):
 _BySource = dict[str, list[_Value]]  # by talker and kind, such as HEHDT
 
 
+def _by_source() -> _BySource:
+    return defaultdict(list)
+
+
 @dataclass
 class _Heard:
     """What the sentences of a log say."""
 
-    times: _BySource = field(default_factory=lambda: defaultdict(list))
+    times: _BySource = field(default_factory=_by_source)
     channels: dict[str, _BySource] = field(
-        default_factory=lambda: defaultdict(lambda: defaultdict(list))
+        default_factory=lambda: defaultdict(_by_source)
     )
     count: int = 0
     damaged: list[int] = field(default_factory=list)  # lines
@@ -77,7 +81,8 @@ def read_nmea(path: Path) -> LogTable:
     Of several sources of a channel the best is taken, and a note names the others.
     Raises InputError for a damaged log and one without time or channels.
     """
-    heard = _listen(read_lines(path, "log of NMEA 0183"))
+    lines = read_lines(path, "log of NMEA 0183")
+    heard = _listen(lines)
     notes = _check_damage(path, heard)
     _check_content(path, heard)
 
@@ -88,8 +93,12 @@ def read_nmea(path: Path) -> LogTable:
         tracks[channel] = _track(sources[best], clock)
         others = sorted(sources.keys() - {best})
         if others:
-            notes.append(f"{channel} is from {best}; {', '.join(others)} left out")
-    return _table(path, _with_wind_over_ground(tracks), notes)
+            left_out = ", ".join(others)
+            notes.append(f"{channel} is from {best}; {left_out} left out")
+    winds = {name: tracks.pop(name) for name in _WINDS if name in tracks}
+    if winds and "psi" in tracks:
+        tracks |= _wind_over_ground(winds, tracks)
+    return _table(path, tracks, notes)
 
 
 def _listen(lines: list[str]) -> _Heard:
@@ -101,14 +110,14 @@ def _listen(lines: list[str]) -> _Heard:
             continue
         heard.count += 1
         try:
-            found = parse_sentence(match[0])
-            time = _time(found)
-            values = _channel_values(found)
+            sentence = parse_sentence(match[0])
+            time = _time(sentence)
+            values = _channel_values(sentence)
         except ValueError:
             heard.damaged.append(number)
             continue
 
-        source = found.talker + found.kind
+        source = sentence.talker + sentence.kind
         if np.isfinite(time):
             heard.times[source].append(_Value(number, time, time))
         for channel, value in values.items():
@@ -119,19 +128,24 @@ def _listen(lines: list[str]) -> _Heard:
 def _time(sentence: Sentence) -> float:
     """Seconds since 1970 where a sentence has a date, else of the day; nan without a time."""
     kind = NMEA_SENTENCES[sentence.kind]
-    fields = dict(enumerate(sentence.fields))
-    match = (
-        _TIME.fullmatch(fields.get(kind.time, "")) if kind.time is not None else None
-    )
+    match = _TIME.fullmatch(_field(sentence, kind.time))
     if match is None:
         return np.nan
     hours, minutes, seconds = match.groups()
     of_day = 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds)
 
-    date = fields.get(kind.date, "") if kind.date is not None else ""
+    date = _field(sentence, kind.date)
     if not date:
         return of_day
-    return datetime.strptime(date, "%d%m%y").replace(tzinfo=UTC).timestamp() + of_day
+    midnight = datetime.strptime(date, "%d%m%y").replace(tzinfo=UTC)
+    return midnight.timestamp() + of_day
+
+
+def _field(sentence: Sentence, at: int | None) -> str:
+    """The field at a place; empty where the sentence ends before, or has no such field."""
+    if at is None or at >= len(sentence.fields):
+        return ""
+    return sentence.fields[at]
 
 
 def _channel_values(sentence: Sentence) -> dict[str, float]:
@@ -180,19 +194,29 @@ def _check_content(path: Path, heard: _Heard) -> None:
         )
 
 
-def _rank(source: str, values: list[_Value]) -> tuple[bool, bool, int]:
-    """Rank of a source: with dates, no display that repeats others' sentences (II), many times."""
-    dated = values[0].time > 2.0 * DAY
-    moments = {one.line if np.isnan(one.time) else one.time for one in values}
-    return dated, not source.startswith("II"), len(moments)
+class _Rank(NamedTuple):
+    """What makes a source better than another, the first first."""
+
+    preference: int  # by its kind
+    is_dated: bool
+    is_original: bool  # no display (II) that repeats others' sentences
+    moments: int  # at which it says something
+
+
+def _rank(source: str, values: list[_Value]) -> _Rank:
+    moments = set()
+    for one in values:
+        moments.add(one.line if np.isnan(one.time) else one.time)
+    return _Rank(
+        preference=_PREFERENCE.get(source[2:], 0),
+        is_dated=values[0].time > 2.0 * DAY,
+        is_original=not source.startswith("II"),
+        moments=len(moments),
+    )
 
 
 def _best_source(sources: _BySource) -> str:
-    def rank(source: str) -> tuple[int, tuple[bool, bool, int]]:
-        kind = source[2:]
-        return _PREFERENCE.get(kind, 0), _rank(source, sources[source])
-
-    return max(sorted(sources), key=rank)
+    return max(sorted(sources), key=lambda source: _rank(source, sources[source]))
 
 
 def _main_clock(times: _BySource) -> _Track:
@@ -204,47 +228,53 @@ def _main_clock(times: _BySource) -> _Track:
         clock = np.unwrap(clock, period=DAY)
     never_back = np.maximum.accumulate(clock)
     t, first = np.unique(never_back, return_index=True)
-    return _Track(t, lines[first], t)
+    return _Track(t, lines[first], values=t)
 
 
 def _track(values: list[_Value], clock: _Track) -> _Track:
     """Values of a source at their own times, else at those of the lines between which they stand."""
-    lines, t, numbers = np.array(values).T
+    lines, own_time, numbers = np.array(values).T
     by_line = np.interp(lines, clock.lines, clock.t)
     # a time of the day is that of the day on which its line stands
-    days = np.round((by_line - t) / DAY)
-    t = np.where(np.isnan(t), by_line, t + DAY * days)
+    days = np.round((by_line - own_time) / DAY)
+    t = own_time + DAY * days
+    has_none = np.isnan(own_time)
+    t[has_none] = by_line[has_none]
+
     milliseconds = np.round(t, 3)
     t, first = np.unique(milliseconds, return_index=True)
     return _Track(t, lines[first], numbers[first])
 
 
-def _with_wind_over_ground(tracks: dict[str, _Track]) -> dict[str, _Track]:
-    """Winds from the bow as those over ground where heading and velocity are known, else left out."""
-    found = {name: track for name, track in tracks.items() if name not in _WINDS}
-    if "psi" not in tracks:
-        return found
+def _wind_over_ground(
+    winds: dict[str, _Track], tracks: dict[str, _Track]
+) -> dict[str, _Track]:
+    """The wind over ground, of that from the bow, where the velocity is known or not needed."""
+    if {"wind_angle", "wind_speed"} <= winds.keys():
+        angle = winds["wind_angle"]
+        wind_from = angle.values + _angle_at(angle.t, tracks["psi"])
+        return {
+            "wind_from": angle._replace(values=wind_from),
+            "wind_speed": winds["wind_speed"],
+        }
+    is_apparent = {"apparent_wind_angle", "apparent_wind_speed"} <= winds.keys()
+    if not is_apparent or not {"sog", "cog"} <= tracks.keys():
+        return {}
+    angle = winds["apparent_wind_angle"]
+    bearing = angle.values + _angle_at(angle.t, tracks["psi"])
+    course = _angle_at(angle.t, tracks["cog"])
+    speed = np.interp(angle.t, tracks["sog"].t, tracks["sog"].values)
+    apparent = winds["apparent_wind_speed"].values * np.exp(1j * bearing)
+    wind = apparent - speed * np.exp(1j * course)
+    return {
+        "wind_from": angle._replace(values=np.angle(wind)),
+        "wind_speed": angle._replace(values=np.abs(wind)),
+    }
 
-    def at(name: str, t: Floats) -> Floats:
-        track = tracks[name]
-        values = track.values if name == "sog" else np.unwrap(track.values)
-        return np.interp(t, track.t, values)
 
-    if {"wind_angle", "wind_speed"} <= tracks.keys():
-        angle = tracks["wind_angle"]
-        wind_from = angle.values + at("psi", angle.t)
-        found["wind_from"] = angle._replace(values=wind_from)
-        found["wind_speed"] = tracks["wind_speed"]
-    elif {"apparent_wind_angle", "apparent_wind_speed", "sog", "cog"} <= tracks.keys():
-        angle = tracks["apparent_wind_angle"]
-        bearing = angle.values + at("psi", angle.t)
-        apparent = tracks["apparent_wind_speed"].values * np.exp(1j * bearing)
-        course = at("cog", angle.t)
-        headwind = at("sog", angle.t) * np.exp(1j * course)
-        wind = apparent - headwind
-        found["wind_from"] = angle._replace(values=np.angle(wind))
-        found["wind_speed"] = angle._replace(values=np.abs(wind))
-    return found
+def _angle_at(t: Floats, track: _Track) -> Floats:
+    """An angle at other times, rad."""
+    return np.interp(t, track.t, np.unwrap(track.values))
 
 
 def _table(path: Path, tracks: dict[str, _Track], notes: list[str]) -> LogTable:
@@ -255,14 +285,15 @@ def _table(path: Path, tracks: dict[str, _Track], notes: list[str]) -> LogTable:
     lines = np.zeros(t.size, dtype=int)
     for channel, track in tracks.items():
         rows = np.searchsorted(t, track.t)
-        columns[channel] = np.full(t.size, np.nan)
-        columns[channel][rows] = track.values
+        values = np.full(t.size, np.nan)
+        values[rows] = track.values
+        columns[channel] = values
         lines[rows] = track.lines
-    return LogTable.of_columns(
-        path,
-        columns,
-        lines.tolist(),
-        "line {line}",
+    return LogTable(
+        path=path,
+        cells=columns,
+        rows=lines.tolist(),
+        place_words="line {line}",
         units={"t": "unix"},
         notes=tuple(notes),
     )

@@ -16,12 +16,12 @@ def read_parquet(path: Path) -> LogTable:
         arrow = import_module("pyarrow")
         parquet = import_module("pyarrow.parquet")
         file = parquet.ParquetFile(arrow.BufferReader(content))
-        about = file.metadata
-        groups = [about.row_group(k) for k in range(about.num_row_groups)]
-        check_unpacked(path, sum(group.total_byte_size for group in groups))
-        cells = about.num_rows * about.num_columns
-        check_unpacked(path, 8 * cells)
+        shape = file.metadata
+        size = 0
+        for k in range(shape.num_row_groups):
+            size += shape.row_group(k).total_byte_size
+        check_unpacked(path, max(size, 8 * shape.num_rows * shape.num_columns))
 
         table = file.read()
         table.validate(full=True)  # offsets beyond the data
-        return read_frame(table.to_pandas(), path, 1)
+        return read_frame(table.to_pandas(), path, first=1)
