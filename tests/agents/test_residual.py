@@ -340,7 +340,7 @@ def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(
     [
         (
             lambda: ResidualVecEnv(ships(COURSE), authority=0.5),
-            "authority: 0.5 found without a base",
+            "authority: expected 1 without a base",
         ),
         (
             lambda: ResidualVecEnv(ships(COURSE), BASES["lq"][1], authority=3.0),
