@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from agents import LearnedPolicy
-from agents.policies.network import Network
+from agents.policies.network import Layer, Network
 from shipgym.ships import load_model
 from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 
@@ -20,15 +20,13 @@ def random_policy(activation: str) -> LearnedPolicy:
     """A policy of course keeping with weights at random."""
     random = np.random.default_rng(0)
     shapes = pairwise(SIZES)
-    layers = tuple(
-        (
-            random.normal(0.0, 0.2, (n_out, n_in)).astype(np.float32),
-            np.zeros(n_out, np.float32),
-        )
-        for n_in, n_out in shapes
-    )
+    layers = []
+    for n_in, n_out in shapes:
+        weight = random.normal(0.0, 0.2, (n_out, n_in)).astype(np.float32)
+        layers.append(Layer(weight, np.zeros(n_out, np.float32)))
+    network = Network(tuple(layers), activation)
     scales = tuple(observation_scales(load_model("mariner")).tolist())
-    return LearnedPolicy(Network(layers, activation), OBSERVATION_NAMES, scales)
+    return LearnedPolicy(network, OBSERVATION_NAMES, scales)
 
 
 def rate(policy: LearnedPolicy, ships: int) -> float:

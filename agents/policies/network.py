@@ -3,16 +3,23 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym import InputError
-from shipgym.checks import check_choice
+from shipgym.checks import check_choice, check_finite, unexpected
 
 Numbers = NDArray[np.float32]
-Layer = tuple[Numbers, Numbers]
+
+
+class Layer(NamedTuple):
+    """Weights of a dense layer, float32, as torch has them."""
+
+    weight: Numbers  # shape (n_out, n_in)
+    bias: Numbers  # shape (n_out,)
+
 
 ACTIVATIONS: dict[str, Callable[[Numbers], Any]] = {
     "relu": lambda x: np.maximum(x, 0.0, out=x),
@@ -23,11 +30,12 @@ OUTPUTS = ("linear", "tanh")
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """Dense layers, one activation between; InputError if shapes do not fit, or a number is not finite."""
+    """Dense layers with one activation between them.
 
-    layers: tuple[
-        Layer, ...
-    ]  # float32 arrays of shape (n_out, n_in) and (n_out,), as torch has them
+    Raises InputError if shapes do not fit together, or a number is not finite.
+    """
+
+    layers: tuple[Layer, ...]
     activation: str = "relu"  # relu or tanh, after every layer but the last
     output: str = "linear"  # linear or tanh, after the last
 
@@ -35,58 +43,63 @@ class Network:
         check_choice(self.activation, ACTIVATIONS, "network.activation")
         check_choice(self.output, OUTPUTS, "network.output")
         if not self.layers:
-            raise InputError("network.layers: none found, expected at least one")
-        for i, (weight, bias) in enumerate(self.layers):
-            _check_layer(weight, bias, f"network.layers[{i}]")
-        for i, ((before, _), (weight, _)) in enumerate(pairwise(self.layers)):
-            if weight.shape[1] != before.shape[0]:
+            raise InputError("network.layers: expected at least one, got none")
+        for i, layer in enumerate(self.layers):
+            _check_layer(layer, f"network.layers[{i}]")
+
+        for i, (before, layer) in enumerate(pairwise(self.layers), start=1):
+            n_outputs = len(before.bias)
+            n_inputs = layer.weight.shape[1]
+            if n_inputs != n_outputs:
                 raise InputError(
-                    f"network.layers[{i + 1}].weight: {weight.shape[1]} inputs found,"
-                    f" expected the {before.shape[0]} outputs of the layer before"
+                    f"network.layers[{i}].weight: expected {n_outputs} inputs, as many"
+                    f" as the layer before has outputs, got {n_inputs}"
                 )
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Numbers of inputs, of each layer's outputs."""
-        return (
-            self.layers[0][0].shape[1],
-            *(weight.shape[0] for weight, _ in self.layers),
-        )
+        """Number of inputs, then of outputs of each layer."""
+        n_inputs = self.layers[0].weight.shape[1]
+        return (n_inputs, *(len(layer.bias) for layer in self.layers))
 
-    def __call__(self, x: Numbers) -> Numbers:
-        """Outputs of shape (n, n_out) for inputs of shape (n, n_in); the inputs are left as they are."""
-        last = len(self.layers) - 1
-        for i, (weight, bias) in enumerate(self.layers):
-            x = x @ weight.T
-            x += bias
-            if i < last:
-                ACTIVATIONS[self.activation](x)
+    def __call__(self, inputs: Numbers) -> Numbers:
+        """Outputs of shape (n, n_out) for inputs of shape (n, n_in), which stay as they are."""
+        *hidden, last = self.layers
+        activate = ACTIVATIONS[self.activation]
+
+        x = inputs
+        for layer in hidden:
+            x = x @ layer.weight.T
+            x += layer.bias
+            activate(x)
+
+        x = x @ last.weight.T
+        x += last.bias
         if self.output == "tanh":
             np.tanh(x, out=x)
         return x
 
 
-def _check_layer(weight: Any, bias: Any, where: str) -> None:
-    for name, array, ndim in (("weight", weight, 2), ("bias", bias, 1)):
-        place = f"{where}.{name}"
-        known = isinstance(array, np.ndarray) and array.dtype == np.float32
-        if not known or array.ndim != ndim or array.size == 0:
-            found = (
-                getattr(array, "dtype", type(array).__name__),
-                getattr(array, "shape", ()),
-            )
-            raise InputError(
-                f"{place}: {found[0]} of shape {found[1]} found, expected float32 with"
-                f" {ndim} axes, none of them empty"
-            )
-        if not np.isfinite(array).all():
-            wrong = tuple(np.argwhere(~np.isfinite(array))[0].tolist())
-            raise InputError(
-                f"{place}: {array[wrong]} found at {list(wrong)}, expected finite"
-                " numbers"
-            )
-    if len(bias) != len(weight):
+def _check_layer(layer: Layer, where: str) -> None:
+    _check_array(layer.weight, 2, f"{where}.weight")
+    _check_array(layer.bias, 1, f"{where}.bias")
+
+    n_rows = len(layer.weight)
+    n_biases = len(layer.bias)
+    if n_biases != n_rows:
         raise InputError(
-            f"{where}.bias: {len(bias)} found, expected {len(weight)}, one for each row"
-            " of weight"
+            f"{where}.bias: expected {n_rows}, one for each row of weight, got"
+            f" {n_biases}"
         )
+
+
+def _check_array(array: Any, ndim: int, where: str) -> None:
+    """Refuse what is no array of finite float32 numbers with so many axes."""
+    expected = f"float32 with {ndim} axes, none of them empty"
+    if not isinstance(array, np.ndarray):
+        raise unexpected(where, expected, array)
+    if array.dtype != np.float32 or array.ndim != ndim or array.size == 0:
+        raise InputError(
+            f"{where}: expected {expected}, got {array.dtype} of shape {array.shape}"
+        )
+    check_finite(array, where)

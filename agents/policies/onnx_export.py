@@ -1,122 +1,143 @@
-"""A learned policy as an ONNX graph, written from its weights; neither torch nor shipgym is needed to run it.
+"""A learned policy as an ONNX graph, written from its weights.
 
-Inputs, outputs and metadata stand in docs/policies.md; in these `history` and `hold`
-are older names of `frame_stack` and `action_repeat`.
+Neither torch nor shipgym is needed to run it. Inputs, outputs and metadata are
+described in docs/policies.md.
 """
 
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from agents.policies.network import Network
 from agents.policies.policy import ORDERS, LearnedPolicy
 from shipgym import InputError
 from shipgym.extras import library
-from shipgym.files import write_bytes
 
-OPSET, IR_VERSION = 17, 8  # of 2022: what runs on ships is not of this year
+OPSET, IR_VERSION = 17, 8  # of 2022: runtimes on ships are not the newest
 OPERATORS = {"relu": "Relu", "tanh": "Tanh"}
+#: Fields of a policy's file that say nothing to someone who runs the graph.
+LEFT_OUT = ("format", "kind", "network", "training")
 
 
-def export_onnx(policy: Any, path: str | Path) -> None:
-    """Write a learned policy as an ONNX file.
+class _Graph:
+    """Nodes and constants of a graph, as they are added."""
 
-    `policy`: with a frame stack or a base too: see the inputs above. Raises InputError
-    if it is not a learned policy, if the file cannot be written, or onnx is not
-    installed.
-    """
-    write_bytes(onnx_model(policy).SerializeToString(), Path(path))
+    def __init__(self, onnx: Any) -> None:
+        self.onnx = onnx
+        self.nodes: list[Any] = []
+        self.constants: list[Any] = []
+
+    def add(
+        self, operator: str, inputs: list[str], output: str, **attributes: int
+    ) -> str:
+        """Add an operator; returns the name of its output."""
+        node = self.onnx.helper.make_node(operator, inputs, [output], **attributes)
+        self.nodes.append(node)
+        return output
+
+    def constant(self, name: str, value: Any) -> str:
+        """Add a constant; returns its name."""
+        tensor = self.onnx.numpy_helper.from_array(np.asarray(value), name)
+        self.constants.append(tensor)
+        return name
+
+    def port(self, name: str, size: int) -> Any:
+        """Input or output of the graph, shape (batch, size)."""
+        real = self.onnx.TensorProto.FLOAT
+        return self.onnx.helper.make_tensor_value_info(name, real, ["batch", size])
 
 
 def onnx_model(policy: Any) -> Any:
-    """The ONNX model of a learned policy, checked by onnx (arguments and errors as `export_onnx`)."""
+    """ONNX model of a learned policy, checked by onnx.
+
+    Raises InputError if it is not a learned policy, or onnx is not installed.
+    """
     if not isinstance(policy, LearnedPolicy):
         raise InputError(
-            f"policy: {type(policy).__name__} found, expected a learned policy: a"
-            " classical controller is not a network; export it with --c or --fmu"
+            f"policy: expected a learned policy, got {type(policy).__name__}, which is"
+            " not a network; export it with --c or --fmu"
         )
     onnx = library("onnx", "onnx", "the export needs it")
-    helper, real = onnx.helper, onnx.TensorProto.FLOAT
-    width = policy.frame_stack * len(policy.observation_names)
-    ends = [
-        {"observations": width},
-        {"action": 2 if policy.action == "rudder-shaft" else 1},
-    ]
-    if policy.base is not None:
-        ends = [ends[0] | {"base_action": 1}, ends[1] | {"part": 1}]
-    inputs, outputs = (
-        [
-            helper.make_tensor_value_info(name, real, ["batch", size])
-            for name, size in end.items()
-        ]
-        for end in ends
+
+    model = onnx.helper.make_model(
+        _graph(policy, onnx),
+        opset_imports=[onnx.helper.make_opsetid("", OPSET)],
+        ir_version=IR_VERSION,
+        producer_name="shipgym",
     )
-    nodes, constants = _nodes(policy, helper)
-    initializers = [
-        onnx.numpy_helper.from_array(array, name) for name, array in constants.items()
-    ]
-    graph = helper.make_graph(nodes, "policy", inputs, outputs, initializers)
-    opset = [helper.make_opsetid("", OPSET)]
-    model = helper.make_model(
-        graph, opset_imports=opset, ir_version=IR_VERSION, producer_name="shipgym"
-    )
-    helper.set_model_props(model, _metadata(policy))
+    onnx.helper.set_model_props(model, _metadata(policy))
     onnx.checker.check_model(model, full_check=True)
     return model
 
 
-def _nodes(policy: LearnedPolicy, helper: Any) -> tuple[list[Any], dict[str, Any]]:
-    """Operators from the inputs to the action, and the constants they use by name."""
-    constants = {
-        "low": np.array(-1.0, dtype=np.float32),
-        "high": np.array(1.0, dtype=np.float32),
-    }
-    nodes: list[Any] = []
-
-    def add(operator: str, inputs: list[str], output: str, **attributes: Any) -> str:
-        nodes.append(helper.make_node(operator, inputs, [output], **attributes))
-        return output
-
-    x, network = "observations", policy.network
+def _graph(policy: LearnedPolicy, onnx: Any) -> Any:
+    """Graph from the observations, and the base's action if there is a base, to the action."""
+    inputs = {"observations": policy.frame_stack * len(policy.observation_names)}
+    outputs = {"action": 2 if policy.action == "rudder-shaft" else 1}
     if policy.base is not None:
-        x = add("Concat", [x, "base_action"], "seen", axis=1)
-    between = [OPERATORS[network.activation]] * (len(network.layers) - 1)
-    after = "Tanh" if network.output == "tanh" else ""
-    for i, ((weight, bias), operator) in enumerate(
-        zip(network.layers, [*between, after], strict=True)
-    ):
-        names = [f"layers.{i}.weight", f"layers.{i}.bias"]
-        constants |= dict(zip(names, (weight, bias), strict=True))
-        x = add("Gemm", [x, *names], f"sum.{i}", transB=1)
-        x = add(operator, [x], f"layer.{i}") if operator else x
+        inputs["base_action"] = 1
+        outputs["part"] = 1
+
+    graph = _Graph(onnx)
+    seen = "observations"
+    if policy.base is not None:
+        seen = graph.add("Concat", [seen, "base_action"], "seen", axis=1)
+    output = _add_network(graph, policy.network, seen)
+    _add_action(graph, policy, output)
+
+    return onnx.helper.make_graph(
+        graph.nodes,
+        "policy",
+        [graph.port(name, size) for name, size in inputs.items()],
+        [graph.port(name, size) for name, size in outputs.items()],
+        graph.constants,
+    )
+
+
+def _add_network(graph: _Graph, network: Network, inputs: str) -> str:
+    """Dense layers; returns the name of their output."""
+    between = OPERATORS[network.activation]
+    last = len(network.layers) - 1
+
+    x = inputs
+    for i, layer in enumerate(network.layers):
+        weight = graph.constant(f"layers.{i}.weight", layer.weight)
+        bias = graph.constant(f"layers.{i}.bias", layer.bias)
+        x = graph.add("Gemm", [x, weight, bias], f"sum.{i}", transB=1)
+        if i < last:
+            x = graph.add(between, [x], f"layer.{i}")
+    if network.output == "tanh":
+        x = graph.add("Tanh", [x], "output")
+    return x
+
+
+def _add_action(graph: _Graph, policy: LearnedPolicy, output: str) -> None:
+    """What `LearnedPolicy.commands` does with the network's output."""
     if policy.action == "rudder-discrete":
-        constants["orders"] = ORDERS
-        add(
-            "Gather",
-            ["orders", add("ArgMax", [x], "number", axis=1, keepdims=1)],
-            "action",
-            axis=0,
-        )
-    elif policy.base is None:
-        add("Clip", [x, "low", "high"], "action")
-    else:
-        constants["authority"] = np.array(policy.authority, dtype=np.float32)
-        part = add(
-            "Mul", [add("Clip", [x, "low", "high"], "limited"), "authority"], "part"
-        )
-        add(
-            "Clip",
-            [add("Add", ["base_action", part], "wanted"), "low", "high"],
-            "action",
-        )
-    used = {name for node in nodes for name in node.input}
-    return nodes, {name: array for name, array in constants.items() if name in used}
+        orders = graph.constant("orders", ORDERS)
+        number = graph.add("ArgMax", [output], "number", axis=1, keepdims=1)
+        graph.add("Gather", [orders, number], "action", axis=0)
+        return
+
+    low = graph.constant("low", np.float32(-1.0))
+    high = graph.constant("high", np.float32(1.0))
+    if policy.base is None:
+        graph.add("Clip", [output, low, high], "action")
+        return
+
+    authority = graph.constant("authority", np.float32(policy.authority))
+    limited = graph.add("Clip", [output, low, high], "limited")
+    part = graph.add("Mul", [limited, authority], "part")
+    wanted = graph.add("Add", ["base_action", part], "wanted")
+    graph.add("Clip", [wanted, low, high], "action")
 
 
 def _metadata(policy: LearnedPolicy) -> dict[str, str]:
-    """What its file says of it."""
+    """Fields of the policy's file, each as JSON."""
     content, _ = policy.file_fields()
-    left_out = ("format", "kind", "network", "training")
-    values = {name: one for name, one in content.items() if name not in left_out}
-    return {name: json.dumps(value) for name, value in values.items()}
+    return {
+        name: json.dumps(value)
+        for name, value in content.items()
+        if name not in LEFT_OUT
+    }

@@ -52,16 +52,15 @@ SHOWING = ("action", "roll", "corridor", "ground")
 
 
 class Memory(NamedTuple):
-    """What a policy with a frame stack, a base or an action repeat remembers."""
+    """What a policy remembers of ships; for a single observation without the first axis."""
 
-    #: past observations, oldest first; for a single observation without the first axis,
-    #: shape (n, frame_stack - 1, n_observations)
-    seen: Numbers
+    seen: (
+        Numbers  # past observations, oldest first, (n, frame_stack - 1, n_observations)
+    )
     base: Any  # state of the base
-    #: control intervals until the next decision, the network's outputs of the last one,
-    #: and those in force, limited in rate; for a single observation without the first
-    #: axis, shape (n, 1 + 2 n_outputs)
-    repeated: Numbers
+    left: Numbers  # control intervals that the output still lasts, (n, 1)
+    output: Numbers  # of the network at the last decision, (n, n_outputs)
+    in_force: Numbers  # the same, limited in rate, (n, n_outputs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,34 +120,39 @@ class LearnedPolicy:
     def __post_init__(self) -> None:
         check_choice(self.action, ACTIONS, "action")
         check_part(self)
+        names, scales = self.observation_names, self.observation_scales
+        if len(scales) != len(names):
+            raise InputError(
+                f"observation_scales: expected {len(names)} numbers, got {len(scales)}"
+            )
         if self.action == "rudder-discrete" and self.rate_limit < NO_LIMIT:
             raise InputError(
-                f"rate_limit: {self.rate_limit:g} found with discrete orders,"
-                " expected 2"
-            )
-        n, n_scales = len(self.observation_names), len(self.observation_scales)
-        if n_scales != n:
-            raise InputError(
-                f"observation_scales: {n_scales} found, expected {n} numbers"
+                f"rate_limit: expected {NO_LIMIT:g} with discrete orders, got"
+                f" {self.rate_limit:g}"
             )
         if self.base is not None:
             if self.action != "rudder":
                 raise InputError(
-                    f"action: '{self.action}' found together with a base, expected"
-                    " 'rudder'"
+                    f"action: expected 'rudder' with a base, got '{self.action}'"
                 )
-            self.base.check_fits(
-                self.observation_names, self.observation_scales, "base"
-            )
-        n_in = self.frame_stack * n + (self.base is not None)
-        n_out, has = OUTPUTS[self.action], self.network.sizes
-        if has[0] != n_in:
-            why = f"{self.frame_stack} x {n} observations and the base's"
-            raise InputError(f"network: {has[0]} inputs found, expected {n_in}: {why}")
-        if has[-1] != n_out:
-            why = f"for action '{self.action}'"
+            self.base.check_fits(names, scales, "base")
+        self._check_network()
+
+    def _check_network(self) -> None:
+        n_inputs, *_, n_outputs = self.network.sizes
+        n_observed = self.frame_stack * len(self.observation_names)
+        n_proposed = 0 if self.base is None else 1
+        expected = n_observed + n_proposed
+        if n_inputs != expected:
             raise InputError(
-                f"network: {has[-1]} outputs found, expected {n_out}: {why}"
+                f"network: expected {expected} inputs, {n_observed} observations of the"
+                f" frame stack and {n_proposed} of a base, got {n_inputs}"
+            )
+        expected = OUTPUTS[self.action]
+        if n_outputs != expected:
+            raise InputError(
+                f"network: expected {expected} outputs for action '{self.action}', got"
+                f" {n_outputs}"
             )
 
     @classmethod
@@ -167,8 +171,18 @@ class LearnedPolicy:
         """Short name: the algorithm, or `learned`."""
         return str(self.training.get("algorithm", "learned"))
 
+    @property
+    def remembers(self) -> bool:
+        """Whether a command depends on earlier observations."""
+        return (
+            self.frame_stack > 1
+            or self.base is not None
+            or self.action_repeat > 1
+            or self.rate_limit < NO_LIMIT
+        )
+
     def reset(self) -> None:
-        """The state with which an episode begins: None, whatever the number of ships."""
+        """State with which an episode begins: None, for any number of ships."""
 
     def predict(
         self,
@@ -177,87 +191,100 @@ class LearnedPolicy:
         episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[Action, Any]:
-        """See `Policy.predict`: the mean of what was learned, or of discrete orders the most likely one.
+        """See `Policy.predict`: the mean of what was learned, or the most likely discrete order.
 
         Of discrete orders the order itself is returned, not its number (`order_numbers`
-        gives it). The state is a `Memory` if there is a frame stack, a base, an action
-        repeat or a rate limit, else as given.
+        gives it). The state is a `Memory` if the policy `remembers` anything, else as
+        given.
         """
-        n = len(self.observation_names)
         given = checked_observation(observation, self.observation_names, np.float32)
-        rows = np.atleast_2d(given)
-        if (self.frame_stack, self.base, self.action_repeat, self.rate_limit) == (
-            1,
-            None,
-            1,
-            NO_LIMIT,
-        ):
-            action = self.commands(self.network(rows[:, :n]), None)
-            return (action if given.ndim == 2 else action[0]), state
-        seen, inner, held = self._recalled(
-            state, episode_start, rows[:, :n], given.ndim
-        )
-        window = np.concatenate([seen, rows[:, None, :n]], axis=1)
-        inputs, proposed = window.reshape(len(rows), -1), None
+        shape = given.shape[:-1]
+        rows = np.atleast_2d(given)[:, : len(self.observation_names)]
+        if not self.remembers:
+            action = self.commands(self.network(rows))
+            return action.reshape(*shape, action.shape[-1]), state
+
+        memory = self._recalled(state, episode_start, rows, shape)
+        window = np.concatenate([memory.seen, rows[:, None]], axis=1)
+        inputs = window.reshape(len(rows), -1)
+        memory = memory._replace(seen=window[:, 1:])
+
+        proposed = None
         if self.base is not None:
-            order, inner = self.base.predict(given, inner, episode_start, deterministic)
-            proposed = np.asarray(order, dtype=np.float32).reshape(len(rows), 1)
-            inputs = np.concatenate([inputs, proposed], axis=1)
-        held = self._decided(inputs, held)
-        action = self.commands(held[:, 1 + OUTPUTS[self.action] :], proposed)
-        kept = window[:, 1:].copy()
-        if given.ndim == 2:
-            return action, Memory(kept, inner, held)
-        return action[0], Memory(kept[0], inner, held[0])
-
-    def _decided(self, inputs: Numbers, held: Numbers) -> Numbers:
-        """Outputs in use: new ones of the ships whose last decision is over, or was not a number."""
-        due = (held[:, 0] < 1.0) | ~np.isfinite(held).all(axis=1)
-        left, outputs, before = np.split(held, [1, 1 + OUTPUTS[self.action]], axis=1)
-        if due.any():
-            left = np.where(due[:, None], np.float32(self.action_repeat), left)
-            outputs = np.where(due[:, None], self.network(inputs), outputs)
-        in_force = outputs
-        if (
-            self.rate_limit < NO_LIMIT
-        ):  # limited from those before, if they were numbers
-            in_force = toward(
-                outputs, np.where(np.isfinite(before), before, 0.0), self.rate_limit
+            order, base = self.base.predict(
+                given, memory.base, episode_start, deterministic
             )
-        return np.concatenate([left - 1.0, outputs, in_force], axis=1)
+            proposed = np.asarray(order, dtype=np.float32).reshape(-1, 1)
+            inputs = np.hstack([inputs, proposed])
+            memory = memory._replace(base=base)
 
-    def commands(self, output: Numbers, proposed: Numbers | None) -> Action:
-        """What is commanded for the network's outputs and the base's action, each of shape (n, ...)."""
+        memory = self._decided(inputs, memory)
+        action = self.commands(memory.in_force, proposed)
+        action = action.reshape(*shape, action.shape[-1])
+        return action, _shaped(memory, shape)
+
+    def _decided(self, inputs: Numbers, memory: Memory) -> Memory:
+        """Ask the network for ships whose last output is over, or was not a number."""
+        in_force = memory.in_force
+        known = np.isfinite(memory.output + in_force)
+        over = memory.left < 1.0
+        due = over | ~known.all(axis=1, keepdims=True)
+
+        left = memory.left
+        output = memory.output
+        if due.any():
+            left = np.where(due, np.float32(self.action_repeat), left)
+            output = np.where(due, self.network(inputs), output)
+
+        if self.rate_limit < NO_LIMIT:
+            before = np.where(np.isfinite(in_force), in_force, np.float32(0.0))
+            in_force = toward(output, before, self.rate_limit)
+        else:
+            in_force = output
+        return memory._replace(left=left - 1.0, output=output, in_force=in_force)
+
+    def commands(self, output: Numbers, proposed: Numbers | None = None) -> Action:
+        """Commands for outputs of the network and a base's action, each of shape (n, ...)."""
         if self.action == "rudder-discrete":
-            return ORDERS[output.argmax(axis=1), None]
-        limited = np.clip(output, -1.0, 1.0)
+            likeliest = output.argmax(axis=1, keepdims=True)
+            return np.asarray(ORDERS[likeliest])
+        limited: Action = np.clip(output, -1.0, 1.0)
         if proposed is None:
             return limited
-        return combined(proposed, limited, float(self.authority))
+        action: Action = combined(proposed, limited, float(self.authority))
+        return action
 
     def _recalled(
-        self, state: Any, starts: Any, rows: Numbers, ndim: int
-    ) -> tuple[Numbers, Any, Numbers]:
-        """What each ship remembers, as in `Memory`; where an episode begins, the present fills the past."""
-        past, n = self.frame_stack - 1, len(rows)
-        present = np.repeat(rows[:, None], past, axis=1)
-        nothing = np.zeros((n, 1 + 2 * OUTPUTS[self.action]), dtype=np.float32)
+        self, state: Any, starts: Any, rows: Numbers, shape: tuple[int, ...]
+    ) -> Memory:
+        """Memory of each ship; where an episode begins, the present fills the past."""
+        n, n_observed = rows.shape
+        past = self.frame_stack - 1
+        output = np.zeros((n, OUTPUTS[self.action]), dtype=np.float32)
+        fresh = Memory(
+            seen=np.repeat(rows[:, None], past, axis=1),
+            base=None,
+            left=np.zeros((n, 1), dtype=np.float32),
+            output=output,
+            in_force=output,
+        )
         if state is None:
-            return present, None, nothing
-        if not isinstance(state, tuple) or len(state) != len(Memory._fields):
+            return fresh
+        if not isinstance(state, Memory):
             raise InputError(
-                f"state: {type(state).__name__} found, expected what the last predict"
-                " returned, or None where episodes begin"
+                "state: expected what the last predict returned, or None where episodes"
+                f" begin, got {type(state).__name__}"
             )
-        seen, inner, held = state
-        expected = (n, past, rows.shape[1])
-        seen = checked_memory(seen, expected if ndim == 2 else expected[1:])
-        flags = checked_starts(starts, (n,))
-        held = np.where(flags[:, None], nothing, np.reshape(held, nothing.shape))
-        return (
-            np.where(flags[:, None, None], present, np.reshape(seen, expected)),
-            inner,
-            held,
+        checked_memory(state.seen, (*shape, past, n_observed))
+
+        begins = checked_starts(starts, (n,))[:, None]
+        kept = _shaped(state, (n,))
+        return Memory(
+            seen=np.where(begins[:, None], fresh.seen, kept.seen),
+            base=kept.base,
+            left=np.where(begins, fresh.left, kept.left),
+            output=np.where(begins, fresh.output, kept.output),
+            in_force=np.where(begins, fresh.in_force, kept.in_force),
         )
 
     def check_fits(
@@ -291,24 +318,24 @@ class LearnedPolicy:
             "roll": "roll" in self.observation_names,
             **self.env_options,
         }
-        names = [
-            name
-            for name in SHOWING
-            if name in known and name in Task.option_names(definition)
-        ]
-        task = Task.of(definition, **{name: known[name] for name in names})
+        asked = set(SHOWING) & set(Task.option_names(definition)) & set(known)
+        task = Task.of(definition, **{name: known[name] for name in asked})
         task.check_fits(model)
+
         shown = task.observed(model)
-        names, scales = [one.name for one in shown], [one.scale for one in shown]
+        names = [quantity.name for quantity in shown]
+        scales = [quantity.scale for quantity in shown]
         self.check_fits(names, scales, f"model '{model.name}'")
 
     def save(self, path: str | Path) -> None:
         """Write NAME.json and, beside it, NAME.safetensors (fields in docs/policies.md)."""
-        write_policy(*self.file_fields(), Path(path))
+        content, tensors = self.file_fields()
+        write_policy(content, tensors, Path(path))
 
     def file_fields(self) -> tuple[dict[str, Any], Tensors]:
-        """What stands in its JSON, and its weights by name."""
+        """Content of its JSON, and its weights by name."""
         network, tensors = network_fields(self.network)
+        base = None if self.base is None else self.base.to_dict()
         content = {
             "format": FORMAT,
             "kind": "learned",
@@ -317,7 +344,7 @@ class LearnedPolicy:
             "action": self.action,
             "network": network,
             "frame_stack": self.frame_stack,
-            "base": None if self.base is None else self.base.to_dict(),
+            "base": base,
             "authority": self.authority,
             "action_repeat": self.action_repeat,
             "rate_limit": self.rate_limit,
@@ -329,20 +356,23 @@ class LearnedPolicy:
 
 
 def check_part(agent: Any) -> None:
-    """Refuse an impossible share of the rudder, frame stack, repeat or rate, of a policy or of its ships."""
+    """Refuse an impossible share of the rudder, frame stack, repeat or rate.
+
+    `agent`: a policy, or the ships among which it learns (`ResidualVecEnv`).
+    """
     check_number(agent.authority, "authority", above=0.0, at_most=LARGEST_AUTHORITY)
     check_whole(agent.frame_stack, "frame_stack", at_least=1)
     check_whole(agent.action_repeat, "action_repeat", at_least=1)
     check_number(agent.rate_limit, "rate_limit", above=0.0, at_most=NO_LIMIT)
     if agent.base is None and agent.authority != 1.0:
         raise InputError(
-            f"authority: {agent.authority:g} found without a base, expected 1, or a"
-            " base"
+            f"authority: expected 1 without a base, got {agent.authority:g}; give a"
+            " base to which the agent adds"
         )
 
 
 def toward(outputs: Any, before: Any, rate_limit: float) -> Any:
-    """Outputs limited to [-1, 1], and to what can be reached in one control interval from those before."""
+    """Outputs limited to [-1, 1], and to a change of `rate_limit` from those before."""
     within = np.clip(outputs, -1.0, 1.0)
     return np.clip(within, before - rate_limit, before + rate_limit)
 
@@ -352,17 +382,30 @@ def combined(proposed: Any, part: Any, authority: float) -> Any:
     return np.clip(proposed + authority * part, -1.0, 1.0)
 
 
+def _shaped(memory: Memory, shape: tuple[int, ...]) -> Memory:
+    """Memory of ships whose arrays begin with other axes: (n,), or () for a single one."""
+    return Memory(
+        seen=memory.seen.reshape(*shape, *memory.seen.shape[-2:]),
+        base=memory.base,
+        left=memory.left.reshape(*shape, 1),
+        output=memory.output.reshape(*shape, memory.output.shape[-1]),
+        in_force=memory.in_force.reshape(*shape, memory.in_force.shape[-1]),
+    )
+
+
 def network_fields(network: Network) -> tuple[dict[str, Any], Tensors]:
-    """What a policy's JSON says of its network, and the weights by name."""
+    """Description of a network in a policy's JSON, and its weights by name."""
     tensors = Tensors()
-    for i, (weight, bias) in enumerate(network.layers):
-        tensors[f"layers.{i}.weight"] = np.ascontiguousarray(weight)
-        tensors[f"layers.{i}.bias"] = np.ascontiguousarray(bias)
-    return {
+    for i, layer in enumerate(network.layers):
+        tensors[f"layers.{i}.weight"] = np.ascontiguousarray(layer.weight)
+        tensors[f"layers.{i}.bias"] = np.ascontiguousarray(layer.bias)
+
+    described = {
         "activation": network.activation,
         "output": network.output,
         "sizes": list(network.sizes),
-    }, tensors
+    }
+    return described, tensors
 
 
 def order_numbers(action: ArrayLike) -> NDArray[np.int64]:

@@ -6,27 +6,40 @@ layers or wrappers) is refused, not guessed.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain, count, takewhile
-from typing import Any
+from itertools import count
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller, model_hash
-from agents.policies.network import Network
+from agents.policies.network import Layer, Network
 from agents.policies.weights_file import as_json
 from shipgym import InputError
 from shipgym.checks import quoted
 from shipgym.envs.registration import env_id
 from shipgym.tasks.definition import TASKS
 
-#: What acts in a policy: its hidden layers, the last one where it stands apart, what
-#: follows that, and the usual activation; PPO and A2C, SAC and TQC, TD3 and DDPG.
+
+class Actor(NamedTuple):
+    """What acts in a policy of stable-baselines3."""
+
+    body: str  # hidden layers
+    head: str  # last layer; empty where it is the last of the body
+    output: str  # what follows it
+    activation: str  # usual one between the layers
+
+    @property
+    def first_weight(self) -> str:
+        """Weight by which a policy of this kind is known."""
+        return f"{self.head or self.body + '.0'}.weight"
+
+
 ACTORS = (
-    ("mlp_extractor.policy_net", "action_net", "linear", "Tanh"),
-    ("actor.latent_pi", "actor.mu", "tanh", "ReLU"),
-    ("actor.mu", "", "tanh", "ReLU"),
+    Actor("mlp_extractor.policy_net", "action_net", "linear", "Tanh"),  # PPO, A2C
+    Actor("actor.latent_pi", "actor.mu", "tanh", "ReLU"),  # SAC, TQC
+    Actor("actor.mu", "", "tanh", "ReLU"),  # TD3, DDPG
 )
 NOT_ACTING = (
     "mlp_extractor.value_net.",
@@ -36,9 +49,8 @@ NOT_ACTING = (
     "actor_target.",
     "critic",
 )
-DENSE = "dense layers with ReLU or Tanh between them"
-SDE = "state-dependent exploration (use_sde) found, expected an agent without"
 ACTIVATION_OF = {"ReLU": "relu", "Tanh": "tanh"}
+DENSE = "dense layers with ReLU or Tanh between them"
 #: Keywords of a vector environment that say how it runs, not what is asked.
 RUNNING = (
     "model",
@@ -50,7 +62,7 @@ RUNNING = (
 )
 #: Wrappers that change observations.
 REFUSED = ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs")
-#: What the wrapper has that adds to a controller.
+#: Attributes of the wrapper that adds to a controller, and their types.
 RESIDUAL = {
     "authority": float,
     "frame_stack": int,
@@ -68,65 +80,64 @@ def sb3_fields(agent: Any, env: Any = None) -> dict[str, Any]:
     that it learned in, with its wrappers; by default the agent's own. Raises InputError
     for an agent or a wrapper that cannot be written as a learned policy.
     """
-    given = agent.get_env() if env is None else env
-    if given is None:
+    outermost = agent.get_env() if env is None else env
+    if outermost is None:
         raise InputError(
-            "env: none found and the agent has none, expected the environment it"
-            " learned in"
+            "env: expected the environment that the agent learned in, got none; give it"
+            " with env="
         )
-    stack = list(_stack(given))
-    _check_wrappers(stack)
-    found = {**_environment(stack[-1]), **_residual(stack)}
+    stack = list(_stack(outermost))
+    for wrapper in stack:
+        _check_wrapper(wrapper)
+    learned_in = _environment(stack[-1])
+
     network = _network(agent)
-    _check_extraction(network, agent, found["action"])
-    return {"network": network, **found}
+    _check_extraction(network, agent, learned_in["action"])
+    return {"network": network, **learned_in, **_residual(stack)}
 
 
 def _stack(env: Any) -> Iterator[Any]:
-    """The environment and what it wraps, down to the ships."""
+    """Environment and what it wraps, down to the ships."""
     while env is not None:
         yield env
-        held = vars(env)
-        inner = held.get("vector_env")  # of ShipVecEnv
-        if "envs" in held:  # of DummyVecEnv
+        attributes = vars(env)
+        inner = attributes.get("vector_env")  # of ShipVecEnv
+        if "envs" in attributes:  # of DummyVecEnv
             inner = env.envs[0]
-        env = held.get("venv", held.get("env", inner))
+        env = attributes.get("venv", attributes.get("env", inner))
 
 
-def _check_wrappers(stack: Sequence[Any]) -> None:
-    for wrapper in stack:
-        name = type(wrapper).__name__
-        if name == "VecNormalize" and wrapper.norm_obs:
-            raise InputError(
-                "env: VecNormalize that scales observations found, expected"
-                " VecNormalize(norm_obs=False): the environments scale them already"
-            )
-        if name in REFUSED or isinstance(
-            wrapper, gymnasium.ObservationWrapper | gymnasium.ActionWrapper
-        ):
-            raise InputError(
-                f"env: wrapper {name} found, expected none that changes observations or"
-                " actions but ResidualVecEnv, whose frame_stack shows past ones"
-            )
+def _check_wrapper(wrapper: Any) -> None:
+    """Refuse a wrapper that changes observations or actions."""
+    name = type(wrapper).__name__
+    if name == "VecNormalize" and wrapper.norm_obs:
+        raise InputError(
+            "env: expected VecNormalize(norm_obs=False), got one that scales"
+            " observations, which the environments do already"
+        )
+    changing = gymnasium.ObservationWrapper | gymnasium.ActionWrapper
+    if name in REFUSED or isinstance(wrapper, changing):
+        raise InputError(
+            "env: expected no wrapper that changes observations or actions but"
+            f" ResidualVecEnv, whose frame_stack shows past ones, got {name}"
+        )
 
 
 def _residual(stack: Sequence[Any]) -> dict[str, Any]:
-    """History, base and authority of the wrapper that adds to a controller, if there is one."""
+    """Base and other settings of the wrapper that adds to a controller, if there is one."""
     for wrapper in stack:
-        if vars(wrapper).keys() >= {"base", *RESIDUAL}:
-            base = wrapper.base
-            if base is not None and not isinstance(base, Controller):
-                raise InputError(
-                    f"base: {type(base).__name__} found, expected a controller of"
-                    " shipgym, which a file can hold"
-                )
-            return {
-                "base": base,
-                **{
-                    name: kind(getattr(wrapper, name))
-                    for name, kind in RESIDUAL.items()
-                },
-            }
+        if not vars(wrapper).keys() >= {"base", *RESIDUAL}:
+            continue
+        base = wrapper.base
+        if base is not None and not isinstance(base, Controller):
+            raise InputError(
+                "base: expected a controller of shipgym, which a file can hold, got"
+                f" {type(base).__name__}"
+            )
+        settings = {
+            name: kind(getattr(wrapper, name)) for name, kind in RESIDUAL.items()
+        }
+        return {"base": base, **settings}
     return {}
 
 
@@ -134,119 +145,142 @@ def _environment(ships: Any) -> dict[str, Any]:
     """What is observed and commanded, and where."""
     if not hasattr(ships, "observation_names"):
         raise InputError(
-            f"env: {type(ships).__name__} found, expected an environment of shipgym,"
-            " such as ShipVecEnv"
+            "env: expected an environment of shipgym, such as ShipVecEnv, got"
+            f" {type(ships).__name__}"
         )
-    model, spec = ships.model, ships.spec
-    kwargs = dict(spec.kwargs) if spec is not None else {}
+    names = tuple(ships.observation_names)
+    name_of_env, options = env_id(task_showing(names)), {}
+    if ships.spec is not None:
+        name_of_env = ships.spec.id
+        options = _options(ships.spec.kwargs)
+
     return {
-        "observation_names": tuple(ships.observation_names),
+        "observation_names": names,
         "observation_scales": tuple(float(scale) for scale in ships.observation_scales),
         "action": ships.task.action,
-        "env_id": (
-            env_id(task_showing(ships.observation_names)) if spec is None else spec.id
-        ),
-        "env_options": {
-            name: as_json(value)
-            for name, value in kwargs.items()
-            if name not in RUNNING and not (name == "task" and value in TASKS)
-        },
-        "model_name": model.name,
-        "model_sha256": model_hash(model),
+        "env_id": name_of_env,
+        "env_options": options,
+        "model_name": ships.model.name,
+        "model_sha256": model_hash(ships.model),
     }
 
 
+def _options(keywords: Mapping[str, Any]) -> dict[str, Any]:
+    """Keywords that say what is asked of the ships, as JSON has them."""
+    options = {}
+    for name, value in keywords.items():
+        task_of_package = name == "task" and value in TASKS
+        if name not in RUNNING and not task_of_package:
+            options[name] = as_json(value)
+    return options
+
+
 def task_showing(names: Sequence[str]) -> str:
-    """The task of the package that shows these quantities."""
+    """Task of the package that shows these quantities."""
     return "PathFollowing" if "cross_track" in names else "CourseKeeping"
 
 
 def _network(agent: Any) -> Network:
-    """The layers from observation to command."""
+    """Layers from observation to command."""
     policy = agent.policy
-    actor: Any = getattr(policy, "actor", None)
-    name = type(
-        getattr(policy if actor is None else actor, "features_extractor", None)
-    ).__name__
-    if name not in ("FlattenExtractor", "NoneType"):
+    actor = getattr(policy, "actor", None) or policy
+    extractor = type(getattr(actor, "features_extractor", None)).__name__
+    if extractor not in ("FlattenExtractor", "NoneType"):
         raise InputError(
-            f"agent: features extractor {name} found, expected none: use 'MlpPolicy' as"
-            " it is"
+            "agent: expected 'MlpPolicy' without a features extractor, got one with"
+            f" {extractor}"
         )
-    if getattr(agent, "use_sde", False):
-        raise InputError(f"agent: {SDE}")
-    what = f"{type(agent).__name__} with {type(policy).__name__}"
+    check_exploration(getattr(agent, "use_sde", False), "agent: ")
+
     activation = getattr(getattr(policy, "activation_fn", None), "__name__", None)
+    what = f"{type(agent).__name__} with {type(policy).__name__}"
     return actor_network(policy.state_dict(), activation, what)
+
+
+def check_exploration(use_sde: Any, where: str = "") -> None:
+    """Refuse state-dependent exploration, whose policies command by other layers."""
+    if use_sde:
+        raise InputError(
+            f"{where}expected an agent without state-dependent exploration, got one"
+            " with it (use_sde)"
+        )
 
 
 def actor_network(
     weights: Mapping[str, Any], activation: str | None, what: str
 ) -> Network:
-    """The network that commands, of the tensors of a policy by name.
+    """Network that commands, from the tensors of a policy by name.
 
     `activation`: torch's class between the layers, by default the algorithm's own;
     `what`: whose they are. Raises InputError for those of another algorithm, and for
-    what is no dense layer.
+    layers that are not dense.
     """
-    found = [one for one in ACTORS if f"{one[1] or one[0] + '.0'}.weight" in weights]
-    if not found:
+    known = [actor for actor in ACTORS if actor.first_weight in weights]
+    if not known:
         raise InputError(
-            f"agent: {what} found, expected PPO, A2C, SAC, TD3, DDPG or TQC with"
-            " 'MlpPolicy'"
+            "agent: expected PPO, A2C, SAC, TD3, DDPG or TQC with 'MlpPolicy', got"
+            f" {what}"
         )
-    body, head, output, own = found[0]
-    if (between := activation or own) not in ACTIVATION_OF:
+    actor = known[0]
+    between = activation or actor.activation
+    if between not in ACTIVATION_OF:
+        raise InputError(f"agent: expected {DENSE}, got {between} as layer 1")
+
+    layers = _dense_layers(actor, weights)
+    used = {f"{layer}.{part}" for layer in layers for part in Layer._fields}
+    acting = {name for name in weights if not name.startswith(NOT_ACTING)}
+    if used != acting:
         raise InputError(
-            f"agent: layer 1 of the network is {between}, expected {DENSE}"
+            f"agent: expected {DENSE}, got weights missing or unknown:"
+            f" {quoted(sorted(used ^ acting))}"
         )
-    hidden = takewhile(
-        lambda layer: f"{layer}.weight" in weights, (f"{body}.{2 * i}" for i in count())
-    )
-    layers = [
-        (f"{layer}.weight", f"{layer}.bias")
-        for layer in (*hidden, *filter(None, [head]))
+
+    tensors = [
+        Layer(_array(weights[f"{layer}.weight"]), _array(weights[f"{layer}.bias"]))
+        for layer in layers
     ]
-    odd = set(chain(*layers)) ^ {
-        name for name in weights if not name.startswith(NOT_ACTING)
-    }
-    if odd:
-        raise InputError(
-            f"agent: weights {quoted(sorted(odd))} missing or not known, expected"
-            f" {DENSE}"
-        )
-    pairs = tuple(
-        (_array(weights[weight]), _array(weights[bias])) for weight, bias in layers
-    )
-    return Network(pairs, ACTIVATION_OF[between], output)
+    return Network(tuple(tensors), ACTIVATION_OF[between], actor.output)
+
+
+def _dense_layers(actor: Actor, weights: Mapping[str, Any]) -> list[str]:
+    """Names of the layers from observation to command; activations stand between them."""
+    layers = []
+    for number in count(step=2):
+        layer = f"{actor.body}.{number}"
+        if f"{layer}.weight" not in weights:
+            break
+        layers.append(layer)
+    if actor.head:
+        layers.append(actor.head)
+    return layers
 
 
 def _array(parameter: Any) -> NDArray[np.float32]:
-    return np.ascontiguousarray(
-        parameter.detach().cpu().numpy(), dtype=np.float32
-    ).copy()
+    numbers = parameter.detach().cpu().numpy()
+    return np.array(numbers, dtype=np.float32, order="C")
 
 
 def _check_extraction(network: Network, agent: Any, action: str) -> None:
-    """The network must command what the agent does, on observations at random."""
-    inputs = (
-        np.random.default_rng(0)
-        .uniform(-1.0, 1.0, (N_COMPARED, network.sizes[0]))
-        .astype(np.float32)
-    )
-    if agent.observation_space.shape != inputs.shape[1:]:
+    """Refuse a network that commands otherwise than its agent, on observations at random."""
+    n_inputs = network.sizes[0]
+    shape = agent.observation_space.shape
+    if shape != (n_inputs,):
         raise InputError(
-            f"agent: observations of shape {agent.observation_space.shape} found,"
-            f" expected {inputs.shape[1:]}, as its network has inputs"
+            f"agent: expected observations of shape {(n_inputs,)}, as its network has"
+            f" inputs, got {shape}"
         )
-    theirs, _ = agent.predict(inputs, deterministic=True)
+
+    random = np.random.default_rng(0)
+    inputs = random.uniform(-1.0, 1.0, (N_COMPARED, n_inputs)).astype(np.float32)
+    commands, _ = agent.predict(inputs, deterministic=True)
     output = network(inputs)
     if action == "rudder-discrete":
-        agrees = bool((output.argmax(axis=-1) == theirs).all())
+        agrees = np.array_equal(output.argmax(axis=-1), commands)
     else:
-        agrees = bool(np.abs(np.clip(output, -1.0, 1.0) - theirs).max() < AGREEMENT)
+        deviation = np.abs(np.clip(output, -1.0, 1.0) - commands)
+        agrees = bool(deviation.max() < AGREEMENT)
     if not agrees:
         raise InputError(
-            f"agent: {type(agent.policy).__name__} gives other commands than its layers"
-            " do, expected 'MlpPolicy' with actions in [-1, 1]"
+            "agent: expected 'MlpPolicy' with actions in [-1, 1], got"
+            f" {type(agent.policy).__name__}, which commands otherwise than its layers"
         )

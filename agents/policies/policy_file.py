@@ -27,6 +27,7 @@ from shipgym.checks import (
     check_whole,
     placed,
     quoted,
+    unexpected,
 )
 from shipgym.tasks.scales import OBSERVATION_NAMES
 
@@ -60,45 +61,40 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy:
 
     table = check_table(content["weights"], f"{where}: weights", ("sha256",))
     sha256 = check_text(table.get("sha256"), f"{where}: weights.sha256")
-    tensors = read_weights(weights_path(path), sha256, path)
+    tensors = read_weights(path, sha256)
     with placed(where):
         agent = _learned(content, tensors)
     if tensors:
         raise InputError(
-            f"{weights_path(path)}: unknown {quoted(tensors)} found with the weights;"
-            f" {REMEDY}"
+            f"{weights_path(path)}: expected only the weights of the network's layers,"
+            f" got {quoted(tensors)} too; {REMEDY}"
         )
     return agent
 
 
 def _learned(content: Mapping[str, Any], tensors: Tensors) -> LearnedPolicy:
-    """A learned policy; its weights are taken out of `tensors`."""
-    place = check_table(content["environment"], "environment", ("id", "options"))
-    options = check_table(place.get("options"), "environment.options")
+    """Learned policy of a file's fields; its weights are taken out of `tensors`."""
+    environment = check_table(content["environment"], "environment", ("id", "options"))
+    options = check_table(environment.get("options"), "environment.options")
     names = _names(content["observation_names"], own_task="task" in options)
+    base = None
+    if content["base"] is not None:
+        base = read_controller(check_table(content["base"], "base"), "base")
+
     return LearnedPolicy(
         network=_network(content["network"], tensors),
         observation_names=names,
         observation_scales=read_scales(content["observation_scales"], names),
-        **{
-            name: content[name]
-            for name in (
-                "action",
-                "frame_stack",
-                "authority",
-                "action_repeat",
-                "rate_limit",
-            )
-        },
-        base=(
-            None
-            if content["base"] is None
-            else read_controller(check_table(content["base"], "base"), "base")
-        ),
-        env_id=check_text(place.get("id"), "environment.id"),
+        action=content["action"],
+        frame_stack=content["frame_stack"],
+        base=base,
+        authority=content["authority"],
+        action_repeat=content["action_repeat"],
+        rate_limit=content["rate_limit"],
+        env_id=check_text(environment.get("id"), "environment.id"),
         env_options=dict(options),
-        **read_model(content["model"]),
         training=dict(check_table(content["training"], "training")),
+        **read_model(content["model"]),
     )
 
 
@@ -106,47 +102,45 @@ def _network(value: Any, tensors: Tensors) -> Network:
     table = check_table(value, "network", ("activation", "output", "sizes"))
     sizes = table.get("sizes")
     if not isinstance(sizes, list) or len(sizes) < 2:
-        raise InputError(
-            f"network.sizes: {sizes!r} found, expected a list of two numbers or more"
-        )
-    counts = [
+        raise unexpected("network.sizes", "a list of two numbers or more", sizes)
+    for i, size in enumerate(sizes):
         check_whole(size, f"network.sizes[{i}]", at_least=1)
-        for i, size in enumerate(sizes)
-    ]
-    layers: list[Layer] = []
-    for i, (n_in, n_out) in enumerate(pairwise(counts)):
-        name = f"layers.{i}"
-        weight = _tensor(tensors, f"{name}.weight", (n_out, n_in))
-        layers.append((weight, _tensor(tensors, f"{name}.bias", (n_out,))))
-    activation, output = (str(table.get(name)) for name in ("activation", "output"))
-    return Network(tuple(layers), activation, output)
+
+    layers = []
+    for i, (n_in, n_out) in enumerate(pairwise(sizes)):
+        weight = _tensor(tensors, f"layers.{i}.weight", (n_out, n_in))
+        bias = _tensor(tensors, f"layers.{i}.bias", (n_out,))
+        layers.append(Layer(weight, bias))
+    return Network(
+        tuple(layers),
+        activation=str(table.get("activation")),
+        output=str(table.get("output")),
+    )
 
 
 def _tensor(tensors: Tensors, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """One of the weights, which is taken out."""
+    """Take one of the weights out."""
+    where = f"network: weights '{name}'"
     if name not in tensors:
-        raise InputError(
-            f"network: weights '{name}' are missing, expected shape {shape}; {REMEDY}"
-        )
+        raise InputError(f"{where}: expected shape {shape}, got none; {REMEDY}")
     array = tensors.pop(name)
     if array.shape != shape or array.dtype != np.float32:
         raise InputError(
-            f"network: weights '{name}': {array.dtype} of shape {array.shape} found,"
-            f" expected float32 of shape {shape}; {REMEDY}"
+            f"{where}: expected float32 of shape {shape}, got {array.dtype} of shape"
+            f" {array.shape}; {REMEDY}"
         )
     return array
 
 
 def _names(value: Any, own_task: bool) -> tuple[str, ...]:
-    """Names of observations; unless of a user's own task, the first are always the same."""
+    """Names of observations; except in a user's own task the first are those of course keeping."""
     where = "observation_names"
     if not isinstance(value, list):
-        raise InputError(f"{where}: {value!r} found, expected a list of names")
-    names = tuple(check_text(name, f"{where}[{i}]") for i, name in enumerate(value))
+        raise unexpected(where, "a list of names", value)
+    for i, name in enumerate(value):
+        check_text(name, f"{where}[{i}]")
     if not own_task:
-        check_names(names[: len(OBSERVATION_NAMES)], OBSERVATION_NAMES, where)
-    if len(set(names)) < len(names):
-        raise InputError(
-            f"{where}: a name twice in {quoted(names)}, expected each once"
-        )
-    return names
+        check_names(value[: len(OBSERVATION_NAMES)], OBSERVATION_NAMES, where)
+    if len(set(value)) < len(value):
+        raise InputError(f"{where}: expected each name once, got {quoted(value)}")
+    return tuple(value)

@@ -21,8 +21,13 @@ from numpy.typing import NDArray
 from agents.controllers.controller import model_hash
 from agents.policies.network import Network
 from agents.policies.policy import LearnedPolicy
-from agents.policies.policy_extraction import SDE, actor_network, task_showing
+from agents.policies.policy_extraction import (
+    actor_network,
+    check_exploration,
+    task_showing,
+)
 from shipgym import InputError, ShipModel
+from shipgym.arrays import Floats
 from shipgym.checks import check_table, placed, quoted
 from shipgym.envs.registration import env_id
 from shipgym.files import LARGEST_TENSORS, parse_json, read_bytes
@@ -56,7 +61,7 @@ class Sb3Agent:
 
     path: Path
     network: Network
-    bounds: NDArray[np.float64]  # least and largest of its observations, shape (n, 2)
+    bounds: Floats  # least and largest of its observations, shape (n, 2)
 
     def policy(self, task: Task, ship: ShipModel) -> LearnedPolicy:
         """The agent as one that learned this task with this ship.
@@ -64,21 +69,21 @@ class Sb3Agent:
         Raises InputError if it observes or commands other quantities than the task has.
         """
         shown = task.observed(ship)
-        names = tuple(one.name for one in shown)
-        bounds = np.array([(one.low, one.high) for one in shown])
+        names = tuple(quantity.name for quantity in shown)
+        bounds = np.array([(quantity.low, quantity.high) for quantity in shown])
         if bounds.shape != self.bounds.shape or not np.allclose(bounds, self.bounds):
             raise InputError(
-                f"{self.path}: {len(self.bounds)} observations within"
-                f" {self.bounds.tolist()} found, expected the task's {len(bounds)}"
-                f" within {bounds.tolist()}; what learned with a base or a frame stack"
-                " is written by LearnedPolicy.from_sb3(agent).save(...)"
+                f"{self.path}: expected the task's {len(bounds)} observations within"
+                f" {bounds.tolist()}, got {len(self.bounds)} within"
+                f" {self.bounds.tolist()}; save an agent that learned with a base or a"
+                " frame stack by LearnedPolicy.from_sb3(agent).save(...)"
             )
         with placed(str(self.path)):
             return LearnedPolicy(
-                self.network,
-                names,
-                tuple(one.scale for one in shown),
-                task.action,
+                network=self.network,
+                observation_names=names,
+                observation_scales=tuple(quantity.scale for quantity in shown),
+                action=task.action,
                 env_id=env_id(task_showing(names)),
                 model_name=ship.name,
                 model_sha256=model_hash(ship),
@@ -86,46 +91,48 @@ class Sb3Agent:
 
 
 def read_sb3(path: Path) -> Sb3Agent:
-    """The agent in a zip that stable-baselines3 or sb3-contrib saved.
+    """Read the agent in a zip that stable-baselines3 or sb3-contrib saved.
 
     Raises InputError for a file that is no such zip, for policies and feature
     extractors of one's own, for observations that VecNormalize scaled, and if torch is
     not installed.
     """
-    content = read_bytes(path, "zip of stable-baselines3", LARGEST_TENSORS)
-    try:
-        with _opened(content) as file:
-            data, weights = (
-                file.read("data").decode(),
-                _weights(file.read("policy.pth")),
-            )
-    except ModuleNotFoundError:
-        raise InputError(
-            f"{path}: needs torch, not installed: pip install 'shipgym[rl]'"
-        ) from None
-    except Exception as error:  # of zipfile and of torch, of any kind
-        why = f"{type(error).__name__}: {error}".partition("\n")[0][:200]
-        raise InputError(
-            f"{path}: not a zip of stable-baselines3 ({why!r}); {REMEDY}"
-        ) from None
+    data, weights = _members(path)
     about = check_table(parse_json(data, f"{path}: data:", REMEDY), f"{path}: data")
     with placed(str(path)):
         activation = _activation(about)
         bounds = _bounds(about)
         _check_not_scaled(about, len(bounds))
-        return Sb3Agent(
-            path, actor_network(weights, activation, "another algorithm"), bounds
-        )
+        network = actor_network(weights, activation, "another algorithm")
+        return Sb3Agent(path, network, bounds)
+
+
+def _members(path: Path) -> tuple[str, dict[str, Any]]:
+    """JSON of a zip and its weights by name."""
+    content = read_bytes(path, "zip of stable-baselines3", LARGEST_TENSORS)
+    try:
+        with _opened(content) as file:
+            return file.read("data").decode(), _weights(file.read("policy.pth"))
+    except ModuleNotFoundError:
+        raise InputError(
+            f"{path}: expected torch to be installed, which reads it; pip install"
+            " 'shipgym[rl]'"
+        ) from None
+    except Exception as error:  # of zipfile and of torch, of any kind
+        first_line = f"{type(error).__name__}: {error}".partition("\n")[0]
+        raise InputError(
+            f"{path}: expected a zip of stable-baselines3, got another file or a broken"
+            f" one ({first_line[:200]!r}); {REMEDY}"
+        ) from None
 
 
 def _opened(content: bytes) -> ZipFile:
-    """A zip of members as they are, all of them together no larger than the whole."""
+    """Open a zip of uncompressed members, all of them together no larger than the whole."""
     file = ZipFile(BytesIO(content))
-    stored = all(one.compress_type == ZIP_STORED for one in file.infolist())
-    if not stored or sum(one.file_size for one in file.infolist()) > len(content):
-        raise ValueError(
-            "compressed members found, expected them as `save` writes them"
-        )
+    members = file.infolist()
+    stored = all(member.compress_type == ZIP_STORED for member in members)
+    if not stored or sum(member.file_size for member in members) > len(content):
+        raise ValueError("expected members as `save` writes them, got compressed ones")
     return file
 
 
@@ -134,53 +141,48 @@ def _weights(content: bytes) -> dict[str, Any]:
     import torch
 
     with _opened(content):
-        found: dict[str, Any] = torch.load(
+        tensors: dict[str, Any] = torch.load(
             BytesIO(content), map_location="cpu", weights_only=True
         )
-    for name, one in found.items():
-        if (
-            not isinstance(name, str)
-            or one.dtype != torch.float32
-            or one.numel() * 4 > len(content)
-        ):
+    for name, tensor in tensors.items():
+        single = isinstance(name, str) and tensor.dtype == torch.float32
+        if not single or tensor.nbytes > len(content):
             raise ValueError(f"weights {name!r}: expected numbers of type float32")
-        one.numpy()
-    return found
+        tensor.numpy()
+    return tensors
 
 
 def _activation(about: Mapping[str, Any]) -> str | None:
-    """What is between the layers, None for the usual; the policy has to be one that is known."""
-    module = check_table(about.get("policy_class"), "data: policy_class").get(
-        "__module__"
-    )
+    """Name of what is between the layers, None for the usual; refuses policies of one's own."""
+    policy_class = check_table(about.get("policy_class"), "data: policy_class")
+    module = policy_class.get("__module__")
     if not POLICIES.fullmatch(str(module)):
         raise InputError(
-            f"policy of {module!r} found, expected 'MlpPolicy' of stable-baselines3,"
-            " sb3-contrib"
+            "expected 'MlpPolicy' of stable-baselines3 or sb3-contrib, got a policy of"
+            f" {module!r}"
         )
-    kwargs = check_table(about.get("policy_kwargs"), "data: policy_kwargs")
-    if about.get("use_sde") or kwargs.get("use_sde"):
-        raise InputError(SDE)
-    if other := kwargs.keys() - KWARGS:
+    keywords = check_table(about.get("policy_kwargs"), "data: policy_kwargs")
+    check_exploration(about.get("use_sde") or keywords.get("use_sde"))
+    other = keywords.keys() - KWARGS
+    if other:
         raise InputError(
-            f"policy_kwargs {quoted(sorted(other))} found, expected 'MlpPolicy' as"
-            " it is"
+            "expected 'MlpPolicy' as it is, got one with policy_kwargs"
+            f" {quoted(sorted(other))}"
         )
-    return (
-        str(kwargs.get("activation_fn", "")).rpartition(".")[2].removesuffix("'>")
-        or None
-    )
+    # such as <class 'torch.nn.modules.activation.ReLU'>
+    name = str(keywords.get("activation_fn", "")).rpartition(".")[2]
+    return name.removesuffix("'>") or None
 
 
-def _bounds(about: Mapping[str, Any]) -> NDArray[np.float64]:
+def _bounds(about: Mapping[str, Any]) -> Floats:
     space = check_table(about.get("observation_space"), "data: observation_space")
     try:
-        return np.array(
-            [str(space[name]).strip("[]").split() for name in ("low", "high")], float
-        ).T
+        low, high = (str(space[name]).strip("[]").split() for name in ("low", "high"))
+        return np.array([low, high], dtype=np.float64).T
     except (KeyError, ValueError):
         raise InputError(
-            "data: observation_space: no flat Box found, expected that of a task"
+            "data: observation_space: expected the flat Box of a task, got another"
+            " space"
         ) from None
 
 
@@ -189,21 +191,25 @@ def _check_not_scaled(about: Mapping[str, Any], n: int) -> None:
     if about.get("_last_obs") is None:  # has not learned
         return
     try:
-        pickled = base64.b64decode(
-            check_table(about["_last_obs"], "data: _last_obs")[":serialized:"]
-        )
-        found = [
-            one
-            for _, one, _ in pickletools.genops(pickled)
-            if isinstance(one, bytes | bytearray)
-        ]
-        seen = np.frombuffer(max(found, key=len), np.float32).reshape(-1, n)
-        known = bool(np.allclose(np.hypot(seen[:, 0], seen[:, 1]), 1.0, atol=1e-4))
+        last = _last_observations(about).reshape(-1, n)
+        length = np.hypot(last[:, 0], last[:, 1])
+        known = np.allclose(length, 1.0, atol=1e-4)
     except (LookupError, TypeError, ValueError, OverflowError):
         known = False
     if not known:
         raise InputError(
-            "last observations found that are scaled, or not of shipgym: a zip lacks"
-            " the statistics of VecNormalize; train with norm_obs=False, the"
-            " environments scale their observations"
+            "data: _last_obs: expected observations of shipgym that are not scaled, got"
+            " others: a zip lacks the statistics of VecNormalize; train with"
+            " norm_obs=False, the environments scale their observations"
         )
+
+
+def _last_observations(about: Mapping[str, Any]) -> NDArray[np.float32]:
+    """Numbers in the pickle of the last observations, which is not executed."""
+    entry = check_table(about["_last_obs"], "data: _last_obs")
+    pickled = base64.b64decode(entry[":serialized:"])
+    buffers = []
+    for _, argument, _ in pickletools.genops(pickled):
+        if isinstance(argument, bytes | bytearray):
+            buffers.append(argument)
+    return np.frombuffer(max(buffers, key=len), np.float32)

@@ -25,73 +25,80 @@ REMEDY = "take another copy of both files"
 def write_policy(content: Mapping[str, Any], tensors: Tensors, path: Path) -> None:
     """Write NAME.json and, first, NAME.safetensors.
 
-    `content`: what stands in the JSON; `tensors`: the weights; none where a policy has
-    none; `path`: NAME.json. Raises InputError if the name does not end in .json, the
-    folder cannot be written, or JSON cannot hold the content.
+    `content`: of the JSON; `tensors`: the weights; `path`: NAME.json. Raises InputError
+    if the name does not end in .json, the folder cannot be written, or JSON cannot hold
+    the content.
     """
+    from safetensors.numpy import save
+
     if path.suffix != ".json":
         raise InputError(
-            f"{path}: a policy's file ends in .json, with the weights beside it in"
-            " .safetensors"
+            f"{path}: expected a name that ends in .json; the weights are written"
+            " beside it, in .safetensors"
         )
     try:
         json.dumps(content, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise InputError(
-            f"{path}: training and env_options: {error}; expected what JSON can hold"
+            f"{path}: training and env_options: expected what JSON can hold: {error}"
         ) from None
-    weights = None
-    if tensors:
-        from safetensors.numpy import save as as_bytes
 
-        written: bytes = as_bytes(tensors)
-        write_bytes(written, weights_path(path))
-        weights = {"sha256": hashlib.sha256(written).hexdigest()}
-    write_json({**content, "weights": weights}, path)
+    weights: bytes = save(tensors)
+    sha256 = hashlib.sha256(weights).hexdigest()
+    write_bytes(weights, weights_path(path))
+    write_json({**content, "weights": {"sha256": sha256}}, path)
 
 
 def weights_path(path: Path) -> Path:
-    """Where the weights of NAME.json are."""
+    """File with the weights of NAME.json."""
     return path.with_suffix(".safetensors")
 
 
-def read_weights(path: Path, sha256: str, json_path: Path) -> Tensors:
-    """Weights at `path`, of the hash in `json_path`; InputError if missing, broken or of another policy."""
-    content = read_bytes(path, f"file with the weights of {json_path}", LARGEST_TENSORS)
+def read_weights(path: Path, sha256: str) -> Tensors:
+    """Weights by name, of the policy at `path` (NAME.json), whose JSON has their hash.
+
+    Raises InputError if they are missing, broken or those of another policy.
+    """
+    from safetensors.numpy import load
+
+    file = weights_path(path)
+    content = read_bytes(file, f"file with the weights of {path}", LARGEST_TENSORS)
     found = hashlib.sha256(content).hexdigest()
     if found != sha256:
         raise InputError(
-            f"{path}: SHA-256 {found[:12]}... found in {len(content)} bytes, expected"
-            f" {sha256[:12]}..., which is the field weights.sha256 of {json_path}: cut"
-            f" short, or of another policy; {REMEDY}"
+            f"{file}: expected SHA-256 {sha256[:12]}..., the field weights.sha256 of"
+            f" {path}, got {found[:12]}... of {len(content)} bytes: cut short, or of"
+            f" another policy; {REMEDY}"
         )
-    from safetensors.numpy import load
-
     try:
         tensors: Tensors = load(content)
-    except (
-        Exception
-    ) as error:  # safetensors' own errors and those of the types it does not know
+    except Exception as error:  # of safetensors, and of types that NumPy does not know
         raise InputError(
-            f"{path}: not a safetensors file ({error}); {REMEDY}"
+            f"{file}: expected a safetensors file, got one that is broken ({error});"
+            f" {REMEDY}"
         ) from None
     return tensors
 
 
 def as_json(value: Any) -> Any:
-    """An option of an environment as JSON has it; models by their names."""
-    if isinstance(value, ShipModel):
-        return value.name
-    if isinstance(value, Weather):
-        return value.to_dict()
+    """Convert an option of an environment to what JSON has; models to their names."""
+    match value:
+        case ShipModel():
+            return value.name
+        case Weather():
+            return value.to_dict()
+        case Path():
+            return str(value)
+        case Mapping():
+            return {str(name): as_json(entry) for name, entry in value.items()}
+        case list() | tuple():
+            return [as_json(entry) for entry in value]
+        case np.ndarray() | np.generic():
+            return as_json(value.tolist())
+        case float() if np.isnan(value):
+            return None
+        case float() if np.isinf(value):
+            return str(value)
     if is_dataclass(value) and not isinstance(value, type):
         return as_json(asdict(value))
-    if isinstance(value, Mapping):
-        return {str(name): as_json(one) for name, one in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return as_json(value.tolist())
-    if isinstance(value, list | tuple):
-        return [as_json(one) for one in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None if np.isnan(value) else str(value)
-    return str(value) if isinstance(value, Path) else value
+    return value

@@ -14,7 +14,7 @@ from agents.rollouts.metrics import costs, mean, steering
 from agents.rollouts.rollout import Rollout, check_fits, rollout
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats, Integers
-from shipgym.checks import check_number
+from shipgym.checks import check_number, unexpected
 from shipgym.envs.engine import Engine
 from shipgym.tasks.scales import observation_scales
 from shipgym.tasks.task import Task, course_keeping_task
@@ -112,58 +112,64 @@ def sail(
         Whether models that were found unstable when they were identified may be sailed,
         with a warning.
     """
-    fleet = _fleet(models)
-    numbers = _seeds(seeds, len(fleet))
-    lanes = (
-        [model for model in fleet for _ in range(numbers[0].size)]
-        if len(fleet) > 1
-        else fleet
-    )
-    check_fits(
-        controller, task or course_keeping_task(), lanes[0], f"model '{lanes[0].name}'"
-    )
-    found = []
+    ships = _ships(models)
+    numbers = _seeds(seeds, len(ships))
+    asked = task or course_keeping_task()
+    check_fits(controller, asked, ships[0], f"model '{ships[0].name}'")
+
+    one_ship = len(ships) == 1
+    episodes = numbers.reshape(len(ships), -1)
+    groups = []
     for first in range(0, numbers.size, AT_ONCE):
-        some = numbers.reshape(-1)[first : first + AT_ONCE]
-        ships = lanes[first : first + AT_ONCE] if len(fleet) > 1 else fleet
-        engine = Engine(ships, some.size, task, allow_unstable=allow_unstable)
-        found.append(_figures(rollout(controller, engine, some, record=RECORDED)))
-    figures = {
-        name: np.concatenate([part[name] for part in found]) for name in found[0]
-    }
-    return Episodes(
-        **{name: one.reshape(numbers.shape) for name, one in figures.items()},
-        seeds=numbers,
-    )
+        group = range(first, min(first + AT_ONCE, numbers.size))
+        rows, columns = np.divmod(group, episodes.shape[1])
+        engine = Engine(
+            ships if one_ship else [ships[row] for row in rows],
+            len(group),
+            asked,
+            allow_unstable=allow_unstable,
+        )
+        some = episodes[rows, columns]
+        run = rollout(controller, engine, some, record=RECORDED)
+        groups.append(_figures(run))
+
+    figures = {}
+    for name in groups[0]:
+        values = np.concatenate([group[name] for group in groups])
+        figures[name] = values.reshape(numbers.shape)
+    return Episodes(**figures, seeds=numbers)
 
 
 def _seeds(seeds: ArrayLike, n_models: int) -> Integers:
     """Seeds of the episodes, with several models one row for each."""
     numbers = np.asarray(seeds)
     if numbers.dtype.kind not in "iu" or numbers.size == 0:
-        raise InputError(f"seeds: {seeds!r} found, expected integers")
-    if n_models > 1 and numbers.ndim == 0:
-        numbers = np.full(n_models, int(numbers))
-    if n_models > 1 and numbers.shape[0] != n_models:
-        expected = f"({n_models},) or ({n_models}, n_episodes): one row for each model"
-        raise InputError(f"seeds: shape {numbers.shape} found, expected {expected}")
+        raise unexpected("seeds", "integers", seeds)
+    if n_models == 1:
+        return numbers
+    if numbers.ndim == 0:
+        return np.full(n_models, int(numbers))
+    if len(numbers) != n_models:
+        raise InputError(
+            f"seeds: expected shape ({n_models},) or ({n_models}, n_episodes), a row"
+            f" for each model, got {numbers.shape}"
+        )
     return numbers
 
 
 def _figures(run: Rollout) -> dict[str, NDArray[np.generic]]:
     """Figures of `Episodes`, each of shape (n,)."""
-    cost, steered = costs(run), steering(run)
+    cost = costs(run)
+    steered = steering(run)
     return {
         "cost": cost["cost"],
-        **{
-            f"{part}_cost": cost[f"cost_{part}"]
-            for part in ("heading", "rudder", "rudder_rate", "end")
-        },
-        **{
-            name: steered[name]
-            for name in ("heading_rmse_deg", "rudder_travel_deg_min")
-        },
-        "extrapolating": mean(run, run.infos["extrapolating"]),
+        "heading_cost": cost["cost_heading"],
+        "rudder_cost": cost["cost_rudder"],
+        "rudder_rate_cost": cost["cost_rudder_rate"],
+        "end_cost": cost["cost_end"],
+        "heading_rmse_deg": steered["heading_rmse_deg"],
+        "rudder_travel_deg_min": steered["rudder_travel_deg_min"],
+        "extrapolating": mean(run, "extrapolating"),
         "terminated": run.terminated,
         "duration_s": run.steps * run.dt,
     }
@@ -193,38 +199,48 @@ def step_response(
     duration : float, optional
         In s; by default the time to travel 16 ship lengths.
     """
-    fleet = _fleet(models)
+    ships = _ships(models)
+    first = ships[0]
     check_number(
         step_deg, "step_deg", at_least=-LARGEST_STEP_DEG, at_most=LARGEST_STEP_DEG
     )
+    if duration is None:
+        duration = STEP_LENGTHS * first.travel_time
+    check_number(duration, "duration", above=0.0)
     asked = task or course_keeping_task()
-    check_fits(controller, asked, fleet[0], f"model '{fleet[0].name}'")
-    lasts = STEP_LENGTHS * fleet[0].travel_time if duration is None else duration
-    steps = int(
-        np.ceil(check_number(lasts, "duration", above=0.0) / asked.interval(fleet[0]))
-    )
+    check_fits(controller, asked, first, f"model '{first.name}'")
+
+    steps = int(np.ceil(duration / asked.interval(first)))
     straight = asked.changed(course_change_deg=0.0, episode_steps=steps)
-    engine = Engine(fleet, len(fleet), straight, allow_unstable=allow_unstable)
-    seeds = np.zeros(len(fleet), dtype=np.int64)
-    course = _OtherCourse(engine, float(np.radians(step_deg)))
-    states = rollout(controller, engine, seeds, record=RECORDED, show=course).states
-    left = (
-        (0, steps + 1 - len(states["psi"])),
-        (0, 0),
-    )  # after all were lost, if they were
-    found = states["psi"] - states["set_point"], states["delta"]
-    heading, rudder = (np.pad(values, left, mode="edge").T for values in found)
-    t: Floats = np.arange(steps + 1, dtype=np.float64) * engine.dt
-    return StepResponses(t, heading, rudder)
+    engine = Engine(ships, len(ships), straight, allow_unstable=allow_unstable)
+    run = rollout(
+        controller,
+        engine,
+        np.zeros(len(ships), dtype=np.int64),
+        record=RECORDED,
+        show=_NewCourse(engine, float(np.radians(step_deg))),
+    )
+    change = run.states["psi"] - run.states["set_point"]
+    return StepResponses(
+        t=np.arange(steps + 1, dtype=np.float64) * engine.dt,
+        heading=_continued(change, steps + 1),
+        rudder=_continued(run.states["delta"], steps + 1),
+    )
 
 
-class _OtherCourse:
-    """Observations of another course, a step away, rad, of ships that keep theirs in an engine."""
+def _continued(history: Floats, n_samples: int) -> Floats:
+    """History of each ship, shape (n_ships, n_samples); the last value lasts to the end."""
+    missing = n_samples - len(history)
+    return np.pad(history, ((0, missing), (0, 0)), mode="edge").T
+
+
+class _NewCourse:
+    """Shows ships a course that is a step, rad, away from the one they keep in an engine."""
 
     def __init__(self, engine: Engine, step: float) -> None:
         self.engine = engine
         self.step = step
-        self.reach = observation_scales(engine.model)[-1]
+        self.largest_integral = observation_scales(engine.model)[-1]
         self.integral = np.zeros(engine.num_envs)
         self.started = 0.0
 
@@ -232,14 +248,18 @@ class _OtherCourse:
         state = self.engine.physical_state()
         error = self.step - (state["psi"] - state["set_point"])
         self.integral = gathered(
-            self.integral, error, self.started, self.engine.dt, self.reach
+            self.integral,
+            error,
+            started=self.started,
+            dt=self.engine.dt,
+            reach=self.largest_integral,
         )
         self.started = 1.0
-        return on_course(observations, error, self.integral, self.reach)
+        return on_course(observations, error, self.integral, self.largest_integral)
 
 
-def _fleet(models: ShipModel | Sequence[ShipModel]) -> list[ShipModel]:
-    fleet = [models] if isinstance(models, ShipModel) else list(models)
-    if not fleet:
-        raise InputError("models: none found, expected at least one")
-    return fleet
+def _ships(models: ShipModel | Sequence[ShipModel]) -> list[ShipModel]:
+    ships = [models] if isinstance(models, ShipModel) else list(models)
+    if not ships:
+        raise InputError("models: expected at least one, got none")
+    return ships

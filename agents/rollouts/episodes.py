@@ -1,5 +1,6 @@
 """Histories of single episodes of a task, as they are replayed."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -37,31 +38,76 @@ def recorded(
     """
     engine = task.engine(len(seeds))
     run = rollout(policy, engine, np.asarray(seeds), record=True, tolerant=True)
-    stride = -(-task.task.episode_steps // samples)
-    episodes = [_episode(run, task, lane, engine, stride) for lane in range(len(seeds))]
-    return Recorded(episodes, np.where(run.failed, np.nan, run.costs))
+    stride = math.ceil(task.task.episode_steps / samples)
+    episodes = []
+    for lane in range(len(seeds)):
+        episodes.append(episode_of(run, task, lane, engine, stride))
+
+    costs = np.where(run.failed, np.nan, run.costs)
+    return Recorded(episodes, costs)
 
 
-def _episode(
+class _Lane:
+    """One ship of a rollout that recorded everything, at the samples of its history."""
+
+    def __init__(self, run: Rollout, lane: int, stride: int) -> None:
+        self.run = run
+        self.lane = lane
+        self.steps = int(run.steps[lane])
+        self.failed = bool(run.failed[lane])
+        n_intervals = math.ceil(self.steps / stride)
+        if self.failed:  # she drifts on after that
+            n_intervals = self.steps // stride
+        self.samples = np.minimum(stride * np.arange(n_intervals + 1), self.steps)
+
+    def at_samples(self, histories: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Histories that are finite throughout, each of shape (n_samples,)."""
+        finite = {}
+        for name, values in histories.items():
+            sampled = values[self.samples, self.lane]
+            if np.isfinite(sampled).all():
+                finite[name] = sampled
+        return finite
+
+    def summed(self, per_step: Floats) -> Floats:
+        """Sums between the samples of what each step of a rollout has."""
+        running = np.cumsum(per_step[: self.steps, self.lane])
+        return np.diff(np.append(0.0, running)[self.samples])
+
+    def success(self) -> bool | None:
+        """Whether the episode was a success; None if its task knows none."""
+        infos = self.run.infos
+        for name in SUCCESS:
+            if name in infos:
+                flags = infos[name][: self.steps + 1, self.lane]
+                return bool(np.any(flags[1:] > 0.0))
+        return None
+
+
+def episode_of(
     run: Rollout, task: BenchmarkTask, lane: int, engine: Engine, stride: int
 ) -> Episode | None:
-    """One lane of a rollout that recorded everything."""
-    ship, failed, steps = run.model, bool(run.failed[lane]), int(run.steps[lane])
-    count = (
-        steps // stride if failed else -(-steps // stride)
-    )  # where the policy failed she drifts on
-    if not count:
-        return None
-    at = np.minimum(stride * np.arange(count + 1), steps)
-    states = {name: values[at, lane] for name, values in run.states.items()}
-    infos = {name: values[: steps + 1, lane] for name, values in run.infos.items()}
-    success = [bool(np.any(infos[name][1:] > 0.0)) for name in SUCCESS if name in infos]
+    """Episode of a lane of a rollout that recorded everything; None without a sample.
 
-    def summed(values: Floats) -> Floats:
-        return np.diff(np.append(0.0, np.cumsum(values))[at])
+    `stride`: control intervals between two samples.
+    """
+    ship = run.model
+    history = _Lane(run, lane, stride)
+    if len(history.samples) < 2:
+        return None
 
     parts = task.task.reward_parts
-    commands = {name: states.get(f"{name}_command") for name in ship.command_names}
+    infos = {
+        name: values
+        for name, values in run.infos.items()
+        if name not in parts and name not in SUCCESS
+    }
+    states = history.at_samples(run.states)
+    commands = {}
+    for name in ship.command_names:
+        order = f"{name}_command"
+        if order in states:
+            commands[name] = states[order][1:]
     return Episode(
         environment=task.env_id,
         model=ship.name,
@@ -69,29 +115,18 @@ def _episode(
         length=ship.particulars["length"],
         beam=ship.particulars.get("beam"),
         rudder_limit=ship.steering.limit,
-        states=_finite(states),
-        actions=run.actions[at[:-1], lane],
-        rewards=summed(run.rewards[:steps, lane]),
-        commands={
-            name: values[1:] for name, values in commands.items() if values is not None
-        },
-        reward_parts={name: summed(infos[name][1:]) for name in parts},
-        info=_finite(
-            {name: infos[name][at] for name in infos if name not in {*parts, *SUCCESS}}
-        ),
+        states=states,
+        actions=run.actions[history.samples[:-1], lane],
+        rewards=history.summed(run.rewards),
+        commands=commands,
+        reward_parts={name: history.summed(run.infos[name][1:]) for name in parts},
+        info=history.at_samples(infos),
         waypoints=engine.waypoints(lane),
         corridor=engine.path_metres("corridor"),
         turn_radius=engine.path_metres("turn_radius"),
         arguments=plain({"model": task.model, **task.arguments}),
         seed=int(run.seeds[lane]),
-        terminated=not failed and bool(run.terminated[lane]),
-        truncated=not failed and bool(run.truncated[lane]),
-        success=success[0] if success else None,
+        terminated=bool(run.terminated[lane]) and not history.failed,
+        truncated=bool(run.truncated[lane]) and not history.failed,
+        success=history.success(),
     )
-
-
-def _finite(histories: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Those that are finite throughout."""
-    return {
-        name: values for name, values in histories.items() if np.isfinite(values).all()
-    }

@@ -29,7 +29,6 @@ STATES = ("psi", "u", "v", "n", "delta", "set_point")
 DEAD_BAND = np.radians(0.5)  # the rudder has turned round once it came back by so much
 SMALLEST_CHANGE = np.radians(5.0)  # of course, whose overshoot and settling count
 SETTLED_SHARE, SETTLED_LEAST = 0.05, np.radians(1.0)  # of the change of course, and rad
-OF_COURSES = ("overshoot_percent", "settling_s", "unsettled")
 OF_PATHS = ("cross_track_rmse_m", "outside_corridor", "left_corridor", "grounded")
 #: Entries of `info` from which the figures of paths are computed.
 PATH_INFO = (
@@ -39,6 +38,14 @@ PATH_INFO = (
     "grounded",
     "success",
 )
+
+
+class CourseChange(NamedTuple):
+    """Figures of a change of course, or means over those of an episode."""
+
+    overshoot_percent: float  # of the first error
+    settling_s: float
+    unsettled: float  # 1 if it has not settled, else 0
 
 
 def recorded_for_metrics(task: Task) -> tuple[str, ...]:
@@ -74,15 +81,16 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         charged as if it had lost control then; success is on a path whether its end was
         reached, else whether control was kept.
     """
+    nowhere = np.full(len(run.seeds), np.nan)
     own = task_figures(run)
     lost = run.terminated & ~(own["success"] > 0.0)
     return {
         **costs(run),
         **steering(run),
-        **dict.fromkeys((*OF_COURSES, *OF_PATHS), np.full(len(run.seeds), np.nan)),
+        **dict.fromkeys((*CourseChange._fields, *OF_PATHS), nowhere),
         **own,
         "fuel": fuel_per_distance(run),
-        "extrapolating": mean(run, run.infos["extrapolating"]),
+        "extrapolating": mean(run, "extrapolating"),
         "terminated": lost.astype(np.float64),
         "failed": run.failed.astype(np.float64),
         "duration_s": run.steps * run.dt,
@@ -98,57 +106,72 @@ def task_figures(run: Rollout) -> dict[str, Floats]:
     if _keeps_course(run.task):
         kept = ~(run.terminated | run.failed)
         return {**course_changes(run), "success": kept.astype(np.float64)}
+
     # a task of a user's own, which charges ships that are lost
-    charged = total(run.infos["reward_end"][1:] * run.sailing) < 0.0
-    return {"success": (~(charged | run.failed)).astype(np.float64)}
+    charged = total(during(run, "reward_end")) < 0.0
+    kept = ~(charged | run.failed)
+    return {"success": kept.astype(np.float64)}
 
 
 def costs(run: Rollout) -> dict[str, Floats]:
     """Cost of each episode and its parts, see `metrics`."""
-    parts = {
-        f"cost_{name.removeprefix('reward_')}": total(
-            -run.infos[name][1:] * run.sailing
-        )
-        for name in run.task.reward_parts
-    }
-    left = run.task.episode_steps - run.steps
-    parts["cost_end"] = parts["cost_end"] + np.where(
-        run.failed, left * worst_step_cost(run.task), 0.0
-    )
-    return {"cost": sum(parts.values(), start=np.zeros(len(run.seeds))), **parts}
+    parts = {}
+    for name in run.task.reward_parts:
+        part = name.removeprefix("reward_")
+        rewards = total(during(run, name))
+        parts[f"cost_{part}"] = -rewards
+
+    # an episode in which the policy failed is charged as one that was lost
+    steps_left = run.task.episode_steps - run.steps
+    charged = steps_left * worst_step_cost(run.task)
+    parts["cost_end"] += np.where(run.failed, charged, 0.0)
+
+    cost = np.zeros(len(run.seeds))
+    for values in parts.values():
+        cost = cost + values
+    return {"cost": cost, **parts}
 
 
 def steering(run: Rollout) -> dict[str, Floats]:
     """Heading error and rudder activity of each episode, see `metrics`."""
-    minutes, rudder = run.steps * run.dt / 60.0, run.states["delta"]
-    turned = np.abs(np.diff(rudder, axis=0)) * run.sailing
+    minutes = run.steps * run.dt / 60.0
+    rudder = run.states["delta"]
+    moved = np.abs(np.diff(rudder, axis=0))
+    travel = total(np.where(run.sailing, moved, 0.0))
+    turns = reversals(rudder, run.sailing)
+
     heading_rmse = np.full(len(run.seeds), np.nan)
     if _keeps_course(run.task):
-        heading_rmse = np.sqrt(mean(run, run.infos["heading_error"] ** 2))
+        heading_rmse = root_mean_square(run, "heading_error")
     return {
         "heading_rmse_deg": np.degrees(heading_rmse),
-        "rudder_travel_deg_min": ratio(np.degrees(total(turned)), minutes),
-        "rudder_reversals_min": ratio(reversals(rudder, run.sailing), minutes),
+        "rudder_travel_deg_min": ratio(np.degrees(travel), minutes),
+        "rudder_reversals_min": ratio(turns, minutes),
     }
 
 
 def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Floats:
     """How often an angle turns round, by more than a dead band each time.
 
-    `angle`: rad, shape (n_steps + 1, n); `counts`: intervals that count, shape
-    (n_steps, n); `dead_band`: rad; a smaller return does not count. Returns shape (n,).
+    `angle`: rad, shape (n_steps + 1, n); `counts`: intervals that count, the first ones
+    of each, shape (n_steps, n); `dead_band`: rad; a smaller return does not count.
+    Returns shape (n,).
     """
-    low, high = angle[0], angle[0]  # since the last turn
-    way: Floats = np.zeros(angle.shape[1])  # -1, 0 or 1
+    lowest = angle[0]  # since the last turn
+    highest = angle[0]
+    direction = np.zeros(angle.shape[1])  # -1, 0 or 1
     number: Floats = np.zeros(angle.shape[1])
-    for now, going in zip(angle[1:], counts, strict=True):
-        up, down = going & (now > low + dead_band), going & (now < high - dead_band)
-        up, down = up & (way <= 0.0), down & (way >= 0.0)
-        number = number + ((up | down) & (way != 0.0))
-        way = np.where(up, 1.0, np.where(down, -1.0, way))
-        turned, goes_on = up | down, np.where(going, now, low)
-        low = np.where(turned, now, np.minimum(low, goes_on))
-        high = np.where(turned, now, np.maximum(high, np.where(going, now, high)))
+
+    for now, counted in zip(angle[1:], counts, strict=True):
+        rises = (direction <= 0.0) & (now > lowest + dead_band)
+        falls = (direction >= 0.0) & (now < highest - dead_band)
+        turns = rises | falls
+
+        # the first movement of all is no reversal
+        number += counted & turns & (direction != 0.0)
+        direction = np.select([rises, falls], [1.0, -1.0], default=direction)
+        lowest = np.where(turns, now, np.minimum(lowest, now))
+        highest = np.where(turns, now, np.maximum(highest, now))
     return number
 
 
@@ -160,73 +183,101 @@ def course_changes(run: Rollout) -> dict[str, Floats]:
     on the other side, in percent of the first error; it has settled at the time from
     which on the error stays within 5 % of the first one, but no less than 1 degree. One
     that has not counts as unsettled, with the whole of its duration as the time.
-    Returns `OF_COURSES`, the last a share of the changes, each of shape (n,).
+    Returns the fields of `CourseChange`, each of shape (n,).
     """
-    means = np.full((3, len(run.seeds)), np.nan)
-    for episode in range(len(run.seeds)):
-        last = int(run.steps[episode])
-        course = run.states["set_point"][: last + 1, episode]
-        error = wrapped(course - run.states["psi"][: last + 1, episode])
-        begins = [0, *(np.flatnonzero(np.diff(course[:-1]) != 0.0) + 1).tolist(), last]
-        found = []
-        for begin, end in pairwise(begins):
-            if end > begin and abs(error[begin]) >= SMALLEST_CHANGE:
-                changed = (
-                    course[end] != course[begin]
-                )  # the error at `end` is that against the next course
-                found.append(step_figures(error[begin : end + (not changed)], run.dt))
-        if found:
-            means[:, episode] = np.mean(found, axis=0)
-    return dict(zip(OF_COURSES, means, strict=True))
+    figures = CourseChange._fields
+    means = np.full((len(figures), len(run.seeds)), np.nan)
+    for episode, steps in enumerate(run.steps):
+        last = int(steps) + 1
+        course = run.states["set_point"][:last, episode]
+        heading = run.states["psi"][:last, episode]
+        changes = changes_of_course(course, heading, run.dt)
+        if changes:
+            means[:, episode] = np.mean(changes, axis=0)
+    return dict(zip(figures, means, strict=True))
 
 
-def step_figures(error: Floats, dt: float) -> tuple[float, float, float]:
-    """Overshoot in percent, settling time in s and whether it has not settled, of one change of course.
+def changes_of_course(course: Floats, heading: Floats, dt: float) -> list[CourseChange]:
+    """Changes of a course to steer that are large enough to count.
+
+    `course`, `heading`: rad, shape (n_samples,); `dt`: between the samples, s.
+    """
+    error = wrapped(course - heading)
+    last = len(course) - 1
+    altered = 1 + np.flatnonzero(np.diff(course[:last]))
+
+    changes = []
+    for begin, end in pairwise([0, *altered.tolist(), last]):
+        if begin == end or abs(error[begin]) < SMALLEST_CHANGE:
+            continue
+        # the error at the end may already be that against the next course
+        next_course = course[end] != course[begin]
+        after = end if next_course else end + 1
+        changes.append(step_figures(error[begin:after], dt))
+    return changes
+
+
+def step_figures(error: Floats, dt: float) -> CourseChange:
+    """Figures of one change of course.
 
     `error`: heading error from the change on, rad, shape (n_samples,); `dt`: between
     the samples, s.
     """
-    first = float(error[0])
-    beyond = max(0.0, float((-np.sign(first) * error).max()))
-    band = max(SETTLED_SHARE * abs(first), SETTLED_LEAST)
+    change = abs(float(error[0]))
+    beyond = -np.sign(error[0]) * error  # on the other side
+    overshoot = max(0.0, float(beyond.max()))
+
+    band = max(SETTLED_SHARE * change, SETTLED_LEAST)
     outside = np.flatnonzero(np.abs(error) > band)
-    unsettled = outside[-1] == len(error) - 1
-    time = (len(error) - 1 if unsettled else int(outside[-1]) + 1) * dt
-    return 100.0 * beyond / abs(first), time, float(unsettled)
+    last = len(error) - 1
+    settled = min(int(outside[-1]) + 1, last)
+    return CourseChange(
+        overshoot_percent=100.0 * overshoot / change,
+        settling_s=settled * dt,
+        unsettled=float(outside[-1] == last),
+    )
 
 
 def fuel_per_distance(run: Rollout) -> Floats:
     """Fuel for each mile made good, that of straight running at service speed in calm water being 1.
 
-    Power is proportional to the cube of the shaft speed (propeller law); the way made
-    good is along the path, over ground, or in course keeping along the ordered course,
-    through the water. So it counts the speed lost to rudder and drift, the way
-    lengthened by yawing, and the weather. It is no consumption: how the engine answers
-    to load is not modelled. NaN where no way was made good, or the task has neither
-    path nor course, shape (n,).
+    Power is proportional to the cube of the shaft speed (propeller law). The distance
+    counts the speed lost to rudder and drift, the way lengthened by yawing, and the
+    weather. It is no consumption: how the engine answers to load is not modelled. NaN
+    where no way was made good, or the task has neither path nor course, shape (n,).
     """
     if not (_on_path(run.task) or _keeps_course(run.task)):
         return np.full(len(run.seeds), np.nan)
-    service = run.model.service_shaft_speed if "n" in run.model.state_names else 0.0
-    shaft = run.states["n"][1:] / service if service > 0.0 else 1.0
-    spent = total(np.where(run.sailing, shaft, 0.0) ** 3) * run.dt
+    service = 0.0
+    if "n" in run.model.state_names:
+        service = run.model.service_shaft_speed
+
+    # power over that at service speed
+    power = run.sailing.astype(np.float64)
+    if service > 0.0:
+        power = (during(run, "n") / service) ** 3
+
+    spent = total(power) * run.dt
+    in_calm_water = distance_made_good(run) / run.model.particulars["speed"]
+    return ratio(spent, np.maximum(in_calm_water, 0.0))
+
+
+def distance_made_good(run: Rollout) -> Floats:
+    """Distance along the path, over ground, or along the ordered course, through the water, m, shape (n,)."""
     if _on_path(run.task):
-        way = np.where(run.sailing, run.infos["distance_made_good"][1:], 0.0).max(
-            axis=0, initial=0.0
-        )
-    else:
-        error = run.infos["heading_error"]
-        along = run.states["u"] * np.cos(error) + run.states["v"] * np.sin(error)
-        way = total(np.where(run.sailing, along[1:], 0.0)) * run.dt
-    return ratio(spent * run.model.particulars["speed"], np.maximum(way, 0.0))
+        distance = during(run, "distance_made_good")
+        return np.asarray(distance.max(axis=0, initial=0.0))
+    error = during(run, "heading_error")
+    ahead = during(run, "u") * np.cos(error)
+    aside = during(run, "v") * np.sin(error)
+    return total(ahead + aside) * run.dt
 
 
 def path_following(run: Rollout) -> dict[str, Floats]:
     """How each episode followed its path, see `metrics`."""
-    outside = (run.infos["in_corridor"][1:] == 0.0) & run.sailing
-
+    outside = run.sailing & (during(run, "in_corridor") == 0.0)
     return {
-        "cross_track_rmse_m": np.sqrt(mean(run, run.infos["cross_track"] ** 2)),
+        "cross_track_rmse_m": root_mean_square(run, "cross_track"),
         "outside_corridor": ratio(total(outside), run.steps),
         "left_corridor": outside.any(axis=0).astype(np.float64),
         "grounded": _ever(run, "grounded"),
@@ -235,13 +286,27 @@ def path_following(run: Rollout) -> dict[str, Floats]:
 
 
 def _ever(run: Rollout, name: str) -> Floats:
-    """Tell whether a flag was set in an episode, shape (n,)."""
-    return np.minimum(total((run.infos[name][1:] > 0.0) & run.sailing), 1.0)
+    """Flag that says whether another was set in an episode, 1 or 0, shape (n,)."""
+    flags: Flags = during(run, name) > 0.0
+    return np.any(flags, axis=0).astype(np.float64)
 
 
-def mean(run: Rollout, values: Floats) -> Floats:
-    """Mean over the intervals of each episode of what was recorded, shape (n,); NaN for one without any."""
-    return ratio(total(np.where(run.sailing, values[1:], 0.0)), run.steps)
+def during(run: Rollout, name: str) -> Floats:
+    """State or entry of `info` after each interval, 0 where the episode was over, shape (n_steps, n)."""
+    history = run.infos[name] if name in run.infos else run.states[name]
+    return np.where(run.sailing, history[1:], 0.0)
+
+
+def mean(run: Rollout, name: str) -> Floats:
+    """Mean over the intervals of each episode, shape (n,); NaN for one without any."""
+    return ratio(total(during(run, name)), run.steps)
+
+
+def root_mean_square(run: Rollout, name: str) -> Floats:
+    """Root mean square over the intervals of each episode, shape (n,)."""
+    squares = during(run, name) ** 2
+    root: Floats = np.sqrt(ratio(total(squares), run.steps))
+    return root
 
 
 def total(values: Floats | Flags) -> Floats:
@@ -252,11 +317,9 @@ def total(values: Floats | Flags) -> Floats:
 
 def ratio(above: Floats, below: Floats) -> Floats:
     """A quotient, NaN where the divisor is 0."""
-    return np.asarray(
-        np.divide(
-            above, below, out=np.full(np.shape(above), np.nan), where=below != 0.0
-        )
-    )
+    undefined = np.full(np.shape(above), np.nan)
+    quotient: Floats = np.divide(above, below, out=undefined, where=below != 0.0)
+    return quotient
 
 
 class Evaluation(NamedTuple):
@@ -279,8 +342,11 @@ def evaluate(
     `model`: another ship than the task's own.
     """
     numbers = np.asarray(task.seeds if seeds is None else seeds, dtype=np.int64)
-    engine = task.engine(len(numbers), model)
     run = rollout(
-        policy, engine, numbers, record=recorded_for_metrics(task.task), tolerant=True
+        policy,
+        task.engine(len(numbers), model),
+        numbers,
+        record=recorded_for_metrics(task.task),
+        tolerant=True,
     )
     return Evaluation(metrics(run), run)

@@ -1,7 +1,8 @@
 """The replay page: recorded episodes in one HTML file that needs neither network nor installation."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from agents.output import check_page
 from agents.rollouts.replay_series import quantities, run
@@ -29,24 +30,22 @@ def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
     """
     target = Path(out)
     check_page(target)
-    if not paths:
-        raise InputError("episodes: none found, expected at least one episode file")
-    called = names([Path(path) for path in paths])
-    episodes = {
-        name: Episode.load(path) for name, path in zip(called, paths, strict=True)
-    }
+    titles = names([Path(path) for path in paths])
+    episodes = {}
+    for title, path in zip(titles, paths, strict=True):
+        episodes[title] = Episode.load(path)
     write_text(replay_page(episodes), target)
 
 
 def replay_page(episodes: Mapping[str, Episode]) -> str:
     """HTML that loads nothing, of episodes by what the legend calls them; InputError if there is none."""
     if not episodes:
-        raise InputError("episodes: none found, expected at least one")
+        raise InputError("episodes: expected at least one, got none")
     runs = [run(name, episode) for name, episode in episodes.items()]
-    ships = ", ".join(dict.fromkeys(episode.model for episode in episodes.values()))
+    models = dict.fromkeys(episode.model for episode in episodes.values())
     return render(
         PLAYER,
-        title=f"Replay: {ships}",
+        title=f"Replay: {', '.join(models)}",
         data={"runs": runs, "quantities": quantities(runs)},
     )
 
@@ -57,12 +56,16 @@ def names(paths: Sequence[Path]) -> list[str]:
     A file that is given twice is numbered.
     """
     stems = [path.absolute().with_suffix("").parts for path in paths]
-    for depth in range(1, max(map(len, stems)) + 1):
-        called = ["/".join(stem[-depth:]).replace("//", "/") for stem in stems]
-        if len(set(called)) == len(set(stems)):
-            break
-    earlier = [called[:i].count(name) for i, name in enumerate(called)]
-    return [
-        name if k == 0 else f"{name} ({k + 1})"
-        for name, k in zip(called, earlier, strict=True)
-    ]
+    n_files = len(set(stems))
+    depth = 1
+    while len({stem[-depth:] for stem in stems}) < n_files:
+        depth += 1
+
+    titles = []
+    times: Counter[str] = Counter()
+    for stem in stems:
+        title = str(PurePosixPath(*stem[-depth:]))
+        times[title] += 1
+        number = f" ({times[title]})" if times[title] > 1 else ""
+        titles.append(title + number)
+    return titles

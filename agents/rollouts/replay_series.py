@@ -1,18 +1,17 @@
 """What the replay page shows of an episode: its states in the units in which they are read."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from shipgym import Episode
 from shipgym.arrays import Floats
-from shipgym.files import shipped_toml
 from shipgym.tasks.guidance import wrapped
 
-# significant, of the numbers in the page: a millimetre in a kilometre; nine decimals at
-# most
+# significant digits of the numbers in the page: a millimetre in a kilometre
 DIGITS = 7
+MOST_DECIMALS = 9
 BEAM = 1.0 / 6.5  # of the length, drawn where the beam is not known
 COURSE_ORDERS = (
     "set_point",
@@ -21,21 +20,34 @@ COURSE_ORDERS = (
     "desired_course",
     "los_course",
 )
-FACTS = (
-    "environment",
-    "model",
-    "number",
-    "dt",
-    "length",
-    "corridor",
-)  # of an episode, as they are
-SHOWN = ("x", "y", "psi", "r", "phi", "delta", "n", "heading_error")  # each by itself
 CROSS_TRACK = ("cross_track_error", "cross_track")
+#: What is not listed under `other`, because a series shows it.
+SHOWN = ("x", "y", "psi", "r", "phi", "delta", "n", "heading_error")
 
 
-#: What may be shown, in this order; a quantity that no episode has is left out.
-QUANTITIES = shipped_toml("agents.rollouts", "quantities.toml")["quantity"]
-TOLD = ("label", "unit", "decimals", "line", "order", "short")  # of a quantity
+class Quantity(NamedTuple):
+    """A quantity that the page may show over time and as a read-out."""
+
+    label: str
+    unit: str
+    decimals: int
+    line: str  # series that is drawn
+    order: str | None = None  # series of its order, drawn dashed
+    short: str | None = None  # short name
+
+
+#: In the order of the page; a quantity that no episode has is left out.
+QUANTITIES = (
+    Quantity("heading", "deg", 1, "psi", order="course_order"),
+    Quantity("cross-track error", "m", 1, "cross_track_error", short="cross-track"),
+    Quantity("heading error", "deg", 1, "heading_error"),
+    Quantity("rudder", "deg", 1, "delta", order="rudder_order"),
+    Quantity("speed through water", "m/s", 2, "speed", short="speed"),
+    Quantity("yaw rate", "deg/s", 2, "yaw_rate"),
+    Quantity("heel", "deg", 1, "heel"),
+    Quantity("shaft speed", "1/min", 1, "shaft_speed"),
+    Quantity("reward so far", "", 2, "reward_so_far"),
+)
 
 
 def run(name: str, episode: Episode) -> dict[str, Any]:
@@ -44,79 +56,141 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
     `name`: what the legend calls it. Returns what it is, the ship to draw, the path,
     series of n + 1 values each, and under `other` what was recorded besides, SI units.
     """
-    recorded = {**episode.info, **episode.states}
-    shown = {*SHOWN, _first(COURSE_ORDERS, recorded), _first(CROSS_TRACK, recorded)}
-    other = {key: values for key, values in recorded.items() if key not in shown}
+    parts = {
+        part: np.append(0.0, values) for part, values in episode.reward_parts.items()
+    }
+    seed = None if episode.seed is None else str(episode.seed)
     return {
         "name": name,
-        **{fact: getattr(episode, fact) for fact in FACTS},
-        "seed": (
-            None if episode.seed is None else str(episode.seed)
-        ),  # too long for a number in a browser
+        "environment": episode.environment,
+        "model": episode.model,
+        "number": episode.number,
+        "seed": seed,  # a string: too long for a number in a browser
+        "dt": episode.dt,
         "steps": episode.n_steps,
-        "beam": BEAM * episode.length if episode.beam is None else episode.beam,
+        "length": episode.length,
+        "beam": episode.beam or BEAM * episode.length,
         "rudderLimit": float(np.degrees(episode.rudder_limit)),
         "outcome": outcome(episode),
         "total": float(np.sum(episode.rewards)),
-        "waypoints": None if episode.waypoints is None else rounded(episode.waypoints),
-        "path": None if episode.path is None else rounded(episode.path),
-        "series": {key: rounded(values) for key, values in series(episode).items()},
-        "parts": {
-            key: rounded(np.append(0.0, values))
-            for key, values in episode.reward_parts.items()
-        },
+        "corridor": episode.corridor,
+        "waypoints": _points(episode.waypoints),
+        "path": _points(episode.path),
+        "series": _rounded_all(series(episode)),
+        "parts": _rounded_all(parts),
         "rewards": rounded(np.append(0.0, episode.rewards)),
-        "other": {key: rounded(values) for key, values in other.items()},
+        "other": _rounded_all(_other(episode)),
     }
 
 
+def _points(points: Floats | None) -> list[Any] | None:
+    return None if points is None else rounded(points)
+
+
+def _other(episode: Episode) -> dict[str, Floats]:
+    """What was recorded and is not shown by a series."""
+    recorded = {**episode.info, **episode.states}
+    order = _first(COURSE_ORDERS, recorded)
+    cross_track = _first(CROSS_TRACK, recorded)
+    shown = {*SHOWN, order, cross_track}
+    return {name: values for name, values in recorded.items() if name not in shown}
+
+
 def series(episode: Episode) -> dict[str, Floats]:
-    """What is shown over time, each of shape (n_steps + 1,); angles in degrees.
+    """What is shown over time, each of shape (n_steps + 1,); angles in degrees."""
+    states = episode.states
+    found: dict[str, Floats] = {
+        "x": states["x"],
+        "y": states["y"],
+        "reward_so_far": np.append(0.0, np.cumsum(episode.rewards)),
+    }
+    if "u" in states:
+        sway = states.get("v", 0.0)
+        found["speed"] = np.hypot(states["u"], sway)
+    recorded = {**episode.info, **states}
+    cross_track = _first(CROSS_TRACK, recorded)
+    if cross_track is not None:
+        found["cross_track_error"] = recorded[cross_track]
+
+    return {
+        **found,
+        **_angles(states),
+        **_orders(episode),
+        **_weather(states),
+    }
+
+
+def _angles(states: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Angles of the ship and the course to steer, degrees.
 
     Headings go through north without a jump, from one within 0 to 360 degrees at the
     start.
     """
-    states, commands = episode.states, episode.commands
     heading = np.unwrap(states["psi"])
-    heading -= 2.0 * np.pi * np.floor(heading[0] / (2.0 * np.pi))
-    found: dict[str, Floats] = {
-        "x": states["x"],
-        "y": states["y"],
-        "psi": np.degrees(heading),
-        "delta": np.degrees(states["delta"]),
-        "reward_so_far": np.append(0.0, np.cumsum(episode.rewards)),
-    }
-    if "u" in states:
-        found["speed"] = (
-            np.hypot(states["u"], states["v"]) if "v" in states else np.abs(states["u"])
-        )
-    for shown, name in (("yaw_rate", "r"), ("heel", "phi")):
-        if name in states:
-            found[shown] = np.degrees(states[name])
+    whole_turns = np.floor(heading[0] / (2.0 * np.pi))
+    heading = heading - 2.0 * np.pi * whole_turns
+
+    radians = {"psi": heading, "delta": states["delta"]}
+    if "r" in states:
+        radians["yaw_rate"] = states["r"]
+    if "phi" in states:
+        radians["heel"] = states["phi"]
+    order = _first(COURSE_ORDERS, states)
+    if order is not None:
+        error = wrapped(states[order] - heading)
+        radians["heading_error"] = error
+        radians["course_order"] = heading + error  # without a jump from the heading
+    return {name: np.degrees(values) for name, values in radians.items()}
+
+
+def _orders(episode: Episode) -> dict[str, Floats]:
+    """Rudder that is ordered, degrees, and shaft speed, 1/min."""
+    found: dict[str, Floats] = {}
+    commands = episode.commands
     if "delta" in commands:
         found["rudder_order"] = np.degrees(_before_steps(commands["delta"]))
-    if "n" in states:
-        found["shaft_speed"] = 60.0 * states["n"]
+    if "n" in episode.states:
+        found["shaft_speed"] = 60.0 * episode.states["n"]
     elif "n" in commands:
         found["shaft_speed"] = 60.0 * _before_steps(commands["n"])
-    if order := _first(COURSE_ORDERS, states):
-        error = wrapped(states[order] - heading)
-        found["heading_error"] = np.degrees(error)
-        found["course_order"] = np.degrees(
-            heading + error
-        )  # without a jump from the heading
-    recorded = {**episode.info, **states}
-    if cross_track := _first(CROSS_TRACK, recorded):
-        found["cross_track_error"] = recorded[cross_track]
-    return {**found, **_weather(states)}
+    return found
+
+
+def _before_steps(values: Floats) -> Floats:
+    """Orders at the samples from which on they apply; the last one up to the end."""
+    return np.append(values, values[-1:])
+
+
+def _weather(states: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Wind and current where they are recorded and not zero throughout."""
+    found: dict[str, Floats] = {}
+    speed = states.get("wind_speed")
+    origin = states.get("wind_from")
+    if speed is not None and origin is not None and np.any(speed):
+        found["wind_speed"] = speed
+        found["wind_from"] = np.degrees(origin) % 360.0
+
+    north = states.get("current_north")
+    east = states.get("current_east")
+    if north is not None and east is not None:
+        drift = np.hypot(north, east)
+        if np.any(drift):
+            found["current_speed"] = drift
+            found["current_towards"] = np.degrees(np.arctan2(east, north)) % 360.0
+    return found
 
 
 def quantities(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The histories and read-outs that some of the runs have."""
-    shown = [
-        one for one in QUANTITIES if any(one["line"] in run["series"] for run in runs)
-    ]
-    return [{name: one.get(name) for name in TOLD} for one in shown]
+    """Histories and read-outs that some of the runs have."""
+    recorded: set[str] = set()
+    for one in runs:
+        recorded.update(one["series"])
+
+    shown = []
+    for quantity in QUANTITIES:
+        if quantity.line in recorded:
+            shown.append(quantity._asdict())
+    return shown
 
 
 def outcome(episode: Episode) -> str:
@@ -129,34 +203,26 @@ def outcome(episode: Episode) -> str:
     return ended if episode.success is None else f"{ended}, no success"
 
 
-def _first(names: Sequence[str], states: Mapping[str, Floats]) -> str | None:
+def _first(names: Iterable[str], recorded: Mapping[str, Floats]) -> str | None:
     """The first of some names that is recorded."""
-    return next((name for name in names if name in states), None)
+    for name in names:
+        if name in recorded:
+            return name
+    return None
 
 
-def _weather(states: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Wind and current where they are recorded and not zero throughout."""
-    found: dict[str, Floats] = {}
-    if {"wind_speed", "wind_from"} <= states.keys() and np.any(states["wind_speed"]):
-        found["wind_speed"] = states["wind_speed"]
-        found["wind_from"] = np.degrees(states["wind_from"]) % 360.0
-    if {"current_north", "current_east"} <= states.keys():
-        north, east = states["current_north"], states["current_east"]
-        if np.any(north) or np.any(east):
-            found["current_speed"] = np.hypot(north, east)
-            found["current_towards"] = np.degrees(np.arctan2(east, north)) % 360.0
-    return found
-
-
-def _before_steps(values: Floats) -> Floats:
-    """Orders at the samples from which on they apply; the last one up to the end."""
-    return np.append(values, values[-1:])
+def _rounded_all(histories: Mapping[str, Floats]) -> dict[str, list[Any]]:
+    return {name: rounded(values) for name, values in histories.items()}
 
 
 def rounded(values: Floats) -> list[Any]:
     """Numbers with the digits that the page keeps."""
-    array = np.asarray(values, dtype=float)
-    size = np.floor(np.log10(np.maximum(np.abs(array), np.finfo(float).tiny)))
-    power = 10.0 ** np.clip(DIGITS - 1.0 - size, 0.0, DIGITS + 2.0)
-    short: list[Any] = (np.round(array * power) / power).tolist()
+    array = np.asarray(values, dtype=np.float64)
+    size = np.maximum(np.abs(array), np.finfo(np.float64).tiny)
+    before_point = 1.0 + np.floor(np.log10(size))
+    decimals = np.clip(DIGITS - before_point, 0.0, MOST_DECIMALS)
+
+    factor = 10.0**decimals
+    kept = np.round(array * factor) / factor
+    short: list[Any] = kept.tolist()
     return short

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -99,19 +99,22 @@ def rollout(
         What the policy is shown in place of the observations; asked before each
         command.
     """
-    log = _Log(engine, record, tolerant)
-    seen, memory, starts = engine.reset(seeds), None, log.sailing
+    log = _Log(engine, record)
+    helmsman = _Helmsman(policy, tolerant)
+    observations = engine.reset(seeds)
     log.look()
+
+    starts = log.sailing
     while log.sailing.any():
-        command, memory = log.ask(
-            policy, seen if show is None else show(seen), memory, starts
-        )
+        seen = observations if show is None else show(observations)
+        command = helmsman.steer(seen, starts, log.sailing, engine)
+        log.give_up(command.missing)
         if not log.sailing.any():  # the policy has failed in all episodes
             break
-        seen, rewards, terminated, truncated = engine.step(command)
-        log.note(command, rewards, terminated, truncated)
+        observations, rewards, terminated, truncated = engine.step(command.values)
+        log.note(command.values, rewards, terminated, truncated)
         starts = np.zeros(engine.num_envs, dtype=np.bool_)
-    return log.rollout(np.asarray(seeds))
+    return log.rollout(np.asarray(seeds), helmsman)
 
 
 def episode_costs(policy: Policy, engine: Engine, seeds: NDArray[np.int64]) -> Floats:
@@ -128,97 +131,135 @@ def check_fits(policy: Any, task: Task, ship: ShipModel, where: str) -> None:
     check = getattr(policy, "check_fits", None)
     if check is not None:
         shown = task.observed(ship)
-        check([one.name for one in shown], [one.scale for one in shown], where)
+        check(
+            [quantity.name for quantity in shown],
+            [quantity.scale for quantity in shown],
+            where,
+        )
+
+
+class _Command(NamedTuple):
+    """Answer of a policy for all ships."""
+
+    values: NDArray[np.float32]  # shape (n, n_commands); 0 for ships that do not sail
+    missing: Flags  # ships that sail without a command
+    fault: str  # what is wrong with the answer; empty if nothing
+
+
+class _Helmsman:
+    """Asks a policy for commands; keeps its memory, its first failure and its time."""
+
+    def __init__(self, policy: Policy, tolerant: bool) -> None:
+        self.policy = policy
+        self.tolerant = tolerant
+        self.memory: Any = None
+        self.failure = ""
+        self.seconds = 0.0
+        self.n_calls = 0
+        self.n_commands = 0
+
+    def steer(
+        self, seen: Any, starts: Flags, sailing: Flags, engine: Engine
+    ) -> _Command:
+        """Commands for what is seen; InputError if one is missing and that is no failure."""
+        where = f"step {self.n_calls}: "
+        self.n_calls += 1
+        self.n_commands += int(sailing.sum())
+
+        actions, error = self._answer(seen, starts)
+        shape = (engine.num_envs, len(engine.command))
+        command = _checked_command(actions, shape, sailing)
+        if command.fault:
+            if not self.tolerant:
+                name = type(self.policy).__name__
+                raise InputError(f"{name}.predict: {where}{command.fault}")
+            self.failure = self.failure or where + (error or command.fault)
+        return command
+
+    def _answer(self, seen: Any, starts: Flags) -> tuple[Any, str]:
+        """Actions, None after an error that is tolerated, and this error."""
+        actions, failure = None, ""
+        began = time.process_time()
+        try:
+            actions, self.memory = self.policy.predict(seen, self.memory, starts, True)
+        except Exception as error:  # whatever a user's policy raises
+            if not self.tolerant:
+                raise
+            failure = f"{type(error).__name__}: {error}"
+        self.seconds += time.process_time() - began
+        return actions, failure
+
+
+def _checked_command(actions: Any, shape: tuple[int, int], sailing: Flags) -> _Command:
+    """Command from what a policy returned."""
+    nothing = _Command(np.zeros(shape, dtype=np.float32), sailing, "")
+    try:
+        with np.errstate(over="ignore"):
+            values = np.array(actions, dtype=np.float32)
+    except (TypeError, ValueError):
+        fault = f"expected an array of numbers, got {type(actions).__name__}"
+        return nothing._replace(fault=fault)
+    if values.shape != shape:
+        fault = f"expected actions of shape {shape}, got {values.shape}"
+        return nothing._replace(fault=fault)
+
+    missing = sailing & ~np.isfinite(values).all(axis=1)
+    fault = ""
+    if missing.any():
+        first = int(np.argmax(missing))
+        fault = (
+            f"expected numbers in [-1, 1], got {values[first]} for ship {first}: no"
+            f" finite number for {missing.sum()} of {sailing.sum()} ships; look for a"
+            " division by zero in the controller"
+        )
+    values[missing | ~sailing] = 0.0
+    return _Command(values, missing, fault)
 
 
 class _Log:
     """What has become of the episodes so far."""
 
-    def __init__(
-        self, engine: Engine, record: bool | Collection[str], tolerant: bool
-    ) -> None:
-        self.engine, self.record, self.tolerant = engine, record, tolerant
-        self.names = [name for name in engine.task.info_names if self._keeps(name)]
-        self.sailing = np.ones(engine.num_envs, dtype=np.bool_)
-        self.terminated = self.truncated = self.failed = ~self.sailing
-        self.costs = np.zeros(engine.num_envs)
-        self.failure, self.seconds, self.asked = "", 0.0, 0
+    def __init__(self, engine: Engine, record: bool | Collection[str]) -> None:
+        self.engine = engine
+        self.record = record
+
+        n = engine.num_envs
+        none: Flags = np.zeros(n, dtype=np.bool_)
+        self.sailing = ~none
+        self.terminated = none
+        self.truncated = none
+        self.failed = none
+        self.costs = np.zeros(n)
+
         self.sailed: list[Flags] = []
-        self.intervals: list[tuple[NDArray[np.float32], Floats]] = []
+        self.actions: list[NDArray[np.float32]] = []
+        self.rewards: list[Floats] = []
         self.states: list[dict[str, Floats]] = []
-        self.infos: list[list[Floats]] = []
+        self.infos: list[dict[str, Floats]] = []
 
     def _keeps(self, name: str) -> bool:
         return self.record if isinstance(self.record, bool) else name in self.record
 
     def look(self) -> None:
         """Record where the ships are."""
-        if self.record:
-            state = self.engine.physical_state()
-            self.states.append(
-                {name: values for name, values in state.items() if self._keeps(name)}
-            )
-            self.infos.append([self.engine.info(name).copy() for name in self.names])
+        if not self.record:
+            return
+        states = {}
+        for name, values in self.engine.physical_state().items():
+            if self._keeps(name):
+                states[name] = values
+        self.states.append(states)
 
-    def ask(
-        self, policy: Policy, shown: Any, memory: Any, starts: Flags
-    ) -> tuple[NDArray[np.float32], Any]:
-        """A policy's commands, 0 for ships that do not sail; episodes without a command have failed."""
-        began, why = time.process_time(), ""
-        try:
-            actions, memory = policy.predict(shown, memory, starts, True)
-        except Exception as error:  # whatever a user's policy raises
-            if not self.tolerant:
-                raise
-            actions, why = (
-                None,
-                f"{type(error).__name__}: {error} (at step {len(self.sailed)})",
-            )
-        self.seconds += time.process_time() - began
-        self.asked += int(self.sailing.sum())
-        command, bad, found = self._commands(actions)
-        if bad.any():
-            if not self.tolerant:
-                raise InputError(f"{type(policy).__name__}.predict: {found}")
-            self.failure = self.failure or why or found
-            self.failed, self.sailing = self.failed | bad, self.sailing & ~bad
-        command[~self.sailing] = 0.0
-        return command, memory
+        infos = {}
+        for name in self.engine.task.info_names:
+            if self._keeps(name):
+                infos[name] = self.engine.info(name).copy()
+        self.infos.append(infos)
 
-    def _commands(self, actions: Any) -> tuple[NDArray[np.float32], Flags, str]:
-        """Commands, of which ships that sail there is none, and why."""
-        expected, at = (
-            (self.engine.num_envs, len(self.engine.command)),
-            f"found at step {len(self.sailed)}",
-        )
-        nothing = np.zeros(expected, dtype=np.float32)
-        try:
-            with np.errstate(over="ignore"):
-                found = np.array(actions, dtype=np.float32)
-        except (TypeError, ValueError):
-            return (
-                nothing,
-                self.sailing,
-                f"actions of type {type(actions).__name__} {at}, expected numbers",
-            )
-        if found.shape != expected:
-            seen = f"for observations of shape {self.engine.observations.shape}"
-            return (
-                nothing,
-                self.sailing,
-                f"actions of shape {found.shape} {at}, expected {expected} {seen}",
-            )
-        wrong = self.sailing[:, None] & ~np.isfinite(found)
-        bad: Flags = np.any(wrong, axis=1)
-        if not bad.any():
-            return found, bad, ""
-        said = (
-            f"action {found[wrong][0]} {at} for ship {np.argmax(bad)}: no finite number"
-            f" for {bad.sum()} of {self.sailing.sum()} ships, expected numbers in [-1,"
-            " 1], the command over its limit; look for a division by zero in the"
-            " controller"
-        )
-        return found, bad, said
+    def give_up(self, missing: Flags) -> None:
+        """End episodes whose ships got no command."""
+        self.failed = self.failed | missing
+        self.sailing = self.sailing & ~missing
 
     def note(
         self,
@@ -230,19 +271,20 @@ class _Log:
         """Note what came of an interval."""
         self.sailed.append(self.sailing)
         self.costs -= np.where(self.sailing, rewards, 0.0)
-        self.terminated = self.terminated | self.sailing & terminated
-        self.truncated = self.truncated | self.sailing & truncated
+        self.terminated = self.terminated | (self.sailing & terminated)
+        self.truncated = self.truncated | (self.sailing & truncated)
         if self.record:
-            self.intervals.append((command, rewards))
+            self.actions.append(command)
+            self.rewards.append(rewards)
         self.look()
         self.sailing = self.sailing & ~(terminated | truncated)
 
-    def rollout(self, seeds: NDArray[np.int64]) -> Rollout:
+    def rollout(self, seeds: NDArray[np.int64], helmsman: _Helmsman) -> Rollout:
         """All that was noted."""
-        engine, n = self.engine, self.engine.num_envs
-        actions, rewards = (
-            zip(*self.intervals, strict=True) if self.intervals else ((), ())
-        )
+        engine = self.engine
+        n = engine.num_envs
+        n_commands = len(engine.command)
+        actions = np.array(self.actions, dtype=np.float32)
         return Rollout(
             task=engine.task,
             model=engine.model,
@@ -253,18 +295,18 @@ class _Log:
             terminated=self.terminated,
             truncated=self.truncated,
             failed=self.failed,
-            failure=self.failure,
-            seconds_per_action=self.seconds / max(self.asked, 1),
-            actions=np.array(actions, dtype=np.float32).reshape(
-                -1, n, len(engine.command)
-            ),
-            rewards=np.array(rewards).reshape(-1, n),
-            states={
-                name: np.array([one[name] for one in self.states])
-                for name in (self.states or [{}])[0]
-            },
-            infos={
-                name: np.array([one[k] for one in self.infos])
-                for k, name in enumerate(self.names)
-            },
+            failure=helmsman.failure,
+            seconds_per_action=helmsman.seconds / max(helmsman.n_commands, 1),
+            actions=actions.reshape(-1, n, n_commands),
+            rewards=np.array(self.rewards).reshape(-1, n),
+            states=_stacked(self.states),
+            infos=_stacked(self.infos),
         )
+
+
+def _stacked(records: list[dict[str, Floats]]) -> dict[str, Floats]:
+    """Histories by name, each of shape (n_records, n)."""
+    histories = {}
+    for name in records[0] if records else ():
+        histories[name] = np.array([record[name] for record in records])
+    return histories

@@ -20,7 +20,7 @@ from papers.xu2020_tank import xu_ship
 import agents
 import shipgym
 from agents.controllers.registry import BUILT_IN, controller_class
-from agents.policies.network import Network
+from agents.policies.network import Layer, Network
 from agents.policies.policy import LearnedPolicy
 from agents.suites.suite import FOLDER
 from agents.training.request import TrainingRequest, make_plan
@@ -137,15 +137,12 @@ def controllers(folder: Path) -> None:
 def network(*sizes: int) -> Network:
     """Weights at random."""
     random = np.random.default_rng(0)
-    return Network(
-        tuple(
-            (
-                random.normal(0, 0.3, (b, a)).astype(np.float32),
-                random.normal(0, 0.1, b).astype(np.float32),
-            )
-            for a, b in pairwise(sizes)
-        )
-    )
+    layers = []
+    for n_in, n_out in pairwise(sizes):
+        weight = random.normal(0, 0.3, (n_out, n_in)).astype(np.float32)
+        bias = random.normal(0, 0.1, n_out).astype(np.float32)
+        layers.append(Layer(weight, bias))
+    return Network(tuple(layers))
 
 
 def policies(folder: Path) -> None:

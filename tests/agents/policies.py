@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 
 from agents import LearnedPolicy
-from agents.policies.network import Network
+from agents.policies.network import Layer, Network
 from shipgym.ships import load_model
 from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 
@@ -14,14 +14,12 @@ MARINER = load_model("mariner")
 
 def random_network(*sizes, seed=0, activation="relu", output="linear"):
     random = np.random.default_rng(seed)
-    layers = [
-        (random.normal(0.0, n_in**-0.5, (n_out, n_in)), random.normal(0.0, 0.1, n_out))
-        for n_in, n_out in pairwise(sizes)
-    ]
-    single = tuple(
-        (weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in layers
-    )
-    return Network(single, activation, output)
+    layers = []
+    for n_in, n_out in pairwise(sizes):
+        weight = random.normal(0.0, n_in**-0.5, (n_out, n_in))
+        bias = random.normal(0.0, 0.1, n_out)
+        layers.append(Layer(weight.astype(np.float32), bias.astype(np.float32)))
+    return Network(tuple(layers), activation, output)
 
 
 def random_policy(model=MARINER, seed=0, **more):

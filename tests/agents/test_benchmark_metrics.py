@@ -8,7 +8,7 @@ import pytest
 
 from agents import LQ, sail
 from agents.rollouts import rollout as rollout_module
-from agents.rollouts.episodes import _episode, recorded
+from agents.rollouts.episodes import episode_of, recorded
 from agents.rollouts.metrics import (
     course_changes,
     evaluate,
@@ -300,11 +300,11 @@ def test_what_is_recorded_after_an_episode_is_not_replayed(lq):
     steps = run.steps.astype(int)
     after = np.arange(len(run.states["x"]))[:, None] > steps
     assert after.any()
-    known = [_episode(run, PATH, lane, engine, 3) for lane in (0, 1)]
+    known = [episode_of(run, PATH, lane, engine, 3) for lane in (0, 1)]
     assert [episode.success for episode in known] == [True, True]
     infos = {**run.infos, "success": after.astype(np.float64)}
     later = replace(run, infos=infos, rewards=np.where(after[1:], 99.0, run.rewards))
-    found = [_episode(later, PATH, lane, engine, 3) for lane in (0, 1)]
+    found = [episode_of(later, PATH, lane, engine, 3) for lane in (0, 1)]
     for one, other, cost in zip(known, found, run.costs, strict=True):
         assert other.success is False
         assert one.rewards.sum() == other.rewards.sum() == pytest.approx(-cost)

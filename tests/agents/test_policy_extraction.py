@@ -1,7 +1,6 @@
 """Agents of stable-baselines3 and their policies without torch command the same."""
 
 from copy import deepcopy
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from stable_baselines3.common.vec_env import VecFrameStack, VecNormalize
 
 from agents import LQ, LearnedPolicy, load_agent
 from agents.policies.policy import order_numbers
-from agents.policies.policy_extraction import _environment, _residual, actor_network
+from agents.policies.policy_extraction import actor_network
 from agents.training.residual import ResidualVecEnv
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
@@ -65,63 +64,47 @@ def seen(agent, n=200):
     return np.random.default_rng(0).uniform(-1.0, 1.0, (n, *shape)).astype(np.float32)
 
 
+def same_commands(policy, observations, expected):
+    commands, _ = policy.predict(observations)
+    np.testing.assert_allclose(commands, expected, rtol=0.0, atol=1e-6)
+
+
 @pytest.mark.parametrize("name", AGENTS)
 def test_the_commands_are_those_of_torch(name, tmp_path):
     algorithm, settings = AGENTS[name]
-    agent = strong(
-        algorithm("MlpPolicy", ships(), seed=0, **deepcopy(settings)).learn(32)
-    )
-    policy = LearnedPolicy.from_sb3(agent, training={"algorithm": name.lower()})
+    agent = algorithm("MlpPolicy", ships(), seed=0, **deepcopy(settings))
+    strong(agent.learn(32))
     observations = seen(agent)
     expected, _ = agent.predict(observations, deterministic=True)
     assert expected.std() > 0.3
-    np.testing.assert_allclose(
-        policy.predict(observations)[0], expected, rtol=0.0, atol=1e-6
-    )
+
+    policy = LearnedPolicy.from_sb3(agent, training={"algorithm": name.lower()})
+    same_commands(policy, observations, expected)
     policy.save(tmp_path / "agent.json")
     again = load_agent(tmp_path / "agent.json", MARINER)
-    np.testing.assert_allclose(
-        again.predict(observations)[0], expected, rtol=0.0, atol=1e-6
-    )
-    np.testing.assert_allclose(
-        again.predict(observations[0])[0], expected[0], rtol=0.0, atol=1e-6
-    )
+    same_commands(again, observations, expected)
+    same_commands(again, observations[0], expected[0])
     assert again.name == name.lower()
 
 
 def test_discrete_orders_are_those_of_torch():
-    agent = strong(
-        PPO(
-            "MlpPolicy",
-            ships("shipgym/CourseKeepingDiscrete-v0"),
-            n_steps=8,
-            batch_size=32,
-        )
-    )
+    env = ships("shipgym/CourseKeepingDiscrete-v0")
+    agent = strong(PPO("MlpPolicy", env, n_steps=8, batch_size=32))
     policy = LearnedPolicy.from_sb3(agent)
     expected, _ = agent.predict(seen(agent), deterministic=True)
     assert len(set(expected.tolist())) > 2
-    np.testing.assert_array_equal(
-        order_numbers(policy.predict(seen(agent))[0]), expected
-    )
-    assert (policy.action, policy.env_id) == (
-        "rudder-discrete",
-        "shipgym/CourseKeepingDiscrete-v0",
-    )
+    commands, _ = policy.predict(seen(agent))
+    np.testing.assert_array_equal(order_numbers(commands), expected)
+    assert policy.action == "rudder-discrete"
+    assert policy.env_id == "shipgym/CourseKeepingDiscrete-v0"
 
 
 def test_rudder_and_shaft_are_those_of_torch():
-    agent = PPO(
-        "MlpPolicy",
-        ships("shipgym/PathFollowingShaft-v0", model="kvlcc2"),
-        n_steps=8,
-        batch_size=32,
-    )
-    policy = LearnedPolicy.from_sb3(strong(agent))
+    env = ships("shipgym/PathFollowingShaft-v0", model="kvlcc2")
+    agent = strong(PPO("MlpPolicy", env, n_steps=8, batch_size=32))
+    policy = LearnedPolicy.from_sb3(agent)
     expected, _ = agent.predict(seen(agent), deterministic=True)
-    np.testing.assert_allclose(
-        policy.predict(seen(agent))[0], expected, rtol=0.0, atol=1e-6
-    )
+    same_commands(policy, seen(agent), expected)
     policy.check_fits_model(load_model("kvlcc2"))
 
 
@@ -172,37 +155,58 @@ class Doubled(BaseFeaturesExtractor):
         return 2.0 * observations
 
 
-def made(algorithm, env=None, **settings):
-    return lambda: algorithm("MlpPolicy", ships() if env is None else env(), **settings)
-
-
 QUICK = {"n_steps": 8, "batch_size": 8}
+
+
+def made(algorithm=PPO, env=ships, **settings):
+    return lambda: algorithm("MlpPolicy", env(), **(settings or QUICK))
+
+
+def discrete_ships():
+    return ships("shipgym/CourseKeepingDiscrete-v0")
+
+
+def with_extractor():
+    keywords = {"features_extractor_class": Doubled}
+    return PPO("MlpPolicy", ships(), **QUICK, policy_kwargs=keywords)
+
+
+def without_environment():
+    agent = PPO("MlpPolicy", ships(), **QUICK)
+    agent.env = None
+    return agent
+
+
+def beside_a_function():
+    class Straight:
+        def predict(self, observation, state=None, *_):
+            return np.zeros((len(observation), 1), np.float32), state
+
+    return PPO("MlpPolicy", ResidualVecEnv(ships(), Straight()), **QUICK)
+
+
 REFUSED = {
-    "extractor": (
-        made(PPO, **QUICK, policy_kwargs={"features_extractor_class": Doubled}),
-        "features extractor Doubled found",
-    ),
+    "extractor": (with_extractor, "without a features extractor, got .* Doubled"),
     "activation": (
-        made(PPO, **QUICK, policy_kwargs={"activation_fn": torch.nn.ELU}),
-        "layer 1 of the network is ELU",
+        made(policy_kwargs={"activation_fn": torch.nn.ELU}, n_steps=8, batch_size=8),
+        "got ELU as layer 1",
     ),
-    "sde": (made(PPO, **QUICK, use_sde=True), "use_sde"),
+    "sde": (made(use_sde=True, n_steps=8, batch_size=8), "use_sde"),
     "algorithm": (
-        made(DQN, lambda: ships("shipgym/CourseKeepingDiscrete-v0"), buffer_size=10),
-        "agent: DQN with DQNPolicy found, expected PPO",
+        made(DQN, discrete_ships, buffer_size=10),
+        "agent: expected PPO, .* got DQN with DQNPolicy",
     ),
     "scaled": (
-        made(PPO, lambda: VecNormalize(ships()), **QUICK),
+        made(env=lambda: VecNormalize(ships())),
         r"VecNormalize\(norm_obs=False\)",
     ),
-    "stacked": (
-        made(PPO, lambda: VecFrameStack(ships(), 2), **QUICK),
-        "wrapper VecFrameStack found",
-    ),
+    "stacked": (made(env=lambda: VecFrameStack(ships(), 2)), "got VecFrameStack"),
     "foreign": (
-        made(PPO, lambda: "Pendulum-v1", **QUICK),
+        made(env=lambda: "Pendulum-v1"),
         "expected an environment of shipgym",
     ),
+    "no environment": (without_environment, "env: expected the environment"),
+    "base": (beside_a_function, "base: expected a controller .* got Straight"),
 }
 
 
@@ -214,105 +218,52 @@ def test_what_a_policy_cannot_be_is_refused(name):
 
 
 def test_layers_that_are_not_dense_are_refused_by_name():
-    layers = {
-        "mlp_extractor.policy_net.0": (2, 3),
-        "mlp_extractor.policy_net.2": (2, 2),
-        "action_net": (1, 2),
-    }
-    weights = {f"{name}.weight": torch.ones(shape) for name, shape in layers.items()}
-    weights |= {f"{name}.bias": torch.zeros(shape[0]) for name, shape in layers.items()}
-    network = actor_network(
-        {**weights, "value_net.weight": torch.ones(1, 2)}, None, "mine"
-    )
-    assert (network.sizes, network.activation, network.output) == (
-        (3, 2, 2, 1),
-        "tanh",
-        "linear",
-    )
-    bare = {name: value for name, value in weights.items() if name != "action_net.bias"}
-    with pytest.raises(
-        InputError,
-        match=r"agent: weights 'action_net.bias' missing or not known, expected",
+    weights = {"value_net.weight": torch.ones(1, 2)}
+    for name, shape in (
+        ("mlp_extractor.policy_net.0", (2, 3)),
+        ("mlp_extractor.policy_net.2", (2, 2)),
+        ("action_net", (1, 2)),
     ):
-        actor_network(bare, None, "mine")
-    with pytest.raises(InputError, match=r"weights 'norm.weight' missing or not known"):
+        weights[f"{name}.weight"] = torch.ones(shape)
+        weights[f"{name}.bias"] = torch.zeros(shape[0])
+    network = actor_network(weights, None, "mine")
+    assert network.sizes == (3, 2, 2, 1)
+    assert (network.activation, network.output) == ("tanh", "linear")
+
+    with pytest.raises(InputError, match=r"missing or unknown: 'norm.weight'"):
         actor_network({**weights, "norm.weight": torch.ones(2)}, None, "mine")
+    del weights["action_net.bias"]
+    with pytest.raises(InputError, match=r"missing or unknown: 'action_net.bias'"):
+        actor_network(weights, None, "mine")
 
 
 def test_an_agent_that_commands_otherwise_than_its_layers_is_refused(monkeypatch):
     agent = PPO("MlpPolicy", ships(), **QUICK)
     predict = agent.predict
-    monkeypatch.setattr(
-        agent, "predict", lambda x, **more: (predict(x, **more)[0] + 0.9e-4, None)
-    )
-    LearnedPolicy.from_sb3(agent)
-    monkeypatch.setattr(
-        agent, "predict", lambda x, **more: (predict(x, **more)[0] - 1.05e-4, None)
-    )
-    with pytest.raises(InputError, match="gives other commands than its layers do"):
-        LearnedPolicy.from_sb3(agent)
+
+    def shifted(offset):
+        def commands(observations, **more):
+            return predict(observations, **more)[0] + offset, None
+
+        monkeypatch.setattr(agent, "predict", commands)
+        return agent
+
+    LearnedPolicy.from_sb3(shifted(0.9e-4))
+    with pytest.raises(InputError, match="commands otherwise than its layers"):
+        LearnedPolicy.from_sb3(shifted(-1.05e-4))
     agent.observation_space = Box(-1.0, 1.0, (9,))
-    with pytest.raises(
-        InputError,
-        match=r"shape \(9,\) found, expected \(8,\), as its network has inputs",
-    ):
+    with pytest.raises(InputError, match=r"of shape \(8,\), .* got \(9,\)"):
         LearnedPolicy.from_sb3(agent)
 
 
-def test_what_adds_to_a_controller_is_known_by_what_it_has():
-    added = {
-        "base": LQ.from_model(MARINER),
-        "authority": 1,
-        "frame_stack": 2.0,
-        "action_repeat": 3,
-        "rate_limit": 1,
-    }
-    found = _residual(
-        [
-            SimpleNamespace(),
-            SimpleNamespace(**added),
-            object.__new__(type("Ships", (), {})),
-        ]
-    )
-    assert found == added
-    assert [type(found[name]) for name in list(added)[1:]] == [float, int, int, float]
-    assert _residual([SimpleNamespace(**added | {"base": None})])["base"] is None
-    assert _residual([SimpleNamespace(base=None, authority=1.0)]) == {}
-    with pytest.raises(
-        InputError,
-        match="base: Doubled found, expected a controller of shipgym, which a file",
-    ):
-        _residual([SimpleNamespace(**added | {"base": object.__new__(Doubled)})])
-
-
-def test_an_environment_that_is_not_registered_is_that_of_its_task():
-    shown = {
-        "observation_names": ["cross_track"],
-        "observation_scales": [2],
-        "model": MARINER,
-    }
-    bare = SimpleNamespace(**shown, task=SimpleNamespace(action="rudder"), spec=None)
-    found = _environment(bare)
-    assert (found["env_id"], found["env_options"]) == ("shipgym/PathFollowing-v0", {})
-    assert (found["observation_scales"], found["action"], found["model_name"]) == (
-        (2.0,),
-        "rudder",
-        "mariner",
-    )
-    bare.spec = SimpleNamespace(
-        id="my/Ships-v0", kwargs={"threads": 2, "model": "tanker", "noise": (1.0,)}
-    )
-    assert _environment(bare)["env_options"] == {"noise": [1.0]}
-    assert _environment(bare)["env_id"] == "my/Ships-v0"
-
-
-def test_an_agent_without_an_environment_is_refused():
-    agent = SimpleNamespace(get_env=lambda: None)
-    with pytest.raises(
-        InputError,
-        match="env: none found and the agent has none, expected the environment",
-    ):
-        LearnedPolicy.from_sb3(agent)
+def test_settings_of_the_wrapper_are_those_of_the_policy():
+    base = LQ.from_model(MARINER)
+    settings = {"frame_stack": 2, "action_repeat": 3, "rate_limit": 1.0}
+    for authority, own in ((0.5, base), (1.0, None)):
+        env = ResidualVecEnv(ships(), own, authority=authority, **settings)
+        policy = LearnedPolicy.from_sb3(PPO("MlpPolicy", env, **QUICK))
+        assert (policy.base, policy.authority) == (own, authority)
+        assert settings.items() <= vars(policy).items()
 
 
 def test_single_environments_are_known_too():
@@ -324,5 +275,5 @@ def test_single_environments_are_known_too():
     wrapped = RescaleObservation(
         gymnasium.make(COURSE, model="mariner"), np.float32(-9), np.float32(9)
     )
-    with pytest.raises(InputError, match="wrapper RescaleObservation found"):
+    with pytest.raises(InputError, match="got RescaleObservation"):
         LearnedPolicy.from_sb3(PPO("MlpPolicy", wrapped, **QUICK))
