@@ -66,11 +66,10 @@ ecosystem: $(VENV)/ecosystem-installed
 evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md --images docs/images || test $$? = 1  # 1: aims missed, as the page says
 	test ! -d $(DATA) || $(BIN)/python scripts/predict_real_ships.py --data $(DATA)
-	$(BIN)/shipgym benchmark --suite shipgym-v1 --controllers wheel-over,tuned-wheel-over,mpc,ppo --out build/suite --no-page
-	$(BIN)/python scripts/best_known.py --suite shipgym-v1 build/suite --search tuned-best,ppo
-	$(BIN)/shipgym benchmark --suite shipgym-v2 --controllers tuned-ilos,wheel-over,tuned-wheel-over,mpc,ppo --out build/suite-v2 --no-page
-	$(BIN)/python scripts/train_pretrained.py --table build/suite-v2
-	$(BIN)/python scripts/transfer.py --data $(DATA)
+	$(BIN)/shipgym benchmark --controllers lq,tuned-ilos,wheel-over,tuned-wheel-over,mpc,ppo --out build/suite --no-page
+	$(BIN)/python scripts/best_known.py build/suite
+	$(BIN)/python scripts/train_pretrained.py --table build/suite
+	$(BIN)/python scripts/transfer.py --out build/transfer
 	$(BIN)/python scripts/certainty.py
 	$(BIN)/python scripts/opened_once.py
 	$(BIN)/python scripts/bridge_logs.py

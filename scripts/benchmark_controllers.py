@@ -1,4 +1,4 @@
-"""Some autopilots, one of them your own, through tasks of the benchmark: who steers best, and how surely."""
+"""Run some autopilots, one of them your own, through tasks of the benchmark."""
 
 from __future__ import annotations
 
@@ -10,40 +10,32 @@ import typer
 from agents import LQ, Policy, benchmark
 from agents.suites.suite import BenchmarkTask
 
+Out = Annotated[Path, typer.Argument(help="Folder of the results.")]
+
 
 def gentle(task: BenchmarkTask) -> Policy:
-    """An autopilot of one's own, made for the ship of each task."""
+    """Design an autopilot of one's own for the model of a task."""
     return LQ.from_model(task.ship, integral_lengths=60.0)
 
 
-def main(
-    out: Annotated[Path, typer.Argument(help="Folder of the results.")] = Path(
-        "results"
-    ),
-) -> None:
-    """Run them, then print the ranking and each task's best."""
-    contestants = {
+def main(out: Out = Path("results")) -> None:
+    """Run them, then print the ranking and the best of each task."""
+    controllers = {
         "pid": "pid",
         "lq": "lq",
-        "lqg": "lqg",
-        "ilos": "ilos",
+        "wheel-over": "wheel-over",
         "gentle": gentle,
     }
-    result = benchmark(
-        contestants, suite="shipgym-v1", out=str(out), workers=2, resume=True
-    )
-    for place, entry in enumerate(result.summary["ranking"], start=1):
-        print(
-            f"{place}. {entry['name']:8} {entry['relative_cost']:.3f} times the lowest"
-            " costs"
-        )
-    for task, by_name in result.summary["tasks"].items():
-        best = min(by_name, key=lambda name: by_name[name]["cost"]["value"])
-        cost = by_name[best]["cost"]
-        print(
-            f"{task:22} {best:8} {cost['value']:8.1f} ({cost['low']:.1f} to"
-            f" {cost['high']:.1f})"
-        )
+    result = benchmark(controllers, out=out, workers=2, resume=True)
+    for place, total in enumerate(result.summary["ranking"], start=1):
+        name, relative = total["name"], total["relative_cost"]
+        print(f"{place}. {name:12} {relative:.3f} times the lowest cost")
+
+    for task, cells in result.summary["tasks"].items():
+        best = min(cells, key=lambda name: cells[name]["cost"]["value"])
+        cost = cells[best]["cost"]
+        interval = f"{cost['low']:.1f} to {cost['high']:.1f}"
+        print(f"{task:24} {best:12} {cost['value']:8.1f} ({interval})")
 
 
 if __name__ == "__main__":

@@ -1,183 +1,104 @@
-"""Keep the lowest cost that anything reached in each scored episode of a suite.
+"""Keep the lowest cost that any controller reached in each scored episode of a suite.
 
-    shipgym benchmark --suite shipgym-v2 --controllers wheel-over,tuned-wheel-over --out
-    results python scripts/best_known.py --suite shipgym-v2 results            # of
-    these results, and what is kept python scripts/best_known.py --suite shipgym-v2
-    results --search lq,tuned-wheel-over --tasks roll-limit python scripts/best_known.py
-    --suite shipgym-v2 results --rule --episodes 6    # for docs/benchmark.md
+    shipgym benchmark --controllers wheel-over,tuned-wheel-over,mpc,ppo --out results
+    python scripts/best_known.py results
+    python scripts/best_known.py results --room 6    # the table of docs/benchmark.md
 
-`zero` is the mean cost of the contestant `wheel-over`, designed on the model without
-search. The search (`scripts/oracle.py`) goes on, in each episode, from what the best of
-the contestants named does, on the ship herself with the state known: what it finds no
-autopilot may reach, and it stands in the file as `search`.
+`zero` is the mean cost of `wheel-over`, designed on the model without tuning. Lower costs
+come from results that are complete; costs that are kept already stay if they are lower.
+Some of those were reached by a search of the rudder on the true ship, its state and the
+weather to come known: they stand in the file as `search`.
 """
 
 from __future__ import annotations
 
 import argparse
-import time
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from agents.benchmarking.contestants import LEARNED, Contestant
-from numpy.typing import NDArray
-from oracle import OracleSettings, run_oracle
 
 from agents.benchmarking.results import BenchmarkResult, load_results
+from agents.benchmarking.sources import BEST_KNOWN, LEARNED
 from agents.suites.reference import best_known
-from agents.suites.suite import (
-    N_EPISODES,
-    BenchmarkTask,
-    load_suite,
-    suite_file,
-    suite_hash,
-)
+from agents.suites.suite import DEFAULT_SUITE, N_EPISODES, load_suite, suite_file
 from shipgym.files import write_json
 
-ZERO, SEARCH = "wheel-over", "search"
-# between the best baseline and the best known, of a task that is there for learning
-ROOM = 0.08
+ZERO = "wheel-over"
+LEAST_ROOM = 0.08  # of a task for learning, see docs/benchmark.md
 
 
 def main() -> None:
-    """Write the file of best known costs anew."""
+    """Add results to the file, or print the room that each task leaves."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
+    parser.add_argument("results", type=Path, help="folder of complete results")
+    parser.add_argument("--suite", default=DEFAULT_SUITE)
     parser.add_argument(
-        "results", nargs="*", type=Path, help="folders of results, the first complete"
+        "--room", type=int, metavar="N", help="only print the room in N episodes"
     )
-    parser.add_argument("--suite", default="shipgym-v2")
-    parser.add_argument(
-        "--tasks", default="", help="of the search, separated by commas; by default all"
-    )
-    parser.add_argument(
-        "--search", default="", help="contestants to search from, separated by commas"
-    )
-    parser.add_argument(
-        "--episodes",
-        type=int,
-        default=N_EPISODES,
-        help="of search and rule, the first ones",
-    )
-    parser.add_argument(
-        "--passes", type=int, default=OracleSettings.passes, help="of the search"
-    )
-    parser.add_argument(
-        "--rule",
-        action="store_true",
-        help="only print whether the rule of choice holds",
-    )
-    asked = parser.parse_args()
-    known: dict[str, Any] = best_known(asked.suite)
-    if asked.rule:
-        print(
-            rule(
-                known,
-                asked.suite,
-                [load_results(one) for one in asked.results],
-                asked.episodes,
-            )
-        )
+    arguments = parser.parse_args()
+    suite = load_suite(arguments.suite)
+    known = best_known(suite.source)
+    result = load_results(arguments.results)
+    if result.summary["suite"]["sha256"] != suite.sha256:
+        raise SystemExit(f"{arguments.results}: expected results of {suite.name}")
+    if arguments.room:
+        print("\n".join(room_table(known, result, arguments.room)))
         return
-    for folder in asked.results:
-        add_results(known, folder, asked.suite)
-    write_json(known, suite_file(asked.suite, "best"))
-    wanted = [name for name in asked.tasks.split(",") if name]
-    for task in load_suite(asked.suite).tasks:
-        if asked.search and (not wanted or task.name in wanted):
-            search(known, task, asked)
-            write_json(known, suite_file(asked.suite, "best"))
-    for name, one in known.items():
-        by = {source: one["by"].count(source) for source in sorted(set(one["by"]))}
-        print(
-            f"{name:28s} zero {one['zero']:9.2f}  best known"
-            f" {np.mean(one['costs']):9.2f}  {by}"
-        )
+
+    if result.summary["seeds"]["count"] != N_EPISODES:
+        raise SystemExit(f"{arguments.results}: expected {N_EPISODES} episodes")
+    for task in result.tasks:
+        known[task] = lowest(known.get(task), result, task)
+        zero, best = known[task]["zero"], np.mean(known[task]["costs"])
+        print(f"{task:28s} zero {zero:9.2f}  best known {best:9.2f}")
+    write_json(known, suite_file(suite.source, "best"))
 
 
-def add_results(known: dict[str, Any], folder: Path, suite: str) -> None:
-    """Costs of all contestants of a folder of results; `zero` is taken from all episodes only."""
-    result = load_results(folder)
-    about = result.summary
-    if about["suite"]["sha256"] != suite_hash(suite):
-        raise SystemExit(f"{folder}: expected results of {suite} as it is")
-    whole = about["seeds"]["count"] == N_EPISODES
-    for task, by_name in about["tasks"].items():
-        if ZERO in by_name and whole:
-            known.setdefault(task, {"costs": [], "by": []})["zero"] = by_name[ZERO][
-                "cost"
-            ]["value"]
-        for name, found in by_name.items():
-            if task in known and not found["failed"] and name != "best-known":
-                costs = result.figures(name, task).min(axis=0)
-                keep(
-                    known,
-                    task,
-                    np.pad(costs, (0, N_EPISODES - len(costs)), constant_values=np.inf),
-                    name,
-                )
+def lowest(
+    known: dict[str, Any] | None, result: BenchmarkResult, task: str
+) -> dict[str, Any]:
+    """Return what is kept of a task, the costs of results in place of higher ones."""
+    kept = known or {"costs": [np.inf] * N_EPISODES, "by": [""] * N_EPISODES}
+    costs, by = np.array(kept["costs"]), list(kept["by"])
+    cells = result.summary["tasks"][task]
+    for name, cell in cells.items():
+        if name == BEST_KNOWN or cell["failed"]:
+            continue
+        of_controller = result.figures(name, task).min(axis=0)
+        for number in np.flatnonzero(of_controller < costs):
+            by[number] = name
+        costs = np.minimum(costs, of_controller)
+    zero = cells[ZERO]["cost"]["value"] if ZERO in cells else kept["zero"]
+    return {"zero": zero, "costs": costs.tolist(), "by": by}
 
 
-def search(
-    known: dict[str, Any], task: BenchmarkTask, asked: argparse.Namespace
-) -> None:
-    """Go on from the contestants in some episodes of a task."""
-    began, (ship, sailed, randomisation) = time.process_time(), task.sailed
-    starts = [
-        Contestant(name, name).policies(task, asked.suite)[0]
-        for name in asked.search.split(",")
+def room_table(
+    known: dict[str, Any], result: BenchmarkResult, n_episodes: int
+) -> list[str]:
+    """Return rows of tasks with the room between the best baseline and the best known."""
+    lines = [
+        "| task | best baseline | its cost | best known | room |",
+        "| --- | --- | --- | --- | --- |",
     ]
-    settings = replace(OracleSettings(), passes=asked.passes)
-    seeds = task.seeds[: asked.episodes]
-    found = run_oracle(ship, sailed, seeds, starts, settings, randomisation)
-    costs = np.full(N_EPISODES, np.inf)
-    costs[: len(seeds)] = found.costs
-    keep(known, task.name, costs, SEARCH)
-    spent = time.process_time() - began
-    means = f"{found.start_costs.mean():9.2f} -> {found.costs.mean():9.2f}"
-    print(
-        f"{task.name:28s} {means} in {len(seeds)} episodes, {spent:.0f} s", flush=True
-    )
-
-
-def keep(known: dict[str, Any], task: str, costs: NDArray[np.float64], by: str) -> None:
-    """Put costs in the place of those that are higher."""
-    one = known[task]
-    before = np.array(one["costs"] or np.full(len(costs), np.inf))
-    names = one["by"] or [by] * len(costs)
-    one["costs"] = np.minimum(before, costs).tolist()
-    one["by"] = [
-        by if less else name for less, name in zip(costs < before, names, strict=True)
-    ]
-
-
-def rule(
-    known: dict[str, Any], suite: str, results: Sequence[BenchmarkResult], episodes: int
-) -> str:
-    """Which tasks leave as much room as the rule of choice asks, in the first so many episodes."""
-    lines = ["| task | best baseline | its cost | best known | room | rule |"]
-    lines.append("| --- | --- | --- | --- | --- | --- |")
-    for task in (task for task in load_suite(suite).tasks if task.on == "ship"):
-        costs = {
-            name: float(one.figures(name, task.name)[:, :episodes].mean())
-            for one in results
-            for name in one.summary["contestants"]
-            if name not in (*LEARNED, "best-known")
-        }
+    for task, cells in result.summary["tasks"].items():
+        if result.summary["suite"]["tasks"][task]["on"] != "ship":
+            continue
+        costs = {}
+        for name in cells:
+            if name not in (*LEARNED, BEST_KNOWN):
+                figures = result.figures(name, task)[:, :n_episodes]
+                costs[name] = float(figures.mean())
         best = min(costs, key=costs.__getitem__)
-        least = float(np.mean(known[task.name]["costs"][:episodes]))
-        room = 1.0 - least / costs[best]
-        robust = "robustness" if task.why.startswith("robustness") else "fails"
-        held = "holds" if room >= ROOM else robust
+        best_cost = float(np.mean(known[task]["costs"][:n_episodes]))
+        room = 1.0 - best_cost / costs[best]
         lines.append(
-            f"| {task.name} | {best} | {costs[best]:.1f} | {least:.1f} | {room:.1%} |"
-            f" {held} |"
+            f"| {task} | {best} | {costs[best]:.1f} | {best_cost:.1f} |"
+            f" {room:.1%}{'' if room >= LEAST_ROOM else ' (below)'} |"
         )
-    return "\n".join(lines)
+    return lines
 
 
 if __name__ == "__main__":

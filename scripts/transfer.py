@@ -1,10 +1,9 @@
-"""Transfer: autopilots made on an identified model, run on the ship behind it, beside the same made on her.
+"""Transfer: autopilots made on an identified model against the same made on the ship.
 
     python scripts/transfer.py [TASK ...] --out transfer/    # resumes where it stopped
 
-Tasks are those of `shipgym-v2`: contestants know the identified model and are
-evaluated, in the same 100 episodes, on the ship behind her trials. Each is made twice,
-alike but for what is known:
+Each autopilot of a task of the benchmark is made twice in the same way, and both run the
+same 100 episodes on the ship:
 
     wheel-over     designed on the model, or on the ship
     tuned          the classical controller that cost least on the model, its settings
@@ -13,42 +12,40 @@ alike but for what is known:
                    from the covariance and added to `tuned`; or three learned on the
                    ship, with the same settings, and added to that tuned on her
 
-What one costs on the ship over what its twin costs that knew her is the loss by the
-model's error. How large that error is stands beside it: turning circles at 35 deg and
-zigzags 15/15 and 25/25, which are in no model's trials, and the factor by which trials
-left out widen its standard errors.
+The difference in cost on the ship is the loss due to the model's error. How large that
+error is stands beside it: turning circles at 35 deg and zigzags 15/15 and 25/25, which
+are in no model's trials, and the factor by which trials left out widen its standard
+errors.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from agents.benchmarking.contestants import pretrained
 from build_models import COMPARED_DEG, errors
 from direct_search import tune
-from numpy.typing import NDArray
 
 import shipgym
 from agents.agent_file import load_agent
+from agents.benchmarking.sources import pretrained
 from agents.benchmarking.statistics import Draws, Interval, interval
 from agents.controllers.controller import Controller, Policy
 from agents.controllers.designs import NO_BASES, design, tuned
 from agents.rollouts.metrics import evaluate
 from agents.suites.reference import load_tuned
-from agents.suites.suite import SETS, BenchmarkTask, load_suite, suite_file
+from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, suite_file
 from agents.training import run_folder
 from agents.training.plan import TrainingPlan
 from agents.training.settings import load_settings
 from agents.training.training import train
+from shipgym.arrays import Floats
 from shipgym.files import read_json, write_json
 
-Floats = NDArray[np.float64]
-
-SUITE, RUNS = "shipgym-v2", 3
+RUNS = 3  # of training on the ship
 #: One for each kind of model: the ship's own form, with roll, with shaft; another
 #: ship's form with a kernel; two trials only; and the control, Nomoto's form for an MMG
 #: ship.
@@ -61,13 +58,12 @@ TASKS = (
     "two-zigzags",
     "nomoto-to-mmg",
 )
-KINDS = ("on_model", "on_ship", "knowing")
-HEAD = (
+HEADS = (
     "task",
     "model",
     "error: turns, %; overshoots, deg",
     "factor",
-    "contestant",
+    "controller",
     "made on the model: cost on the model",
     "cost on the ship",
     "made on the ship: cost on the ship",
@@ -76,120 +72,21 @@ HEAD = (
 
 
 @dataclass(frozen=True, eq=False)
-class Contestant:
-    """What one cost, shape (n_runs, n_episodes)."""
+class Transfer:
+    """Costs of a controller, each of shape (n_runs, n_episodes)."""
 
-    name: str
-    on_model: Floats
+    on_model: Floats  # made on the model
     on_ship: Floats
-    knowing: Floats  # on the ship, made on the ship
+    made_on_ship: Floats  # on the ship
 
     @property
-    def lost(self) -> Interval:
-        """What part more it costs on the ship than its twin that knew her, over runs and paired episodes."""
+    def loss(self) -> Interval:
+        """Share that the controller made on the model costs more on the ship."""
         draws = Draws(1, self.on_ship.shape[1])
-        here, there = (
-            draws.means(costs, 0, who).mean(axis=1)
-            for who, costs in enumerate((self.on_ship, self.knowing))
-        )
-        return interval(
-            float(self.on_ship.mean() / self.knowing.mean() - 1.0), here / there - 1.0
-        )
-
-
-def contestants(task: BenchmarkTask, out: Path, runs: int) -> Iterator[Contestant]:
-    """All of one task, each made on the model and on the ship."""
-    model, ship = task.design_task, replace(task.design_task, model=task.true_ship)
-    pairs: dict[str, tuple[Sequence[Policy], Sequence[Policy]]] = {
-        "wheel-over": ([design("wheel-over", model)], [design("wheel-over", ship)])
-    }
-    known = tuned_on(ship, base_of(task))
-    pairs[f"tuned {base_of(task)}"] = ([tuned("base", model, SUITE)], [known])
-    base = out / f"{task.name}-tuned.json"
-    known.save(base)
-    agents = [load_agent(path) for path in pretrained(task.name, "ppo")]
-    pairs["ppo"] = (agents, [learned_on(ship, base, seed, out) for seed in range(runs)])
-    on_model = load_suite(SUITE).task(task.name + SETS["model"])
-    for name, (ours, theirs) in pairs.items():
-        yield Contestant(
-            name, costs(ours, on_model), costs(ours, task), costs(theirs, task)
-        )
-
-
-def base_of(task: BenchmarkTask) -> str:
-    """The kind of controller that cost least on the model, which the agents add to."""
-    found = load_tuned(SUITE)[task.name]
-    return min(
-        (kind for kind in found if kind not in NO_BASES),
-        key=lambda kind: float(found[kind]["cost"]),
-    )
-
-
-def tuned_on(task: BenchmarkTask, kind: str) -> Controller:
-    """A controller with the suite's search budget on a task; guidance leads the LQ found first."""
-    found = read_json(suite_file(SUITE, "tuned"), "tuned settings", "take another copy")
-    budget = found["evaluations"], found["episodes"]
-    lq = tune("lq", task, None, *budget).settings
-    return design(kind, task, tune(kind, task, {"lq": lq}, *budget).settings)
-
-
-def learned_on(task: BenchmarkTask, base: Path, seed: int, out: Path) -> Policy:
-    """One training run, begun, gone on with, or read where it has ended."""
-    folder, settings = out / f"{task.name}-{seed}", {"base": str(base)}
-    plan = TrainingPlan(
-        "ppo",
-        task,
-        load_settings("ppo", task.environment, task.name, settings),
-        seed=seed,
-    )
-    train(plan, folder, resume=(folder / run_folder.RUN).is_file())
-    agent: Policy = load_agent(folder / run_folder.AGENT)
-    return agent
-
-
-def costs(policies: Sequence[Policy], task: BenchmarkTask) -> Floats:
-    """Costs of the scored episodes, shape (n_runs, n_episodes)."""
-    return np.stack([evaluate(policy, task).figures["cost"] for policy in policies])
-
-
-def kept(task: BenchmarkTask, out: Path, runs: int) -> list[Contestant]:
-    """All of one task, read from the folder where they are there already."""
-    file = out / f"{task.name}.json"
-    if not file.is_file():
-        found = {one.name: one for one in contestants(task, out, runs)}
-        parts = {
-            name: {kind: getattr(one, kind).tolist() for kind in KINDS}
-            for name, one in found.items()
-        }
-        write_json({"task": task.name, "costs": parts}, file)
-    costs = read_json(file, "costs of a task", "delete it")["costs"]
-    return [
-        Contestant(name, *(np.array(one[kind]) for kind in KINDS))
-        for name, one in costs.items()
-    ]
-
-
-def rows(task: BenchmarkTask, found: Sequence[Contestant]) -> Iterator[str]:
-    """A line of Markdown for each contestant; what is said of the model stands in the first."""
-    model = shipgym.load_model(task.model)
-    turn, held_out, _ = errors(model, *COMPARED_DEG)
-    factor = (model.provenance or {})["model_error"]["factor"]
-    about = (
-        task.name,
-        f"`{task.model}`",
-        f"{turn:.1f}; {held_out:.1f}",
-        f"{factor:.1f}",
-    )
-    for one in found:
-        lost = one.lost
-        figures = [
-            f"{costs.mean():.1f}" for costs in (one.on_model, one.on_ship, one.knowing)
-        ]
-        figures.append(
-            f"{100 * lost.value:.1f} ({100 * lost.low:.1f} to {100 * lost.high:.1f})"
-        )
-        yield f"| {' | '.join((*about, one.name, *figures))} |"
-        about = ("",) * len(about)
+        ours = draws.means(self.on_ship, 0, 0).mean(axis=1)
+        theirs = draws.means(self.made_on_ship, 0, 1).mean(axis=1)
+        loss = self.on_ship.mean() / self.made_on_ship.mean() - 1.0
+        return interval(float(loss), ours / theirs - 1.0)
 
 
 def main() -> None:
@@ -202,13 +99,111 @@ def main() -> None:
     parser.add_argument(
         "--runs", type=int, default=RUNS, help="of training on the ship"
     )
-    asked = parser.parse_args()
-    asked.out.mkdir(parents=True, exist_ok=True)
-    suite = load_suite(SUITE)
-    print(f"| {' | '.join(HEAD)} |\n|{' --- |' * len(HEAD)}")
-    for name in asked.tasks or TASKS:
-        task = suite.task(name)
-        print("\n".join(rows(task, kept(task, asked.out, asked.runs))), flush=True)
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    print(f"| {' | '.join(HEADS)} |\n|{' --- |' * len(HEADS)}")
+    for name in arguments.tasks or TASKS:
+        transfers = kept_transfers(name, arguments.out, arguments.runs)
+        print("\n".join(rows(name, transfers)), flush=True)
+
+
+def kept_transfers(name: str, out: Path, runs: int) -> dict[str, Transfer]:
+    """Costs of all controllers of a task, read from the folder if they are there."""
+    file = out / f"{name}.json"
+    if not file.is_file():
+        costs = {}
+        for controller, transfer in run_transfers(name, out, runs):
+            parts = vars(transfer).items()
+            costs[controller] = {part: values.tolist() for part, values in parts}
+        write_json({"task": name, "costs": costs}, file)
+    content = read_json(file, "costs of a task", "delete it")["costs"]
+    transfers = {}
+    for controller, parts in content.items():
+        arrays = {part: np.array(values) for part, values in parts.items()}
+        transfers[controller] = Transfer(**arrays)
+    return transfers
+
+
+def run_transfers(name: str, out: Path, runs: int) -> Iterator[tuple[str, Transfer]]:
+    """Make all controllers of a task on the model and on the ship, and run them."""
+    on_ship, on_model, *_ = load_suite().select(name)
+    model = on_ship.design_task
+    ship = replace(model, model=on_ship.true_ship)
+
+    def transfer(ours: Sequence[Policy], theirs: Sequence[Policy]) -> Transfer:
+        return Transfer(
+            on_model=costs(ours, on_model),
+            on_ship=costs(ours, on_ship),
+            made_on_ship=costs(theirs, on_ship),
+        )
+
+    wheel_over = transfer([design("wheel-over", model)], [design("wheel-over", ship)])
+    yield "wheel-over", wheel_over
+
+    base = base_of(model)
+    tuned_on_ship = tune_on(ship, base)
+    yield (
+        f"tuned {base}",
+        transfer([tuned("base", model, DEFAULT_SUITE)], [tuned_on_ship]),
+    )
+
+    base_file = out / f"{name}-tuned.json"
+    tuned_on_ship.save(base_file)
+    agents = [load_agent(path) for path in pretrained(name, "ppo")]
+    learned = [learn_on(ship, base_file, seed, out) for seed in range(runs)]
+    yield "ppo", transfer(agents, learned)
+
+
+def base_of(task: BenchmarkTask) -> str:
+    """Kind of the controller that cost least on the model, which the agents add to."""
+    found = load_tuned(DEFAULT_SUITE)[task.name]
+    bases = [kind for kind in found if kind not in NO_BASES]
+    return min(bases, key=lambda kind: float(found[kind]["cost"]))
+
+
+def tune_on(task: BenchmarkTask, kind: str) -> Controller:
+    """Tune a controller with the suite's search budget; guidance leads a tuned LQ."""
+    path = suite_file(DEFAULT_SUITE, "tuned")
+    search = read_json(path, "tuned settings", "take another copy")
+    budget = search["evaluations"], search["episodes"]
+    lq = tune("lq", task, None, *budget).settings
+    found = tune(kind, task, {"lq": lq}, *budget)
+    return design(kind, task, found.settings)
+
+
+def learn_on(task: BenchmarkTask, base: Path, seed: int, out: Path) -> Policy:
+    """One training run, begun, gone on with, or read where it has ended."""
+    folder = out / f"{task.name}-{seed}"
+    own = {"base": str(base)}
+    settings = load_settings("ppo", task.environment, task.name, own)
+    plan = TrainingPlan("ppo", task, settings, seed=seed)
+    train(plan, folder, resume=(folder / run_folder.RUN).is_file())
+    return load_agent(folder / run_folder.AGENT)
+
+
+def costs(policies: Sequence[Policy], task: BenchmarkTask) -> Floats:
+    """Costs of the scored episodes, shape (n_runs, n_episodes)."""
+    return np.stack([evaluate(policy, task).figures["cost"] for policy in policies])
+
+
+def rows(name: str, transfers: Mapping[str, Transfer]) -> Iterator[str]:
+    """Lines of Markdown, one a controller; the model's error stands in the first."""
+    task = load_suite().task(name)
+    model = shipgym.load_model(task.model)
+    turn, overshoot, _ = errors(model, *COMPARED_DEG)
+    factor = (model.provenance or {})["model_error"]["factor"]
+    about = (
+        name,
+        f"`{task.model}`",
+        f"{turn:.1f}; {overshoot:.1f}",
+        f"{factor:.1f}",
+    )
+    for controller, transfer in transfers.items():
+        loss, low, high = (100.0 * share for share in transfer.loss)
+        figures = [f"{values.mean():.1f}" for values in vars(transfer).values()]
+        figures.append(f"{loss:.1f} ({low:.1f} to {high:.1f})")
+        yield f"| {' | '.join((*about, controller, *figures))} |"
+        about = ("",) * len(about)
 
 
 if __name__ == "__main__":

@@ -86,13 +86,13 @@ class Cell:
         """
         check_shape(content, CELL, where)
         runs = [TrainingRun(**run) for run in content["runs"]]
-        names = {"cost"}.union(*(run.figures for run in runs))
         for run in runs:
-            numbers = [
-                name for name, one in run.figures.items() if one.dtype.kind in "bif"
-            ]
-            shapes = {run.figures[name].shape for name in numbers}
-            if set(numbers) != names or shapes != {(n_episodes,)}:
+            same_figures = run.figures.keys() == runs[0].figures.keys()
+            are_figures = all(
+                figure.dtype.kind in "bif" and figure.shape == (n_episodes,)
+                for figure in run.figures.values()
+            )
+            if "cost" not in run.figures or not (same_figures and are_figures):
                 raise InputError(
                     f"{where}: expected cost and other figures of {n_episodes} episodes"
                 )
@@ -117,9 +117,12 @@ def run_cell(entry: Entry, task: BenchmarkTask, n_episodes: int) -> Cell:
 
 
 def _run(policy: Policy, task: BenchmarkTask, n_episodes: int) -> TrainingRun:
-    figures, run = evaluate(policy, task, task.seeds[:n_episodes])
+    evaluation = evaluate(policy, task, task.seeds[:n_episodes])
     return TrainingRun(
-        figures, run.failure, run.seconds_per_action, policy_hash(policy)
+        figures=evaluation.figures,
+        failure=evaluation.run.failure,
+        seconds_per_action=evaluation.run.seconds_per_action,
+        policy_sha256=policy_hash(policy),
     )
 
 

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.benchmarking.sources import (
+    Source,
     check_object,
     file_hash,
     import_code,
@@ -90,7 +91,8 @@ class Entry:
 
 def _check_design(policy: Policy, task: BenchmarkTask, where: str) -> None:
     """Refuse a policy that was designed on the ship behind a task's model."""
-    if model_hash(task.evaluation.ship) in _design_hashes(policy):
+    true_ship = task.evaluation.ship
+    if model_hash(true_ship) in _design_hashes(policy):
         raise InputError(
             f"{where}: expected a design on the model '{task.model}', got one on the"
             f" ship '{task.true_ship}'"
@@ -99,21 +101,20 @@ def _check_design(policy: Policy, task: BenchmarkTask, where: str) -> None:
 
 def _design_hashes(policy: Policy) -> set[str]:
     """Hashes of the models that a policy and the policies within it were made for."""
-    found: list[Any] = [policy]
-    known = {id(policy)}
-    for one in found:  # grows in the loop
-        for name in INNER_POLICIES:
-            inner = getattr(one, name, None)
-            if inner is None or id(inner) in known:
-                continue
-            known.add(id(inner))
-            found.append(inner)
+    found: dict[int, Any] = {}
+    waiting: list[Any] = [policy]
+    while waiting:
+        part = waiting.pop()
+        if part is None or id(part) in found:
+            continue
+        found[id(part)] = part
         if len(found) > MOST_INNER_POLICIES:
             raise InputError(
                 f"{type(policy).__name__}: expected a policy made of at most"
                 f" {MOST_INNER_POLICIES} policies, got more"
             )
-    return {getattr(one, "model_sha256", "") for one in found}
+        waiting += [getattr(part, name, None) for name in INNER_POLICIES]
+    return {getattr(part, "model_sha256", "") for part in found.values()}
 
 
 def read_entries(controllers: Any) -> tuple[Entry, ...]:
@@ -128,16 +129,12 @@ def read_entries(controllers: Any) -> tuple[Entry, ...]:
         any of these by name.
     """
     if isinstance(controllers, Mapping):
-        entries = [_named(str(name), one) for name, one in controllers.items()]
-    elif isinstance(controllers, str):
-        entries = [_read_entry(text) for text in controllers.split(",")]
-    elif hasattr(controllers, "predict") or not isinstance(controllers, Iterable):
-        entries = [_read_entry(controllers)]
+        entries = [_named(str(name), source) for name, source in controllers.items()]
     else:
-        entries = [_read_entry(one) for one in controllers]
-
+        entries = [_read_entry(given) for given in _as_list(controllers)]
     if not entries:
         raise InputError("controllers: expected at least one, got none")
+
     names = [entry.name for entry in entries]
     for name in names:
         if names.count(name) > 1:
@@ -146,6 +143,15 @@ def read_entries(controllers: Any) -> tuple[Entry, ...]:
                 f" of them: other={name}"
             )
     return tuple(entries)
+
+
+def _as_list(controllers: Any) -> list[Any]:
+    if isinstance(controllers, str):
+        return controllers.split(",")
+    is_policy = hasattr(controllers, "predict")
+    if is_policy or not isinstance(controllers, Iterable):
+        return [controllers]
+    return list(controllers)
 
 
 def _read_entry(given: Any) -> Entry:
@@ -157,19 +163,22 @@ def _read_entry(given: Any) -> Entry:
             return _named(name.strip(), source.strip())
         text = given.strip()
         return Entry(_short_name(text), _checked_text(text))
-    own_name = getattr(given, "name", None) or getattr(given, "__name__", None)
-    return _named(str(own_name or type(given).__name__), given)
+    kind = type(given).__name__
+    own_name = getattr(given, "name", None) or getattr(given, "__name__", kind)
+    return _named(str(own_name), given)
 
 
 def _named(name: str, source: Any) -> Entry:
-    if not name or set(name) & set(NOT_IN_NAMES):
+    forbidden = set(name) & set(NOT_IN_NAMES)
+    if not name or forbidden:
         raise InputError(
             f"controllers: expected a name without any of {' '.join(NOT_IN_NAMES)}, got"
             f" '{name}'"
         )
     if isinstance(source, str):
         return Entry(name, _checked_text(source))
-    for run in source if isinstance(source, Sequence) else [source]:
+    runs = source if isinstance(source, Sequence) else [source]
+    for run in runs:
         check_object(run, name)
     return Entry(name, source)
 
@@ -180,8 +189,11 @@ def _short_name(text: str) -> str:
         return text.rpartition(":")[2]
     if not text.endswith((".json", ".zip")):
         return text
-    stem = Path(text.split("+")[0]).stem
-    return stem.replace("{task}", "").replace("*", "").strip("-_.") or "agent"
+    first_file, _, _ = text.partition("+")
+    stem = Path(first_file).stem
+    for wildcard in ("{task}", "*"):
+        stem = stem.replace(wildcard, "")
+    return stem.strip("-_.") or "agent"
 
 
 def _checked_text(text: str) -> str:
@@ -207,22 +219,21 @@ def check_agents(entry: Entry, tasks: Sequence[BenchmarkTask]) -> None:
     """
     if not entry.is_text or names_code(entry.source):
         return
-    pairs = [
-        (path, task) for task in tasks for path in source_files(entry.source, task)
-    ]
-    sources = {
-        path: load_source(path) for path in dict.fromkeys(path for path, _ in pairs)
-    }
-
-    refusals = []
-    for path, task in pairs:
-        where = f"'{path}' on task '{task.name}'"
-        try:
-            policy = make_policy(sources[path], task)
-            check_fits(policy, task.task, task.ship, where)
-        except InputError as error:
-            refusals.append(str(error))
-    if pairs and len(refusals) == len(pairs):
+    sources: dict[Path, Source] = {}
+    refusals: list[str] = []
+    n_fitting = 0
+    for task in tasks:
+        for path in source_files(entry.source, task):
+            if path not in sources:
+                sources[path] = load_source(path)
+            where = f"'{path}' on task '{task.name}'"
+            try:
+                policy = make_policy(sources[path], task)
+                check_fits(policy, task.task, task.ship, where)
+                n_fitting += 1
+            except InputError as error:
+                refusals.append(str(error))
+    if refusals and not n_fitting:
         raise InputError(
             f"controllers: '{entry.name}' fits none of the tasks: {refusals[0]}"
         )

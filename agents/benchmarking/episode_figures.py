@@ -14,6 +14,12 @@ from shipgym.tasks.guidance import wrapped
 
 MOST_SAMPLES = 240  # of a line
 GREEN, LIGHT_GREEN = "#2f6b3c", "#e3efe5"  # of the path to follow
+GAP = np.full(2, np.nan)  # between outlines
+HISTORIES_GRID = {
+    "shared_xaxes": True,
+    "vertical_spacing": 0.05,
+    "row_heights": [0.58, 0.42],
+}
 
 
 def tracks_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figure:
@@ -29,13 +35,19 @@ def tracks_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figu
         All controllers of the page, which gives each its colour.
     """
     look = looks(names)
-    traces = _path_traces(next(iter(episodes.values())))
+    first = next(iter(episodes.values()))
+    traces = _path_traces(first)
     for name, episode in episodes.items():
         kept = _thinned(episode.n_steps)
-        north, east = episode.states["x"][kept], episode.states["y"][kept]
+        north = episode.states["x"][kept]
+        east = episode.states["y"][kept]
         traces.append(controller_line(east, north, name, look[name], 1.8))
-    north_axis = axis("north, m", scaleanchor="x", scaleratio=1)
-    return page_panels([Panel(traces, "east, m", north_axis)], 480, hovermode="closest")
+
+    return page_panels(
+        [Panel(traces, "east, m", axis("north, m", scaleanchor="x", scaleratio=1))],
+        height=480,
+        hovermode="closest",
+    )
 
 
 def _path_traces(episode: Episode) -> list[Any]:
@@ -43,21 +55,36 @@ def _path_traces(episode: Episode) -> list[Any]:
     if episode.waypoints is None or episode.path is None:
         return []
     north, east = _corridor(episode.path, episode.corridor or 0.0)
-    area: dict[str, Any] = {"fill": "toself", "fillcolor": LIGHT_GREEN}
-    path, marks = episode.path, episode.waypoints
-    return [
-        line(east, north, "corridor", GREEN, 0, hoverinfo="skip", **area),
-        line(
-            path[:, 1],
-            path[:, 0],
-            "path",
-            GREEN,
-            1.4,
-            line_dash="dash",
-            hoverinfo="skip",
-        ),
-        points(marks[:, 1], marks[:, 0], "waypoints", GREEN, 7, hoverinfo="skip"),
-    ]
+    path_north, path_east = episode.path.T
+    mark_north, mark_east = episode.waypoints.T
+    corridor = line(
+        east,
+        north,
+        "corridor",
+        GREEN,
+        0,
+        hoverinfo="skip",
+        fill="toself",
+        fillcolor=LIGHT_GREEN,
+    )
+    path = line(
+        path_east,
+        path_north,
+        "path",
+        GREEN,
+        1.4,
+        hoverinfo="skip",
+        line_dash="dash",
+    )
+    waypoints = points(
+        mark_east,
+        mark_north,
+        "waypoints",
+        GREEN,
+        7,
+        hoverinfo="skip",
+    )
+    return [corridor, path, waypoints]
 
 
 def _corridor(path: Floats, half_width: float) -> Floats:
@@ -65,21 +92,21 @@ def _corridor(path: Floats, half_width: float) -> Floats:
 
     Returns north and east, m, shape (2, n); NaN parts one outline from the next.
     """
-    ahead = np.diff(path, axis=0)
-    ahead /= np.maximum(np.hypot(*ahead.T), np.finfo(float).tiny)[:, None]
-    aside = half_width * np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1)
     begins, ends = path[:-1], path[1:]
-    corners = [begins + aside, ends + aside, ends - aside, begins - aside]
-    strips = np.stack(corners, axis=1)
+    ahead = ends - begins
+    lengths = np.hypot(*ahead.T)
+    ahead /= np.maximum(lengths, np.finfo(float).tiny)[:, None]
+    north, east = ahead.T
+    aside = half_width * np.column_stack([-east, north])
 
     angles = np.linspace(0.0, 2.0 * np.pi, 25)
-    circle = half_width * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    discs = path[1:-1, None] + circle
-    outlines = [
-        np.pad(one, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan).reshape(-1, 2)
-        for one in (strips, discs)
-    ]
-    return np.concatenate(outlines).T
+    circle = half_width * np.column_stack([np.cos(angles), np.sin(angles)])
+    outlines = []
+    for begin, end, side in zip(begins, ends, aside, strict=True):
+        outlines += [begin + side, end + side, end - side, begin - side, GAP]
+    for point in path[1:-1]:
+        outlines += [*(point + circle), GAP]
+    return np.array(outlines).T
 
 
 def histories_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figure:
@@ -87,27 +114,38 @@ def histories_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> F
 
     For the parameters see `tracks_figure`.
     """
-    look = looks(names)
     longest = max(episodes.values(), key=lambda episode: episode.n_steps)
     has_path = longest.waypoints is not None
-    upper = Panel([], "", "cross-track error, m" if has_path else "heading, deg")
-    lower = Panel([], "time, s", axis("rudder, deg", zero=True))
+    look = looks(names)
+    courses, rudders = [], []
     for name, episode in episodes.items():
         kept = _thinned(episode.n_steps)
-        t, rudder = episode.dt * kept, np.degrees(episode.states["delta"])
-        shown = _cross_track(episode) if has_path else _heading_deg(episode)
-        upper.traces.append(controller_line(t, shown[kept], name, look[name], 1.7))
-        lower.traces.append(controller_line(t, rudder[kept], name, look[name], 1.2))
+        time = episode.dt * kept
+        course = _cross_track(episode) if has_path else _heading_deg(episode)
+        rudder = np.degrees(episode.states["delta"])
+        courses.append(controller_line(time, course[kept], name, look[name], 1.7))
+        rudders.append(controller_line(time, rudder[kept], name, look[name], 1.2))
     if not has_path:
-        upper.traces.append(_ordered_course(longest))
+        courses.append(_ordered_course(longest))
 
-    grid = {"shared_xaxes": True, "vertical_spacing": 0.05, "row_heights": [0.58, 0.42]}
-    figure = page_panels([upper, lower], 480, grid=grid)
+    figure = page_panels(
+        [
+            Panel(courses, "", "cross-track error, m" if has_path else "heading, deg"),
+            Panel(rudders, "time, s", axis("rudder, deg", zero=True)),
+        ],
+        height=480,
+        grid=HISTORIES_GRID,
+    )
     if has_path and longest.corridor:
-        bound = {"color": GREEN, "width": 1.2, "dash": "dash"}
-        for y in (-longest.corridor, longest.corridor):
-            figure.add_hline(y=y, line=bound, row=1, col=1)
+        _add_bounds(figure, longest.corridor)
     return figure
+
+
+def _add_bounds(figure: Figure, corridor: float) -> None:
+    """Add lines at the bounds of a corridor to the upper panel."""
+    bound = {"color": GREEN, "width": 1.2, "dash": "dash"}
+    for y in (-corridor, corridor):
+        figure.add_hline(y=y, line=bound, row=1, col=1)
 
 
 def _cross_track(episode: Episode) -> Floats:

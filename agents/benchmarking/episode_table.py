@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.benchmarking.cells import Cell
+from agents.benchmarking.cells import Cell, TrainingRun
 from shipgym.arrays import Integers
 from shipgym.checks import quoted
 from shipgym.drafts import atomic_path
@@ -29,22 +29,23 @@ def episode_table(cells: Mapping[tuple[str, str], Cell], seeds: Integers) -> Col
 
     Figures that a cell lacks are NaN.
     """
-    runs = [
-        (name, task, number, run)
-        for (name, task), cell in cells.items()
-        for number, run in enumerate(cell.runs)
-    ]
+    keys: dict[str, list[str | int]] = {"controller": [], "task": [], "run": []}
+    runs: list[TrainingRun] = []
+    figures: dict[str, None] = {}
+    for (name, task), cell in cells.items():
+        for number, run in enumerate(cell.runs):
+            keys["controller"].append(name)
+            keys["task"].append(task)
+            keys["run"].append(number)
+            runs.append(run)
+            figures |= dict.fromkeys(run.figures)
+
     n_episodes = len(seeds)
-    columns: Columns = {
-        "controller": np.repeat([name for name, *_ in runs], n_episodes),
-        "task": np.repeat([task for _, task, *_ in runs], n_episodes),
-        "run": np.repeat([number for *_, number, _ in runs], n_episodes),
-        "seed": np.tile(seeds, len(runs)),
-    }
-    figures = dict.fromkeys(figure for *_, run in runs for figure in run.figures)
+    columns: Columns = {key: np.repeat(of, n_episodes) for key, of in keys.items()}
+    columns["seed"] = np.tile(seeds, len(runs))
     missing = np.full(n_episodes, np.nan)
     for figure in figures:
-        parts = [run.figures.get(figure, missing) for *_, run in runs]
+        parts = [run.figures.get(figure, missing) for run in runs]
         columns[figure] = np.concatenate(parts, dtype=np.float64)
     return columns
 
@@ -75,8 +76,10 @@ def _to_arrow(arrow: Any, name: str, values: NDArray[Any]) -> Any:
     if name in KEYS:
         return arrow.array(values)
     missing = np.isnan(values)
-    kind = np.bool_ if name in FLAGS else np.float64
-    return arrow.array(np.where(missing, 0.0, values).astype(kind), mask=missing)
+    known = np.where(missing, 0.0, values)
+    if name in FLAGS:
+        known = known.astype(np.bool_)
+    return arrow.array(known, mask=missing)
 
 
 def read_episodes(path: Path, rows: int) -> Columns:
@@ -106,11 +109,13 @@ def read_episodes(path: Path, rows: int) -> Columns:
 
 def _check_table(names: list[str], n_rows: int, expected: int, path: Path) -> None:
     """Refuse a table of another size, or without its keys, before it is read."""
-    if n_rows != expected or expected * len(names) > MOST_NUMBERS:
+    n_columns = len(names)
+    if n_rows != expected or expected * n_columns > MOST_NUMBERS:
         raise InputError(
-            f"{path}: expected {expected} rows, got {n_rows} of {len(names)} columns"
+            f"{path}: expected {expected} rows, got {n_rows} of {n_columns} columns"
         )
-    if len(set(names)) < len(names) or not set(KEYS) <= set(names):
+    different = set(names)
+    if len(different) < n_columns or not different.issuperset(KEYS):
         raise InputError(
             f"{path}: expected columns {quoted(KEYS)} and figures, got {quoted(names)}"
         )
@@ -119,11 +124,7 @@ def _check_table(names: list[str], n_rows: int, expected: int, path: Path) -> No
 def _from_arrow(arrow: Any, name: str, values: Any) -> NDArray[Any]:
     """Convert a column; raises ValueError or TypeError if it is of another type."""
     if name in TEXT_KEYS:
-        texts = values.cast(arrow.string()).to_pylist()
-        longest = max(map(len, texts), default=0)
-        if len(texts) * longest > MOST_NUMBERS:
-            raise ValueError(f"column '{name}' of long texts")
-        return np.array(texts, dtype=np.str_)
+        return _from_texts(name, values.cast(arrow.string()).to_pylist())
 
     kind = values.type
     is_number = arrow.types.is_integer(kind) or arrow.types.is_floating(kind)
@@ -134,3 +135,11 @@ def _from_arrow(arrow: Any, name: str, values: Any) -> NDArray[Any]:
     if name in KEYS and numbers.dtype != np.int64:
         raise ValueError(f"column '{name}' has rows without a value")
     return numbers
+
+
+def _from_texts(name: str, texts: list[str]) -> NDArray[np.str_]:
+    longest = max(map(len, texts), default=0)
+    n_characters = longest * len(texts)  # of the array
+    if n_characters > MOST_NUMBERS:
+        raise ValueError(f"column '{name}' of long texts")
+    return np.array(texts, dtype=np.str_)

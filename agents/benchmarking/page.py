@@ -3,7 +3,6 @@
 import base64
 import gzip
 import shlex
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -216,8 +215,10 @@ def _about_replays(again: Rerun, count: int) -> str:
 
 def _not_replayed(again: Rerun) -> list[str]:
     """Return why controllers cannot be replayed, each reason once."""
-    reasons = [f"{name}: {why}" for (name, _), why in again.refused.items()]
-    return list(dict.fromkeys(reasons))
+    reasons: dict[str, None] = {}
+    for (name, _), why in again.refused.items():
+        reasons[f"{name}: {why}"] = None
+    return list(reasons)
 
 
 def _origin(result: BenchmarkResult) -> dict[str, Any]:
@@ -241,14 +242,10 @@ def _files_and_hashes(result: BenchmarkResult) -> list[tuple[str, str, str]]:
         for path, sha256 in about["files"].items():
             rows.append((name, path, sha256))
         for task, cells in result.summary["tasks"].items():
-            for sha256 in _policy_hashes(cells, name):
+            hashes = cells[name]["policy_sha256"] if name in cells else []
+            for sha256 in filter(None, hashes):
                 rows.append((name, f"controller for {task}", sha256))
     return rows
-
-
-def _policy_hashes(cells: Mapping[str, Any], name: str) -> list[str]:
-    hashes = cells[name]["policy_sha256"] if name in cells else []
-    return [sha256 for sha256 in hashes if sha256]
 
 
 def command(result: BenchmarkResult) -> str:
@@ -260,10 +257,18 @@ def command(result: BenchmarkResult) -> str:
         controllers.append(source if source == name else f"{name}={source}")
 
     suite = summary["suite"]
-    words = ["shipgym", "benchmark", "--controllers", ",".join(controllers)]
-    words += ["--suite", suite["file"] or suite["name"]]
+    options = {
+        "--controllers": ",".join(controllers),
+        "--suite": suite["file"] or suite["name"],
+    }
     if not suite["complete"]:
-        words += ["--tasks", ",".join(summary["tasks"])]
-    if summary["seeds"]["count"] != N_EPISODES:
-        words += ["--episodes", str(summary["seeds"]["count"])]
-    return shlex.join([*words, "--out", "results"])
+        options["--tasks"] = ",".join(summary["tasks"])
+    count = summary["seeds"]["count"]
+    if count != N_EPISODES:
+        options["--episodes"] = str(count)
+    options["--out"] = "results"
+
+    words = ["shipgym", "benchmark"]
+    for option, value in options.items():
+        words += [option, value]
+    return shlex.join(words)

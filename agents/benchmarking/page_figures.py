@@ -1,7 +1,7 @@
 """Figures of a benchmark's scores and costs."""
 
 from collections.abc import Mapping, Sequence
-from itertools import cycle
+from itertools import cycle, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from shipgym.plots import (
     panels,
     translucent,
 )
-from shipgym.plots.style import Figure
+from shipgym.plots.style import Axis, Figure
 
 # as in the replay player (chart.html)
 COLOURS = (
@@ -55,16 +55,31 @@ class Look(NamedTuple):
 
 def looks(names: Sequence[str]) -> dict[str, Look]:
     """Return the look of each controller; the best known is dark and solid."""
-    free = cycle(Look(colour, dash) for dash in DASHES for colour in COLOURS)
-    return {
-        name: Look(INK, "solid") if name == BEST_KNOWN else next(free) for name in names
-    }
+    looks = {}
+    free = cycle(product(DASHES, COLOURS))
+    for name in names:
+        if name == BEST_KNOWN:
+            looks[name] = Look(INK, "solid")
+        else:
+            dash, colour = next(free)
+            looks[name] = Look(colour, dash)
+    return looks
 
 
 def page_panels(shown: Sequence[Panel], height: int, **changes: Any) -> Figure:
     """Return panels without a legend, since the page has one for all figures."""
     usual: dict[str, Any] = {"margin": MARGIN, "showlegend": False, "hovermode": "x"}
     return panels(shown, height, **{**usual, **changes})
+
+
+def row_panel(traces: list[Any], x_axis: Axis, row_height: int) -> Figure:
+    """Return a panel with a row for each controller, the first on top."""
+    controllers = axis(autorange="reversed", automargin=True, showgrid=True)
+    return page_panels(
+        [Panel(traces, x_axis, controllers)],
+        height=row_height * len(traces) + 70,
+        hovermode="closest",
+    )
 
 
 def scores_figure(result: BenchmarkResult) -> Figure:
@@ -74,24 +89,22 @@ def scores_figure(result: BenchmarkResult) -> Figure:
     """
     look = looks(result.ranking)
     has_scores = bool(result.summary["reference"])
+    limits = SCORE_RANGE if has_scores else RELATIVE_RANGE
     traces = []
-    for ranked in result.summary["ranking"]:
-        interval = ranked["score"] if has_scores else {"value": ranked["relative_cost"]}
+    for total in result.summary["ranking"]:
+        interval = total["score"]
+        if not has_scores:
+            interval = dict.fromkeys(("low", "value", "high"), total["relative_cost"])
         if interval["value"] is not None:
-            limits = SCORE_RANGE if has_scores else RELATIVE_RANGE
-            colour = look[ranked["name"]].colour
-            traces.append(_interval_trace(ranked["name"], interval, limits, colour))
+            name = total["name"]
+            trace = _interval_trace(name, interval, limits, look[name].colour)
+            traces.append(trace)
 
-    title = "cost relative to the lowest, geometric mean over tasks"
-    if has_scores:
-        title = f"score: {SCORE}"
-    controllers = axis(autorange="reversed", automargin=True, showgrid=True)
-    height = 30 * len(result.ranking) + 70
-    figure = page_panels(
-        [Panel(traces, title, controllers)], height, hovermode="closest"
-    )
-    if has_scores:
-        _add_score_lines(figure)
+    if not has_scores:
+        title = "cost relative to the lowest, geometric mean over tasks"
+        return row_panel(traces, title, row_height=30)
+    figure = row_panel(traces, f"score: {SCORE}", row_height=30)
+    _add_score_lines(figure)
     return figure
 
 
@@ -103,13 +116,12 @@ def _interval_trace(
 ) -> Any:
     """Return a marker with its interval; a triangle if it is beyond the limits."""
     value = interval["value"]
-    low, high = interval.get("low"), interval.get("high")
-    ends = [value if low is None else low, value, value if high is None else high]
-    low, shown, high = np.clip(np.array(ends, dtype=np.float64), *limits).tolist()
+    ends = [interval[end] for end in ("low", "value", "high")]
+    numbers = [value if end is None else end for end in ends]
+    low, shown, high = np.clip(np.array(numbers, dtype=np.float64), *limits).tolist()
     symbol = "circle"
     if value is not None and value != shown:
         symbol = "triangle-left" if value < shown else "triangle-right"
-    error = {"array": [high - shown], "arrayminus": [shown - low], "thickness": 2.2}
     return graph_objects().Scatter(
         x=[shown],
         y=[name],
@@ -117,7 +129,11 @@ def _interval_trace(
         mode="markers",
         customdata=[value],
         marker={"color": colour, "size": 10, "symbol": symbol},
-        error_x=error,
+        error_x={
+            "array": [high - shown],
+            "arrayminus": [shown - low],
+            "thickness": 2.2,
+        },
         hovertemplate="%{customdata:.3f}<extra>%{y}</extra>",
     )
 
@@ -130,37 +146,46 @@ def _add_score_lines(figure: Figure) -> None:
 
 def profile_figure(result: BenchmarkResult) -> Figure:
     """Return the share of episodes that score more than a threshold."""
-    look, profile = looks(result.ranking), result.summary["profile"]
+    look = looks(result.ranking)
+    profile = result.summary["profile"]
     lines = []
     for name in result.ranking:
-        if name in profile["shares"]:
-            percent = 100.0 * np.asarray(profile["shares"][name])
-            lines.append(
-                controller_line(profile["thresholds"], percent, name, look[name], 2.0)
-            )
-    shares = axis("episodes that score more, %", range=[-2, 102])
-    figure = page_panels([Panel(lines, f"score of an episode: {SCORE}", shares)], 380)
+        shares = profile["shares"].get(name)
+        if shares is not None:
+            percent = 100.0 * np.asarray(shares)
+            thresholds = profile["thresholds"]
+            lines.append(controller_line(thresholds, percent, name, look[name], 2.0))
+
+    y_axis = axis("episodes that score more, %", range=[-2, 102])
+    figure = page_panels(
+        [Panel(lines, f"score of an episode: {SCORE}", y_axis)],
+        height=380,
+    )
     _add_score_lines(figure)
     return figure
 
 
 def costs_figure(result: BenchmarkResult, task: str) -> Figure:
     """Return a box of the episodes' costs in a task for each controller."""
-    look = looks(result.ranking)
-    names = [name for name in result.ranking if name in result.summary["tasks"][task]]
-    costs = {name: result.figures(name, task).ravel() for name in names}
-    boxes = [_box(name, costs[name], look[name].colour) for name in names]
+    boxes = []
+    all_costs = [np.zeros(0)]
+    for name, look in looks(result.ranking).items():
+        if name in result.summary["tasks"][task]:
+            costs = result.figures(name, task).ravel()
+            boxes.append(_box(name, costs, look.colour))
+            all_costs.append(costs)
 
-    every = np.concatenate([np.zeros(0), *costs.values()])
     costs_axis = axis("cost of an episode", type="linear")
-    if len(every) and 0.0 < LOGARITHMIC_RATIO * every.min() < every.max():
-        marks = _one_two_five(every.min(), every.max())
-        costs_axis = axis("cost of an episode", type="log", tickvals=marks)
-    controllers = axis(autorange="reversed", automargin=True)
-    height = 34 * len(names) + 70
-    return page_panels(
-        [Panel(boxes, costs_axis, controllers)], height, hovermode="closest"
-    )
+    if _is_wide(np.concatenate(all_costs)):
+        costs_axis = axis("cost of an episode", type="log", dtick="D2")
+    return row_panel(boxes, costs_axis, row_height=34)
+
+
+def _is_wide(costs: Floats) -> bool:
+    """Tell whether an axis of costs is logarithmic."""
+    if not len(costs) or costs.min() <= 0.0:
+        return False
+    return bool(costs.max() > LOGARITHMIC_RATIO * costs.min())
 
 
 def _box(name: str, costs: Floats, colour: str) -> Any:
@@ -176,14 +201,6 @@ def _box(name: str, costs: Floats, colour: str) -> Any:
         fillcolor=translucent(colour, 0.1),
         hoverinfo="x",
     )
-
-
-def _one_two_five(least: float, most: float) -> list[float]:
-    """Marks of a logarithmic axis: 1, 2 and 5 times powers of ten."""
-    first, last = int(np.floor(np.log10(least))), int(np.ceil(np.log10(most)))
-    return [
-        number * 10.0**power for power in range(first, last + 1) for number in (1, 2, 5)
-    ]
 
 
 def controller_line(x: Any, y: Any, name: str, look: Look, width: float) -> Any:

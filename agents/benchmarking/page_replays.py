@@ -1,6 +1,6 @@
 """The worst episodes of a benchmark, ready for the replay player of its page."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -62,34 +62,41 @@ def best_controllers(result: BenchmarkResult, task: str) -> list[str]:
         cost = cells[name]["cost"]["value"]
         if cost is not None:
             costs[name] = cost
+
     lowest = min(costs.values(), default=np.nan)
-    return [name for name in costs if np.isclose(costs[name], lowest, rtol=SAME_COST)]
+    best = []
+    for name, cost in costs.items():
+        if np.isclose(cost, lowest, rtol=SAME_COST):
+            best.append(name)
+    return best
 
 
 def worst_episodes(
     result: BenchmarkResult, controller: str, task: str, count: int
 ) -> list[EpisodeId]:
     """Return the episodes with the highest costs, over all training runs."""
-    costs = result.figures(controller, task)
-    order = np.argsort(-np.nan_to_num(costs, nan=np.inf).ravel(), kind="stable")
-    runs, numbers = np.unravel_index(order[:count], costs.shape)
     first = result.summary["seeds"]["first"]
-    return [
-        EpisodeId(controller, task, k, first + number)
-        for k, number in zip(runs.tolist(), numbers.tolist(), strict=True)
-    ]
+    costs = result.figures(controller, task)
+    known = np.nan_to_num(costs, nan=np.inf)
+    order = np.argsort(-known, axis=None, kind="stable")
+    worst = np.column_stack(np.unravel_index(order[:count], costs.shape))
+    episodes = []
+    for training_run, number in worst.tolist():
+        episodes.append(EpisodeId(controller, task, training_run, first + number))
+    return episodes
 
 
 def hardest_seed(result: BenchmarkResult, task: str) -> int:
     """Return the seed of the episode with the highest median cost over controllers."""
     first = int(result.summary["seeds"]["first"])
-    costs = [
-        result.figures(name, task).mean(axis=0)
-        for name in usable_controllers(result, task)
-    ]
+    costs = []
+    for name in usable_controllers(result, task):
+        mean_over_runs = result.figures(name, task).mean(axis=0)
+        costs.append(mean_over_runs)
     if not costs:
         return first
-    medians = np.median(np.nan_to_num(costs, nan=np.inf), axis=0)
+    known = np.nan_to_num(costs, nan=np.inf)
+    medians = np.median(known, axis=0)
     return first + int(np.argmax(medians))
 
 
@@ -99,16 +106,18 @@ def choices(result: BenchmarkResult, task: str, count: int) -> list[Choice]:
     First all controllers in the hardest episode, then the worst episodes of each with
     the task's best controller in the same episode.
     """
-    names, seed = usable_controllers(result, task), hardest_seed(result, task)
-    found = [Choice("", [EpisodeId(name, task, 0, seed) for name in names])]
-    best = best_controllers(result, task)
+    names = usable_controllers(result, task)
+    seed = hardest_seed(result, task)
+    hardest = [EpisodeId(name, task, 0, seed) for name in names]
+    choices = [Choice("", hardest)]
+    best, *_ = [*best_controllers(result, task), ""]
     for name in names:
         for episode in worst_episodes(result, name, task, count):
             together = [episode]
-            if best and name != best[0]:
-                together.append(EpisodeId(best[0], task, 0, episode.seed))
-            found.append(Choice(name, together))
-    return found
+            if best not in ("", name):
+                together.append(EpisodeId(best, task, 0, episode.seed))
+            choices.append(Choice(name, together))
+    return choices
 
 
 def replayable(result: BenchmarkResult, wanted: int) -> tuple[int, list[EpisodeId]]:
@@ -117,16 +126,13 @@ def replayable(result: BenchmarkResult, wanted: int) -> tuple[int, list[EpisodeI
     At most `wanted` of each controller and task; at least one.
     """
     for count in range(wanted, 0, -1):
-        shown = [
-            episode
-            for task in result.tasks
-            for choice in choices(result, task, count)
-            for episode in choice.episodes
-        ]
-        episodes = list(dict.fromkeys(shown))
-        if len(episodes) <= MOST_RUNS:
+        shown: dict[EpisodeId, None] = {}
+        for task in result.tasks:
+            for choice in choices(result, task, count):
+                shown |= dict.fromkeys(choice.episodes)
+        if len(shown) <= MOST_RUNS:
             break
-    return count, episodes
+    return count, list(shown)
 
 
 def replay_data(result: BenchmarkResult, again: Rerun, count: int) -> dict[str, Any]:
@@ -140,28 +146,22 @@ def replay_data(result: BenchmarkResult, again: Rerun, count: int) -> dict[str, 
     for task in result.tasks:
         entries[task] = []
         for choice in choices(result, task, count):
-            there = [one for one in choice.episodes if one in again.episodes]
+            there = [
+                episode for episode in choice.episodes if episode in again.episodes
+            ]
             if not there or choice.controller not in ("", there[0].controller):
                 continue
             for episode in there:
                 if episode not in whole:
                     title = _title(result, episode)
                     whole[episode] = run(title, again.episodes[episode])
-            places = [list(whole).index(episode) for episode in there]
-            entries[task].append(
-                {
-                    "who": choice.controller,
-                    "seed": there[0].seed,
-                    "cost": round(cost_of(result, there[0]), 2),
-                    "outcome": whole[there[0]]["outcome"],
-                    "runs": places,
-                }
-            )
+            entries[task].append(_entry(result, choice.controller, there, whole))
+
     look = looks(result.ranking)
-    runs = [
-        {**short(one), "colour": look[episode.controller].colour}
-        for episode, one in whole.items()
-    ]
+    runs = []
+    for episode, history in whole.items():
+        colour = look[episode.controller].colour
+        runs.append({**short(history), "colour": colour})
     return {
         "page": render(PLAYER, title="Replay", data=PLACEHOLDER),
         "mark": f'"{PLACEHOLDER}"',
@@ -171,29 +171,51 @@ def replay_data(result: BenchmarkResult, again: Rerun, count: int) -> dict[str, 
     }
 
 
+def _entry(
+    result: BenchmarkResult,
+    controller: str,
+    episodes: Sequence[EpisodeId],
+    whole: Mapping[EpisodeId, Mapping[str, Any]],
+) -> dict[str, Any]:
+    """Return what may be chosen: whose episode it is, and which runs are replayed."""
+    first = episodes[0]
+    runs = list(whole)
+    return {
+        "who": controller,
+        "seed": first.seed,
+        "cost": round(cost_of(result, first), 2),
+        "outcome": whole[first]["outcome"],
+        "runs": [runs.index(episode) for episode in episodes],
+    }
+
+
 def _title(result: BenchmarkResult, episode: EpisodeId) -> str:
-    n_runs = result.summary["tasks"][episode.task][episode.controller]["runs"]
-    if n_runs == 1:
+    cell = result.summary["tasks"][episode.task][episode.controller]
+    if cell["runs"] == 1:
         return episode.controller
     return f"{episode.controller}, run {episode.run + 1}"
 
 
 def short(whole: dict[str, Any]) -> dict[str, Any]:
     """Return a run with its histories as integers, each the difference to the last."""
-    series = {
-        name: differences(values, DECIMALS[name])
-        for name, values in whole["series"].items()
+    series = {}
+    for name, values in whole["series"].items():
+        series[name] = differences(values, DECIMALS[name])
+    parts = {}
+    for name, values in whole["parts"].items():
+        if np.any(values):
+            parts[name] = differences(values, REWARD_DECIMALS)
+    return {
+        **whole,
+        "series": series,
+        "parts": parts,
+        "rewards": differences(whole["rewards"], REWARD_DECIMALS),
+        "other": {},
     }
-    parts = {
-        name: differences(values, REWARD_DECIMALS)
-        for name, values in whole["parts"].items()
-        if np.any(values)
-    }
-    rewards = differences(whole["rewards"], REWARD_DECIMALS)
-    return {**whole, "series": series, "parts": parts, "rewards": rewards, "other": {}}
 
 
 def differences(values: Sequence[float], decimals: int) -> list[int]:
     """Return the decimals, and the differences of values in units of the last one."""
     units = np.round(np.asarray(values) * 10.0**decimals).astype(np.int64)
-    return [decimals, *np.diff(units, prepend=0).tolist()]
+    steps = np.diff(units, prepend=0)
+    return [decimals, *steps.tolist()]

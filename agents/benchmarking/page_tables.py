@@ -1,8 +1,8 @@
 """Tables of a benchmark's page, which sort by a click on a head."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from agents.benchmarking.page_replays import best_controllers
 from agents.benchmarking.results import BenchmarkResult
@@ -12,22 +12,30 @@ from shipgym.pages.numbers import fixed, number, percent
 BETTER, WORSE = "#1d70b8", "#d9822b"  # tints of probabilities of improvement
 MOST_TINT = 42.0  # per cent of the colour
 
-#: Further figures of a task: head of the column, and how its numbers are written.
-METRICS = {
-    "heading_rmse_deg": ("heading RMSE, deg", "number"),
-    "cross_track_rmse_m": ("cross-track RMSE, m", "number"),
-    "rudder_travel_deg_min": ("rudder travel, deg/min", "number"),
-    "rudder_reversals_min": ("rudder reversals, 1/min", "number"),
-    "overshoot_percent": ("overshoot, %", "number"),
-    "settling_s": ("settling, s", "number"),
-    "unsettled": ("not settled", "share"),
-    "outside_corridor": ("time outside corridor", "share"),
-    "left_corridor": ("left corridor", "share"),
-    "grounded": ("aground", "share"),
-    "success": ("success", "share"),
-    "fuel": ("fuel, straight run = 1", "fixed"),
-    "extrapolating": ("outside model", "share"),
-}
+
+class Metric(NamedTuple):
+    """Further figure of a task."""
+
+    name: str
+    title: str
+    write: Callable[[float], str] = number  # its numbers as text
+
+
+METRICS = (
+    Metric("heading_rmse_deg", "heading RMSE, deg"),
+    Metric("cross_track_rmse_m", "cross-track RMSE, m"),
+    Metric("rudder_travel_deg_min", "rudder travel, deg/min"),
+    Metric("rudder_reversals_min", "rudder reversals, 1/min"),
+    Metric("overshoot_percent", "overshoot, %"),
+    Metric("settling_s", "settling, s"),
+    Metric("unsettled", "not settled", percent),
+    Metric("outside_corridor", "time outside corridor", percent),
+    Metric("left_corridor", "left corridor", percent),
+    Metric("grounded", "aground", percent),
+    Metric("success", "success", percent),
+    Metric("fuel", "fuel, straight run = 1", fixed),
+    Metric("extrapolating", "outside model", percent),
+)
 RARE_METRICS = ("extrapolating",)  # shown only if not 0 throughout
 
 
@@ -154,10 +162,10 @@ def costs_table(result: BenchmarkResult) -> SortableTable:
     rows = []
     for task, cells in result.summary["tasks"].items():
         best = best_controllers(result, task)
-        row = [
-            _interval_cell(cells.get(name, {}).get("cost"), number, star=name in best)
-            for name in names
-        ]
+        row = []
+        for name in names:
+            cost = cells[name]["cost"] if name in cells else None
+            row.append(_interval_cell(cost, number, star=name in best))
         rows.append(_task_row(task, row))
     return SortableTable("costs-table", caption, heads, rows)
 
@@ -183,7 +191,8 @@ def scores_table(result: BenchmarkResult) -> SortableTable:
             TableCell(number(reference["best"]), reference["best"]),
         ]
         for name in names:
-            row.append(_interval_cell(cells.get(name, {}).get("score"), fixed))
+            score = cells[name]["score"] if name in cells else None
+            row.append(_interval_cell(score, fixed))
         rows.append(_task_row(task, row))
     return SortableTable("scores-table", caption, heads, rows)
 
@@ -200,27 +209,28 @@ def improvement_table(result: BenchmarkResult) -> SortableTable:
         TableHead("", kind=""),
         *(TableHead(name, descending=True) for name in names),
     ]
-    improvement = result.summary["improvement"]
-    rows = [
-        _controller_row(
-            name, [_improvement_cell(improvement[name].get(other)) for other in names]
-        )
-        for name in names
-    ]
+    rows = []
+    for name in names:
+        better = result.summary["improvement"][name]
+        cells = [_improvement_cell(better.get(other)) for other in names]
+        rows.append(_controller_row(name, cells))
     return SortableTable("improvement-table", caption, heads, rows)
 
 
 def _improvement_cell(interval: Mapping[str, Any] | None) -> TableCell:
     if interval is None or interval["value"] is None:
         return TableCell()
-    value, low, high = (100.0 * interval[name] for name in ("value", "low", "high"))
-    colour = BETTER if value >= 50.0 else WORSE
-    share = MOST_TINT * abs(value - 50.0) / 50.0
+    value = interval["value"]
+    percent, low, high = (
+        f"{100.0 * interval[name]:.0f}" for name in ("value", "low", "high")
+    )
+    colour = BETTER if value >= 0.5 else WORSE
+    share = MOST_TINT * abs(2.0 * value - 1.0)
     return TableCell(
-        text=f"{value:.0f}",
-        key=interval["value"],
+        text=percent,
+        key=value,
         kind="tinted",
-        below=f"{low:.0f} to {high:.0f}",
+        below=f"{low} to {high}",
         tint=f"color-mix(in srgb,{colour} {share:.0f}%,white)",
     )
 
@@ -232,8 +242,8 @@ def metrics_table(result: BenchmarkResult, task: str, name: str) -> SortableTabl
         " in a batch."
     )
     cells = result.summary["tasks"][task]
-    metrics = [metric for metric in METRICS if _is_shown(metric, cells)]
-    titles = ["cost", *(METRICS[metric][0] for metric in metrics)]
+    metrics = [metric for metric in METRICS if _is_shown(metric.name, cells)]
+    titles = ["cost", *(metric.title for metric in metrics)]
     titles += ["lost", "failed", "µs per action"]
     heads = [TableHead("controller", kind=""), *(TableHead(title) for title in titles)]
     rows = []
@@ -246,31 +256,38 @@ def metrics_table(result: BenchmarkResult, task: str, name: str) -> SortableTabl
 
 def _is_shown(metric: str, cells: Mapping[str, Any]) -> bool:
     """Tell whether a controller has a metric, not 0 if it is a rare one."""
-    means = [cell["metrics"].get(metric, {}).get("mean") for cell in cells.values()]
-    if metric in RARE_METRICS:
-        return any(means)
-    return any(mean is not None for mean in means)
+    for cell in cells.values():
+        figures = cell["metrics"].get(metric)
+        if figures is None or figures["mean"] is None:
+            continue
+        if figures["mean"] or metric not in RARE_METRICS:
+            return True
+    return False
 
 
-def _metrics_row(cell: Mapping[str, Any], metrics: Sequence[str]) -> list[TableCell]:
-    cost, time = cell["cost"]["value"], cell["microseconds_per_action"]
-    return [
-        TableCell(number(cost), cost),
-        *(_metric_cell(metric, cell["metrics"].get(metric)) for metric in metrics),
+def _metrics_row(cell: Mapping[str, Any], metrics: Sequence[Metric]) -> list[TableCell]:
+    cost = cell["cost"]["value"]
+    row = [TableCell(number(cost), cost)]
+    for metric in metrics:
+        figures = cell["metrics"].get(metric.name)
+        row.append(_metric_cell(metric, figures))
+    time = cell["microseconds_per_action"]
+    row += [
         _failure_cell(cell["lost"]),
         _failure_cell(cell["failed"]),
         TableCell(number(time, 2), time),
     ]
+    return row
 
 
-def _metric_cell(metric: str, figures: Mapping[str, Any] | None) -> TableCell:
+def _metric_cell(metric: Metric, figures: Mapping[str, Any] | None) -> TableCell:
     if figures is None or figures["mean"] is None:
         return TableCell()
-    mean, kind = figures["mean"], METRICS[metric][1]
-    if kind == "share":
-        return TableCell(percent(mean), mean)
-    write = fixed if kind == "fixed" else number
-    return TableCell(write(mean), mean, below=write(figures["p95"]))
+    mean = figures["mean"]
+    text = metric.write(mean)
+    if metric.write is percent:
+        return TableCell(text, mean)
+    return TableCell(text, mean, below=metric.write(figures["p95"]))
 
 
 def _interval_cell(
@@ -280,9 +297,14 @@ def _interval_cell(
     kind = "best" if star else ""
     if interval is None or interval["value"] is None:
         return TableCell(kind=kind)
-    low, high = write(interval["low"]), write(interval["high"])
-    value = interval["value"]
-    return TableCell(write(value), value, kind, f"{low} to {high}", star)
+    value, low, high = (interval[name] for name in ("value", "low", "high"))
+    return TableCell(
+        text=write(value),
+        key=value,
+        kind=kind,
+        below=f"{write(low)} to {write(high)}",
+        star=star,
+    )
 
 
 def _count_cell(count: int) -> TableCell:

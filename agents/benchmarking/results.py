@@ -31,7 +31,7 @@ from agents.benchmarking.results_format import (
     KIND,
     check_summary,
 )
-from agents.benchmarking.sources import file_hash, names_code
+from agents.benchmarking.sources import file_hash
 from agents.benchmarking.summary import summarise
 from agents.controllers.controller import model_hash
 from agents.output import check_writable, present
@@ -64,14 +64,14 @@ class BenchmarkResult:
         One row for each episode: controller, task, run, seed, and figures by name.
     suite : Suite or None
         Suite that it was run on, if it is known.
-    allow_code : tuple of str
-        Functions that the user named as controllers; none if it was read from a file.
+    entries : tuple of Entry
+        Controllers that were run; none if it was read from a file.
     """
 
     summary: dict[str, Any]
     episodes: Columns
     suite: Suite | None = None
-    allow_code: tuple[str, ...] = ()
+    entries: tuple[Entry, ...] = ()
 
     @property
     def ranking(self) -> list[str]:
@@ -88,15 +88,13 @@ class BenchmarkResult:
 
         Raises InputError if its suite is not known.
         """
-        if self.suite is not None:
-            return self.suite.task(name)
-        suite = self.summary["suite"]["name"]
-        if suite not in list_suites():
+        if self.suite is None:
+            name = self.summary["suite"]["name"]
             raise InputError(
-                f"suite: '{suite}' is none of shipgym's; load_results(path,"
-                " suite='your_suite.toml')"
+                f"suite: expected the one of the results, '{name}', got none;"
+                " load_results(path, suite=load_suite('your_suite.toml'))"
             )
-        return load_suite(suite).task(name)
+        return self.suite.task(name)
 
     @property
     def failures(self) -> list[str]:
@@ -106,10 +104,11 @@ class BenchmarkResult:
             for task, why in about["refused"].items():
                 failures.append(f"{name} could not run {task}: {why}")
             for task, cells in self.summary["tasks"].items():
-                if name in cells and cells[name]["failed"]:
+                cell = cells.get(name)
+                if cell is not None and cell["failed"]:
+                    count, failure = cell["failed"], cell["failure"]
                     failures.append(
-                        f"{name} failed in {cells[name]['failed']} episodes of {task}:"
-                        f" {cells[name]['failure']}"
+                        f"{name} failed in {count} episodes of {task}: {failure}"
                     )
         return failures
 
@@ -123,9 +122,10 @@ class BenchmarkResult:
         check_choice(task, self.tasks, "task")
         check_choice(name, self.episodes, "figure")
         is_controller = self.episodes["controller"] == controller
-        rows = is_controller & (self.episodes["task"] == task)
+        is_task = self.episodes["task"] == task
+        figures = self.episodes[name][is_controller & is_task]
         n_episodes = self.summary["seeds"]["count"]
-        return np.asarray(self.episodes[name][rows].reshape(-1, n_episodes))
+        return np.reshape(figures, (-1, n_episodes))
 
     def save(self, folder: str | Path) -> Self:
         """Write `episodes.parquet` and then `results.json`, each whole or not at all.
@@ -133,15 +133,16 @@ class BenchmarkResult:
         Returns the result with the hash of `episodes.parquet` in its summary. Raises
         InputError if pyarrow is missing or the folder cannot be written.
         """
-        target = Path(folder)
         pyarrow()
+        target = Path(folder)
         make_folder(target)
-        write_episodes(self.episodes, target / EPISODES)
-        sha256 = file_hash(target / EPISODES)
-        episodes = {**self.summary["episodes"], "sha256": sha256}
-        saved = replace(self, summary={**self.summary, "episodes": episodes})
-        write_json(saved.summary, target / RESULTS)
-        return saved
+        table = target / EPISODES
+        write_episodes(self.episodes, table)
+
+        about_table = {**self.summary["episodes"], "sha256": file_hash(table)}
+        summary = {**self.summary, "episodes": about_table}
+        write_json(summary, target / RESULTS)
+        return replace(self, summary=summary)
 
 
 def check_new(folder: Path, resume: bool, suite: str) -> Path:
@@ -190,10 +191,12 @@ def collect(
     `cells` has every entry in every task, by the names of both.
     """
     names = [entry.name for entry in entries]
-    in_order = {
-        (name, task.name): cells[name, task.name] for name in names for task in tasks
-    }
-    table = episode_table(in_order, FIRST_SEED + np.arange(n_episodes))
+    in_order = {}
+    for name in names:
+        for task in tasks:
+            in_order[name, task.name] = cells[name, task.name]
+    seeds = FIRST_SEED + np.arange(n_episodes)
+    table = episode_table(in_order, seeds)
     summary = {
         "format": FORMAT,
         "kind": KIND,
@@ -210,11 +213,13 @@ def collect(
             entry.name: _about_entry(entry, tasks, cells) for entry in entries
         },
         **summarise(tasks, names, cells),
-        "episodes": {"file": EPISODES, "rows": len(table["seed"]), "sha256": None},
+        "episodes": {
+            "file": EPISODES,
+            "rows": len(table["seed"]),
+            "sha256": None,
+        },
     }
-    texts = [entry.source for entry in entries if entry.is_text]
-    code = tuple(text for text in texts if names_code(text))
-    return BenchmarkResult(summary, table, suite, code)
+    return BenchmarkResult(summary, table, suite, tuple(entries))
 
 
 def versions() -> dict[str, str]:
@@ -274,7 +279,8 @@ def load_results(path: str | Path, suite: Suite | None = None) -> BenchmarkResul
     path : str or Path
         Their folder, or `results.json` in it.
     suite : Suite, optional
-        Your own suite that they are of (`load_suite`), to run episodes again.
+        Your own suite that they are of (`load_suite`), to run episodes again; a shipped
+        one is found by its name.
     """
     where = Path(path)
     if where.is_dir():
@@ -287,32 +293,34 @@ def load_results(path: str | Path, suite: Suite | None = None) -> BenchmarkResul
     check_format(summary, FORMAT, str(where))
     check_fields(summary, FIELDS, str(where), REMEDY)
     check_summary(summary, str(where))
-    if suite is not None and suite.sha256 != summary["suite"]["sha256"]:
+    about = summary["suite"]
+    if suite is None and about["name"] in list_suites():
+        suite = load_suite(about["name"])
+    elif suite is not None and suite.sha256 != about["sha256"]:
         raise InputError(f"{where}: expected results of this suite, got of another")
 
-    table = where.with_name(EPISODES)
-    if summary["episodes"]["sha256"] != file_hash(table):
+    table, about_table = where.with_name(EPISODES), summary["episodes"]
+    if about_table["sha256"] != file_hash(table):
         raise InputError(
             f"{table}: expected the file that {RESULTS} was written with, got another"
             f" or one that is cut short; {REMEDY}"
         )
-    episodes = read_episodes(table, summary["episodes"]["rows"])
+    episodes = read_episodes(table, about_table["rows"])
     _check_rows(summary, episodes, str(where))
     return BenchmarkResult(dict(summary), episodes, suite)
 
 
 def _check_rows(summary: Mapping[str, Any], episodes: Columns, where: str) -> None:
     """Refuse a table whose rows are not those that the summary counts."""
-    expected = {
-        (name, task): cell["runs"]
-        for task, cells in summary["tasks"].items()
-        for name, cell in cells.items()
-    }
+    runs_of: dict[tuple[str, str], int] = {}
+    for task, cells in summary["tasks"].items():
+        for name, cell in cells.items():
+            runs_of[name, task] = cell["runs"]
     names, tasks = episodes["controller"].tolist(), episodes["task"].tolist()
     rows = Counter(zip(names, tasks, strict=True))
     count = summary["seeds"]["count"]
-    for name, task in [*expected, *rows]:
-        runs = expected.get((name, task), 0)
+    for name, task in [*runs_of, *rows]:
+        runs = runs_of.get((name, task), 0)
         if rows[name, task] != runs * count:
             raise InputError(
                 f"{where}: expected {runs} runs of {count} episodes of '{name}' on"

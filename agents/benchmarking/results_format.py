@@ -91,12 +91,15 @@ def check_summary(content: Mapping[str, Any], where: str) -> None:
     check_whole(content["seeds"]["count"], f"{where}: seeds.count", at_least=1)
 
     controllers = content["controllers"]
-    ranked = [one["name"] for one in content["ranking"]]
-    shares = content["profile"]["shares"]
-    for name in [*ranked, *content["improvement"], *shares]:
+    ranked = [total["name"] for total in content["ranking"]]
+    named = [*ranked, *content["improvement"], *content["profile"]["shares"]]
+    for name in named:
         check_choice(name, controllers, f"{where}: name of a controller")
-    for task in [*content["tasks"], *content["reference"]]:
-        check_choice(task, content["suite"]["tasks"], f"{where}: name of a task")
+
+    tasks = content["suite"]["tasks"]
+    for task in content["reference"]:
+        check_choice(task, tasks, f"{where}: name of a task")
     for task, cells in content["tasks"].items():
+        check_choice(task, tasks, f"{where}: name of a task")
         for name in cells:
             check_choice(name, ranked, f"{where}: tasks.{task}: name of a controller")

@@ -1,10 +1,10 @@
 """The benchmark: every controller steers every task of a suite, in the same episodes."""
 
 import shutil
-from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +13,15 @@ from agents.benchmarking.entries import Entry, check_agents, read_entries
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, collect
 from agents.jobs import JobEngine, run_jobs
 from agents.output import in_use
-from agents.suites.suite import DEFAULT_SUITE, N_EPISODES, BenchmarkTask, load_suite
+from agents.suites.suite import (
+    DEFAULT_SUITE,
+    N_EPISODES,
+    BenchmarkTask,
+    Suite,
+    load_suite,
+)
 from identification.progress import Progress
-from shipgym.checks import check_number, check_whole
+from shipgym.checks import check_whole
 from shipgym.errors import InputError
 
 
@@ -66,23 +72,46 @@ def benchmark(
     entries = read_entries(controllers)
     read = load_suite(suite, allow_code)
     selected = read.select(tasks)
-    check_whole(episodes, "episodes", at_least=1)
-    check_number(episodes, "episodes", at_most=N_EPISODES)
+    check_whole(episodes, "episodes", at_least=1, at_most=N_EPISODES)
     where = JobEngine(engine, workers, address)
     for entry in entries:
         check_agents(entry, selected)
-    folder = None if out is None else check_new(Path(out), resume, read.name)
-    if folder is not None:
-        where = replace(where, keep=folder / PARTS)
+    if out is None:
+        return _run(read, selected, entries, episodes, where, progress)
 
-    with nullcontext() if folder is None else in_use(folder):
-        cells = _run_cells(entries, selected, episodes, where, progress)
-        if not any(cell.runs for cell in cells.values()):
-            if folder is not None and not resume:
-                shutil.rmtree(folder / PARTS, ignore_errors=True)
-            raise InputError(_no_controller(cells))
-        result = collect(read, selected, entries, cells, episodes)
-        return result if folder is None else result.save(folder)
+    folder = check_new(Path(out), resume, read.name)
+    parts = folder / PARTS
+    where = replace(where, keep=parts)
+    with in_use(folder):
+        try:
+            result = _run(read, selected, entries, episodes, where, progress)
+        except NoResultsError:
+            if not resume:
+                shutil.rmtree(parts, ignore_errors=True)
+            raise
+        return result.save(folder)
+
+
+class NoResultsError(InputError):
+    """No controller could run any task."""
+
+
+def _run(
+    suite: Suite,
+    tasks: Sequence[BenchmarkTask],
+    entries: Sequence[Entry],
+    n_episodes: int,
+    where: JobEngine,
+    progress: Progress | None,
+) -> BenchmarkResult:
+    cells = _run_cells(entries, tasks, n_episodes, where, progress)
+    if not any(cell.runs for cell in cells.values()):
+        (entry, task), cell = next(iter(cells.items()))
+        raise NoResultsError(
+            f"controllers: no controller could run any task; '{entry}' in '{task}':"
+            f" {cell.refused}"
+        )
+    return collect(suite, tasks, entries, cells, n_episodes)
 
 
 def _run_cells(
@@ -93,27 +122,17 @@ def _run_cells(
     progress: Progress | None,
 ) -> dict[tuple[str, str], Cell]:
     """Run every entry in every task; cells by the names of both."""
-    texts = [entry for entry in entries if entry.is_text]
-    objects = [entry for entry in entries if not entry.is_text]
-    pairs = [(entry, task) for entry in texts for task in tasks]
-    jobs = [job_of(entry, task, n_episodes) for entry, task in pairs]
+    pairs = list(product(entries, tasks))
+    elsewhere = [(entry, task) for entry, task in pairs if entry.is_text]
+    jobs = [job_of(entry, task, n_episodes) for entry, task in elsewhere]
     tell = progress and partial(progress, "tasks done")
     contents = run_jobs(run_job, jobs, where, tell)
 
     cells: dict[tuple[str, str], Cell] = {}
-    for (entry, task), content in zip(pairs, contents, strict=True):
+    for (entry, task), content in zip(elsewhere, contents, strict=True):
         part = f"part of '{entry.name}' on '{task.name}'"
         cells[entry.name, task.name] = Cell.from_dict(content, n_episodes, part)
-    for entry in objects:
-        for task in tasks:
+    for entry, task in pairs:
+        if not entry.is_text:
             cells[entry.name, task.name] = run_cell(entry, task, n_episodes)
     return cells
-
-
-def _no_controller(cells: Mapping[tuple[str, str], Cell]) -> str:
-    """Say that nothing could be run, and why not the first."""
-    (entry, task), cell = next(iter(cells.items()))
-    return (
-        f"controllers: no controller could run any task; '{entry}' in '{task}':"
-        f" {cell.refused}"
-    )

@@ -7,11 +7,10 @@ import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from agents.agent_file import load_agent
+from agents.agent_file import PRETRAINED, load_agent
 from agents.controllers.controller import Controller, Policy
 from agents.controllers.designs import CLASSICAL, design, tuned
 from agents.controllers.registry import (
@@ -65,7 +64,8 @@ def import_code(text: str) -> Any:
 
 def check_object(source: Any, name: str) -> None:
     """Refuse an object that is neither a controller nor a function."""
-    if not callable(getattr(source, "predict", None)) and not callable(source):
+    is_policy = callable(getattr(source, "predict", None))
+    if not is_policy and not callable(source):
         raise InputError(
             f"controllers: '{name}': expected a controller (with `predict`), a function"
             f" that makes one for a task, or a text such as 'pid', got {source!r}"
@@ -74,20 +74,19 @@ def check_object(source: Any, name: str) -> None:
 
 def make_policies(source: Any, task: BenchmarkTask) -> list[Policy]:
     """Make the controllers of a source for a design task."""
-    if isinstance(source, Sequence) and not isinstance(source, str):
-        return [make_policy(run, task) for run in source]
     if not isinstance(source, str):
-        return [make_policy(source, task)]
+        runs = source if isinstance(source, Sequence) else [source]
+        return [make_policy(run, task) for run in runs]
 
     if source in controller_kinds():
-        needs_path = controller_class(source).has_autopilot
-        kind = "lq" if needs_path and not task.task.follows_path else source
-        return [design(kind, task)]
+        return [_designed(source, task)]
     if source.startswith(TUNED):
-        return [tuned(source.removeprefix(TUNED), task, task.suite)]
+        kind = source.removeprefix(TUNED)
+        return [tuned(kind, task, task.suite)]
     if names_code(source):
         with working_folder():
-            return [make_policy(import_code(source), task)]
+            function = import_code(source)
+            return [make_policy(function, task)]
 
     paths = source_files(source, task)
     if not paths:
@@ -96,13 +95,22 @@ def make_policies(source: Any, task: BenchmarkTask) -> list[Policy]:
     return [make_policy(load_source(path), task) for path in paths]
 
 
+def _designed(kind: str, task: BenchmarkTask) -> Policy:
+    """Design a controller; without a path, the LQ that guidance leads."""
+    needs_path = controller_class(kind).has_autopilot
+    if needs_path and not task.task.follows_path:
+        kind = "lq"
+    return design(kind, task)
+
+
 def make_policy(source: Source, task: BenchmarkTask) -> Policy:
     """Return a policy itself, or what a function makes for a task."""
     policy: Any = source if hasattr(source, "predict") else source(task)
     if not callable(getattr(policy, "predict", None)):
+        name = getattr(source, "__name__", source)
         raise InputError(
-            f"{getattr(source, '__name__', source)}: expected a controller with"
-            f" `predict` for task '{task.name}', got {policy!r}"
+            f"{name}: expected a controller with `predict` for task '{task.name}', got"
+            f" {policy!r}"
         )
     return policy  # type: ignore[no-any-return]
 
@@ -121,13 +129,16 @@ def source_files(text: str, task: BenchmarkTask) -> list[Path]:
     if text in LEARNED:
         return pretrained(name, text)
     if names_code(text):
-        module = sys.modules.get(text.rpartition(":")[0])
+        module_name, _, _ = text.rpartition(":")
+        module = sys.modules.get(module_name)
         source = getattr(module, "__file__", None)
         return [Path(source)] if source else []
     if text in known_names():
         return []
-    patterns = [pattern.replace("{task}", name) for pattern in text.split("+")]
-    return [path for pattern in patterns for path in matching_files(pattern)]
+    paths: list[Path] = []
+    for pattern in text.split("+"):
+        paths += matching_files(pattern.replace("{task}", name))
+    return paths
 
 
 def matching_files(pattern: str) -> list[Path]:
@@ -141,14 +152,15 @@ def pretrained(task: str, algorithm: str) -> list[Path]:
 
     TASK-ALGORITHM.json, or one for each training run, TASK-ALGORITHM-RUN.json.
     """
-    folder = Path(str(files("agents").joinpath("pretrained")))
-    name = f"{glob.escape(str(folder / task))}-{algorithm}"
+    folder = glob.escape(str(PRETRAINED))
+    name = f"{folder}/{task}-{algorithm}"
     return [*matching_files(f"{name}.json"), *matching_files(f"{name}-*.json")]
 
 
 def file_hash(path: str | Path) -> str:
     """Return the SHA-256 of a file; raises InputError if it cannot be read."""
-    return hashlib.sha256(read_bytes(Path(path), "file", LARGEST_TENSORS)).hexdigest()
+    content = read_bytes(Path(path), "file", LARGEST_TENSORS)
+    return hashlib.sha256(content).hexdigest()
 
 
 def policy_hash(policy: Policy) -> str | None:
@@ -159,4 +171,5 @@ def policy_hash(policy: Policy) -> str | None:
         content = policy.to_dict()
     except (AttributeError, InputError):  # guidance over a user's own autopilot
         return None
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    text = json.dumps(content, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()

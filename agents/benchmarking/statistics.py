@@ -28,6 +28,7 @@ from shipgym.arrays import Floats, Integers, finite
 N_DRAWS = 2000
 LEVEL = 0.95
 TRIMMED = 0.25  # of the scores at each end
+ScoreScale = tuple[float, float]  # costs whose scores are 0 and 1
 
 
 class Interval(NamedTuple):
@@ -67,12 +68,18 @@ class Draws:
     def __init__(
         self, n_tasks: int, n_episodes: int, seed: int = 0, n_draws: int = N_DRAWS
     ) -> None:
+        self.n_episodes = n_episodes
+        self.n_draws = n_draws
+        self.seed = seed
         random = np.random.default_rng([seed, 0])
         even = np.full(n_episodes, 1.0 / n_episodes)
-        counts = random.multinomial(n_episodes, even, (n_tasks, n_draws))
-        self.n_draws, self.seed = n_draws, seed
-        #: Share of each episode in a draw, shape (n_tasks, n_draws, n_episodes).
-        self.episodes: Floats = counts / n_episodes
+        size = n_tasks, n_draws
+        #: How often a draw has each episode, shape (n_tasks, n_draws, n_episodes).
+        self.counts: Integers = random.multinomial(n_episodes, even, size)
+
+    def shares(self, task: int) -> Floats:
+        """Share of each episode of a task in a draw, shape (n_draws, n_episodes)."""
+        return self.counts[task] / self.n_episodes
 
     def runs(self, task: int, n_runs: int, controller: int) -> Integers:
         """Draw training runs of a controller in a task, shape (n_draws, n_runs)."""
@@ -81,18 +88,19 @@ class Draws:
 
     def means(self, costs: Floats, task: int, controller: int) -> Floats:
         """Mean costs of drawn runs over drawn episodes, shape (n_draws, n_runs)."""
-        by_run = self.episodes[task] @ costs.T
+        by_run = self.shares(task) @ costs.T
         runs = self.runs(task, len(costs), controller)
         return np.take_along_axis(by_run, runs, axis=1)
 
 
 def interval(value: float, draws: Floats) -> Interval:
     """A statistic with its percentile interval over draws of shape (n_draws,)."""
-    if not np.isfinite(value) or not np.isfinite(draws).all():
+    if not (np.isfinite(value) and np.isfinite(draws).all()):
         return Interval(float(value), np.nan, np.nan)
     tail = 50.0 * (1.0 - LEVEL)
-    low, high = np.percentile(draws, [tail, 100.0 - tail])
-    return Interval(float(value), float(low), float(high))
+    ends = tail, 100.0 - tail
+    low, high = np.percentile(draws, ends).tolist()
+    return Interval(float(value), low, high)
 
 
 def mean_cost(costs: Floats, draws: Draws, task: int, controller: int = 0) -> Interval:
@@ -105,13 +113,14 @@ def interquartile_cost(
     costs: Floats, draws: Draws, task: int, controller: int = 0
 ) -> Interval:
     """Interquartile mean over runs and episodes of one task, without rare bad ends."""
-    n_runs, n_episodes = costs.shape
-    episode_counts = np.rint(draws.episodes[task] * n_episodes).astype(np.int64)
+    n_runs, _ = costs.shape
     runs = draws.runs(task, n_runs, controller)
     run_counts = (runs[:, :, None] == np.arange(n_runs)).sum(axis=1)
+    episode_counts = draws.counts[task]
     weights = run_counts[:, :, None] * episode_counts[:, None, :]
     drawn = weighted_interquartile_mean(
-        costs.ravel(), weights.reshape(draws.n_draws, -1)
+        costs.ravel(),
+        weights.reshape(draws.n_draws, -1),
     )
     return interval(float(interquartile_mean(costs)), drawn)
 
@@ -130,27 +139,29 @@ def weighted_interquartile_mean(values: Floats, weights: Integers) -> Floats:
     array of shape (n_samples,)
     """
     order = np.argsort(values, kind="stable")
-    upper = np.cumsum(weights[:, order], axis=1)
-    total = upper[:, -1:]
-    cut = np.floor(TRIMMED * total).astype(np.int64)
-    kept = np.clip(upper, cut, total - cut)
-    inside = np.diff(kept, axis=1, prepend=cut)
-    sizes = (total - 2 * cut)[:, 0]
-    return np.asarray(inside @ values[order] / sizes)
+    # places of the values in each sorted sample end where the next value's begin
+    ends = np.cumsum(weights[:, order], axis=1)
+    size = ends[:, -1:]
+    n_cut = np.floor(TRIMMED * size).astype(np.int64)
+    kept_ends = np.clip(ends, n_cut, size - n_cut)
+    kept_counts = np.diff(kept_ends, axis=1, prepend=n_cut)
+    sums = kept_counts @ values[order]
+    return np.asarray(sums / kept_counts.sum(axis=1))
 
 
 def score(cost: ArrayLike, zero: ArrayLike, best: ArrayLike) -> Floats:
     """Share of the way from the cost `zero` to the cost `best`; NaN if there is none."""
     start = np.asarray(zero, dtype=np.float64)
-    whole = start - np.asarray(best, dtype=np.float64)
-    part = start - np.asarray(cost, dtype=np.float64)
+    whole_way = start - np.asarray(best, dtype=np.float64)
+    way = start - np.asarray(cost, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(whole > 0.0, part / whole, np.nan)
+        shares = way / whole_way
+    return np.where(whole_way > 0.0, shares, np.nan)
 
 
 def aggregate_score(
     costs: Sequence[Floats],
-    references: Sequence[tuple[float, float]],
+    references: Sequence[ScoreScale],
     draws: Draws,
     tasks: Sequence[int],
     controller: int,
@@ -171,10 +182,14 @@ def aggregate_score(
         return NOTHING
     scores, drawn = [], []
     for task, cost, (zero, best) in zip(tasks, costs, references, strict=True):
-        scores.append(score(cost.mean(axis=1), zero, best))
-        drawn.append(score(draws.means(cost, task, controller), zero, best))
-    value = float(interquartile_mean(np.concatenate(scores)))
-    return interval(value, interquartile_mean(np.concatenate(drawn, axis=1), axis=1))
+        run_costs = cost.mean(axis=1)
+        drawn_costs = draws.means(cost, task, controller)
+        scores.append(score(run_costs, zero, best))
+        drawn.append(score(drawn_costs, zero, best))
+
+    value = interquartile_mean(np.concatenate(scores))
+    drawn_values = interquartile_mean(np.concatenate(drawn, axis=1), axis=1)
+    return interval(float(value), drawn_values)
 
 
 def improvement(
@@ -199,23 +214,40 @@ def improvement(
     if not common:
         return NOTHING
     values, drawn = [], np.zeros(draws.n_draws)
-    rows = np.arange(draws.n_draws)[:, None, None]
     for task in common:
-        first, second = costs[task][:, None], other_costs[task][None]
-        wins = (first < second) + 0.5 * (first == second)  # (n_first, n_second, n)
+        wins = _wins(costs[task], other_costs[task])
         values.append(wins.mean())
-
-        n_first, n_second, _ = wins.shape
-        first_runs = draws.runs(task, n_first, controllers[0])
-        second_runs = draws.runs(task, n_second, controllers[1])
-        per_draw = np.tensordot(draws.episodes[task], wins, axes=(1, 2))
-        pairs = per_draw[rows, first_runs[:, :, None], second_runs[:, None, :]]
-        drawn += pairs.mean(axis=(1, 2))
+        drawn += _drawn_wins(wins, draws, task, controllers)
     return interval(float(np.mean(values)), drawn / len(common))
+
+
+def _wins(costs: Floats, other_costs: Floats) -> Floats:
+    """Wins of each run over each other run, shape (n_runs, n_others, n_episodes)."""
+    first, second = costs[:, None], other_costs[None]
+    return (first < second) + 0.5 * (first == second)
+
+
+def _drawn_wins(
+    wins: Floats, draws: Draws, task: int, controllers: tuple[int, int]
+) -> Floats:
+    """Mean wins over drawn episodes and pairs of drawn runs, shape (n_draws,)."""
+    n_first, n_second, _ = wins.shape
+    first, second = controllers
+    first_runs = draws.runs(task, n_first, first)
+    second_runs = draws.runs(task, n_second, second)
+
+    by_pair = np.tensordot(draws.shares(task), wins, axes=(1, 2))
+    rows = np.arange(draws.n_draws)
+    drawn_pairs = by_pair[
+        rows[:, None, None],
+        first_runs[:, :, None],
+        second_runs[:, None, :],
+    ]
+    return np.asarray(drawn_pairs.mean(axis=(1, 2)))
 
 
 def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Floats:
     """Share of the scores, of any shape, above each threshold, shape (n_thresholds,)."""
     ordered = np.sort(np.ravel(scores))
-    below = np.searchsorted(ordered, np.asarray(thresholds), side="right")
-    return np.asarray(1.0 - below / len(ordered))
+    n_below = np.searchsorted(ordered, np.asarray(thresholds), side="right")
+    return np.asarray(1.0 - n_below / len(ordered))

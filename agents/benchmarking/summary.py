@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,13 @@ import numpy as np
 from agents.benchmarking import statistics
 from agents.benchmarking.cells import Cell
 from agents.benchmarking.sources import BEST_KNOWN
-from agents.benchmarking.statistics import NOTHING, Draws, Interval, score
+from agents.benchmarking.statistics import (
+    NOTHING,
+    Draws,
+    Interval,
+    ScoreScale,
+    score,
+)
 from agents.suites.reference import reference_costs
 from agents.suites.suite import N_EPISODES, SETS, BenchmarkTask
 from shipgym.arrays import Floats, finite
@@ -38,11 +45,14 @@ def summarise(
         Every controller in every task, by the names of both.
     """
     costs = _Costs(tuple(tasks), tuple(names), cells)
-    by_task = {task.name: costs.cells_of(k) for k, task in enumerate(tasks)}
-    reference = {
-        tasks[task].name: {"zero": zero, "best": best}
-        for task, (zero, best) in costs.reference.items()
-    }
+    by_task = {}
+    for number, task in enumerate(tasks):
+        by_task[task.name] = costs.of_task(number)
+
+    reference = {}
+    for number, (zero, best) in costs.reference.items():
+        task_name = tasks[number].name
+        reference[task_name] = {"zero": zero, "best": best}
     return {
         "tasks": by_task,
         "reference": reference,
@@ -65,19 +75,24 @@ class _Costs:
         return self.cells[self.names[controller], self.tasks[task].name]
 
     @cached_property
-    def costs(self) -> dict[tuple[int, int], Floats]:
-        """Costs by controller and task, each of shape (n_runs, n_episodes)."""
-        return {
-            (controller, task): self.cell(controller, task).costs
-            for controller in range(len(self.names))
-            for task in range(len(self.tasks))
-            if self.cell(controller, task).runs
-        }
+    def costs(self) -> dict[int, dict[int, Floats]]:
+        """Costs by controller and by task that it ran, shape (n_runs, n_episodes)."""
+        costs: dict[int, dict[int, Floats]] = {}
+        for controller in range(len(self.names)):
+            costs[controller] = {}
+            for task in range(len(self.tasks)):
+                cell = self.cell(controller, task)
+                if cell.runs:
+                    costs[controller][task] = cell.costs
+        return costs
 
     @cached_property
     def n_episodes(self) -> int:
         """Number of episodes of each task."""
-        return next((costs.shape[1] for costs in self.costs.values()), 1)
+        for by_task in self.costs.values():
+            for costs in by_task.values():
+                return int(costs.shape[1])
+        return 1
 
     @cached_property
     def draws(self) -> Draws:
@@ -85,44 +100,54 @@ class _Costs:
         return Draws(len(self.tasks), self.n_episodes)
 
     @cached_property
-    def reference(self) -> dict[int, tuple[float, float]]:
+    def reference(self) -> dict[int, ScoreScale]:
         """Costs whose scores are 0 and 1 by task; they are of all scored episodes."""
-        if self.n_episodes < N_EPISODES or not self.tasks[0].suite:
+        suite = self.tasks[0].suite
+        if self.n_episodes < N_EPISODES or not suite:
             return {}
-        known = reference_costs(self.tasks[0].suite)
-        return {
-            number: known[task.name]
-            for number, task in enumerate(self.tasks)
-            if task.name in known
-        }
+        known = reference_costs(suite)
+        reference = {}
+        for number, task in enumerate(self.tasks):
+            if task.name in known:
+                reference[number] = known[task.name]
+        return reference
 
     def tasks_on(self, on: str) -> list[int]:
         """Return the numbers of the tasks of a set of episodes."""
         return [number for number, task in enumerate(self.tasks) if task.on == on]
 
-    def cells_of(self, task: int) -> dict[str, dict[str, Any]]:
-        """Return what each controller came to in a task, by name."""
-        controllers = [who for who, number in self.costs if number == task]
-        means = [
-            self.costs[who, task].mean()
-            for who in controllers
-            if self.names[who] != BEST_KNOWN
-        ]
-        lowest = min(means, default=np.nan)
-        return {self.names[who]: self._about(who, task, lowest) for who in controllers}
+    def of_task(self, task: int) -> dict[str, dict[str, Any]]:
+        """Return the figures of each controller in a task, by name."""
+        figures = {}
+        lowest = self._lowest(task)
+        for controller, by_task in self.costs.items():
+            if task in by_task:
+                name = self.names[controller]
+                figures[name] = self._figures(controller, task, lowest)
+        return figures
 
-    def _about(self, controller: int, task: int, lowest: float) -> dict[str, Any]:
-        """Return what a controller came to in a task whose lowest mean cost is given."""
-        cell, costs = self.cell(controller, task), self.costs[controller, task]
+    def _lowest(self, task: int) -> float:
+        """Lowest mean cost in a task among controllers that are usable at sea."""
+        means = []
+        for controller, by_task in self.costs.items():
+            if task in by_task and self.names[controller] != BEST_KNOWN:
+                means.append(by_task[task].mean())
+        return min(means, default=np.nan)
+
+    def _figures(self, controller: int, task: int, lowest: float) -> dict[str, Any]:
+        """Return the figures of a controller in a task, whose lowest cost is given."""
+        costs = self.costs[controller][task]
         cost = statistics.mean_cost(costs, self.draws, task, controller)
         cost_iqm = statistics.interquartile_cost(costs, self.draws, task, controller)
-        reference = self.reference.get(task)
+        score = _score_of(cost, self.reference.get(task))
+
+        cell = self.cell(controller, task)
         seconds = float(np.mean([run.seconds_per_action for run in cell.runs]))
         failures = [run.failure for run in cell.runs if run.failure]
         return {
             "cost": cost.to_dict(),
             "cost_iqm": cost_iqm.to_dict(),
-            "score": _score_of(cost, reference).to_dict(),
+            "score": score.to_dict(),
             "relative_cost": finite(cost.value / lowest),
             "runs": len(cell.runs),
             "lost": cell.count("terminated"),
@@ -139,36 +164,35 @@ class _Costs:
         Those that could run all tasks come first; they are ordered by score if every
         task has references, otherwise by relative cost.
         """
-        others = [on for on in SETS if on != "ship" and self.tasks_on(on)]
-        ranked = [
-            {
-                "name": name,
-                **self._total(controller, "ship", by_task),
-                "elsewhere": {
-                    on: self._total(controller, on, by_task) for on in others
-                },
-            }
-            for controller, name in enumerate(self.names)
-        ]
-        by_score = all(task in self.reference for task in self.tasks_on("ship"))
-        return sorted(ranked, key=lambda one: _sort_key(one, by_score))
+        ranked = []
+        for controller, name in enumerate(self.names):
+            totals = {}
+            for on in SETS:
+                if on == "ship" or self.tasks_on(on):
+                    totals[on] = self._total(controller, on, by_task)
+            on_ship = totals.pop("ship")
+            ranked.append({"name": name, **on_ship, "elsewhere": totals})
+
+        tasks = self.tasks_on("ship")
+        by_score = all(task in self.reference for task in tasks)
+        return sorted(ranked, key=lambda total: _sort_key(total, by_score))
 
     def _total(
         self, controller: int, on: str, by_task: Mapping[str, Any]
     ) -> dict[str, Any]:
-        """Return what a controller came to in all tasks of a set of episodes."""
-        tasks = [task for task in self.tasks_on(on) if (controller, task) in self.costs]
+        """Return the totals of a controller in all tasks of a set of episodes."""
+        costs, name = self.costs[controller], self.names[controller]
+        tasks = [task for task in self.tasks_on(on) if task in costs]
         scored = [task for task in tasks if self._has_room(task)]
         score = statistics.aggregate_score(
-            [self.costs[controller, task] for task in scored],
-            [self.reference[task] for task in scored],
-            self.draws,
-            scored,
-            controller,
+            costs=[costs[task] for task in scored],
+            references=[self.reference[task] for task in scored],
+            draws=self.draws,
+            tasks=scored,
+            controller=controller,
         )
-        cells = [
-            by_task[self.tasks[task].name][self.names[controller]] for task in tasks
-        ]
+
+        cells = [by_task[self.tasks[task].name][name] for task in tasks]
         relative = [cell["relative_cost"] for cell in cells if cell["relative_cost"]]
         geometric_mean = np.exp(np.mean(np.log(relative))) if relative else np.nan
         return {
@@ -187,49 +211,56 @@ class _Costs:
         zero, best = self.reference[task]
         return zero > best
 
+    def _on_ship(self, controller: int) -> dict[int, Floats]:
+        """Costs of a controller by task, on the ship."""
+        tasks = self.tasks_on("ship")
+        costs = self.costs[controller]
+        return {task: costs[task] for task in tasks if task in costs}
+
     def improvements(self) -> dict[str, dict[str, Any]]:
         """Return the probability that one costs less than another, for all pairs."""
-        on_ship = [
-            {
-                task: self.costs[controller, task]
-                for task in self.tasks_on("ship")
-                if (controller, task) in self.costs
-            }
-            for controller in range(len(self.names))
-        ]
         improvements: dict[str, dict[str, Any]] = {name: {} for name in self.names}
-        for first, name in enumerate(self.names):
-            for second, other in enumerate(self.names):
-                if first != second:
-                    pair = (first, second)
-                    better = statistics.improvement(
-                        on_ship[first], on_ship[second], self.draws, pair
-                    )
-                    improvements[name][other] = better.to_dict()
+        numbers = range(len(self.names))
+        for first, second in permutations(numbers, 2):
+            better = statistics.improvement(
+                costs=self._on_ship(first),
+                other_costs=self._on_ship(second),
+                draws=self.draws,
+                controllers=(first, second),
+            )
+            name, other = self.names[first], self.names[second]
+            improvements[name][other] = better.to_dict()
         return improvements
 
     def profiles(self) -> dict[str, Any]:
         """Return the share of episodes whose score is above each threshold."""
         shares = {}
         for controller, name in enumerate(self.names):
-            scores = [
-                score(self.costs[controller, task], *self.reference[task]).ravel()
-                for task in self.tasks_on("ship")
-                if task in self.reference and (controller, task) in self.costs
-            ]
-            finite_scores = np.concatenate([np.zeros(0), *scores])
-            finite_scores = finite_scores[np.isfinite(finite_scores)]
-            if len(finite_scores):
-                profile = statistics.performance_profile(finite_scores, THRESHOLDS)
+            scores = self._episode_scores(controller)
+            if len(scores):
+                profile = statistics.performance_profile(scores, THRESHOLDS)
                 shares[name] = profile.tolist()
         return {"thresholds": THRESHOLDS.tolist(), "shares": shares}
 
+    def _episode_scores(self, controller: int) -> Floats:
+        """Scores of all episodes on the ship that have one, shape (n,)."""
+        parts = [np.zeros(0)]
+        for task, costs in self._on_ship(controller).items():
+            if task in self.reference:
+                zero, best = self.reference[task]
+                scores = score(costs, zero, best)
+                parts.append(scores.ravel())
+        all_scores = np.concatenate(parts)
+        return all_scores[np.isfinite(all_scores)]
 
-def _score_of(cost: Interval, reference: tuple[float, float] | None) -> Interval:
+
+def _score_of(cost: Interval, reference: ScoreScale | None) -> Interval:
     """Score of a mean cost; it falls as the cost rises, so that the bounds swap."""
     if reference is None:
         return NOTHING
-    value, low, high = score([cost.value, cost.high, cost.low], *reference).tolist()
+    zero, best = reference
+    costs = cost.value, cost.high, cost.low
+    value, low, high = score(costs, zero, best).tolist()
     return Interval(value, low, high)
 
 
@@ -248,12 +279,13 @@ def _metrics(cell: Cell) -> dict[str, dict[str, float | None]]:
     return metrics
 
 
-def _sort_key(ranked: Mapping[str, Any], by_score: bool) -> tuple[float, ...]:
+def _sort_key(total: Mapping[str, Any], by_score: bool) -> tuple[float, ...]:
     """Return what controllers are sorted by: tasks, score, relative cost."""
-    score = ranked["score"]["value"] if by_score else None
-    cost = ranked["relative_cost"]
+    score = total["score"]["value"]
+    cost = total["relative_cost"]
+    has_score = by_score and score is not None
     return (
-        -ranked["tasks"],
-        np.inf if score is None else -score,
+        -total["tasks"],
+        -score if has_score else np.inf,
         np.inf if cost is None else cost,
     )

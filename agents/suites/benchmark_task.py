@@ -23,6 +23,7 @@ FIRST_SEED = 1_000_000
 N_EPISODES = 100
 #: Sets of episodes of a task with a true ship, and what their names end in.
 SETS: Mapping[str, str] = {"ship": "", "model": "-on-model", "far": "-far"}
+OPTION_FIELDS = ("options", "far")
 
 
 class Scenario(NamedTuple):
@@ -76,14 +77,21 @@ class BenchmarkTask:
         if not self.environment.endswith(".py"):
             where = f"task '{self.name}': environment"
             check_choice(self.environment, SHORT_NAMES, where)
+
+    def check_ship(self) -> None:
+        """Refuse a ship whose observations have other scales than those of its model.
+
+        Raises InputError, also for an unknown model, ship or option.
+        """
         designed = self.design.task.observed(self.design.ship)
         steered = self.evaluation.task.observed(self.evaluation.ship)
-        for one, other in zip(designed, steered, strict=True):
-            if (one.name, one.scale) != (other.name, other.scale):
+        for on_model, on_ship in zip(designed, steered, strict=True):
+            if (on_model.name, on_model.scale) != (on_ship.name, on_ship.scale):
                 raise InputError(
                     f"task '{self.name}': ship: expected the particulars of"
-                    f" '{self.model}', got '{self.true_ship}', whose '{other.name}' is"
-                    f" shown in units of {other.scale:g} instead of {one.scale:g}"
+                    f" '{self.model}', got '{self.true_ship}', whose '{on_ship.name}'"
+                    f" is shown in units of {on_ship.scale:g} instead of"
+                    f" {on_model.scale:g}"
                 )
 
     @property
@@ -119,11 +127,17 @@ class BenchmarkTask:
         task = SHORT_NAMES.get(self.environment, self.environment)
         return Scenario(*read_options(task, model, options))
 
-    @property
+    @cached_property
     def design_task(self) -> Self:
         """The task as controllers are given it: without the ship behind the model."""
-        name = self.design_name or self.name
-        return replace(self, name=name, true_ship="", far={}, on="ship", design_name="")
+        return replace(
+            self,
+            name=self.design_name or self.name,
+            true_ship="",
+            far={},
+            on="ship",
+            design_name="",
+        )
 
     @property
     def ship(self) -> ShipModel:
@@ -151,27 +165,27 @@ class BenchmarkTask:
     @property
     def files(self) -> list[Path]:
         """Files of the user's own that it names: tasks, models, rewards, sensors."""
-        options = [*self.options.values(), *self.far.values()]
-        named = [self.environment, self.model, self.true_ship, *options]
-        endings = (".py", ".json")
-        texts = [one for one in named if isinstance(one, str) and one.endswith(endings)]
-        return [Path(text) for text in texts if Path(text).is_file()]
+        named = [self.environment, self.model, self.true_ship]
+        named += [*self.options.values(), *self.far.values()]
+        texts = [value for value in named if isinstance(value, str)]
+        paths = [Path(text) for text in texts if text.endswith((".py", ".json"))]
+        return [path for path in paths if path.is_file()]
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `from_dict` reads, ready for JSON."""
-        content = {one.name: getattr(self, one.name) for one in fields(self)}
-        for name in ("options", "far"):
-            content[name] = {
-                key: one.to_dict() if isinstance(one, Weather) else one
-                for key, one in content[name].items()
-            }
+        content = {part.name: getattr(self, part.name) for part in fields(self)}
+        for name in OPTION_FIELDS:
+            options = dict(content[name])
+            if isinstance(options.get("sea"), Weather):
+                options["sea"] = options["sea"].to_dict()
+            content[name] = options
         return content
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         """Read what `to_dict` returned."""
         values = dict(content)
-        for name in ("options", "far"):
+        for name in OPTION_FIELDS:
             options = dict(values[name])
             if isinstance(options.get("sea"), Mapping):
                 options["sea"] = Weather.from_dict(options["sea"], "sea")

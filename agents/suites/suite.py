@@ -63,7 +63,8 @@ class Suite:
     def task(self, name: str) -> BenchmarkTask:
         """Return a task by name; raises InputError for an unknown one."""
         known = {task.name: task for task in self.tasks}
-        return known[check_choice(name, known, f"suite '{self.name}': task")]
+        check_choice(name, known, f"suite '{self.name}': task")
+        return known[name]
 
     def select(self, names: str | Sequence[str] | None) -> tuple[BenchmarkTask, ...]:
         """Return tasks by name, each once; None for all of them.
@@ -76,6 +77,7 @@ class Suite:
             names = [name.strip() for name in names.split(",")]
         if not names:
             raise InputError("tasks: expected at least one, got none")
+
         selected: dict[str, BenchmarkTask] = {}
         for name in names:
             sets = [task for task in self.tasks if task.design_name == name]
@@ -94,6 +96,8 @@ def load_suite(
 ) -> Suite:
     """Read a shipped suite by name, or a suite of the user's own.
 
+    Models and ships of a shipped one are loaded when they are used.
+
     Raises InputError for an unknown name, with the nearest, or naming the field at
     fault.
 
@@ -105,35 +109,23 @@ def load_suite(
         Python files and modules that the suite may name, as it writes them, or their
         paths. A suite is data: it runs no code that its user has not named too.
     """
-    text = str(suite)
-    if not text.endswith(".toml"):
-        return _shipped(text)
-    path = Path(text).resolve()
+    where = str(suite)
+    if not where.endswith(".toml"):
+        return _shipped(where)
+    path = Path(where).resolve()
     content = read_bytes(path, "TOML file of a suite", LARGEST_SUITE)
-    read = parse_suite(_decoded(content, text), text, path.parent, allow_code)
-    tasks = tuple(replace(task, suite=str(path)) for task in read.tasks)
-    return Suite(read.name, tasks, str(path), hashlib.sha256(content).hexdigest())
+    try:
+        text = content.decode()
+    except UnicodeDecodeError:
+        raise InputError(f"{where}: expected UTF-8, got other bytes") from None
+    return parse_suite(text, where, path.parent, allow_code, source=str(path))
 
 
 @cache
 def _shipped(name: str) -> Suite:
-    content = _shipped_file(name).read_bytes()
-    read = parse_suite(content.decode(), f"suite '{name}'")
-    tasks = tuple(replace(task, suite=name) for task in read.tasks)
-    return Suite(read.name, tasks, name, hashlib.sha256(content).hexdigest())
-
-
-def _shipped_file(name: str) -> Path:
-    known = list_suites()
-    check_choice(name, known, "suite", " or the path of a TOML file")
-    return FOLDER / f"{name}.toml"
-
-
-def _decoded(content: bytes, where: str) -> str:
-    try:
-        return content.decode()
-    except UnicodeDecodeError:
-        raise InputError(f"{where}: expected UTF-8, got other bytes") from None
+    check_choice(name, list_suites(), "suite", " or the path of a TOML file")
+    text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+    return _read_suite(text, f"suite '{name}'", _Reader(FOLDER), source=name)
 
 
 def find_task(
@@ -145,7 +137,8 @@ def find_task(
     """
     tasks = load_suite(suite, allow_code).tasks
     known = {task.name: task for task in tasks if task.on == "ship"}
-    return known[check_choice(name, known, "task")].design_task
+    check_choice(name, known, "task")
+    return known[name].design_task
 
 
 def suite_file(suite: str, what: str) -> Path:
@@ -164,20 +157,33 @@ def parse_suite(
     where: str,
     folder: Path = Path(),
     allow_code: Collection[str] = (),
+    source: str = "",
 ) -> Suite:
-    """Read a suite from its TOML text; raises InputError naming the field at fault.
+    """Read a suite from its TOML text, and check its models and ships.
 
-    `where` begins the messages, `folder` is where relative paths begin; for
-    `allow_code` see `load_suite`.
+    `where` begins the messages, `folder` is where relative paths begin, `source` the
+    `Suite.source`; for `allow_code` see `load_suite`. Raises InputError naming the
+    field at fault.
     """
+    suite = _read_suite(text, where, _Reader(folder, allow_code), source)
+    for task in suite.tasks:
+        with placed(f"{where}: tasks.{task.design_name}"):
+            task.check_ship()
+    return suite
+
+
+def _read_suite(text: str, where: str, reader: "_Reader", source: str) -> Suite:
     content = parse_toml(text, f"{where}:")
     check_keys(content, ("name", "tasks"), where)
     name = check_text(content.get("name"), f"{where}: name")
-    reader = _Reader(folder, allow_code)
+    tables = check_table(content.get("tasks"), f"{where}: tasks")
+
     tasks: list[BenchmarkTask] = []
-    for task, table in check_table(content.get("tasks"), f"{where}: tasks").items():
-        tasks += reader.read(task, table, f"{where}: tasks.{task}")
-    return Suite(name, tuple(tasks))
+    for task_name, table in tables.items():
+        task = reader.read(task_name, table, f"{where}: tasks.{task_name}")
+        tasks += _sets_of(replace(task, suite=source))
+    sha256 = hashlib.sha256(text.encode()).hexdigest()
+    return Suite(name, tuple(tasks), source, sha256)
 
 
 @dataclass(frozen=True)
@@ -185,91 +191,98 @@ class _Reader:
     """Reads the tasks of a suite."""
 
     folder: Path
-    allow_code: Collection[str]
+    allow_code: Collection[str] = ()
 
-    def read(self, name: str, value: Any, where: str) -> list[BenchmarkTask]:
-        """Return a task, once for each of its sets of episodes."""
+    def read(self, name: str, value: Any, where: str) -> BenchmarkTask:
+        """Return a task, that of the ship if it has one."""
         table = check_table(value, where, FIELDS)
         if table.get("far") and "ship" not in table:
             raise InputError(
                 f"{where}.far: expected `ship` too, the one behind the model, got none"
             )
-        text = check_text(table.get("environment"), f"{where}.environment")
-        if ":" in text or text.endswith(".py"):
-            self.check_allowed(text, f"{where}.environment")
-        data_only(self.without_allowed(table), where)
+        environment_text = check_text(table.get("environment"), f"{where}.environment")
+        self.check_code(environment_text, table, where)
 
-        environment = read_environment(text, self.folder, f"{where}.environment")
-        options = {
-            **environment.options,
-            **self.options(table.get("options", {}), f"{where}.options"),
-            **self.options({"sea": table["sea"]} if "sea" in table else {}, where),
-        }
-        default = options.pop("model", None)
-        model = check_text(table.get("model", default), f"{where}.model")
+        environment = read_environment(
+            environment_text, self.folder, f"{where}.environment"
+        )
+        options = dict(environment.options)
+        options |= self.options(table.get("options", {}), f"{where}.options")
+        if "sea" in table:
+            options |= self.options({"sea": table["sea"]}, where)
+        default_model = options.pop("model", None)
+        model = check_text(table.get("model", default_model), f"{where}.model")
         ship = check_text(table["ship"], f"{where}.ship") if "ship" in table else ""
-        far = self.options(table.get("far", {}), f"{where}.far")
         with placed(where):
-            task = BenchmarkTask(
+            return BenchmarkTask(
                 name=name,
                 environment=environment.name,
                 model=self.absolute(model),
-                why=table.get("why", ""),
+                why=str(table.get("why", "")),
                 options=options,
                 true_ship=self.absolute(ship),
+                far=self.options(table.get("far", {}), f"{where}.far"),
                 design_name=name,
             )
-            return _with_sets(task, far)
 
-    def check_allowed(self, text: str, where: str) -> None:
+    def check_code(
+        self, environment: str, table: Mapping[str, Any], where: str
+    ) -> None:
         """Refuse code that the user has not named too."""
-        if not self.allowed(text):
+        is_code = ":" in environment or environment.endswith(".py")
+        if is_code and not self.allows(environment):
             raise InputError(
-                f"{where}: expected no code that you have not named yourself, got"
-                f" '{text}'; if you trust it: --allow-code {text}"
+                f"{where}.environment: expected no code that you have not named"
+                f" yourself, got '{environment}'; if you trust it: --allow-code"
+                f" {environment}"
             )
+        data_only(self.without_allowed(table), where)
 
-    def allowed(self, text: str) -> bool:
-        """Say whether the user has named this code too."""
+    def allows(self, text: str) -> bool:
+        """Tell whether the user has named this code too."""
         paths = [Path(code).resolve() for code in self.allow_code]
         return text in self.allow_code or (self.folder / text).resolve() in paths
 
     def without_allowed(self, value: Any) -> Any:
         """Copy a value of TOML without the code that is allowed."""
         if isinstance(value, Mapping):
-            return {key: self.without_allowed(one) for key, one in value.items()}
+            return {key: self.without_allowed(part) for key, part in value.items()}
         if isinstance(value, list):
-            return [self.without_allowed(one) for one in value]
-        return None if isinstance(value, str) and self.allowed(value) else value
+            return [self.without_allowed(part) for part in value]
+        is_allowed = isinstance(value, str) and self.allows(value)
+        return None if is_allowed else value
 
     def options(self, value: Any, where: str) -> dict[str, Any]:
         """Keywords of an environment: a sea may be a table, paths become absolute."""
-        options = {
-            name: self.absolute(one) for name, one in check_table(value, where).items()
-        }
-        if isinstance(options.get("sea"), Mapping):
+        table = check_table(value, where)
+        options = {name: self.absolute(part) for name, part in table.items()}
+        sea = options.get("sea")
+        if isinstance(sea, Mapping):
             with placed(f"{where}.sea"):
-                options["sea"] = Weather.from_dict(options["sea"], f"{where}.sea")
+                options["sea"] = Weather.from_dict(sea, f"{where}.sea")
         return options
 
     def absolute(self, value: Any) -> Any:
         """Absolute path of a Python or JSON file; anything else as it is."""
         if isinstance(value, list):
-            return [self.absolute(one) for one in value]
+            return [self.absolute(part) for part in value]
         if isinstance(value, str) and value.endswith((".py", ".json")):
             return str((self.folder / value).resolve())
         return value
 
 
-def _with_sets(task: BenchmarkTask, far: Mapping[str, Any]) -> list[BenchmarkTask]:
+def _sets_of(task: BenchmarkTask) -> list[BenchmarkTask]:
     """Return a task once for each set of episodes that it has."""
+    on_ship = replace(task, far={})
     if not task.true_ship:
-        return [task]
-    on_model = replace(task, name=task.name + SETS["model"], on="model", true_ship="")
-    if not far:
-        return [task, on_model]
-    return [
+        return [on_ship]
+    on_model = replace(
         task,
-        on_model,
-        replace(task, name=task.name + SETS["far"], on="far", far=far),
-    ]
+        name=task.name + SETS["model"],
+        on="model",
+        true_ship="",
+        far={},
+    )
+    if not task.far:
+        return [on_ship, on_model]
+    return [on_ship, on_model, replace(task, name=task.name + SETS["far"], on="far")]

@@ -19,8 +19,9 @@ from agents.benchmarking.contestants import Contestant
 from rich.console import Console
 
 from agents import load_agent, load_results
-from agents.benchmarking.results import gathered
-from agents.benchmarking.run import checked_part, job_of, run_job
+from agents.benchmarking.cells import Cell, job_of, run_job
+from agents.benchmarking.entries import Entry
+from agents.benchmarking.results import collect
 from agents.cli.benchmark_tables import costs_table, ranking_table
 from agents.deployment.helm import Helm
 from agents.deployment.nmea import Line
@@ -34,7 +35,7 @@ from agents.job_results import (
 )
 from agents.jobs import JobEngine, run_jobs
 from agents.policies.sb3_zip import read_sb3
-from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, parse_suite
+from agents.suites.suite import BenchmarkTask, find_task, load_suite, parse_suite
 from agents.training.plan import TrainingPlan, training_options
 from agents.training.run_folder import other_versions, read_plan
 from agents.training.settings import load_settings, read_settings_file
@@ -46,6 +47,7 @@ from shipgym.trials.guesses import guess_trial
 
 SHOWN = Console(file=io.StringIO(), width=120)
 JOBS: list[dict[str, Any]] = [{"number": 1}, {"number": 2}]
+N_PART = 3  # episodes of a kept part of a benchmark
 
 
 def written(fields: Any) -> None:
@@ -86,8 +88,8 @@ def use_results(result: Any) -> None:
         return
     for table in (ranking_table(result), costs_table(result)):
         SHOWN.print(table)
-    for task, found in result.summary["tasks"].items():
-        for name in found:
+    for task, cells in result.summary["tasks"].items():
+        for name in cells:
             result.figures(name, task)
     written(result.summary)
 
@@ -194,34 +196,38 @@ def read_study(path: Path) -> Any:
 
 
 @cache
-def part_job() -> tuple[Contestant, BenchmarkTask, str]:
-    """A contestant, a task, and the job of both."""
-    one, task = Contestant("pid", "pid"), load_suite().task("mariner-calm")
-    return one, task, job_to_json(job_of(one, task, DEFAULT_SUITE, 3), "job")
+def part_job() -> tuple[Entry, BenchmarkTask, str]:
+    """A controller, a task, and the job of both."""
+    entry, task = Entry("pid", "pid"), load_suite().task("sharp-turns")
+    return entry, task, job_to_json(job_of(entry, task, N_PART), "job")
 
 
 def keep_part(folder: Path) -> None:
     """What a benchmark that goes on finds."""
-    costs = {"cost": np.array([1.0, 2.0, 3.0]), "success": np.array([1.0, 0.0, np.nan])}
+    figures = {
+        "cost": np.array([1.0, 2.0, 3.0]),
+        "success": np.array([1.0, 0.0, np.nan]),
+    }
     run = {
-        "episodes": costs,
+        "figures": figures,
         "failure": "",
         "seconds_per_action": 1e-6,
         "policy_sha256": None,
     }
-    KeptResults(folder, run_job).save(
-        part_job()[2], result_to_json({"refused": "", "runs": [run, run]})
-    )
+    _, _, job = part_job()
+    result = result_to_json({"refused": "", "runs": [run, run]})
+    KeptResults(folder, run_job).save(job, result)
 
 
 def read_part(path: Path) -> Any:
     """A benchmark of parts that are done."""
-    one, task, text = part_job()
-    kept = KeptResults(path.parent, run_job).load(text)
+    entry, task, job = part_job()
+    kept = KeptResults(path.parent, run_job).load(job)
     if kept is None:
         return None
-    part = checked_part(result_from_json(kept), json.loads(text))
-    return gathered(DEFAULT_SUITE, [task], [one], {(one.name, task.name): part}, 3)
+    cell = Cell.from_dict(result_from_json(kept), N_PART, "part")
+    cells = {(entry.name, task.name): cell}
+    return collect(load_suite(), [task], [entry], cells, N_PART)
 
 
 @cache
@@ -232,8 +238,8 @@ def pid() -> Any:
 
 def read_zip(path: Path) -> Any:
     """An agent of stable-baselines3, as one that learned the first task."""
-    agent, task = read_sb3(path), part_job()[1]
-    return agent.policy(task.task, task.ship)
+    task = find_task("sharp-turns")
+    return read_sb3(path).policy(task.task, task.ship)
 
 
 def read_bridge(path: Path) -> Helm:

@@ -225,7 +225,7 @@ def episode(folder: Path) -> None:
 def results(folder: Path) -> None:
     """A benchmark of two controllers."""
     made = agents.benchmark(
-        "pid,lq", tasks=["mariner-calm", "mariner-current"], episodes=3
+        "pid,lq", tasks=["sharp-turns-far", "roll-limit"], episodes=3
     )
     folder.joinpath("results").mkdir()
     made.save(folder / "results" / "two")

@@ -30,7 +30,6 @@ from shipgym import load_model
 from shipgym.errors import InputError
 from tests.agents.policies import random_policy
 from tests.agents.small_suite import TEXT, TURNS, write_suite
-from tests.golden.texts import same_text
 
 N, FIRST = 4, 1_000_000
 MARINER = load_model("mariner")
@@ -122,9 +121,9 @@ def test_the_table_is_tidy(folder):
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        (("pdi", "calm"), "controller: 'pdi' found, expected one of 'pid', 'lq'"),
-        (("pid", "clam"), "task: 'clam' found, expected one of 'calm'"),
-        (("pid", "calm", "cots"), "figure: 'cots' found"),
+        (("pdi", "calm"), "controller: expected one of 'pid', 'lq', got 'pdi'"),
+        (("pid", "clam"), "task: expected one of 'calm', got 'clam'"),
+        (("pid", "calm", "cots"), "figure: expected one of .* got 'cots'"),
     ],
 )
 def test_figures_of_unknown_names_are_refused(folder, asked, said):
@@ -183,7 +182,7 @@ def test_a_cell_is_of_the_episodes_that_were_asked_for(figures):
 
 @pytest.mark.parametrize("episodes", [0, 101, 2.5])
 def test_as_many_episodes_are_run_as_are_scored_at_most(suite, episodes):
-    with pytest.raises(InputError, match=f"episodes: {episodes} found"):
+    with pytest.raises(InputError, match=f"episodes: expected .* got {episodes}"):
         benchmark("pid", suite, episodes=episodes)
 
 
@@ -256,7 +255,7 @@ def test_scores_are_of_best_known_costs_and_settings_are_those_that_were_tuned(
         costs = result.figures(name, "calm")
         np.testing.assert_array_equal(costs, other.figures("own", "calm"))
     refused = result.summary["controllers"]["tuned-mpc"]["refused"]["calm"]
-    assert "no tuned settings of 'mpc'" in refused
+    assert "expected one that was tuned" in refused
     cells = result.summary["tasks"]["calm"]
     assert cells["best-known"]["score"]["value"] == 1.0
     cost = cells["tuned-lq"]["cost"]["value"]
@@ -520,20 +519,19 @@ def test_functions_of_ones_own(suite, tmp_path, monkeypatch):
     costs, others = (one.figures("gentle", "calm") for one in (by_text, by_function))
     np.testing.assert_array_equal(costs, others)
     assert len(by_text.summary["controllers"]["gentle"]["files"]) == 1
-    code = "my_autopilots:gentle"
-    assert (by_text.allow_code, by_function.allow_code) == ((code,), ())
 
 
 def test_an_agent_that_fits_no_task_is_refused_before_anything_is_run(suite, tmp_path):
     guide = WheelOver.from_model(MARINER)
     guide.save(tmp_path / "guide.json")
     file = str(tmp_path / "guide.json")
-    said = "controllers: 'guide' fits none of the tasks: .*'calm': 8 observations found"
+    said = "controllers: 'guide' fits none of the tasks: .*'calm': expected 15 observations, got 8"
     with pytest.raises(InputError, match=said):
         benchmark(file, suite, "calm", tmp_path / "out", episodes=2)
     assert not (tmp_path / "out").exists()
     both = benchmark({"guide": guide, "pid": "pid"}, suite, "calm", episodes=2)
-    assert "8 observations" in both.summary["controllers"]["guide"]["refused"]["calm"]
+    refused = both.summary["controllers"]["guide"]["refused"]["calm"]
+    assert "expected 15 observations, got 8" in refused
 
     path = find_task("sharp-turns")
     WheelOver.from_model(path.ship, task=path.task).save(file)
@@ -624,7 +622,7 @@ def test_a_suite_of_ones_own_is_run_as_a_shipped_one(own):
     about = result.summary["suite"]["tasks"]["narrow"]
     assert about["environment"] == str(own / "fairway.py")
     (refused, _) = result.summary["controllers"]["lq"]["refused"].values()
-    assert "observation 0 is 'heading_sin'" in refused
+    assert "expected 'heading_error_sin', got 'heading_sin'" in refused
 
 
 def test_episodes_of_a_suite_of_ones_own_are_run_again_where_it_is_given(own):
@@ -632,7 +630,7 @@ def test_episodes_of_a_suite_of_ones_own_are_run_again_where_it_is_given(own):
     benchmark("my_helm:make", "own.toml", "fairway", "out", episodes=1, allow_code=code)
     episode = EpisodeId("make", "fairway", 0, FIRST)
     refused = rerun(load_results("out"), [episode], "my_helm:make").refused
-    assert "suite: 'own' is none of shipgym's" in refused["make", "fairway"]
+    assert "suite: expected the one of the results, 'own'" in refused["make", "fairway"]
     suite = load_suite("own.toml", code)
     again = rerun(load_results("out", suite), [episode], "my_helm:make")
     assert (again.refused, again.different) == ({}, ())
@@ -654,11 +652,8 @@ def rewrite(folder, change):
     BenchmarkResult({**result.summary, "episodes": episodes}, columns).save(folder)
 
 
-@pytest.mark.parametrize(
-    "source",
-    ["evil_code:make", "evil_code", "evil_code.py", "*", "/dev/zero", "lq+evil:make"],
-)
-def test_results_run_no_code_that_they_name(copy, suite, source, tmp_path, monkeypatch):
+@pytest.mark.parametrize("source", ["evil_code:make", "evil_code", "*", "/dev/zero"])
+def test_results_run_nothing_that_they_name(copy, suite, source, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code = "open('RAN', 'w').close()\nfrom agents import LQ\n"
     code += "make = lambda task: LQ.from_model(task.ship)\n"
@@ -667,31 +662,14 @@ def test_results_run_no_code_that_they_name(copy, suite, source, tmp_path, monke
     summary = json.loads((copy / "results.json").read_text())
     summary["controllers"]["lq"] |= {"source": source, "files": {}}
     (copy / "results.json").write_text(json.dumps(summary))
+
     result, before = load_results(copy, load_suite(suite)), list(sys.path)
     episode = EpisodeId("lq", "calm", 0, FIRST)
-    assert list(rerun(result, [episode]).refused) == [("lq", "calm")]
+    said = "expected 'lq', which results do not hold"
+    assert said in rerun(result, [episode]).refused["lq", "calm"]
     assert not (tmp_path / "RAN").exists()
     assert sys.path == before
-    if source == "evil_code:make":  # unless the user names it
-        assert rerun(result, [episode], {"lq": source}).episodes.keys() == {episode}
-        assert (tmp_path / "RAN").exists()
-        del sys.modules["evil_code"]
-
-
-def test_files_are_known_by_their_hashes(suite, tmp_path):
-    for run in range(2):
-        pid = PID.from_model(MARINER, frequency=0.05 + 0.01 * run)
-        pid.save(tmp_path / f"calm-[pid]-{run}.json")
-    pattern = f"mine={tmp_path}/{{task}}-[[]pid]-*.json"
-    benchmark(pattern, suite, "calm", tmp_path / "out", episodes=2)
-    result = load_results(tmp_path / "out", load_suite(suite))
-    episodes = [EpisodeId("mine", "calm", run, FIRST) for run in range(2)]
-    again = rerun(result, episodes)
-    assert (list(again.episodes), again.different) == (episodes, ())
-    other = LQ.from_model(MARINER)
-    other.save(tmp_path / "calm-[pid]-1.json")
-    said = "calm-[pid]-1.json': expected the file that took part, got another"
-    assert said in rerun(result, episodes).refused["mine", "calm"]
+    assert rerun(result, [episode], "lq").episodes.keys() == {episode}
 
 
 @pytest.mark.parametrize(
@@ -701,7 +679,7 @@ def test_files_are_known_by_their_hashes(suite, tmp_path):
         (
             "results.json",
             lambda data: data.replace(b'"format": 1', b'"format": 9'),
-            "format 9 found",
+            "expected format 1, .* got 9",
         ),
         (
             "results.json",
@@ -758,31 +736,37 @@ def test_results_that_do_not_agree_with_their_episodes_are_refused(copy, change,
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda one: one["seeds"].update(count=0), "r.json: seeds.count: 0 found"),
-        (lambda one: one["seeds"].update(count="4"), "r.json: seeds.count: '4' "),
+        (
+            lambda one: one["seeds"].update(count=0),
+            "r.json: seeds.count: expected .* got 0",
+        ),
+        (
+            lambda one: one["seeds"].update(count="4"),
+            "r.json: seeds.count: expected .* got '4'",
+        ),
         (
             lambda one: one["ranking"][0].update(name="los"),
-            "r.json: name of a controller: 'los' found",
+            "r.json: name of a controller: expected .* got 'los'",
         ),
         (
             lambda one: one["improvement"].update(los={}),
-            "r.json: name of a controller: 'los' found",
+            "r.json: name of a controller: expected .* got 'los'",
         ),
         (
             lambda one: one["profile"]["shares"].update(los=[]),
-            "r.json: name of a controller: 'los' found",
+            "r.json: name of a controller: expected .* got 'los'",
         ),
         (
             lambda one: one["tasks"].update(rough={}),
-            "r.json: name of a task: 'rough' found",
+            "r.json: name of a task: expected .* got 'rough'",
         ),
         (
             lambda one: one["reference"].update(rough={"zero": 1, "best": 0}),
-            "r.json: name of a task: 'rough' found",
+            "r.json: name of a task: expected .* got 'rough'",
         ),
         (
             lambda one: one["ranking"].clear(),
-            "r.json: tasks.calm: name of a controller: 'pid' found",
+            "r.json: tasks.calm: name of a controller: expected .* got 'pid'",
         ),
         (lambda one: one["tasks"]["calm"]["lq"].pop("runs"), r"tasks.calm.lq.*runs"),
     ],
@@ -850,8 +834,8 @@ def test_the_command_ranks_and_writes(suite, tmp_path):
     words += ["--episodes", 2, "--workers", 1, "--out", out, "--no-page"]
     answer = shipgym(*words)
     assert answer.exit_code == 0, answer.stderr
-    micro_seconds = r"(?m)(?<=  )\d+\.\d\d$"
-    assert same_text("benchmark", answer.stdout + answer.stderr, micro_seconds)
+    assert answer.stdout.startswith("small-v1: 1 task of 2 episodes, best first")
+    assert f"written: {out}" in answer.stdout.replace("\n", "")
     assert load_results(out).ranking == ["pid"]
     (out / "index.html").touch()
     again = shipgym(*words, "--resume", "--json")
@@ -889,10 +873,10 @@ def test_bad_input_is_one_message_and_nothing_is_written(suite, tmp_path):
     calm = ["--suite", suite, "--tasks", "calm"]
     for words, said in (
         (["--controllers", "pdi"], "Did you mean 'pid'"),
-        (["--engine", "rai"], "engine: 'rai' found"),
+        (["--engine", "rai"], "engine: expected one of 'local', 'ray', got 'rai'"),
         (["--suite", "shipgym-v2"], "Did you mean 'shipgym-v1'"),
         (["--suite", tmp_path / "none.toml"], "there is no such TOML file of a suite"),
-        (["--suite", suite, "--tasks", "calm,"], "task: '' found, expected one of"),
+        (["--suite", suite, "--tasks", "calm,"], "task: expected one of"),
         ([*calm, "--controllers", f"pid,{cut}"], "may be cut short"),
         ([*calm, "--controllers", f"pid,{weightless}"], "no such file"),
         ([*calm, "--controllers", f"pid,{other}"], "fits none of the tasks"),

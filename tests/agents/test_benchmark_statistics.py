@@ -16,38 +16,8 @@ from agents.benchmarking.statistics import (
     score,
     weighted_interquartile_mean,
 )
-from tests.golden.texts import flat, same_text
 
 RANDOM = np.random.default_rng(0)
-
-
-def test_every_statistic_of_three_runs_and_seven_episodes_is_the_golden_one():
-    """With draws of runs and episodes, of two tasks; the costs follow no pattern."""
-    place = np.arange(21.0).reshape(3, 7)
-    one = {
-        0: 20.0 + 5.0 * np.sin(2.0 * place) + place,
-        1: 31.0 + 9.0 * np.cos(3.0 * place),
-    }
-    other = {
-        0: 27.0 + 7.0 * np.cos(place[:2]),
-        1: 30.0 + 9.5 * np.sin(5.0 * place[:1]),
-        2: place,
-    }
-    draws = Draws(3, 7, seed=5, n_draws=301)
-    references = [(40.0, 18.0), (45.0, 25.0)]
-    told = {
-        "mean": mean_cost(one[0], draws, 0, 3).to_dict(),
-        "middle": interquartile_cost(one[1], draws, 1, 2).to_dict(),
-        "middle of one run": interquartile_cost(other[1], draws, 1).to_dict(),
-        "score": (
-            aggregate_score([one[0], one[1]], references, draws, [0, 1], 1).to_dict()
-        ),
-        "no score": aggregate_score([], [], draws, [], 1).to_dict(),
-        "better": improvement(one, other, draws, (1, 2)).to_dict(),
-        "worse": improvement(other, one, draws, (2, 1)).to_dict(),
-        "nobody": improvement({}, other, draws, (0, 1)).to_dict(),
-    }
-    assert same_text("statistics", "\n".join(flat(told, "")))
 
 
 def test_interquartile_mean_of_eight_scores_by_hand():
@@ -180,7 +150,7 @@ def test_performance_profile_by_hand():
     assert shares.tolist() == [1.0, 0.75, 0.75, 0.25, 0.0]
 
 
-def test_runs_are_drawn_for_each_contestant_and_the_first_by_default():
+def test_runs_are_drawn_for_each_controller_and_the_first_by_default():
     costs, draws = RANDOM.normal(50.0, 9.0, (3, 20)), Draws(1, 20, n_draws=50)
     for statistic in (mean_cost, interquartile_cost):
         assert (
@@ -196,7 +166,7 @@ def test_percentile_interval():
 
 def test_draws_are_the_same_every_time_and_others_for_each_task():
     draws, again = Draws(2, 50), Draws(2, 50)
-    np.testing.assert_array_equal(draws.episodes, again.episodes)
+    np.testing.assert_array_equal(draws.counts, again.counts)
     np.testing.assert_array_equal(draws.runs(1, 4, 2), again.runs(1, 4, 2))
-    assert (draws.episodes[0] != draws.episodes[1]).any()
-    np.testing.assert_allclose(draws.episodes.sum(axis=2), 1.0)
+    assert (draws.counts[0] != draws.counts[1]).any()
+    np.testing.assert_allclose(draws.shares(0).sum(axis=1), 1.0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from agents.cli import benchmark_tables, tables
+from agents.cli import tables
 from shipgym.manoeuvres import Criterion, IndexInterval
 from shipgym.pages.numbers import counted, degrees, fixed, number, percent
 from tests.golden.texts import same_text
@@ -189,53 +189,3 @@ def test_margins_without_bound_and_without_number_are_told_apart():
     first, second = cells(table, 2)
     assert first == "PID 1.00 1.00 1.00 1.0 inf 61.2 0"
     assert second == "PPO 1.00 1.00 1.00 1.0 - - 4"
-
-
-def entry(name, failed=0):
-    score = {"value": 0.51234, "low": 0.4, "high": 0.6}
-    return {
-        "name": name,
-        "failed": failed,
-        "score": score,
-        "relative_cost": 1.5,
-        "tasks": 2,
-        "lost": 1,
-    }
-
-
-def result():
-    of_lq = {
-        "microseconds_per_action": 3.0,
-        "cost": {"value": 2.0, "low": 1.5, "high": 2.5},
-        "score": {"value": None, "low": None, "high": None},
-        "lost": 1,
-        "failed": 2,
-        "metrics": {"success": {"mean": 0.98}},
-    }
-    of_pid = of_lq | {
-        "microseconds_per_action": None,
-        "cost": {"value": 1.0, "low": None, "high": None},
-    }
-    of_pid["metrics"] = {}
-    slower = of_lq | {"microseconds_per_action": 5.0}
-    summary = {
-        "seeds": {"count": 100},
-        "suite": {"name": "shipgym-v1"},
-        "ranking": [entry("lq"), entry("pid", 7)],
-        "tasks": {"calm": {"lq": of_lq, "pid": of_pid}, "rough": {"lq": slower}},
-        "controllers": {"lq": {"runs": 1}, "pid": {"runs": 3}},
-    }
-    return SimpleNamespace(summary=summary, tasks=tuple(summary["tasks"]))
-
-
-def test_controllers_are_shown_with_the_mean_of_their_times():
-    first, second = cells(benchmark_tables.ranking_table(result()), 2)
-    assert first == "lq 0.512 0.400 to 0.600 1.500 2 1 1 0 4.00"
-    assert second == "pid 0.512 0.400 to 0.600 1.500 2 3 1 7 -"
-
-
-def test_costs_are_shown_by_task_the_lowest_first():
-    first, second, third = cells(benchmark_tables.costs_table(result()), 3)
-    assert first == "calm pid 1.00 - - 3 -"
-    assert second == "lq 2.00 1.50 to 2.50 - 3 98 %"
-    assert third == "rough lq 2.00 1.50 to 2.50 - 3 98 %"

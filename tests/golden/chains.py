@@ -24,10 +24,10 @@ SHIP_FILE = ROOT / "examples" / "mariner" / "ship.toml"
 #: Parts of names in metrics.json that tell of the run, not of the ship.
 OF_THE_RUN = ("time", "duration", "version", "path", "software")
 
-CONTESTANTS = ("pid", "lq", "ppo")
+CONTROLLERS = ("pid", "lq", "ppo")
 TASKS = tuple(task.name for task in load_suite().tasks if task.on == "ship")
 EPISODES = 3
-KEYS = ("contestant", "task", "run", "seed")
+KEYS = ("controller", "task", "run", "seed")
 
 METHODS: Mapping[str, Mapping[str, Any]] = {
     "default": {},
@@ -79,10 +79,10 @@ def record_demo(_: str) -> dict[str, Floats]:
 
 def record_pretrained(task: str) -> dict[str, Floats]:
     """All figures of a few scored episodes of a task, steered by PID, LQ and the pretrained agent."""
-    result = benchmark(list(CONTESTANTS), tasks=[task], episodes=EPISODES)
+    result = benchmark(list(CONTROLLERS), tasks=[task], episodes=EPISODES)
     return {
         f"{one} {name}": vector(result.figures(one, task, name))
-        for one in CONTESTANTS
+        for one in CONTROLLERS
         for name in result.episodes
         if name not in KEYS
     }
