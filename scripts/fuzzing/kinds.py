@@ -18,9 +18,9 @@ import numpy as np
 from rich.console import Console
 
 from agents import load_agent, load_results
-from agents.benchmarking.contestants import Contestant
-from agents.benchmarking.results import gathered
-from agents.benchmarking.run import checked_part, job_of, run_job
+from agents.benchmarking.cells import Cell, job_of, run_job
+from agents.benchmarking.entries import Entry
+from agents.benchmarking.results import collect
 from agents.cli.benchmark_tables import costs_table, ranking_table
 from agents.deployment.helm import Helm
 from agents.deployment.nmea import Line
@@ -34,14 +34,15 @@ from agents.job_results import (
 )
 from agents.jobs import JobEngine, run_jobs
 from agents.policies.sb3_zip import read_sb3
-from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, parse_suite
+from agents.suites.suite import load_suite, parse_suite
 from agents.training.plan import Plan, training_options
 from agents.training.run_folder import other_versions, read_plan
 from agents.training.settings import load_settings, read_settings_file
 from fuzzing.reading import CORPUS, Kind
-from shipgym import Episode, ShipFile, ShipModel, Trial
+from shipgym import Episode, ShipFile, ShipModel, Trial, load_model
 from shipgym.envs.episode_file import to_file
 from shipgym.files import LARGEST_TOML, read_bytes
+from shipgym.tasks.task import Task
 from shipgym.trials.guesses import guess_trial
 
 SHOWN = Console(file=io.StringIO(), width=120)
@@ -194,35 +195,42 @@ def read_study(path: Path) -> Any:
     return _opened(path.parent, read_plan(CORPUS / "run" / "ppo"), ()).trials
 
 
+SUITE = load_suite()
+TASK = SUITE.task("sharp-turns")
+ENTRY = Entry("pid", "pid")
+EPISODES = 3
+
+
 @cache
-def part_job() -> tuple[Contestant, BenchmarkTask, str]:
-    """A contestant, a task, and the job of both."""
-    one, task = Contestant("pid", "pid"), load_suite().task("mariner-calm")
-    return one, task, job_to_json(job_of(one, task, DEFAULT_SUITE, 3), "job")
+def cell_job() -> str:
+    """A cell of a benchmark, as JSON."""
+    return job_to_json(job_of(ENTRY, TASK, EPISODES), "job")
 
 
-def keep_part(folder: Path) -> None:
+def keep_cell(folder: Path) -> None:
     """What a benchmark that goes on finds."""
-    costs = {"cost": np.array([1.0, 2.0, 3.0]), "success": np.array([1.0, 0.0, np.nan])}
+    figures = {
+        "cost": np.array([1.0, 2.0, 3.0]),
+        "success": np.array([1.0, 0.0, np.nan]),
+    }
     run = {
-        "episodes": costs,
+        "figures": figures,
         "failure": "",
         "seconds_per_action": 1e-6,
         "policy_sha256": None,
     }
-    KeptResults(folder, run_job).save(
-        part_job()[2], result_to_json({"refused": "", "runs": [run, run]})
-    )
+    result = result_to_json({"refused": "", "runs": [run, run]})
+    KeptResults(folder, run_job).save(cell_job(), result)
 
 
-def read_part(path: Path) -> Any:
-    """A benchmark of parts that are done."""
-    one, task, text = part_job()
-    kept = KeptResults(path.parent, run_job).load(text)
+def read_cell(path: Path) -> Any:
+    """A benchmark of cells that are done."""
+    kept = KeptResults(path.parent, run_job).load(cell_job())
     if kept is None:
         return None
-    part = checked_part(result_from_json(kept), json.loads(text))
-    return gathered(DEFAULT_SUITE, [task], [one], {(one.name, task.name): part}, 3)
+    cell = Cell.from_dict(result_from_json(kept), EPISODES, "cell")
+    cells = {(ENTRY.name, TASK.name): cell}
+    return collect(SUITE, [TASK], [ENTRY], cells, EPISODES)
 
 
 @cache
@@ -233,8 +241,7 @@ def pid() -> Any:
 
 def read_zip(path: Path) -> Any:
     """An agent of stable-baselines3, as one that learned the first task."""
-    agent, task = read_sb3(path), part_job()[1]
-    return agent.policy(task.task, task.ship)
+    return read_sb3(path).policy(Task.of("CourseKeeping"), load_model("mariner"))
 
 
 def read_bridge(path: Path) -> Helm:
@@ -285,6 +292,6 @@ KINDS = (
     Kind("study", read_study, len, main="study.json", prepare=keep_study, slow=200),
     Kind("suite", read_suite, slow=2),
     Kind("settings", read_settings, slow=8),
-    Kind("part", read_part, use_results, prepare=keep_part, slow=10),
+    Kind("cell", read_cell, use_results, prepare=keep_cell, slow=10),
     Kind("kept-result", read_kept, prepare=keep_results),
 )
