@@ -68,7 +68,6 @@ def build_autopilot(
     results are the same. Raises InputError for anything wrong with the files or
     arguments; nothing is written then.
     """
-    where.check()
     check_number(draws, "draws", at_least=2)
     check_number(seed, "seed", at_least=0, at_most=LARGEST_SEED)
     for kind in designs:
