@@ -4,13 +4,13 @@ Results do not depend, bit for bit, on where jobs run or how many run at once: e
 has one thread, and jobs and results pass through JSON in every case.
 """
 
+import json
 import logging
 import os
 import socket
 import sys
 import threading
 import time
-import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from joblib import Parallel, cpu_count, delayed, parallel_config
 from joblib.externals.loky import get_reusable_executor
@@ -29,7 +29,6 @@ from agents.controllers.registry import registered_modules
 from agents.job_results import (
     JobFunction,
     KeptResults,
-    job_from_json,
     job_to_json,
     result_from_json,
     result_to_json,
@@ -43,6 +42,8 @@ __all__ = ["HERE", "EngineError", "JobEngine", "JobError", "run_jobs"]
 
 #: Called with the number of jobs done and their total.
 JobProgress = Callable[[int, int], None]
+#: A job and its result as JSON, in the order in which jobs finish.
+Finished = Iterator[tuple[str, str]]
 
 
 class JobError(RuntimeError):
@@ -97,16 +98,6 @@ class JobEngine:
 HERE = JobEngine()
 
 
-class JobOutcome(NamedTuple):
-    """The result of a job as JSON, or the error that it raised."""
-
-    job: str  # as JSON
-    result: str = ""
-    error: str = ""
-    is_wrong_input: bool = False
-    traceback: str = ""
-
-
 def run_jobs(
     function: JobFunction,
     jobs: Sequence[Mapping[str, Any]],
@@ -116,8 +107,8 @@ def run_jobs(
     """Run independent jobs and return their results in the order of the jobs.
 
     Raises InputError for wrong arguments, a cluster that does not answer, or wrong
-    input that a job reports. Raises JobError, naming the job, if a job raises anything
-    else, or if a worker is killed.
+    input that a job reports. Raises JobError, with the beginning of the job, if a job
+    raises anything else, or if a worker is killed.
 
     Parameters
     ----------
@@ -146,35 +137,15 @@ def run_jobs(
             progress(sum(text in results for text in texts), len(texts))
 
     report()
-    for outcome in _outcomes(function, pending, where):
-        _check_outcome(outcome, f"job {texts.index(outcome.job)}")
-        results[outcome.job] = outcome.result
+    for text, result in _finished(function, pending, where):
+        results[text] = result
         if kept is not None:
-            kept.save(outcome.job, outcome.result)
+            kept.save(text, result)
         report()
     return [result_from_json(results[text]) for text in texts]
 
 
-def _check_outcome(outcome: JobOutcome, name: str) -> None:
-    """Raise the error of a job, if any, with a name and the beginning of the job."""
-    if not outcome.error:
-        return
-    longest = 200  # characters of a job in a message
-    begin = outcome.job[:longest]
-    if len(outcome.job) > longest:
-        begin += " ..."
-    message = f"{name} {begin}: {outcome.error}"
-    if outcome.is_wrong_input:
-        raise InputError(message)
-    error = JobError(message)
-    error.add_note(outcome.traceback)
-    raise error
-
-
-def _outcomes(
-    function: JobFunction, texts: list[str], where: JobEngine
-) -> Iterator[JobOutcome]:
-    """Outcomes of jobs in the order in which they finish."""
+def _finished(function: JobFunction, texts: list[str], where: JobEngine) -> Finished:
     if not texts:
         return iter(())
     if where.engine == "ray":
@@ -185,24 +156,24 @@ def _outcomes(
     return _in_processes(function, texts, workers)
 
 
-def _do_job(function: JobFunction, text: str) -> JobOutcome:
-    """Do a job on one thread; exceptions become text, since some cannot be pickled."""
+def _do_job(function: JobFunction, text: str) -> tuple[str, str]:
+    """Do a job on one thread; errors become some that have the job in their message."""
     variables = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     one_thread = dict.fromkeys(variables, "1")  # for libraries loaded by the job
+    longest = 200  # characters of a job in a message
+    name = f"job {text[:longest]}" + " ..." * (len(text) > longest)
     try:
         with _environment(one_thread), threadpool_limits(1):
-            result = function(job_from_json(text))
-            return JobOutcome(text, result_to_json(result))
+            return text, result_to_json(function(json.loads(text)))
     except InputError as error:
-        return JobOutcome(text, error=str(error), is_wrong_input=True)
+        raise InputError(f"{name}: {error}") from None
     except Exception as error:
-        message = f"{type(error).__name__}: {error}"
-        return JobOutcome(text, error=message, traceback=traceback.format_exc())
+        raise JobError(f"{name}: {type(error).__name__}: {error}") from error
 
 
 def _do_in_worker(
     function: JobFunction, modules: Sequence[str], folder: Path, text: str
-) -> JobOutcome:
+) -> tuple[str, str]:
     """Do a job in another process, in a folder, after importing users' controllers."""
     _end_with_parent()
     if folder.is_dir():  # another computer may lack it
@@ -239,33 +210,30 @@ def _killed_worker() -> JobError:
     )
 
 
-def _in_processes(
-    function: JobFunction, texts: list[str], workers: int
-) -> Iterator[JobOutcome]:
+def _in_processes(function: JobFunction, texts: list[str], workers: int) -> Finished:
     """Do jobs in processes of joblib's loky backend, which end with the last job."""
     run = Parallel(
-        workers, return_as="generator_unordered", batch_size=1, pre_dispatch=workers
+        workers,
+        backend="loky",
+        return_as="generator_unordered",
+        batch_size=1,
+        pre_dispatch=workers,
     )
     try:
         with (
             _environment({"PYTHONSAFEPATH": "1"}),
-            parallel_config("loky", inner_max_num_threads=1),
             warnings.catch_warnings(),
-            closing(run(_calls(function, texts))) as outcomes,
+            closing(run(_calls(function, texts))) as finished,
         ):
-            warnings.filterwarnings(
-                "ignore", ".*tasks which were still being processed"
-            )
-            yield from outcomes
+            warnings.filterwarnings("ignore", ".*tasks which were still being")
+            yield from finished
     except BrokenProcessPool:
         raise _killed_worker() from None
     finally:
         get_reusable_executor().shutdown(wait=True, kill_workers=True)
 
 
-def _on_ray(
-    function: JobFunction, texts: list[str], where: JobEngine
-) -> Iterator[JobOutcome]:
+def _on_ray(function: JobFunction, texts: list[str], where: JobEngine) -> Finished:
     """Do jobs by joblib's Ray backend, in rounds, since it returns a round as a whole."""
     with _connected_ray(where) as ray, parallel_config("ray"):
         cores = int(ray.cluster_resources().get("CPU", 1))
@@ -322,19 +290,13 @@ def _check_address(address: str) -> None:
     if address == "auto":
         return
     host, _, port = address.removeprefix("ray://").rpartition(":")
-    if not host or not port.isdigit() or not 0 < int(port) < 65536:
-        raise EngineError(
-            "address: expected 'HOST:PORT', 'ray://HOST:PORT' or 'auto', got"
-            f" '{address}'; the port of a cluster is 6379 unless it was started with"
-            " another, that of its client server 10001"
-        )
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=10.0).close()
-    except OSError as error:
+    except (OSError, ValueError, OverflowError) as error:
         raise EngineError(
-            f"address: expected a Ray cluster at '{address}', got no answer"
-            f" ({error.strerror or error}); start one by `ray start --head`, or leave"
-            " the address out to run on this computer"
+            "address: expected a Ray cluster at 'HOST:PORT', 'ray://HOST:PORT' or"
+            f" 'auto', got '{address}' ({error}); start one by `ray start --head`, or"
+            " leave the address out to run on this computer"
         ) from None
 
 

@@ -35,14 +35,15 @@ from agents.job_results import (
 )
 from agents.jobs import JobEngine, run_jobs
 from agents.policies.sb3_zip import read_sb3
-from agents.suites.suite import BenchmarkTask, find_task, load_suite, parse_suite
+from agents.suites.suite import load_suite, parse_suite
 from agents.training.plan import TrainingPlan, training_options
 from agents.training.run_folder import other_versions, read_plan
 from agents.training.settings import load_settings, read_settings_file
 from fuzzing.reading import CORPUS, Kind
-from shipgym import Episode, ShipFile, ShipModel, Trial
+from shipgym import Episode, ShipFile, ShipModel, Trial, load_model
 from shipgym.envs.episode_file import to_file
 from shipgym.files import LARGEST_TOML, read_bytes
+from shipgym.tasks.task import Task
 from shipgym.trials.guesses import guess_trial
 
 SHOWN = Console(file=io.StringIO(), width=120)
@@ -195,14 +196,19 @@ def read_study(path: Path) -> Any:
     return open_study(path.parent, read_plan(CORPUS / "run" / "ppo"), ()).trials
 
 
+SUITE = load_suite()
+TASK = SUITE.task("sharp-turns")
+ENTRY = Entry("pid", "pid")
+EPISODES = 3
+
+
 @cache
-def part_job() -> tuple[Entry, BenchmarkTask, str]:
-    """A controller, a task, and the job of both."""
-    entry, task = Entry("pid", "pid"), load_suite().task("sharp-turns")
-    return entry, task, job_to_json(job_of(entry, task, N_PART), "job")
+def cell_job() -> str:
+    """A cell of a benchmark, as JSON."""
+    return job_to_json(job_of(ENTRY, TASK, EPISODES), "job")
 
 
-def keep_part(folder: Path) -> None:
+def keep_cell(folder: Path) -> None:
     """What a benchmark that goes on finds."""
     figures = {
         "cost": np.array([1.0, 2.0, 3.0]),
@@ -214,20 +220,18 @@ def keep_part(folder: Path) -> None:
         "seconds_per_action": 1e-6,
         "policy_sha256": None,
     }
-    _, _, job = part_job()
     result = result_to_json({"refused": "", "runs": [run, run]})
-    KeptResults(folder, run_job).save(job, result)
+    KeptResults(folder, run_job).save(cell_job(), result)
 
 
-def read_part(path: Path) -> Any:
-    """A benchmark of parts that are done."""
-    entry, task, job = part_job()
-    kept = KeptResults(path.parent, run_job).load(job)
+def read_cell(path: Path) -> Any:
+    """A benchmark of cells that are done."""
+    kept = KeptResults(path.parent, run_job).load(cell_job())
     if kept is None:
         return None
-    cell = Cell.from_dict(result_from_json(kept), N_PART, "part")
-    cells = {(entry.name, task.name): cell}
-    return collect(load_suite(), [task], [entry], cells, N_PART)
+    cell = Cell.from_dict(result_from_json(kept), EPISODES, "cell")
+    cells = {(ENTRY.name, TASK.name): cell}
+    return collect(SUITE, [TASK], [ENTRY], cells, EPISODES)
 
 
 @cache
@@ -238,8 +242,7 @@ def pid() -> Any:
 
 def read_zip(path: Path) -> Any:
     """An agent of stable-baselines3, as one that learned the first task."""
-    task = find_task("sharp-turns")
-    return read_sb3(path).policy(task.task, task.ship)
+    return read_sb3(path).policy(Task.of("CourseKeeping"), load_model("mariner"))
 
 
 def read_bridge(path: Path) -> Helm:
@@ -290,6 +293,6 @@ KINDS = (
     Kind("study", read_study, len, main="study.json", prepare=keep_study, slow=200),
     Kind("suite", read_suite, slow=2),
     Kind("settings", read_settings, slow=8),
-    Kind("part", read_part, use_results, prepare=keep_part, slow=10),
+    Kind("cell", read_cell, use_results, prepare=keep_cell, slow=10),
     Kind("kept-result", read_kept, prepare=keep_results),
 )

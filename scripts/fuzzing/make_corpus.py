@@ -225,14 +225,14 @@ def episode(folder: Path) -> None:
 def results(folder: Path) -> None:
     """A benchmark of two controllers."""
     made = agents.benchmark(
-        "pid,lq", tasks=["sharp-turns-far", "roll-limit"], episodes=3
+        "pid,lq", tasks=["sharp-turns", "course-unstable"], episodes=3
     )
     folder.joinpath("results").mkdir()
     made.save(folder / "results" / "two")
 
 
 def run(folder: Path) -> None:
-    """The folder of a training in the midst of it."""
+    """The file of a training and its checkpoint."""
     settings = {
         "base": "none",
         "ships": 2,
@@ -248,16 +248,21 @@ def run(folder: Path) -> None:
     target.parent.mkdir()
     request = TrainingRequest("ppo", options=options, settings=settings)
     train(make_plan(request), target, evaluation_episodes=2)
+    folder.joinpath("checkpoint").mkdir()
+    checkpoint = target / "checkpoint.safetensors"
+    checkpoint.rename(folder / "checkpoint" / "ppo.safetensors")
     for entry in target.iterdir():
-        if entry.name not in ("run.json", "checkpoint.safetensors"):
-            shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+        if entry.is_dir():
+            shutil.rmtree(entry)
+        elif entry.name != "run.json":
+            entry.unlink()
 
 
 def texts(folder: Path) -> None:
     """Files of suites and of settings."""
     folder.joinpath("suite").mkdir()
     text = (FOLDER / "shipgym-v1.toml").read_text()
-    names = ("mariner-calm", "mariner-rough", "container-path")
+    names = ("course-unstable", "failing-gear", "sharp-turns")
     tables = ["[tasks." + part for part in text.split("\n[tasks.")[1:]]
     chosen = [
         one

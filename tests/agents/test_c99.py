@@ -94,7 +94,7 @@ def kernel_ship():
     structure = kernel_box(box.dynamics, kernel)
     numbers = 1e-3 * random.normal(size=9)
     weights = dict(zip(structure.coefficient_names, numbers, strict=True))
-    return replace(box, coefficients=weights, covariance=None, own_table=structure)
+    return replace(box, coefficients=weights, covariance=None, dynamics=structure)
 
 
 @pytest.mark.parametrize("name", ["tanker", "kvlcc2-rm-svm", "kernel"])

@@ -9,8 +9,6 @@ import shlex
 import subprocess
 import sys
 import warnings
-from contextlib import nullcontext
-from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -20,31 +18,15 @@ from typer.testing import CliRunner
 
 from agents.cli import app, main, reproduction
 from agents.cli.command import Commands, report_os_error, shared_options
-from agents.jobs import JobEngine, JobError
+from agents.jobs import JobError
 from agents.training.run_folder import CHECKPOINT
 from shipgym import InputError, ManoeuvreError, UnstableModelError, load_model
-from tests.golden.texts import same_page, same_text
 
 ROOT = Path(__file__).parents[2]
 
 
 def shipgym(*arguments):
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
-
-
-def test_what_is_for_verification_alone_is_refused_without_it(tmp_path):
-    for option in (
-        ("--allow-code", "mine:make"),
-        ("--sample", "8"),
-        ("--tolerance", "0.1"),
-    ):
-        answer = shipgym("benchmark", "--out", tmp_path / "out", *option)
-        assert answer.exit_code == 2
-        assert (
-            "--allow-code, --sample and --tolerance are for --verify alone, leave"
-            " them out" in answer.output
-        )
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.fixture
@@ -108,19 +90,6 @@ def test_every_command_has_json_and_quiet_and_an_example_that_it_takes(name):
     assert begin == name
     assert not command.make_context(name, example).args
     assert command.epilog in " ".join(shipgym(name, "--help").stdout.split())
-
-
-def test_commands_take_the_golden_options():
-    """Their names, defaults, bounds and help."""
-    attributes = "metavar default min max required nargs multiple hidden help"
-    lines = []
-    for name, command in commands().items():
-        lines.append(f"{name}: {' '.join(command.help.split())}\n{command.epilog}")
-        for option in command.params:
-            values = [getattr(option, key, None) for key in attributes.split()]
-            flags = [*option.opts, *option.secondary_opts]
-            lines.append(" ".join([*flags, *map(str, values)]))
-    assert same_text("commands", "\n".join(lines))
 
 
 @pytest.mark.parametrize(
@@ -194,25 +163,11 @@ def test_identify_writes_model_and_metrics(demo, tmp_path):
     assert "N_vvr" in answer.stdout
     assert "zigzag_15_15.csv" in answer.stdout
     assert "estimated, not given in the ship file: N_rdot" in answer.stderr
-    assert same_text("identify", answer.stdout + answer.stderr)
     names = ["metrics.json", "model.json", "report.html", "settings.json"]
     assert sorted(path.name for path in (tmp_path / "ship").iterdir()) == names
     assert load_model(tmp_path / "ship" / "model.json").coefficients["N_d"] > 0.0
     metrics = json.loads((tmp_path / "ship" / "metrics.json").read_text())
     assert metrics["trials"]["zigzag_15_15.csv"]["use"] == "validate"
-
-
-def test_identify_prints_nothing_but_json_when_asked(demo, tmp_path):
-    answer = shipgym(
-        "identify",
-        demo,
-        "--out",
-        tmp_path / "ship",
-        "--set",
-        "samples=integral",
-        "--json",
-    )
-    assert json.loads(answer.stdout)["stable"] is True
 
 
 def test_an_unstable_model_exits_with_1_and_prints_no_coefficients(
@@ -295,24 +250,9 @@ def test_trials_writes_figures_that_work_offline(tmp_path):
     answer = shipgym("trials", "mariner", "--out", tmp_path / "plots.html")
     assert answer.exit_code == 0
     page = (tmp_path / "plots.html").read_text()
-    drawn = {
-        "zigzags-0",
-        "zigzags-1",
-        "zigzags-2",
-        "zigzags-3",
-        "zigzags-paths",
-        "zigzags-histories",
-    }
-    drawn |= {
-        "circles-0",
-        "circles-1",
-        "circles-paths",
-        "circles-histories",
-        "spirals-0",
-    }
-    drawn |= {"spirals-histories", "pull-outs", "pull-outs-histories"}
     names = re.findall(r'Plotly.newPlot\("plot-([\w-]+)"', page)
-    assert (set(names), len(names)) == (drawn, 14)
+    assert len(set(names)) == len(names) == 14
+    assert {"zigzags-paths", "circles-1", "spirals-0", "pull-outs"} <= set(names)
     for caption in (
         "Zigzag 20/20, starboard first. ",
         "Paths from above, north up, in metres.",
@@ -321,30 +261,6 @@ def test_trials_writes_figures_that_work_offline(tmp_path):
     ):
         assert caption in page
     assert 'src="http' not in page
-    assert same_page("trials page", page)
-    assert same_text("trials", answer.stdout + answer.stderr)
-
-
-@pytest.mark.parametrize("model", ["marinr", "no_such.json"])
-def test_an_unknown_model_exits_with_2(model):
-    answer = shipgym("trials", model)
-    assert answer.exit_code == 2
-    assert model in answer.stderr
-
-
-def test_a_model_file_cut_in_half_exits_with_2(tmp_path):
-    load_model("mariner").save(tmp_path / "model.json")
-    text = (tmp_path / "model.json").read_text()
-    (tmp_path / "model.json").write_text(text[: len(text) // 2])
-    answer = shipgym("trials", tmp_path / "model.json")
-    assert answer.exit_code == 2
-    assert "cut short" in answer.stderr
-
-
-def test_figures_go_to_html_files_only(tmp_path):
-    answer = shipgym("trials", "mariner", "--out", tmp_path / "plots.png")
-    assert answer.exit_code == 2
-    assert ".html" in answer.stderr
 
 
 @pytest.mark.parametrize(
@@ -377,26 +293,25 @@ def test_what_cannot_be_read_or_written_is_one_line(
     assert told == (f"error: {said}" if said else "")
 
 
-def test_a_wrong_file_gives_no_traceback_from_the_shell(tmp_path):
-    answer = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "agents.cli",
-            "identify",
-            "absent.toml",
-            "--out",
-            str(tmp_path / "out"),
-        ],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-        env=os.environ | {"COLUMNS": "80"},
-    )
-    assert answer.returncode == 2
-    assert "Traceback" not in answer.stderr
-    assert answer.stderr.count("\n") == 1
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["marinr"], "Did you mean 'mariner'"),
+        (["no_such.json"], "no_such.json"),
+        (["half.json"], "cut short"),
+        (["mariner", "--out", "plots.png"], ".html"),
+        (["tanker", "--depth", "18"], "draught of 18.46 m"),
+        (["mariner", "--depth", "30"], "deep-water model"),
+    ],
+)
+def test_what_trials_cannot_use_exits_with_2(words, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    load_model("mariner").save("model.json")
+    text = Path("model.json").read_text()
+    Path("half.json").write_text(text[: len(text) // 2])
+    answer = shipgym("trials", *words)
+    assert answer.exit_code == 2
+    assert message in answer.stderr
 
 
 def test_trials_in_shallow_water():
@@ -406,44 +321,6 @@ def test_trials_in_shallow_water():
     assert found["imo"] == {}  # the criteria are made for deep water
     turn = found["manoeuvres"]["turning circle 35 deg to starboard"]
     assert turn["tactical_diameter_lengths"]["value"] > 3.5
-    for name, depth, said in (
-        ("tanker", 18, "draught of 18.46 m"),
-        ("mariner", 30, "deep-water model"),
-    ):
-        answer = shipgym("trials", name, "--depth", depth)
-        assert answer.exit_code == 2
-        assert said in answer.stderr
-
-
-def test_the_result_of_a_training_is_printed(monkeypatch, tmp_path):
-    result = SimpleNamespace(
-        to_dict=dict,
-        resumed_from=None,
-        lq_cost=None,
-        best_cost=1.234,
-        best_steps=2000,
-        steps=3000,
-        lq_reached=None,
-        finished=True,
-        plan=SimpleNamespace(settings=SimpleNamespace(total_steps=9000)),
-    )
-    monkeypatch.setattr("agents.training.training.train", lambda *_, **__: result)
-    words = ("train", "ppo", "--out", tmp_path / "run")
-    assert shipgym(*words).stdout.splitlines() == [
-        "cost of a held-out episode: 1.23 (step 2,000 of 3,000)",
-        f"written: {tmp_path / 'run' / 'agent.json'}",
-    ]
-    result.resumed_from = 1500
-    result.lq_cost = 2.5
-    result.lq_reached = {"steps": 1200, "seconds": 7.6}
-    result.finished = False
-    assert shipgym(*words).stdout.splitlines() == [
-        "resumed at step 1,500",
-        "cost of a held-out episode: 1.23; LQ's: 2.50 (step 2,000 of 3,000)",
-        "LQ's cost reached at step 1,200, after 8 s",
-        f"stopped at step 3,000 of 9,000: continue with --resume --out {words[-1]}",
-        f"written: {tmp_path / 'run' / 'agent.json'}",
-    ]
 
 
 @pytest.mark.parametrize(
@@ -558,67 +435,6 @@ def test_a_warning_is_one_line_on_standard_error(monkeypatch, capsys):
     assert capsys.readouterr() == ("", "warning: the cache is full\n")
 
 
-def test_names_that_the_terminal_has_no_letters_for_are_written_all_the_same(
-    monkeypatch,
-):
-    monkeypatch.setattr(sys, "stdout", TextIOWrapper(BytesIO(), "ascii"))
-    run_main(monkeypatch, lambda: print("\u2192 Elbe", flush=True))
-    assert sys.stdout.buffer.getvalue().strip() == b"\\u2192 Elbe"
-
-
-def test_without_standard_output_nothing_is_begun_and_without_standard_error_nothing_is_said(
-    monkeypatch,
-):
-    monkeypatch.setattr(sys, "stderr", None)
-    run_main(monkeypatch, lambda: print("odd", file=sys.stderr))
-    assert sys.stderr.name == os.devnull
-    sys.stderr.close()
-    monkeypatch.setattr(sys, "stdout", None)
-    with pytest.raises(SystemExit, match="error: standard output is closed"):
-        run_main(monkeypatch, lambda: None)
-
-
-def test_options_of_trials_are_used_and_progress_is_shown(monkeypatch, tmp_path):
-    calls, bars = [], []
-    trials = SimpleNamespace(
-        indices={},
-        water="water of 25 m",
-        criteria={},
-        refused={"direct spiral": "runs away"},
-        to_dict=dict,
-    )
-
-    def standard_trials(ship, draws, seed, progress, depth):
-        calls.append((ship.name, draws, seed, depth))
-        progress(2)
-        return trials
-
-    monkeypatch.setattr("agents.cli.standard_trials.standard_trials", standard_trials)
-    monkeypatch.setattr(
-        "agents.cli.trials_page.write_page", lambda ship, trials, out: out.touch()
-    )
-    options = ["--depth", "25", "--draws", "7", "--seed", "3", "--out"]
-    page = tmp_path / "a.html"
-    answer = shipgym("trials", "tanker", *options, page)
-    assert answer.exit_code == 0, answer.stderr
-    assert "service speed in water of 25 m" in " ".join(answer.stdout.split())
-    assert [line for line in answer.stdout.splitlines() if line][-2:] == [
-        "The IMO criteria are made for deep water: leave --depth out to assess them.",
-        f"written: {page}",
-    ]
-    assert answer.stderr == "warning: no direct spiral: runs away\n"
-    assert shipgym("trials", "tanker", "--depth", 18).exit_code == 2
-
-    monkeypatch.setattr(
-        "agents.cli.terminal.progress_bars",
-        lambda: nullcontext(lambda *now: bars.append(now)),
-    )
-    answer = shipgym("trials", "tanker", "--json")
-    assert json.loads(answer.stdout) == {"model": "tanker", "seed": 0}
-    assert calls == [("tanker", 7, 3, 25.0), ("tanker", 100, 0, float("inf"))]
-    assert bars == [("models drawn", 2, 100)]
-
-
 @pytest.fixture
 def built(monkeypatch):
     """Arguments of `build_autopilot`, and the result that it returns."""
@@ -641,27 +457,6 @@ def built(monkeypatch):
         "identification.validation.warnings.model_warnings", lambda _: ["odd sway"]
     )
     return result
-
-
-def test_options_of_autopilot_reach_the_chain(built, demo, tmp_path):
-    words = ("autopilot", demo, "--out", tmp_path)
-    options = """--draws 3 --seed 4 --agent a.json --standards --workers 2 --method ls
-        --autopilots"""
-    assert shipgym(*words).exit_code == 0
-    assert shipgym(*words, *options.split(), "pid, lqg").exit_code == 0
-    (places, usual), (same, given) = built.calls
-    assert places == same == (demo, tmp_path)
-    assert (usual["draws"], usual["options"], usual["where"]) == (200, {}, JobEngine())
-    assert given == {
-        "draws": 3,
-        "seed": 4,
-        "options": {"method": "ls"},
-        "agents": ["a.json"],
-        "standards": True,
-        "progress": None,
-        "designs": ["pid", "lqg"],
-        "where": JobEngine("local", 2),
-    }
 
 
 @pytest.mark.parametrize(

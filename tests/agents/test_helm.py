@@ -206,7 +206,7 @@ def test_what_steers_no_route_and_no_rate_is_refused():
     ):
         Helm(LQ_MARINER, None, Limits(), rate=0.01)
     with pytest.raises(
-        InputError, match=r"rate of turn: 1 found, expected .* rad/s, to a heading"
+        InputError, match=r"rate of turn: expected .* \(rad/s, to a heading\), got 1"
     ):
         Helm(TURN_RATE, 0.5, Limits(), rate=1.0)
 
@@ -240,7 +240,7 @@ def test_limits_are_those_of_the_page():
         told |= dict(zip(re.findall(r"`(\w+)`", names), numbers, strict=False))
     limits = Limits()
     assert vars(limits) == {name: told[name] for name in vars(limits)}
-    with pytest.raises(InputError, match="late_s: 0"):
+    with pytest.raises(InputError, match="late_s: expected a number > 0"):
         Limits(late_s=0.0)
 
 

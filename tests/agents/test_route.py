@@ -73,8 +73,8 @@ def test_a_route_reaches_as_far_as_a_plane_and_turns_fit_between_waypoints():
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        ("1,2\n89.1,3\n", r"line 3 \(data row 2\), column 'latitude': 89.1 found"),
-        ("1,2\n1,-180.5\n", r"line 3 \(data row 2\), column 'longitude': -180.5 found"),
+        ("1,2\n89.1,3\n", r"line 3 \(data row 2\), column 'latitude': .*, got 89.1"),
+        ("1,2\n1,-180.5\n", "column 'longitude': .*, got -180.5"),
         ("1,2\n", "route.csv: expected at least 2 waypoints, got 1"),
         ("1,2\n5,2\n", r"route.csv: waypoints: expected .* got 442.* km"),
     ],

@@ -270,7 +270,7 @@ def test_an_address_that_never_works_is_refused_at_once():
 @pytest.mark.parametrize("name", ["speed_up", "heading", "rate"])
 def test_what_is_no_number_is_refused_before_anything_is_opened(name):
     given = {"heading": 0.1, "rate": 0.001} | {name: math.nan}
-    with pytest.raises(InputError, match=f"{name}: nan found"):
+    with pytest.raises(InputError, match=f"{name}: expected a number, got nan"):
         asyncio.run(steer(PID_MARINER, "usb:1", **given))
 
 
@@ -287,9 +287,7 @@ def test_a_simulated_ship_keeps_time_and_runs_so_many_times_as_fast():
 
     with asyncio.Runner(loop_factory=no_waiting) as runner:
         runner.run(sails())
-        with pytest.raises(
-            InputError, match="speed_up: 0 found, expected a number > 0"
-        ):
+        with pytest.raises(InputError, match="speed_up: expected a number > 0, got 0"):
             runner.run(simulate_ship(ship, "udp:127.0.0.1:9", speed_up=0.0))
     assert ship.steps == 600
     assert steps[0] == pytest.approx(59.9 / 10.0)
@@ -407,12 +405,8 @@ def test_the_command_simulates_the_ship_that_is_asked_for_and_drops_sentences():
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (
-            ["--drop", "HDT"],
-            "--drop: 'HDT' found, expected name=value, such as --drop HDT=60",
-        ),
-        (["--drop", "hdt='late'"], "--drop hdt: 'late' .*found, expected"),
-        (["--drop", "hdt=-1"], "--drop hdt: -1 found, expected a number >= 0"),
+        (["--drop", "HDT"], "--drop: expected name=value, such as --drop HDT=60"),
+        (["--drop", "hdt='late'"], "--drop hdt: expected a number >= 0, got 'late'"),
         (
             ["--drop", "XYZ=3"],
             "drop: unknown key 'XYZ'. Known keys: 'APB', 'BWC', 'HDT', 'RMC', 'ROT'",

@@ -1,0 +1,93 @@
+"""The walks of `docs/architecture.md`: a journey enters the functions that its walk names, in their order."""
+
+import asyncio
+import re
+import sys
+from pathlib import Path
+from threading import Thread
+
+import pytest
+from typer.testing import CliRunner
+
+from agents import LQ, load_agent
+from agents.cli import app
+from agents.deployment.simulated import SimulatedShip, simulate_ship
+from shipgym import example_ship, load_model
+from tests.agents.steering import free_port
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+#: A file and a function of it.
+STEP = re.compile(r"`((?:shipgym|identification|agents)/[\w/]+\.py)`: `([\w.]+)`")
+
+
+def run(*arguments):
+    result = CliRunner().invoke(app, [str(one) for one in arguments])
+    assert result.exit_code == 0, result.output
+
+
+def log_to_model(folder):
+    run("identify", example_ship(), "--structure", "abkowitz", "--out", folder / "ship")
+
+
+def model_to_autopilot(folder):
+    autopilot = LQ.from_model(load_model("mariner-tls-svm"))
+    autopilot.predict([0.0] * len(autopilot.observation_names))
+    autopilot.save(folder / "lq.json")
+    load_agent(folder / "lq.json")
+
+
+def cell(folder):
+    arguments = (
+        "--tasks sharp-turns --controllers lq --episodes 1 --workers 1 --no-page --out"
+    )
+    run("benchmark", *arguments.split(), folder / "results")
+
+
+def helm(folder):
+    model = load_model("mariner-tls-svm")
+    LQ.from_model(model).save(folder / "lq.json")
+    address = f"tcp:127.0.0.1:{free_port()}"
+    passage = simulate_ship(SimulatedShip(model), address, duration=60.0, speed_up=20.0)
+    ship = Thread(target=asyncio.run, args=(passage,))
+    ship.start()
+    options = ["--heading", 5, "--duration", 40, "--speed-up", 20]
+    run("steer", folder / "lq.json", "--nmea", address, *options)
+    ship.join()
+
+
+WALKS = {
+    "From a log to a model": log_to_model,
+    "From a model to an autopilot": model_to_autopilot,
+    "A cell of the benchmark": cell,
+    "The helm": helm,
+}
+
+
+def entered(journey, folder):
+    """Files and functions of the project in the order in which a journey first enters them."""
+    seen = {}
+
+    def note(frame, event, _):
+        code = frame.f_code
+        if event == "call" and code not in seen and code.co_filename.startswith(root):
+            seen[code] = code.co_filename.removeprefix(root), code.co_qualname
+
+    root = f"{ROOT}/"
+    sys.setprofile(note)
+    try:
+        journey(folder)
+    finally:
+        sys.setprofile(None)
+    return list(seen.values())
+
+
+@pytest.mark.parametrize("title", WALKS)
+def test_a_journey_enters_what_its_walk_names(title, tmp_path):
+    _, _, section = PAGE.partition(f"## {title}\n")
+    section, _, _ = section.partition("\n## ")
+    named = list(dict.fromkeys(STEP.findall(re.sub(r"\s+", " ", section))))
+    assert len(named) > 10
+    order = entered(WALKS[title], tmp_path)
+    assert not [step for step in named if step not in order]
+    assert sorted(named, key=order.index) == named
