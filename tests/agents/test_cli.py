@@ -32,21 +32,6 @@ def shipgym(*arguments):
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
-def test_what_is_for_verification_alone_is_refused_without_it(tmp_path):
-    for option in (
-        ("--allow-code", "mine:make"),
-        ("--sample", "8"),
-        ("--tolerance", "0.1"),
-    ):
-        answer = shipgym("benchmark", "--out", tmp_path / "out", *option)
-        assert answer.exit_code == 2
-        assert (
-            "--allow-code, --sample and --tolerance are for --verify alone, leave"
-            " them out" in answer.output
-        )
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.fixture
 def broken(demo, tmp_path):
     """Writes the demo's ship file with one thing replaced."""
