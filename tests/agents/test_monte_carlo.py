@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from agents.engines.jobs import JobEngine
+from agents.jobs import JobEngine
 
 from agents import LQ, PID, sail
 from agents.verification.index_uncertainty import (

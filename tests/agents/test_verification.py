@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from agents.engines.jobs import JobEngine
+from agents.jobs import JobEngine
 
 from agents import PID, WheelOver
 from agents.verification.chain import build_autopilot, stage, with_standards

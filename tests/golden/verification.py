@@ -14,7 +14,7 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from agents.engines.jobs import HERE
+from agents.jobs import HERE
 
 from agents import LQ, PID, WheelOver
 from agents.verification import chain, steered
