@@ -214,7 +214,7 @@ def test_settings_of_a_comparison_go_to_the_methods_that_have_them(demo):
     found = compare_ship(ship, settings, None, " ls ,ls-svm")
     assert found.left_out == {"ls": ("C",)}
     assert found.results["ls-svm"].settings["method"]["C"] == 2.0
-    assert {one.structure for one in found.standings} == {"nomoto"}
+    assert {one.structure for one in found.ranked} == {"nomoto"}
     assert found.best.settings["samples"]["rule"] == "euler"
 
 
