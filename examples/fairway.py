@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 
 from shipgym.tasks.contract import (
     Flag,
-    Seen,
+    ObservationSpec,
     Setting,
     at_service_speed,
     clip,
@@ -36,7 +36,7 @@ class Settings(NamedTuple):
 
 
 class State(NamedTuple):
-    course: float  # rad, to steer; shown in pictures
+    heading_setpoint: float  # rad, to steer; shown in pictures
     cross_track: float  # m, positive to starboard
     limit: float  # m/s, in force
     speeding: Flag
@@ -49,17 +49,25 @@ class Reward(NamedTuple):
 
 
 class Observation(NamedTuple):
-    heading_sin: Annotated[float, Seen(-1.0, 1.0)]
-    heading_cos: Annotated[float, Seen(-1.0, 1.0)]
+    heading_sin: Annotated[float, ObservationSpec(-1.0, 1.0)]
+    heading_cos: Annotated[float, ObservationSpec(-1.0, 1.0)]
     yaw_rate: Annotated[
-        float, Seen(-5.0, 5.0, "rad/s", lambda ship, _: ship.speed / ship.length)
+        float,
+        ObservationSpec(-5.0, 5.0, "rad/s", lambda ship, _: ship.speed / ship.length),
     ]
-    surge: Annotated[float, Seen(-2.0, 3.0, "m/s", lambda ship, _: ship.speed)]
+    surge: Annotated[
+        float, ObservationSpec(-2.0, 3.0, "m/s", lambda ship, _: ship.speed)
+    ]
     cross_track: Annotated[
-        float, Seen(-2.0, 2.0, "m", lambda ship, s: s.half_width * ship.length)
+        float,
+        ObservationSpec(-2.0, 2.0, "m", lambda ship, s: s.half_width * ship.length),
     ]
-    limit: Annotated[float, Seen(0.0, 1.0, "m/s", lambda ship, _: ship.speed)]
-    to_zone: Annotated[float, Seen(0.0, 1.0, "m", lambda ship, _: 8.0 * ship.length)]
+    limit: Annotated[
+        float, ObservationSpec(0.0, 1.0, "m/s", lambda ship, _: ship.speed)
+    ]
+    to_zone: Annotated[
+        float, ObservationSpec(0.0, 1.0, "m", lambda ship, _: 8.0 * ship.length)
+    ]
 
 
 def begin(ship, settings, random, plan):

@@ -28,7 +28,7 @@ from shipgym import InputError
 from shipgym.engine.records import field_types
 from shipgym.files import read_toml
 from shipgym.tasks import path_following
-from shipgym.tasks.contract import Seen
+from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.scales import rounded_interval
 from shipgym.tasks.steering import Extras, Helm
 
@@ -213,7 +213,7 @@ def observation_bounds() -> dict[str, tuple[float, float]]:
     for record in (Helm, Extras, path_following.Observation):
         for name, kind in field_types(record, notes=True).items():
             for note in getattr(kind, "__metadata__", ()):
-                if isinstance(note, Seen):
+                if isinstance(note, ObservationSpec):
                     bounds[name] = (note.low, note.high)
     return bounds
 

@@ -10,7 +10,7 @@ from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, placed
 from shipgym.tasks.guidance import Path
-from shipgym.tasks.path_following import Fix, fix, leg_from, next_turn, turned_off
+from shipgym.tasks.planned_legs import Fix, fix, leg_after, leg_from, turn_is_over
 from shipgym.trials.navigation import local_metres
 from shipgym.trials.readers.csv_file import read_csv
 
@@ -90,14 +90,14 @@ class Route:
         """Direction of the path beside the ship, distance from it and turns ahead; position in rad."""
         here = self._fix(latitude, longitude)
         leg = self.leg
-        self.ended = leg.turn == 0.0 and here.way >= leg.turn_at
+        self.ended = leg.turn == 0.0 and here.along_track >= leg.turn_at
         turn_to_go = max(fabs(leg.turn) - here.turned, 0.0)
         return {
             "set_point": leg.course + copysign(here.turned, leg.turn),
-            "cross_track": here.cross,
-            "next_turn_distance": leg.turn_at - here.way,
+            "cross_track": here.cross_track,
+            "next_turn_distance": leg.turn_at - here.along_track,
             "next_turn_angle": copysign(turn_to_go, leg.turn),
-            "second_turn_distance": leg.second_at - here.way,
+            "second_turn_distance": leg.second_at - here.along_track,
             "second_turn_angle": leg.second_turn,
         }
 
@@ -109,10 +109,7 @@ class Route:
         )
         position = float(north), float(east)
         here = fix(*position, self.leg, scale, scale)
-        while turned_off(self.leg, here.way, scale, scale):
-            arc = scale.turn_radius * fabs(self.leg.turn)
-            end_of_turn = self.leg.turn_at + arc
-            waypoint = next_turn(int(self.leg.number), self.plan)
-            self.leg = leg_from(waypoint, end_of_turn, scale.turn_radius, self.plan)
+        while turn_is_over(self.leg, here.along_track, scale.turn_radius):
+            self.leg = leg_after(self.leg, scale.turn_radius, self.plan)
             here = fix(*position, self.leg, scale, scale)
         return here

@@ -144,7 +144,9 @@ class EpisodeProgram:
     def _task_hooks(self) -> dict[str, Any]:
         """Functions of the task, and what its records are used for."""
         task = self.task
-        bounds = {path: (seen.low, seen.high) for path, seen in task.seen.items()}
+        bounds = {
+            path: (spec.low, spec.high) for path, spec in task.observations.items()
+        }
         return {
             "task_begin": task.begin,
             "task_step": task.step,

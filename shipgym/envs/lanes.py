@@ -181,7 +181,7 @@ class Lanes:
         self._states[:, row : row + LANES] = lanes.reshape(-1, LANES)
 
     def physical_state(self) -> dict[str, Floats]:
-        """State, course, commands and, unless it is calm, weather, in SI units.
+        """State, set-point, commands and, unless it is calm, weather, in SI units.
 
         Each is of shape (num_envs,). Heading and yaw rate are without the first-order
         motion in waves, which has names of its own, as has the weather
@@ -189,8 +189,8 @@ class Lanes:
         steer, rad.
         """
         state = {name: self.read(name) for name in self.model.state_names}
-        if "course" in self.program.state_rows["task_state"].present:
-            state["set_point"] = self.read("course")
+        if "heading_setpoint" in self.program.state_rows["task_state"].present:
+            state["set_point"] = self.read("heading_setpoint")
         limit = self._ship_number("rudder_limit")
         state["delta_command"] = self.read("rudder_command") * limit
         if "n" in self.model.command_names:
@@ -344,7 +344,7 @@ def ship_columns(
             known[kind] = weather_column(model, sea, step, task.water_depth)
 
         ship = Ship(*numbers[: len(Ship._fields)].tolist())
-        scales = [task.scale(path, ship) for path in task.definition.seen]
+        scales = [task.scale(path, ship) for path in task.definition.observations]
         factors = [1.0 / scale if scale else 0.0 for scale in scales]
         parameters = known.get(kind, np.zeros(0))
         columns.append([*numbers, *envelope_numbers(model), *parameters, *factors])

@@ -199,7 +199,8 @@ def _differ(
 def _often_clipped(task: Task, seen: dict[str, list[float]]) -> Iterator[str]:
     """Observations that are often beyond their bounds."""
     for path, values in seen.items():
-        low, high = task.definition.seen[path].low, task.definition.seen[path].high
+        spec = task.definition.observations[path]
+        low, high = spec.low, spec.high
         beyond = [
             value for value in values if value < low - BEYOND or value > high + BEYOND
         ]

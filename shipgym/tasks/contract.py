@@ -1,11 +1,12 @@
-"""What a task, a reward and a sensor set are: files of plain functions on named records.
+"""Contract of tasks, rewards and sensor sets: files of functions on named records.
 
 A task file defines (`shipgym/tasks/course_keeping.py` is one)
 
 * `Settings`, `State`, `Reward` and `Observation`, named tuples of floats. `Settings`
   has defaults, which are keywords of its environment; a last field annotated `Numbers`
   is a list. The reward is the sum of the fields of `Reward`, which `info` has as
-  `reward_NAME`. Each field of `Observation` is annotated with a `Seen`.
+  `reward_NAME`. Each field of `Observation` is annotated with an
+  `ObservationSpec`.
 * `begin(ship, settings, random, plan) -> (Motion, State)`: how an episode begins.
 * `step(motion, state, interval, ship, settings) -> (State, Reward, failed, arrived)`:
   after an interval.
@@ -15,7 +16,7 @@ A task file defines (`shipgym/tasks/course_keeping.py` is one)
 and may define
 
 * `due(motion, state, interval, ship, settings) -> bool` and `on_event(motion, state,
-  interval, ship, settings, random, plan) -> State`: what comes seldom, such as the next
+  interval, ship, settings, random, plan) -> State`: rare events, such as the next
   set-point.
 * `worst_cost(settings) -> float`: the largest cost of a step. A ship that is lost pays
   it for the rest of the episode, so that ending early never pays.
@@ -28,7 +29,7 @@ and may define
   without a ship, `model` None, then with one; `listed(value)`: what a keyword of
   another kind, such as a list of waypoints, means as numbers.
 
-A field `course` of `State`, rad, is the course to steer in `physical_state()` and in
+A field `heading_setpoint` of `State`, rad, is `set_point` in `physical_state()` and in
 pictures.
 
 A reward file defines `Reward` and `reward(motion, state, interval, ship, settings) ->
@@ -63,28 +64,30 @@ Scale = float | Callable[[Ship, Any], float]
 
 
 class Random(NamedTuple):
-    """The random numbers of one episode: each is a function of the episode and of its own number alone."""
+    """Key of the random numbers of one episode.
+
+    Each number is a function of the key, the episode and its own number alone.
+    """
 
     key: Any  # uint64
     episode: Any  # uint64
 
 
 def drawn(random: Random, number: int, low: float, high: float) -> float:
-    """Random number of an episode, by its number, in [low, high)."""
+    """Draw the random number of an episode that has a number, in [low, high)."""
     return uniform(random.key, random.episode, np.uint64(number), low, high)
 
 
 class Interval(NamedTuple):
-    """What the engine knows of the control interval that is over."""
+    """Control interval that is over."""
 
     dt: float  # s
     steps: float  # control intervals so far
     rudder_before: float  # rad, rudder at its beginning
     rudder_command: float  # part of the limit
     shaft_command: float  # part of the shaft speed at service speed
-    envelope_distance: (
-        float  # how many times further out than the training data (`Envelope.distance`)
-    )
+    # how many times further out than the training data (`Envelope.distance`)
+    envelope_distance: float
     extrapolating: float  # 1 where the ship was outside that data
 
 
@@ -107,19 +110,20 @@ class Readings(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Seen:
-    """How a quantity is observed.
+class ObservationSpec:
+    """Bounds, unit and scale of an observation.
 
     Attributes
     ----------
     low, high : float
         Bounds of the observation.
     unit : str
-        Of the quantity.
+        Unit of the quantity.
     scale : float or callable
         Physical value of an observation of 1, or `(ship, settings) -> float`.
     option : str
-        Which shows it: `roll`, `shaft` or `shaft speed`; by default it is always shown.
+        `roll`, `shaft` or `shaft speed`, which the observation is made for; by default
+        it is always made.
     """
 
     low: float
@@ -136,11 +140,11 @@ class Setting:
     Attributes
     ----------
     about : str
-        What it is, a sentence.
+        Its meaning, a sentence.
     at_least, at_most, above : float or None
         Its bounds.
     whole : bool
-        Whether it is a whole number.
+        Whether it is an integer.
     """
 
     about: str
@@ -161,10 +165,10 @@ __all__ = [
     "Interval",
     "Motion",
     "Numbers",
+    "ObservationSpec",
     "Random",
     "Readings",
     "Scale",
-    "Seen",
     "Setting",
     "Ship",
     "arctan2",

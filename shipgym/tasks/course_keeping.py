@@ -77,9 +77,9 @@ class Settings(NamedTuple):
 
 
 class State(NamedTuple):
-    """How an episode goes."""
+    """How far an episode has come."""
 
-    course: float  # rad, to steer
+    heading_setpoint: float  # rad
     next_change: float  # step of the next new set-point
     changes: float  # how many there were
     integral: float  # of the heading error, rad s
@@ -87,7 +87,7 @@ class State(NamedTuple):
 
 
 class Reward(NamedTuple):
-    """Its parts."""
+    """Parts of the reward."""
 
     heading: float
     steering: SteeringReward
@@ -103,42 +103,45 @@ class Observation(NamedTuple):
 def begin(
     ship: Ship, settings: Settings, random: Random, plan: Numbers
 ) -> tuple[Motion, State]:
-    """On a random heading, with a first set-point."""
+    """Begin an episode on a random heading, with a first set-point."""
     heading = drawn(random, 0, -pi, pi)
     motion = at_service_speed(0.0, 0.0, heading, ship)
     state = changed(State(heading, 0.0, 0.0, 0.0, 0.0), 0.0, settings, random)
+    error = wrap(state.heading_setpoint - heading)
     return motion, State(
-        state.course, state.next_change, 1.0, 0.0, wrap(state.course - heading)
+        heading_setpoint=state.heading_setpoint,
+        next_change=state.next_change,
+        changes=1.0,
+        integral=0.0,
+        heading_error=error,
     )
 
 
 def changed(state: State, steps: float, settings: Settings, random: Random) -> State:
-    """The next heading to keep, listed or drawn, and the step at which it changes again."""
-    number = int(
-        max(0.0, state.changes)
-    )  # not before the first, whatever a checkpoint holds
-    largest = radians(settings.course_change_deg)
-    change = drawn(random, 1 + 2 * number, -largest, largest)
-    wait = floor(
-        settings.change_interval_steps * drawn(random, 2 + 2 * number, 0.5, 1.5)
-    )
+    """Change the set-point, as listed or drawn, and say when it changes again."""
+    number = int(max(0.0, state.changes))  # a checkpoint may hold anything
     listed = settings.course_changes_deg
     if len(listed) > 0:
         change = radians(listed[number]) if number < len(listed) else 0.0
-        wait = settings.change_interval_steps
+        wait = float(settings.change_interval_steps)
+    else:
+        largest = radians(settings.course_change_deg)
+        change = drawn(random, 1 + 2 * number, -largest, largest)
+        part = drawn(random, 2 + 2 * number, 0.5, 1.5)
+        wait = floor(settings.change_interval_steps * part)
     return State(
-        state.course + change,
-        steps + max(wait, 1.0),
-        state.changes + 1.0,
-        state.integral,
-        state.heading_error,
+        heading_setpoint=state.heading_setpoint + change,
+        next_change=steps + max(wait, 1.0),
+        changes=state.changes + 1.0,
+        integral=state.integral,
+        heading_error=state.heading_error,
     )
 
 
 def due(
     motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings
 ) -> bool:
-    """Whether the set-point changes."""
+    """Return whether the set-point changes."""
     return interval.steps >= state.next_change
 
 
@@ -151,27 +154,31 @@ def on_event(
     random: Random,
     plan: Numbers,
 ) -> State:
-    """A new set-point."""
+    """Change the set-point."""
     return changed(state, interval.steps, settings, random)
 
 
 def step(
     motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings
 ) -> tuple[State, Reward, bool, bool]:
-    """The cost of an interval, and whether control is lost."""
-    error = wrap(state.course - motion.psi)
-    integral = integrated(state.integral, error, interval, ship, settings.weights)
-    scaled = error * (1.0 / radians(settings.weights.heading_scale_deg))
+    """Judge an interval: its cost, and whether control is lost."""
+    weights = settings.weights
+    error = wrap(state.heading_setpoint - motion.psi)
+    integral = integrated(state.integral, error, interval, ship, weights)
+    scaled = error * (1.0 / radians(weights.heading_scale_deg))
     reward = Reward(
-        -scaled * scaled, steering_reward(motion, interval, ship, settings.weights)
+        heading=-scaled * scaled,
+        steering=steering_reward(motion, interval, ship, weights),
+    )
+    after = State(
+        heading_setpoint=state.heading_setpoint,
+        next_change=state.next_change,
+        changes=state.changes,
+        integral=integral,
+        heading_error=error,
     )
     lost = fabs(error) > radians(settings.max_heading_error_deg)
-    return (
-        State(state.course, state.next_change, state.changes, integral, error),
-        reward,
-        lost,
-        False,
-    )
+    return after, reward, lost, False
 
 
 def worst_cost(settings: Settings) -> float:
@@ -183,8 +190,8 @@ def worst_cost(settings: Settings) -> float:
 def observe(
     readings: Readings, state: State, interval: Interval, ship: Ship, settings: Settings
 ) -> Observation:
-    """What every autopilot sees."""
+    """Observe what every autopilot does."""
     return Observation(
-        helm(state.course, state.integral, readings, interval, ship),
-        extras(readings, interval, ship),
+        helm=helm(state.heading_setpoint, state.integral, readings, interval, ship),
+        extras=extras(readings, interval, ship),
     )

@@ -1,8 +1,8 @@
-"""A task file as the engine takes it: read from a module, path or name, checked, its reward replaced."""
+"""Definitions of tasks: read from a module, path or name, checked, rewards replaced."""
 
 import importlib
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -18,19 +18,18 @@ from shipgym.checks import (
     check_whole,
     did_you_mean,
     quoted,
-    shown,
+    unexpected,
 )
 from shipgym.engine.hooks import reward_of_another, step_of_task
 from shipgym.engine.records import Record, field_types, is_record, leaves
 from shipgym.engine.specialise import is_shipped
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function
-from shipgym.tasks.contract import Seen
+from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.source import (
     Configurable,
     annotated,
     check_namespace,
-    keywords,
     read_source,
 )
 
@@ -48,8 +47,7 @@ FUNCTIONS = {
     "listed": ("value",),
 }
 NEEDED = ("begin", "step", "observe")
-#: What shows an observation beside the others: an environment with `roll`, or with
-#: orders to the shaft.
+#: Options of an environment that observations are made for.
 OPTIONS = ("", "roll", "shaft", "shaft speed")
 #: Names in `info` that are the engine's.
 TAKEN = (
@@ -68,7 +66,7 @@ TASKS = {
 
 
 def never_due(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> bool:
-    """Of a task without events."""
+    """Default `due`: the task has no events."""
     return False
 
 
@@ -81,29 +79,37 @@ def no_event(
     random: Any,
     plan: Any,
 ) -> Any:
-    """Of a task without events."""
+    """Default `on_event`: the task has no events."""
     return state
 
 
 def no_worst_cost(settings: Any) -> float:
-    """Of a task in which a lost ship costs nothing more."""
+    """Default `worst_cost`: a lost ship costs nothing more."""
     return 0.0
+
+
+def no_plan(settings: Any) -> int:
+    """Default `plan_length`: the task has no plan."""
+    return 0
+
+
+def no_check(settings: Any, model: Any) -> None:
+    """Default `check`: all settings fit."""
 
 
 @dataclass(frozen=True)
 class TaskDefinition(Configurable):
-    """Records and functions of a task, by their names in its file (`shipgym.tasks.contract`).
+    """Records and functions of a task by their names in its file.
+
+    `shipgym.tasks.contract` says what each is.
 
     Attributes
     ----------
     name : str
-        Of the task.
     source : str
-        Where it was read from, for messages.
+        Place of the file, for messages.
     Settings, State, Reward, Observation : type
-        Its records.
     begin, step, observe, due, on_event, worst_cost, plan_length, check, listed : callable
-        Its functions.
     reported : tuple of str
         Fields of the state that `info` has.
     episode_steps : int
@@ -119,71 +125,76 @@ class TaskDefinition(Configurable):
     due: Callable[..., Any] = never_due
     on_event: Callable[..., Any] = no_event
     worst_cost: Callable[..., Any] = no_worst_cost
-    plan_length: Callable[[Any], int] = lambda settings: 0
-    check: Callable[[Any, Any], None] = lambda settings, model: None
+    plan_length: Callable[[Any], int] = no_plan
+    check: Callable[[Any, Any], None] = no_check
     listed: Callable[[Any], Any] = np.asarray
     reported: tuple[str, ...] = ()
     episode_steps: int = 600
 
     @cached_property
-    def seen(self) -> dict[str, Seen]:
-        """How each quantity is observed, by its path in `Observation`."""
-        return _seen(self.Observation)
+    def observations(self) -> dict[str, ObservationSpec]:
+        """Bounds, unit and scale of each observation, by its path in `Observation`."""
+        return _observations(self.Observation)
 
     @cached_property
     def flags(self) -> tuple[str, ...]:
         """Reported fields that are true or false."""
         kinds = field_types(self.State, notes=True)
-        return tuple(
-            name
-            for name in self.reported
-            if bool in getattr(kinds[name], "__metadata__", ())
-        )
+        flags = []
+        for name in self.reported:
+            if bool in getattr(kinds[name], "__metadata__", ()):
+                flags.append(name)
+        return tuple(flags)
 
     @cached_property
     def reward_names(self) -> tuple[str, ...]:
         """Names of the parts of its reward."""
-        return tuple(path.rpartition(".")[2] for path in leaves(self.Reward))
+        return last_names(leaves(self.Reward))
 
     @property
     def shipped(self) -> bool:
-        """Whether its reward is one of the package's."""
+        """True where its reward is one of the package's."""
         return is_shipped(self.Reward)
 
     @property
     def reward_source(self) -> str:
-        """The file of its reward, for messages."""
-        return str(
-            getattr(sys.modules.get(self.Reward.__module__), "__file__", None)
-            or self.source
-        )
+        """File of its reward, for messages."""
+        module = sys.modules.get(self.Reward.__module__)
+        return getattr(module, "__file__", None) or self.source
 
     def make_settings(self, options: Mapping[str, Any]) -> Any:
-        """Settings by keywords; InputError for an unknown one, or a value that does not fit."""
+        """Make settings by keywords.
+
+        InputError for an unknown one, or a value that does not fit.
+        """
         settings = super().make_settings(options)
         asked(self.check, settings, None)
         return settings
 
 
-def _seen(record: Record, prefix: str = "") -> dict[str, Any]:
-    """How the fields of a record, and of those within it, are observed, by their paths."""
-    paths: dict[str, Any] = {}
-    for name, kind, seen in annotated(record, Seen):
-        paths |= (
-            _seen(kind, f"{prefix}{name}.")
-            if is_record(kind)
-            else {prefix + name: seen}
-        )
-    return paths
+def _observations(record: Record, prefix: str = "") -> dict[str, Any]:
+    """Annotations of the fields of a record, and of those within it, by their paths."""
+    specs: dict[str, Any] = {}
+    for name, kind, spec in annotated(record, ObservationSpec):
+        if is_record(kind):
+            specs |= _observations(kind, f"{prefix}{name}.")
+        else:
+            specs[prefix + name] = spec
+    return specs
+
+
+def last_names(paths: Iterable[str]) -> tuple[str, ...]:
+    """Last names of paths such as `helm.rudder`."""
+    return tuple(path.rpartition(".")[2] for path in paths)
 
 
 #: Definitions by themselves: one that is read again is the same object, so that it is
-#: looked at once.
+#: compiled once.
 _KNOWN: dict[TaskDefinition, TaskDefinition] = {}
 
 
 def read_definition(source: Any, reward: Any = None) -> TaskDefinition:
-    """The task of a module, a file, or one of the package's by name.
+    """Read the task of a module, a file, or one of the package's by name.
 
     Raises InputError if something is missing or of another form, naming it.
 
@@ -195,122 +206,120 @@ def read_definition(source: Any, reward: Any = None) -> TaskDefinition:
     reward : str, Path or module, optional
         The path of a file, or a module, whose reward takes the place of the task's.
     """
-    definition = (
-        source if isinstance(source, TaskDefinition) else _definition(*_named(source))
-    )
+    if isinstance(source, TaskDefinition):
+        definition = source
+    else:
+        definition = _definition(source)
     if reward is not None:
         definition = _with_reward(definition, reward)
     _check_names(definition)
     return _KNOWN.setdefault(definition, definition)
 
 
-def _named(source: Any) -> tuple[Any, str]:
+def _definition(source: Any) -> TaskDefinition:
     if isinstance(source, str) and source in TASKS:
-        return read_source(importlib.import_module(TASKS[source]))
-    if isinstance(source, str) and Path(source).suffix != ".py":
+        source = importlib.import_module(TASKS[source])
+    elif isinstance(source, str) and Path(source).suffix != ".py":
         raise InputError(
-            f"task: {source!r} found, expected the path of a .py file or one of"
-            f" {quoted(TASKS)}.{did_you_mean(source, TASKS)}"
+            f"task: expected the path of a .py file or one of {quoted(TASKS)}, got"
+            f" {source!r}.{did_you_mean(source, TASKS)}"
         )
-    return read_source(source)
-
-
-def _definition(namespace: Any, where: str) -> TaskDefinition:
+    namespace, where = read_source(source)
     optional = [name for name in FUNCTIONS if name not in NEEDED]
     found = check_namespace(namespace, where, RECORDS, FUNCTIONS, optional)
-    reported = getattr(namespace, "REPORTED", ())
-    expected = f"expected a tuple of fields of State, none of {TAKEN}"
-    if not isinstance(reported, tuple | list):
-        raise InputError(f"{where}: REPORTED: {shown(reported)} found, {expected}")
-    for name in reported:
-        if name not in found["State"]._fields or name in TAKEN:
-            raise InputError(f"{where}: REPORTED: {shown(name)} found, {expected}")
+    name = check_text(getattr(namespace, "NAME", Path(where).stem), f"{where}: NAME")
+    reported = _reported(namespace, found["State"], f"{where}: REPORTED")
+    steps = getattr(namespace, "EPISODE_STEPS", TaskDefinition.episode_steps)
+    check_whole(steps, f"{where}: EPISODE_STEPS", at_least=1)
+
     definition = TaskDefinition(
-        name=check_text(getattr(namespace, "NAME", Path(where).stem), f"{where}: NAME"),
-        source=where,
-        reported=tuple(reported),
-        episode_steps=check_whole(
-            getattr(namespace, "EPISODE_STEPS", 600),
-            f"{where}: EPISODE_STEPS",
-            at_least=1,
-        ),
-        **found,
+        name=name, source=where, reported=reported, episode_steps=steps, **found
     )
-    for path, seen in definition.seen.items():
-        _check_seen(seen, f"{where}: Observation.{path}")
+    for path, spec in definition.observations.items():
+        _check_observation(spec, f"{where}: Observation.{path}")
     return definition
 
 
-def _check_seen(seen: Seen | None, where: str) -> None:
-    if seen is None:
+def _reported(namespace: Any, state: Any, where: str) -> tuple[str, ...]:
+    """Check which fields of a state are to be reported."""
+    reported = getattr(namespace, "REPORTED", ())
+    expected = f"a tuple of fields of State, none of {TAKEN}"
+    if not isinstance(reported, tuple | list):
+        raise unexpected(where, expected, reported)
+    for name in reported:
+        if name not in state._fields or name in TAKEN:
+            raise unexpected(where, expected, name)
+    return tuple(reported)
+
+
+def _check_observation(spec: ObservationSpec | None, where: str) -> None:
+    if spec is None:
         raise InputError(
-            f"{where}: no bounds found, expected Annotated[float, Seen(low, high, unit,"
-            " scale)]"
+            f"{where}: expected Annotated[float, ObservationSpec(low, high, unit,"
+            " scale)], got no bounds"
         )
-    check_number(seen.low, f"{where}: lower bound")
-    check_number(seen.high, f"{where}: upper bound", above=seen.low)
-    check_choice(seen.option, OPTIONS, f"{where}: option")
-    check_text(seen.unit, f"{where}: unit")
-    if callable(seen.scale):
-        check_function(
-            seen.scale, 2, f"{where}: scale", "a function of ship and settings"
-        )
+    check_number(spec.low, f"{where}: lower bound")
+    check_number(spec.high, f"{where}: upper bound", above=spec.low)
+    check_choice(spec.option, OPTIONS, f"{where}: option")
+    check_text(spec.unit, f"{where}: unit")
+    where = f"{where}: scale"
+    if callable(spec.scale):
+        check_function(spec.scale, 2, where, "a function of ship and settings")
     else:
-        check_number(seen.scale, f"{where}: scale", above=0.0)
+        check_number(spec.scale, where, above=0.0)
 
 
 def _check_names(definition: TaskDefinition) -> None:
-    seen = tuple(path.rpartition(".")[2] for path in definition.seen)
-    settings = tuple(name for name, *_ in keywords(definition.Settings))
-    rewards = ("end", *definition.reward_names)
-    for kind, names in (
-        ("Reward", rewards),
-        ("Settings", settings),
-        ("Observation", seen),
-    ):
+    """Refuse two fields of one name; those of records within count as the record's."""
+    names_of = {
+        "Reward": ("end", *definition.reward_names),
+        "Settings": tuple(definition.settings),
+        "Observation": last_names(definition.observations),
+    }
+    for record, names in names_of.items():
         twice = [name for name in names if names.count(name) > 1]
         if twice:
+            where = definition.source
+            if record == "Reward":
+                where = definition.reward_source
             also = "; the engine has one of that name" if twice[0] == "end" else ""
-            where = definition.reward_source if kind == "Reward" else definition.source
             raise InputError(
-                f"{where}: {kind}: two fields named {twice[0]!r} found, expected names"
-                f" that differ{also}"
+                f"{where}: {record}: expected names that differ, got two fields"
+                f" {twice[0]!r}{also}"
             )
-
-
-#: `rewarded_step` with its places filled, one function for the same ones.
-_FILLED: dict[Any, FunctionType] = {}
 
 
 def rewarded_step(
     motion: Any, state: Any, interval: Any, ship: Any, settings: Any
 ) -> Any:
-    """What the task does in an interval, and what another's reward gives for it."""
+    """Step of a task with the reward of another file."""
     after, _, failed, arrived = step_of_task(motion, state, interval, ship, settings)
-    return (
-        after,
-        reward_of_another(motion, after, interval, ship, settings),
-        failed,
-        arrived,
-    )
+    reward = reward_of_another(motion, after, interval, ship, settings)
+    return after, reward, failed, arrived
+
+
+#: `rewarded_step` with its hooks filled, one function for the same ones.
+_FILLED: dict[Any, FunctionType] = {}
 
 
 def _with_reward(definition: TaskDefinition, source: Any) -> TaskDefinition:
-    """A task with the reward of another file: `Reward` and `reward`, or `Reward` and a whole `step`."""
+    """Replace the reward of a task by that of a file: `reward`, or a whole `step`."""
     namespace, where = read_source(source)
-    name = (
-        "step"
-        if hasattr(namespace, "step") and not hasattr(namespace, "reward")
-        else "reward"
-    )
+    has_step = hasattr(namespace, "step") and not hasattr(namespace, "reward")
+    name = "step" if has_step else "reward"
     functions = {name: MOMENT, "worst_cost": ("settings",)}
     found = check_namespace(namespace, where, ("Reward",), functions, ("worst_cost",))
     if name == "reward":
-        places = {
-            "__name__": __name__,
-            "step_of_task": definition.step,
-            "reward_of_another": found.pop(name),
-        }
-        step = FunctionType(rewarded_step.__code__, places, "rewarded_step")
-        found["step"] = _FILLED.setdefault(tuple(places.values()), step)
+        found["step"] = _filled(definition.step, found.pop("reward"))
     return replace(definition, **found)
+
+
+def _filled(step: Any, reward: Any) -> FunctionType:
+    """Fill the hooks of `rewarded_step`."""
+    hooks = {
+        "__name__": __name__,
+        "step_of_task": step,
+        "reward_of_another": reward,
+    }
+    function = FunctionType(rewarded_step.__code__, hooks, "rewarded_step")
+    return _FILLED.setdefault((step, reward), function)

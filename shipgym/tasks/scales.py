@@ -1,4 +1,4 @@
-"""How often an autopilot acts, and in which scales it is shown a ship: the same in every task.
+"""Control interval, and scales in which every autopilot observes a ship.
 
 Both follow from the ship alone, so that a design needs no task.
 """
@@ -11,17 +11,17 @@ from shipgym.arrays import Floats
 from shipgym.engine.records import field_types
 from shipgym.ships.manoeuvring_model import ship_of
 from shipgym.ships.ship_model import ShipModel
-from shipgym.tasks.contract import Seen
+from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.steering import Helm, Weights
 
 #: Control intervals in the time to travel one ship length, about.
 STEPS_PER_LENGTH = 20.0
-#: What every autopilot is shown, in order.
+#: Names of the observations of every autopilot, in order.
 OBSERVATION_NAMES: tuple[str, ...] = Helm._fields
 
 
 class _Settings(NamedTuple):
-    """What the scales depend on beside the ship, as it is by default."""
+    """Default settings that the scales depend on beside the ship."""
 
     weights: Weights = Weights()
 
@@ -34,27 +34,29 @@ def observation_scales(model: ShipModel) -> Floats:
     array of shape (8,)
         SI units.
     """
-    ship, settings = ship_of(model), _Settings()
-
+    ship = ship_of(model)
+    settings = _Settings()
     scales = []
-    for annotated in field_types(Helm, notes=True).values():
-        seen: Seen = annotated.__metadata__[0]
-        scale = seen.scale
+    for annotation in field_types(Helm, notes=True).values():
+        spec: ObservationSpec = annotation.__metadata__[0]
+        scale = spec.scale
         scales.append(scale(ship, settings) if callable(scale) else scale)
     return np.array(scales)
 
 
 def control_interval(model: ShipModel) -> float:
-    """About a twentieth of the time to travel one ship length, as 1, 2 or 5 times a power of ten, s."""
+    """Control interval of a ship, s: about a twentieth of the time to travel a length.
+
+    It is 1, 2 or 5 times a power of ten.
+    """
     return rounded_interval(model.travel_time)
 
 
 def rounded_interval(length_time: float) -> float:
-    """The same for a ship that travels her length in so many seconds."""
+    """Control interval of a ship that travels her length in a time, s."""
     wanted = length_time / STEPS_PER_LENGTH
     power = 10.0 ** np.floor(np.log10(wanted))
-
-    def distance(digit: float) -> float:
-        return float(abs(np.log(digit * power / wanted)))
-
-    return float(min((1.0, 2.0, 5.0, 10.0), key=distance) * power)
+    intervals = power * np.array([1.0, 2.0, 5.0, 10.0])
+    off = np.abs(np.log(intervals / wanted))
+    nearest = intervals[off.argmin()]
+    return float(nearest)

@@ -1,4 +1,4 @@
-"""Files such as tasks, rewards and sensor sets: read, checked for what lacks, and their settings made."""
+"""Files such as tasks, rewards and sensor sets: read, checked, and their settings made."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,23 +9,26 @@ from typing import Any
 
 import numpy as np
 
-from shipgym.checks import check_keys, check_number, check_whole
+from shipgym.checks import check_keys, check_number, check_whole, unexpected
 from shipgym.engine.records import Record, field_types, is_list, is_record, leaves
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function, load_file, refuse_closure
 from shipgym.tasks.contract import Setting
 
+UNBOUNDED = Setting("")
+
 
 def read_source(source: Any) -> tuple[Any, str]:
-    """The names that a file or module defines, and where, for messages."""
-    namespace = load_file(Path(source)) if isinstance(source, str | Path) else source
-    return namespace, str(
-        getattr(namespace, "__file__", None) or getattr(namespace, "__name__", source)
-    )
+    """Return the names that a file or module defines, and its place for messages."""
+    namespace = source
+    if isinstance(source, str | Path):
+        namespace = load_file(Path(source))
+    place = getattr(namespace, "__file__", None)
+    return namespace, str(place or getattr(namespace, "__name__", source))
 
 
 def kept_source(source: Any) -> Any:
-    """The same file for whoever reads it from another folder: paths are made absolute."""
+    """Make the path of a file absolute, for whoever reads it from another folder."""
     if isinstance(source, str | Path) and Path(source).suffix == ".py":
         return str(Path(source).resolve())
     return source
@@ -44,29 +47,36 @@ def check_namespace(
     and what is expected.
     """
     found = {}
-    for name in (*records, *functions):
+    for name in records:
+        record = _named(namespace, name, where, f"a NamedTuple {name!r} of floats")
+        if not is_record(record):
+            raise InputError(
+                f"{where}: {name}: expected a NamedTuple {name!r} of floats, got none"
+            )
+        _check_record(record, name, where)
+        found[name] = record
+
+    for name, arguments in functions.items():
         if name in optional and not hasattr(namespace, name):
             continue
-        what = f"a NamedTuple {name!r} of floats"
-        if name in functions:
-            what = f"a function {name}({', '.join(functions[name])})"
-        if not hasattr(namespace, name):
-            raise InputError(
-                f"{where}: no {name!r} found, expected {what} (see"
-                " shipgym.tasks.contract)"
-            )
-        found[name] = value = getattr(namespace, name)
-        if name not in functions:
-            if not is_record(value):
-                raise InputError(f"{where}: {name} is no NamedTuple, expected {what}")
-            _check_record(value, name, where)
-        else:
-            refuse_closure(value)
-            check_function(value, len(functions[name]), f"{where}: {name}", what)
+        what = f"a function {name}({', '.join(arguments)})"
+        function = _named(namespace, name, where, what)
+        refuse_closure(function)
+        check_function(function, len(arguments), f"{where}: {name}", what)
+        found[name] = function
     return found
 
 
+def _named(namespace: Any, name: str, where: str, what: str) -> Any:
+    if not hasattr(namespace, name):
+        raise InputError(
+            f"{where}: expected {what} (see shipgym.tasks.contract), got no {name!r}"
+        )
+    return getattr(namespace, name)
+
+
 def _check_record(record: Any, name: str, where: str) -> None:
+    """Refuse a record that holds anything but numbers, or settings without defaults."""
     try:
         kinds = field_types(record)
     except (NameError, TypeError) as error:
@@ -75,40 +85,50 @@ def _check_record(record: Any, name: str, where: str) -> None:
         ) from None
     if not leaves(record):
         raise InputError(
-            f"{where}: {name}: no annotated fields found, expected one number at least"
+            f"{where}: {name}: expected one number at least, got no annotated fields"
         )
+
     if name == "Settings":
         for field, setting, default in keywords(record):
             if isinstance(default, float | int):
-                _number(default, f"{where}: Settings.{field}: default", setting)
-    last = list(kinds)[-1]
+                checked_setting(default, f"{where}: Settings.{field}: default", setting)
+        for field in kinds:
+            if field not in record._field_defaults:
+                raise InputError(
+                    f"{where}: Settings.{field}: expected a default, got none"
+                )
+
     for field, kind in kinds.items():
+        place = f"{where}: {name}.{field}"
         default = record._field_defaults.get(field)
-        if name == "Settings" and field not in record._field_defaults:
-            raise InputError(
-                f"{where}: Settings.{field}: no default found, expected one"
-            )
         if is_record(kind):
             _check_record(kind, f"{name}.{field}", where)
-        elif is_list(kind) and not name.startswith("Settings"):
-            raise InputError(
-                f"{where}: {name}.{field}: {kind!r} found, expected a float"
-            )
-        elif isinstance(default, str) or (
-            field != last if is_list(kind) else not isinstance(default, Real | None)
-        ):
-            raise InputError(
-                f"{where}: {name}.{field}: {default!r} found, expected a number, or a"
-                " list as the last field"
-            )
+        elif not is_list(kind):
+            if not isinstance(default, Real | None):
+                raise unexpected(
+                    place, "a number, or a list as the last field", default
+                )
+        elif not name.startswith("Settings"):
+            raise unexpected(place, "a float", kind)
+        elif isinstance(default, str) or field != list(kinds)[-1]:
+            raise unexpected(place, "a number, or a list as the last field", default)
 
 
 @dataclass(frozen=True)
 class Configurable:
-    """What a file defines that has settings."""
+    """File that has settings.
+
+    Attributes
+    ----------
+    name : str
+    source : str
+        Place of the file, for messages.
+    Settings : type
+        Record of settings.
+    """
 
     name: str
-    source: str  # where it was read from, for messages
+    source: str
     Settings: Record
 
     @cached_property
@@ -117,53 +137,66 @@ class Configurable:
         return {name: setting for name, setting, _ in keywords(self.Settings)}
 
     def make_settings(self, options: Mapping[str, Any]) -> Any:
-        """Settings by keywords; InputError for an unknown keyword, or a value out of its range."""
+        """Make settings by keywords.
+
+        InputError for an unknown keyword, or a value out of its range.
+        """
         check_keys(options, self.settings, f"{self.name} options")
-        return make_settings(
-            self.Settings, options, getattr(self, "listed", np.asarray)
-        )
+        listed = getattr(self, "listed", np.asarray)
+        return make_settings(self.Settings, options, listed)
 
 
 def annotated(record: Record, kind: type) -> Iterator[tuple[str, Any, Any]]:
-    """Name and type of each field of a record, and what of a kind it is annotated with, if it is."""
+    """Name, type and annotation of a kind of each field of a record, None without one."""
     for name, hint in field_types(record, notes=True).items():
-        notes = [
-            note for note in getattr(hint, "__metadata__", ()) if isinstance(note, kind)
-        ]
-        own = hint.__origin__ if hasattr(hint, "__metadata__") else hint
-        yield name, own, notes[0] if notes else None
+        notes = getattr(hint, "__metadata__", ())
+        field_type = hint.__origin__ if notes else hint
+        found = None
+        for note in notes:
+            if isinstance(note, kind):
+                found = found or note
+        yield name, field_type, found
 
 
 def keywords(record: Record) -> Iterator[tuple[str, Setting, Any]]:
-    """Name, bounds and default of each keyword: fields, and those of records within with defaults."""
+    """Name, bounds and default of each keyword.
+
+    Keywords are the fields, and those of records within that have defaults.
+    """
+    defaults = record._field_defaults  # type: ignore[attr-defined]
     for name, kind, setting in annotated(record, Setting):
         if is_record(kind) and kind._field_defaults:
             yield from keywords(kind)
         else:
-            yield name, setting or Setting(""), record._field_defaults.get(name)  # type: ignore[attr-defined]
+            yield name, setting or UNBOUNDED, defaults.get(name)
 
 
 def make_settings(
     record: Record, options: Mapping[str, Any], listed: Callable[[Any], Any]
 ) -> Any:
-    """A record of settings, the given ones in place of its defaults; InputError for one out of its range."""
-    values: dict[str, Any] = {}
+    """Make a record of settings, given ones in place of its defaults.
+
+    `listed` makes numbers of a keyword of another kind. InputError for a value out of
+    its range.
+    """
+    values = dict(record._field_defaults)  # type: ignore[attr-defined]
     for name, kind, setting in annotated(record, Setting):
-        bounds = setting or Setting("")
+        bounds = setting or UNBOUNDED
         if is_record(kind) and kind._field_defaults:
             values[name] = make_settings(kind, options, listed)
-        elif name not in options:
-            values[name] = record._field_defaults[name]  # type: ignore[attr-defined]
-        elif is_list(kind):
-            values[name] = _list_of_numbers(options[name], name, bounds, listed)
-        elif is_record(kind):
-            values[name] = _small_record(kind, options[name], name, bounds)
-        else:
-            values[name] = _number(options[name], name, bounds)
+        elif name in options:
+            value = options[name]
+            if is_list(kind):
+                values[name] = _list_of_numbers(value, name, bounds, listed)
+            elif is_record(kind):
+                values[name] = _small_record(kind, value, name, bounds)
+            else:
+                values[name] = checked_setting(value, name, bounds)
     return record(**values)
 
 
-def _number(value: Any, name: str, bounds: Setting) -> float:
+def checked_setting(value: Any, name: str, bounds: Setting) -> float:
+    """Return a number within the bounds of a setting; InputError for another."""
     if bounds.whole:
         check_whole(value, name, at_least=int(bounds.at_least or 0))
     return check_number(
@@ -176,19 +209,15 @@ def _number(value: Any, name: str, bounds: Setting) -> float:
 
 
 def _small_record(kind: Any, value: Any, name: str, bounds: Setting) -> Any:
+    """Make a record, such as a range, of a sequence of its numbers."""
     words = [f"the {word}" for word in kind._fields]
-    if (
-        not isinstance(value, Sequence)
-        or isinstance(value, str)
-        or len(value) != len(words)
-    ):
-        raise InputError(f"{name}: {value!r} found, expected {' and '.join(words)}")
-    return kind(
-        *[
-            _number(one, f"{name}: {word}", bounds)
-            for one, word in zip(value, words, strict=True)
-        ]
-    )
+    is_sequence = isinstance(value, Sequence) and not isinstance(value, str)
+    if not is_sequence or len(value) != len(words):
+        raise unexpected(name, " and ".join(words), value)
+    numbers = []
+    for word, number in zip(words, value, strict=True):
+        numbers.append(checked_setting(number, f"{name}: {word}", bounds))
+    return kind(*numbers)
 
 
 def _list_of_numbers(
@@ -196,14 +225,12 @@ def _list_of_numbers(
 ) -> Any:
     if value is None:
         return np.zeros(0)
-    numbers = np.asarray(asked(listed, value))
-    if numbers.ndim != 1:
-        raise InputError(f"{name}: {value!r} found, expected a list")
-    if len(numbers) == 0:
-        raise InputError(f"{name}: none found, expected one at least, or None")
-    return np.array(
-        [
-            _number(one, f"{name}: number {i}", bounds)
-            for i, one in enumerate(numbers.tolist())
-        ]
-    )
+    given = np.asarray(asked(listed, value))
+    if given.ndim != 1:
+        raise unexpected(name, "a list", value)
+    if len(given) == 0:
+        raise InputError(f"{name}: expected one number at least, or None, got none")
+    numbers = []
+    for i, number in enumerate(given.tolist()):
+        numbers.append(checked_setting(number, f"{name}: number {i}", bounds))
+    return np.array(numbers)

@@ -1,4 +1,4 @@
-"""What tasks of steering have in common: what the helmsman sees, and what rudder, roll and heading cost.
+"""Parts that tasks of steering share: observations of the helm, and costs of steering.
 
 The reward is the classical steering cost with the sign turned (Norrbin 1972, On the
 added resistance due to steering on a straight course; van Amerongen 1982, Adaptive
@@ -6,15 +6,15 @@ steering of ships).
 """
 
 from math import copysign, fabs, radians
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from shipgym.engine.mathematics import clip, pick, sin_cos
 from shipgym.engine.motion import Motion, Ship
-from shipgym.tasks.contract import Interval, Readings, Seen, Setting
+from shipgym.tasks.contract import Interval, ObservationSpec, Readings, Setting
 
 
 class Weights(NamedTuple):
-    """What steering costs."""
+    """Weights and scales of the costs of steering."""
 
     heading_scale_deg: Annotated[
         float,
@@ -24,7 +24,7 @@ class Weights(NamedTuple):
         ),
     ] = 30.0
     rudder_weight: Annotated[
-        float, Setting("Cost of a rudder angle of one heading scale.", 0.0)
+        float, Setting("Cost of a rudder angle of one heading scale.", at_least=0.0)
     ] = 0.1
     rudder_rate_weight: Annotated[
         float,
@@ -34,13 +34,13 @@ class Weights(NamedTuple):
         ),
     ] = 0.01
     roll_weight: Annotated[
-        float, Setting("Cost of a step with a heel of one roll scale.", 0.0)
+        float, Setting("Cost of a step with a heel of one roll scale.", at_least=0.0)
     ] = 0.0
     roll_scale_deg: Annotated[
         float, Setting("Heel whose cost equals its weight, degrees.", above=0.0)
     ] = 30.0
     envelope_weight: Annotated[
-        float, Setting("Cost of a step in which the model extrapolates.", 0.0)
+        float, Setting("Cost of a step in which the model extrapolates.", at_least=0.0)
     ] = 0.0
     integral_zone_deg: Annotated[
         float, Setting("Largest heading error that is integrated, degrees.", above=0.0)
@@ -55,12 +55,11 @@ class Weights(NamedTuple):
 
 
 DEFAULTS = Weights()
-HEADING_SCALE, ROLL_SCALE = (
-    radians(DEFAULTS.heading_scale_deg),
-    radians(DEFAULTS.roll_scale_deg),
-)
+HEADING_SCALE = radians(DEFAULTS.heading_scale_deg)
+ROLL_SCALE = radians(DEFAULTS.roll_scale_deg)
 INTEGRAL_ZONE = radians(DEFAULTS.integral_zone_deg)
-RUDDER_WEIGHT, RATE_WEIGHT = DEFAULTS.rudder_weight, DEFAULTS.rudder_rate_weight
+RUDDER_WEIGHT = DEFAULTS.rudder_weight
+RATE_WEIGHT = DEFAULTS.rudder_rate_weight
 
 
 class SteeringReward(NamedTuple):
@@ -72,130 +71,149 @@ class SteeringReward(NamedTuple):
     envelope: float
 
 
-class RudderWork(NamedTuple):
+class RudderActivity(NamedTuple):
     """How the rudder has been turned to and fro."""
 
-    direction: (
-        float  # in which it turned last: 1 to starboard, -1 to port, 0 not at all yet
-    )
+    direction: float  # of the last turn: 1 to starboard, -1 to port, 0 none so far
     furthest: float  # rad, in that direction
     reversals: float  # how often it has turned back
 
 
+# Scales of observations: physical values of 1
+
+
 def integral_scale(ship: Ship, weights: Weights) -> float:
     """Largest integral of the heading error, rad s."""
-    return (
-        radians(weights.integral_zone_deg)
-        * weights.integral_lengths
-        * ship.length
-        / ship.scale_speed
-    )
+    zone = radians(weights.integral_zone_deg)
+    return zone * weights.integral_lengths * ship.length / ship.scale_speed
+
+
+def length_rate(ship: Ship, settings: Any) -> float:
+    """Yaw rate of one radian per ship length sailed, rad/s."""
+    return ship.scale_speed / ship.length
+
+
+def service_speed(ship: Ship, settings: Any) -> float:
+    """Service speed, m/s."""
+    return ship.scale_speed
+
+
+def rudder_limit(ship: Ship, settings: Any) -> float:
+    """Largest rudder angle, rad."""
+    return ship.rudder_limit
+
+
+def service_shaft_speed(ship: Ship, settings: Any) -> float:
+    """Shaft speed at service speed, 1/s."""
+    return ship.shaft
+
+
+def largest_integral(ship: Ship, settings: Any) -> float:
+    """Largest integral of the heading error by the weights of the settings, rad s."""
+    return integral_scale(ship, settings.weights)
 
 
 class Helm(NamedTuple):
-    """What every autopilot sees."""
+    """Observations of every autopilot."""
 
-    heading_error_sin: Annotated[float, Seen(-1.0, 1.0)]
-    heading_error_cos: Annotated[float, Seen(-1.0, 1.0)]
-    yaw_rate: Annotated[
-        float, Seen(-5.0, 5.0, "rad/s", lambda ship, _: ship.scale_speed / ship.length)
-    ]
-    sway: Annotated[float, Seen(-2.0, 2.0, "m/s", lambda ship, _: ship.scale_speed)]
-    surge: Annotated[float, Seen(-2.0, 3.0, "m/s", lambda ship, _: ship.scale_speed)]
-    rudder: Annotated[float, Seen(-1.0, 1.0, "rad", lambda ship, _: ship.rudder_limit)]
-    last_command: Annotated[
-        float, Seen(-1.0, 1.0, "rad", lambda ship, _: ship.rudder_limit)
-    ]
+    heading_error_sin: Annotated[float, ObservationSpec(-1.0, 1.0)]
+    heading_error_cos: Annotated[float, ObservationSpec(-1.0, 1.0)]
+    yaw_rate: Annotated[float, ObservationSpec(-5.0, 5.0, "rad/s", length_rate)]
+    sway: Annotated[float, ObservationSpec(-2.0, 2.0, "m/s", service_speed)]
+    surge: Annotated[float, ObservationSpec(-2.0, 3.0, "m/s", service_speed)]
+    rudder: Annotated[float, ObservationSpec(-1.0, 1.0, "rad", rudder_limit)]
+    last_command: Annotated[float, ObservationSpec(-1.0, 1.0, "rad", rudder_limit)]
     heading_error_integral: Annotated[
-        float,
-        Seen(
-            -1.0,
-            1.0,
-            "rad s",
-            lambda ship, settings: integral_scale(ship, settings.weights),
-        ),
+        float, ObservationSpec(-1.0, 1.0, "rad s", largest_integral)
     ]
 
 
 class Extras(NamedTuple):
-    """What is seen where it is asked for."""
+    """Observations that are made where an option asks for them."""
 
-    roll: Annotated[float, Seen(-3.0, 3.0, "rad", radians(30.0), "roll")]
-    roll_rate: Annotated[float, Seen(-5.0, 5.0, "rad/s", 0.1, "roll")]
+    roll: Annotated[float, ObservationSpec(-3.0, 3.0, "rad", radians(30.0), "roll")]
+    roll_rate: Annotated[float, ObservationSpec(-5.0, 5.0, "rad/s", 0.1, "roll")]
     shaft_speed: Annotated[
-        float, Seen(-2.0, 2.0, "1/s", lambda ship, _: ship.shaft, "shaft speed")
+        float, ObservationSpec(-2.0, 2.0, "1/s", service_shaft_speed, "shaft speed")
     ]
     last_shaft_command: Annotated[
-        float, Seen(-1.0, 1.0, "1/s", lambda ship, _: ship.shaft, "shaft")
+        float, ObservationSpec(-1.0, 1.0, "1/s", service_shaft_speed, "shaft")
     ]
 
 
 def helm(
-    course: float, integral: float, readings: Readings, interval: Interval, ship: Ship
+    heading_setpoint: float,
+    integral: float,
+    readings: Readings,
+    interval: Interval,
+    ship: Ship,
 ) -> Helm:
-    """The ship against a course to steer, rad."""
-    sine, cosine = sin_cos(course - readings.psi)
+    """Observe the ship against a heading to steer, rad."""
+    sine, cosine = sin_cos(heading_setpoint - readings.psi)
     return Helm(
-        sine,
-        cosine,
-        readings.r,
-        readings.v,
-        readings.u,
-        readings.delta,
-        interval.rudder_command * ship.rudder_limit,
-        integral,
+        heading_error_sin=sine,
+        heading_error_cos=cosine,
+        yaw_rate=readings.r,
+        sway=readings.v,
+        surge=readings.u,
+        rudder=readings.delta,
+        last_command=interval.rudder_command * ship.rudder_limit,
+        heading_error_integral=integral,
     )
 
 
 def extras(readings: Readings, interval: Interval, ship: Ship) -> Extras:
-    """Roll and shaft."""
+    """Observe roll and shaft."""
     return Extras(
-        readings.phi, readings.p, readings.n, interval.shaft_command * ship.shaft
+        roll=readings.phi,
+        roll_rate=readings.p,
+        shaft_speed=readings.n,
+        last_shaft_command=interval.shaft_command * ship.shaft,
     )
 
 
 def integrated(
     integral: float, error: float, interval: Interval, ship: Ship, weights: Weights
 ) -> float:
-    """The integral of the heading error, rad s, which grows only while the error is small."""
-    reach = integral_scale(ship, weights)
-    gathered = pick(
-        fabs(error) > radians(weights.integral_zone_deg), 0.0, error * interval.dt
-    )
-    return clip(integral + gathered, -reach, reach)
+    """Integral of the heading error, rad s, which grows only while the error is small."""
+    largest = integral_scale(ship, weights)
+    is_large = fabs(error) > radians(weights.integral_zone_deg)
+    gathered = pick(is_large, 0.0, error * interval.dt)
+    return clip(integral + gathered, -largest, largest)
 
 
-def worked(
-    work: RudderWork, rudder: float, way_back: float
-) -> tuple[RudderWork, float]:
-    """Rudder work with the rudder where it is now, rad, and whether it has just come so far back, 1 or 0."""
-    behind = work.direction * (work.furthest - rudder)
-    begun = (work.direction == 0.0) & (fabs(rudder) > way_back)
-    turned = behind > way_back
-    direction = pick(
-        begun, copysign(1.0, rudder), pick(turned, -work.direction, work.direction)
-    )
-    furthest = pick(begun | turned | (behind < 0.0), rudder, work.furthest)
-    reversals = pick(turned, 1.0, 0.0)
-    return RudderWork(direction, furthest, work.reversals + reversals), reversals
+def rudder_activity(
+    before: RudderActivity, rudder: float, smallest: float
+) -> tuple[RudderActivity, float]:
+    """Count a reversal if the rudder, rad, has come back by a smallest angle, rad.
+
+    Returns the activity so far, and 1 if the rudder has just been reversed, else 0.
+    """
+    back = before.direction * (before.furthest - rudder)
+    begins = (before.direction == 0.0) & (fabs(rudder) > smallest)
+    turned = back > smallest
+    direction = pick(turned, -before.direction, before.direction)
+    direction = pick(begins, copysign(1.0, rudder), direction)
+    goes_further = back < 0.0
+    furthest = pick(begins | turned | goes_further, rudder, before.furthest)
+    reversed_now = pick(turned, 1.0, 0.0)
+    reversals = before.reversals + reversed_now
+    return RudderActivity(direction, furthest, reversals), reversed_now
 
 
 def steering_reward(
     motion: Motion, interval: Interval, ship: Ship, weights: Weights
 ) -> SteeringReward:
     """Costs of rudder, rudder rate and heel, and of being where the model extrapolates."""
-    per_scale, per_heel = (
-        1.0 / radians(weights.heading_scale_deg),
-        1.0 / radians(weights.roll_scale_deg),
-    )
-    rate = (motion.delta - interval.rudder_before) * ship.length / ship.scale_speed
+    per_scale = 1.0 / radians(weights.heading_scale_deg)
+    per_heel = 1.0 / radians(weights.roll_scale_deg)
+    per_length = ship.length / ship.scale_speed / interval.dt
+    rudder = per_scale * motion.delta
+    rate = per_scale * per_length * (motion.delta - interval.rudder_before)
+    heel = per_heel * motion.phi
     return SteeringReward(
-        rudder=-(weights.rudder_weight * per_scale * per_scale)
-        * motion.delta
-        * motion.delta,
-        rudder_rate=-(weights.rudder_rate_weight * (per_scale / interval.dt) ** 2)
-        * rate
-        * rate,
-        roll=-(weights.roll_weight * per_heel * per_heel) * motion.phi * motion.phi,
+        rudder=-weights.rudder_weight * rudder * rudder,
+        rudder_rate=-weights.rudder_rate_weight * rate * rate,
+        roll=-weights.roll_weight * heel * heel,
         envelope=-weights.envelope_weight * interval.extrapolating,
     )

@@ -1,6 +1,6 @@
-"""A task with its options: what is asked of an autopilot, in which sea, by which commands and sensors."""
+"""Task with its options: settings, sea, commands and sensors."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, NamedTuple, Self
@@ -20,7 +20,6 @@ from shipgym.tasks.scales import control_interval
 
 Sea = str | Weather
 
-LONGEST_INTERVAL = 5.0  # ship lengths at service speed
 #: Keywords of environments of one ship, and of many.
 ENV_OPTIONS = ("model", "task", "reward", "render_mode", "allow_unstable")
 VECTOR_OPTIONS = (
@@ -38,18 +37,18 @@ MEASUREMENTS = ("raw", "filtered")
 
 
 class Observed(NamedTuple):
-    """One quantity that is observed."""
+    """Quantity that is observed of a ship."""
 
     name: str
     low: float  # bounds of the observation
     high: float
     scale: float  # physical value of 1, SI units
-    path: str  # where it stands in the task's `Observation`
+    path: str  # of its field in the task's `Observation`
 
 
 @dataclass(frozen=True)
 class Task:
-    """What an autopilot has to do.
+    """Task of an autopilot: what it has to do, for which it is paid.
 
     Attributes
     ----------
@@ -66,11 +65,11 @@ class Task:
     episode_steps : int
         Control intervals after which an episode is truncated.
     max_envelope_distance : float
-        How many times further out than the training data the model may be taken before
-        the episode ends (see `Envelope.distance`).
+        Distance from the training data at which an episode ends, in multiples of their
+        extent (see `Envelope.distance`).
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
-        What is commanded: the rudder, one of the orders in `RUDDER_ORDERS`, or rudder
-        and shaft speed. A shaft whose propeller is known ahead only is stopped by an
+        Commands: the rudder, one of the orders in `RUDDER_ORDERS`, or rudder and shaft
+        speed. A shaft whose propeller is known ahead only is stopped by an
         order astern.
     roll : bool
         Whether roll angle and rate are observed.
@@ -108,7 +107,7 @@ class Task:
 
     def __post_init__(self) -> None:
         if not self.seas:
-            raise InputError("sea: none found, expected at least one")
+            raise InputError("sea: expected at least one, got none")
         if self.dt is not None:
             check_number(self.dt, "dt", above=0.0)
         check_whole(self.episode_steps, "episode_steps", at_least=1)
@@ -118,94 +117,79 @@ class Task:
         check_number(self.noise, "noise", at_least=0.0)
         if self.sensors is not None and (self.noise > 0.0 or self.measurement != "raw"):
             raise InputError(
-                f"sensors: {self.sensors.source} and noise or measurement found,"
-                " expected one of the two: noise and filters of a sensor set of your"
-                " own are its own settings"
+                "sensors: expected either these or noise and measurement, got"
+                f" {self.sensors.source} and noise or measurement: noise and filters of"
+                " a sensor set of your own are its own settings"
             )
 
     @classmethod
     def of(cls, definition: Any, **options: Any) -> Self:
-        """A task by keywords: those of all tasks, and the settings of its own.
+        """Make a task by keywords: those of all tasks, and the settings of its own.
 
         Raises InputError for a keyword that it does not have, or a value out of range.
         """
         task = read_definition(definition, options.pop("reward", None))
-        sensors = (
-            None if options.get("sensors") is None else read_sensors(options["sensors"])
-        )
-        check_keys(options, cls.option_names(task, sensors), f"{task.name} options")
-        own = {name: value for name, value in options.items() if name in task.settings}
-        common = {
-            name: value for name, value in options.items() if name in cls.common_names()
-        }
-        common |= {
-            "episode_steps": options.get("episode_steps", task.episode_steps),
-            "sensors": sensors,
-        }
+        sensors = options.get("sensors")
         if sensors is not None:
-            of_sensors = {
-                name: value
-                for name, value in options.items()
-                if name in sensors.settings
-            }
-            common["sensor_settings"] = sensors.make_settings(of_sensors)
-        return cls(task, task.make_settings(own), **common, options=options)
+            sensors = read_sensors(sensors)
+        check_keys(options, cls.option_names(task, sensors), f"{task.name} options")
+
+        settings = task.make_settings(_chosen(options, task.settings))
+        common = _chosen(options, cls.common_names())
+        common.setdefault("episode_steps", task.episode_steps)
+        common["sensors"] = sensors
+        if sensors is not None:
+            own = _chosen(options, sensors.settings)
+            common["sensor_settings"] = sensors.make_settings(own)
+        return cls(task, settings, **common, options=options)
 
     @classmethod
     def common_names(cls) -> tuple[str, ...]:
         """Keywords of all tasks."""
-        return tuple(
-            item.name
-            for item in fields(cls)[2:]
-            if item.name not in ("sensor_settings", "options")
-        )
+        own = ("definition", "settings", "sensor_settings", "options")
+        return tuple(item.name for item in fields(cls) if item.name not in own)
 
     @classmethod
     def option_names(
         cls, definition: TaskDefinition, sensors: SensorSet | None = None
     ) -> tuple[str, ...]:
-        """Keywords of a task with a sensor set; InputError if two of them have one name."""
-        names = (*definition.settings, *cls.common_names())
+        """Keywords of a task with a sensor set; InputError if two have one name."""
+        names = [*definition.settings, *cls.common_names()]
         if sensors is not None:
-            names = (*names, *sensors.settings)
+            names += sensors.settings
         for name in names:
             if names.count(name) > 1 or name in VECTOR_OPTIONS:
-                where = (
-                    sensors.source
-                    if sensors and name in sensors.settings
-                    else definition.source
-                )
+                is_sensors = sensors is not None and name in sensors.settings
+                source = sensors.source if is_sensors else definition.source
                 raise InputError(
-                    f"{where}: Settings.{name} found, which is a keyword already;"
-                    " rename it"
+                    f"{source}: Settings.{name}: expected a name of its own, got that of"
+                    " another keyword; rename it"
                 )
-        return names
+        return tuple(names)
 
     def changed(self, **options: Any) -> Self:
-        """The same task with other options."""
+        """Make the same task with other options."""
         return self.of(self.definition, **{**self.options, **options})
 
     @property
     def follows_path(self) -> bool:
-        """Whether there is a path to follow, of waypoints."""
+        """True where there is a path to follow, of waypoints."""
         return "waypoints" in self.definition.settings
 
     @property
     def name(self) -> str:
-        """Of the task."""
+        """Name of the task."""
         return self.definition.name
 
     @cached_property
     def seas(self) -> tuple[Weather, ...]:
-        """The weathers of which each episode has one."""
-        several: Sequence[Any] = (
-            self.sea if isinstance(self.sea, list | tuple) else [self.sea]
-        )
-        return tuple(as_weather(one, "sea", None) for one in several)
+        """Weathers of which each episode has one."""
+        seas = self.sea if isinstance(self.sea, list | tuple) else [self.sea]
+        return tuple(as_weather(sea, "sea", None) for sea in seas)
 
     @property
     def weather(self) -> Weather:
-        """What the sea is like, the first of several."""
+        """Weather of the task, the first of several."""
         return self.seas[0]
 
     def interval(self, model: ShipModel) -> float:
@@ -214,7 +198,8 @@ class Task:
 
     def substeps(self, model: ShipModel) -> int:
         """Steps of the integration in a control interval."""
-        return int(np.ceil(self.interval(model) / (1.5 * control_interval(model))))
+        longest = 1.5 * control_interval(model)
+        return int(np.ceil(self.interval(model) / longest))
 
     def substep(self, model: ShipModel) -> float:
         """Step of the integration, s."""
@@ -224,75 +209,62 @@ class Task:
         """Refuse a ship that lacks what the task needs; InputError names the argument."""
         model.check_depth(self.water_depth)
         if self.dt is not None:
-            longest = (
-                LONGEST_INTERVAL
-                * model.particulars["length"]
-                / model.particulars["speed"]
-            )
-            check_number(
-                self.dt,
-                "dt",
-                at_most=longest,
-                hint=f"s: {LONGEST_INTERVAL:g} ship lengths",
-            )
+            lengths = 5.0
+            longest = lengths * model.travel_time
+            hint = f"s: {lengths:g} ship lengths"
+            check_number(self.dt, "dt", at_most=longest, hint=hint)
         if not getattr(model.dynamics, "has_rudder", True):
             raise InputError(
-                f"model: {model.name!r} has no rudder, expected a ship that is steered"
-                " by one"
+                "model: expected a ship that is steered by a rudder, got"
+                f" {model.name!r}, which has none"
             )
         if self.roll and "phi" not in model.state_names:
             raise InputError(
-                f"roll: {model.name!r} does not roll; leave it out, or take a ship with"
-                " 4 degrees of freedom"
+                "roll: expected a ship with 4 degrees of freedom, got"
+                f" {model.name!r}, which does not roll; leave it out"
             )
         if self.action == "rudder-shaft" and not model.service_shaft_speed > 0.0:
             raise InputError(
-                f"action: 'rudder-shaft' found, but {model.name!r} has no shaft speed"
+                "action: expected one without a shaft for a ship without shaft speed,"
+                f" {model.name!r}, got 'rudder-shaft'"
             )
+
+        source = self.definition.source
         asked(self.definition.check, self.settings, model)
         for quantity in self.observed(model):
-            where = (
-                f"{self.definition.source}: Observation.{quantity.path}: scale for"
-                f" {model.name!r}"
-            )
+            where = f"{source}: Observation.{quantity.path}: scale for {model.name!r}"
             check_number(quantity.scale, where, above=0.0)
-        where = f"{self.definition.source}: plan_length"
-        check_whole(
-            asked(self.definition.plan_length, self.settings), where, at_least=0
-        )
+        length = asked(self.definition.plan_length, self.settings)
+        check_whole(length, f"{source}: plan_length", at_least=0)
 
     def observed(self, model: ShipModel) -> tuple[Observed, ...]:
-        """What is observed of a ship, in order."""
+        """Quantities that are observed of a ship, in order."""
+        options = [""]
+        if self.roll:
+            options.append("roll")
+        if self.action == "rudder-shaft":
+            options.append("shaft")
+            if "n" in model.state_names:
+                options.append("shaft speed")
+
         ship = ship_of(model, self.water_depth)
-        shaft = self.action == "rudder-shaft"
-        speed = shaft and "n" in model.state_names
-        shown = (
-            "",
-            *["roll"] * self.roll,
-            *["shaft"] * shaft,
-            *["shaft speed"] * speed,
-        )
-        return tuple(
-            Observed(
-                path.rpartition(".")[2],
-                seen.low,
-                seen.high,
-                self.scale(path, ship),
-                path,
-            )
-            for path, seen in self.definition.seen.items()
-            if seen.option in shown
-        )
+        observed = []
+        for path, spec in self.definition.observations.items():
+            if spec.option in options:
+                name = path.rpartition(".")[2]
+                scale = self.scale(path, ship)
+                observed.append(Observed(name, spec.low, spec.high, scale, path))
+        return tuple(observed)
 
     def instruments(self, windy: bool) -> SensorSet:
-        """What shows the ship, in weather or in calm water."""
-        return self.sensors or shipped_sensors(
-            windy, self.noise > 0.0, self.measurement == "filtered"
-        )
+        """Sensor set that the ship is seen by, in weather or in calm water."""
+        if self.sensors is not None:
+            return self.sensors
+        return shipped_sensors(windy, self.noise > 0.0, self.measurement == "filtered")
 
     def scale(self, path: str, ship: Ship) -> float:
         """Physical value of an observation of 1."""
-        scale = self.definition.seen[path].scale
+        scale = self.definition.observations[path].scale
         return asked(scale, ship, self.settings) if callable(scale) else scale
 
     @property
@@ -301,43 +273,48 @@ class Task:
         return 2 if self.action == "rudder-shaft" else 1
 
     def least_shaft(self, model: ShipModel) -> float:
-        """Least command of the shaft, part of service speed; one that may not turn astern is stopped."""
+        """Least command of the shaft, part of service speed; 0 if it stays ahead."""
         return -1.0 if model.turns_astern else 0.0
 
     @cached_property
     def info_names(self) -> tuple[str, ...]:
-        """What `info` has."""
-        parts = [f"reward_{name}" for name in (*self.definition.reward_names, "end")]
-        return (*self.definition.reported, "envelope_distance", "extrapolating", *parts)
+        """Names of the numbers in `info`."""
+        engine = ("envelope_distance", "extrapolating")
+        return (*self.definition.reported, *engine, *self.reward_parts)
 
     @cached_property
     def flags(self) -> frozenset[str]:
-        """What of it is true or false."""
+        """Names of those that are true or false."""
         return frozenset({"extrapolating", *self.definition.flags})
 
     @property
     def reward_parts(self) -> tuple[str, ...]:
-        """Names of the parts of the reward among those of `info`."""
-        return tuple(name for name in self.info_names if name.startswith("reward_"))
+        """Names of the parts of the reward among them."""
+        parts = (*self.definition.reward_names, "end")
+        return tuple(f"reward_{name}" for name in parts)
 
     def __getattr__(self, name: str) -> Any:
-        """A setting by its name."""
+        """Setting of the task by its name."""
         if name.startswith("_") or name in ("definition", "settings", "seas"):
             raise AttributeError(name)
-        for record in (
-            self.settings,
-            *(value for value in self.settings if hasattr(value, "_fields")),
-        ):
+        records = [self.settings]
+        records += [value for value in self.settings if hasattr(value, "_fields")]
+        for record in records:
             if name in record._fields:
                 return getattr(record, name)
         raise AttributeError(f"task {self.definition.name!r} has no setting {name!r}")
 
 
+def _chosen(options: Mapping[str, Any], names: Collection[str]) -> dict[str, Any]:
+    """Those of some names among options."""
+    return {name: value for name, value in options.items() if name in names}
+
+
 def course_keeping_task(**options: Any) -> Task:
-    """The task of course keeping by keywords (`Task.of`)."""
+    """Make the task of course keeping by keywords (`Task.of`)."""
     return Task.of("CourseKeeping", **options)
 
 
 def path_following_task(**options: Any) -> Task:
-    """The task of path following by keywords (`Task.of`)."""
+    """Make the task of path following by keywords (`Task.of`)."""
     return Task.of("PathFollowing", **options)

@@ -350,7 +350,9 @@ def test_wrong_batches(mariner):
         Engine([mariner, shipgym.load_model("kvlcc2")], 2)
     with pytest.raises(InputError, match="num_envs: expected"):
         Engine(mariner, 0)
-    with pytest.raises(InputError, match="3 found, expected 1 or one for each of 2"):
+    with pytest.raises(
+        InputError, match="expected 1, or one for each of 2 lanes, got 3"
+    ):
         Engine([mariner] * 3, 2)
 
 
@@ -429,7 +431,7 @@ def test_set_points_are_drawn_within_their_bounds_and_change_in_time():
             )
             for key in range(2000)
         ]
-    changes = np.degrees([one.course - 1.0 for one in drawn])
+    changes = np.degrees([one.heading_setpoint - 1.0 for one in drawn])
     waits = np.array([one.next_change - 50.0 for one in drawn])
     for values, low, high in ((changes, -30.0, 30.0), (waits, 100.0, 300.0)):
         assert low <= values.min() < low + 0.01 * (high - low)
@@ -450,7 +452,7 @@ def test_set_points_are_drawn_within_their_bounds_and_change_in_time():
                 listed,
                 Random(np.uint64(1), np.uint64(0)),
             )
-        assert found.course == pytest.approx(1.0 + np.radians(degrees))
+        assert found.heading_setpoint == pytest.approx(1.0 + np.radians(degrees))
         assert found.next_change == 250.0
     assert course_keeping.due(
         None, state._replace(next_change=9.0), interval(steps=9.0), SHIP, settings
@@ -487,7 +489,7 @@ def test_an_episode_begins_on_a_first_set_point_with_nothing_gathered():
         assert motion == Motion(
             0.0, 0.0, motion.psi, 8.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5
         )
-        assert state.course == pytest.approx(motion.psi + np.radians(170.0))
+        assert state.heading_setpoint == pytest.approx(motion.psi + np.radians(170.0))
         assert (state.next_change, state.changes, state.integral) == (7.0, 1.0, 0.0)
         assert state.heading_error == pytest.approx(np.radians(170.0))
         headings.append(motion.psi)
@@ -510,7 +512,7 @@ def test_set_points_change_at_most_every_step_and_begin_with_the_first_listed():
             ).next_change
             for k in range(30)
         }
-    assert found.course == pytest.approx(1.0 + np.radians(5.0))
+    assert found.heading_setpoint == pytest.approx(1.0 + np.radians(5.0))
     assert waits == {51.0}
 
 

@@ -534,7 +534,7 @@ def documented(page):
 def test_observations_have_the_bounds_of_their_page(name, page, count):
     own = {
         path.rpartition(".")[2]: (seen.low, seen.high)
-        for path, seen in read_definition(name).seen.items()
+        for path, seen in read_definition(name).observations.items()
     }
     found = documented(page)
     assert len(found) == count

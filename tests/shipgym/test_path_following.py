@@ -15,11 +15,12 @@ from shipgym.engine.motion import Motion, Ship, ground_velocity
 from shipgym.engine.records import leaves
 from shipgym.envs.engine import Engine
 from shipgym.sea import Current, Waves, Weather, Wind
-from shipgym.tasks import path_following
+from shipgym.tasks import path_following, planned_legs
 from shipgym.tasks.contract import Interval, Readings
 from shipgym.tasks.guidance import Path, wrapped
-from shipgym.tasks.path_following import Settings, State, fix, leg_from, observe
-from shipgym.tasks.steering import RudderWork, worked
+from shipgym.tasks.path_following import Settings, State, observe
+from shipgym.tasks.planned_legs import fix, leg_from
+from shipgym.tasks.steering import RudderActivity, rudder_activity
 from shipgym.tasks.task import Task
 
 ID = "shipgym/PathFollowing-v0"
@@ -95,7 +96,11 @@ def rounded(path, radius):
 def on_path(radius, plan):
     """The state at the first waypoint."""
     return State(
-        leg_from(0, 0.0, radius, plan), *[0.0] * 8, RudderWork(0.0, 0.0, 0.0), 0.0, 0.0
+        leg_from(0, 0.0, radius, plan),
+        *[0.0] * 8,
+        RudderActivity(0.0, 0.0, 0.0),
+        0.0,
+        0.0,
     )
 
 
@@ -108,7 +113,7 @@ def followed(path, radius, places):
     for one in ways:
         x, y = (np.interp(one, way, column) for column in line.T)
         motion, at = Motion(x, y, *[0.0] * 9), fix(x, y, state.leg, SHIP, asked)
-        state = state._replace(distance_made_good=at.way)
+        state = state._replace(distance_made_good=at.along_track)
         state = path_following.on_event(motion, state, None, SHIP, asked, None, plan)
         states.append((state, motion))
     return states, ways, asked
@@ -133,8 +138,8 @@ def test_a_position_lies_where_the_rounded_path_is_nearest(turns, course, off):
     for (state, motion), way, (north, east) in zip(states, ways, tangents, strict=True):
         aside = off * radius * np.array([-east, north]) / np.hypot(north, east)
         found = fix(motion.x + aside[0], motion.y + aside[1], state.leg, SHIP, asked)
-        assert found.cross == pytest.approx(off * radius, abs=0.02 * radius)
-        assert found.way == pytest.approx(way, rel=1e-3, abs=0.12 * radius)
+        assert found.cross_track == pytest.approx(off * radius, abs=0.02 * radius)
+        assert found.along_track == pytest.approx(way, rel=1e-3, abs=0.12 * radius)
         assert state.cross_track == pytest.approx(0.0, abs=0.001 * radius)
         assert state.distance_made_good == pytest.approx(way, rel=1e-3, abs=1e-6)
 
@@ -142,7 +147,7 @@ def test_a_position_lies_where_the_rounded_path_is_nearest(turns, course, off):
 def test_way_and_course_go_on_evenly_through_turns():
     states, ways, _ = followed(Path(HOOK), RADIUS, np.linspace(0.0, 1.0, 800))
     made, course = np.array(
-        [(state.distance_made_good, state.course) for state, _ in states]
+        [(state.distance_made_good, state.heading_setpoint) for state, _ in states]
     ).T
     np.testing.assert_allclose(np.diff(made), ways[1], rtol=0.01)
     assert np.abs(np.diff(course)).max() < 1.3 * ways[1] / RADIUS
@@ -388,7 +393,7 @@ def test_the_mirrored_voyage_earns_the_same():
         "v",
         "r",
         "delta",
-        "course",
+        "heading_setpoint",
         "integral",
         "heading_error",
         "cross_track",
@@ -397,8 +402,8 @@ def test_the_mirrored_voyage_earns_the_same():
         "leg.course",
         "leg.turn",
         "leg.second_turn",
-        "work.direction",
-        "work.furthest",
+        "rudder_activity.direction",
+        "rudder_activity.furthest",
     }
     for one in (engine, mirror):
         one.reset([4])
@@ -527,12 +532,12 @@ def test_rudder_work_is_told_and_charged():
 
 
 def test_a_reversal_is_a_way_back_of_the_rudder_and_not_its_noise():
-    work, turned = RudderWork(0.0, 0.0, 0.0), []
+    work, turned = RudderActivity(0.0, 0.0, 0.0), []
     for angle in (0.5, -0.5, 4.0, 3.5, 6.0, 5.1, 4.9, 0.0, 0.9, 1.1, 0.2, 0.05):
-        work, reversed_now = worked(work, angle, 1.0)
+        work, reversed_now = rudder_activity(work, angle, 1.0)
         turned.append(reversed_now)
     assert turned == [0.0] * 6 + [1.0, 0.0, 0.0, 1.0, 0.0, 1.0]
-    assert work == RudderWork(-1.0, 0.05, 3.0)
+    assert work == RudderActivity(-1.0, 0.05, 3.0)
 
 
 @pytest.mark.parametrize(
@@ -540,31 +545,37 @@ def test_a_reversal_is_a_way_back_of_the_rudder_and_not_its_noise():
     [
         (
             {"waypoints": [[0, 0], [2000, 0], [0, 10]]},
-            "the path doubles back at row 1, by 180 deg, expected",
+            "row 1: .*got 180 deg: the path doubles back",
         ),
         (
             {"waypoints": [[0, 0], [900, 0], [1800, 900], [1900, 900]]},
-            "rows 2 and 3 are 100 m apart, expected at least 266.6",
+            "rows 2 and 3: .*at least 266.6.*got 100 m",
         ),
         (
             {"waypoints": [[0, 0], [1, 0], [1, 1]]},
-            "rows 0 and 1 are 1 m apart, .* smaller turn_radius",
+            "rows 0 and 1: .*got 1 m; .* smaller turn_radius",
         ),
-        ({"waypoints": [[0, 0], [900, 0], [900, 0]]}, "waypoints: row 2 repeats"),
+        (
+            {"waypoints": [[0, 0], [900, 0], [900, 0]]},
+            "waypoints: row 2: expected another",
+        ),
         (
             {"max_turn_deg": 120.0},
-            "leg_lengths: the least: 8 found, expected a number >= 13.8.*turns",
+            "leg_lengths: the least: expected a number >= 13.8.*turns.*got 8",
         ),
-        ({"waypoints": [[0.0, 0.0]]}, r"shape \(1, 2\) found, expected at least 2"),
-        ({"waypoints": [[0.0, 0.0], [np.nan, 1.0]]}, "waypoints: row 1 is"),
-        ({"waypoints": "north"}, "waypoints: shape"),
-        ({"corridor": 5.0}, "ground: 4 found, expected a number > 5"),
-        ({"leg_lengths": (9.0, 8.0)}, "leg_lengths: the largest: 8 found"),
-        ({"leg_lengths": (5.0,)}, "leg_lengths: .* expected the least and the largest"),
-        ({"max_turn_deg": 170.0}, "max_turn_deg: 170 found"),
-        ({"n_legs": 0}, "n_legs: 0 found"),
-        ({"lookahead": 0.0}, "lookahead: 0 found"),
-        ({"turn_radius": 0.0}, "turn_radius: 0 found"),
+        ({"waypoints": [[0.0, 0.0]]}, r"at least 2 rows .*got shape \(1, 2\)"),
+        (
+            {"waypoints": [[0.0, 0.0], [np.nan, 1.0]]},
+            "waypoints: row 1: expected finite",
+        ),
+        ({"waypoints": "north"}, "waypoints: .*got shape"),
+        ({"corridor": 5.0}, "ground: expected a number > 5 .*got 4"),
+        ({"leg_lengths": (9.0, 8.0)}, "leg_lengths: the largest: .*got 8"),
+        ({"leg_lengths": (5.0,)}, "leg_lengths: expected the least and the largest"),
+        ({"max_turn_deg": 170.0}, "max_turn_deg: .*got 170"),
+        ({"n_legs": 0}, "n_legs: .*got 0"),
+        ({"lookahead": 0.0}, "lookahead: .*got 0"),
+        ({"turn_radius": 0.0}, "turn_radius: .*got 0"),
         ({"turn_radios": 1.0}, "Did you mean 'turn_radius'"),
     ],
 )
@@ -604,13 +615,13 @@ def test_near_the_centre_of_a_turn_places_on_it_are_those_of_a_tenth_of_its_radi
     if x > 2000.0:
         turned = np.pi / 4.0 + np.arctan(angle)
         assert found.turned == pytest.approx(turned)
-        assert found.way == pytest.approx(2000.0 + radius * turned)
+        assert found.along_track == pytest.approx(2000.0 + radius * turned)
         off = (
             radius - 0.1 * radius * np.hypot(1.0, angle) + 0.1 * radius - near * radius
         )
-        assert found.cross == pytest.approx(side * off)
+        assert found.cross_track == pytest.approx(side * off)
     else:
-        assert (found.way, found.turned) == (pytest.approx(x), 0.0)
+        assert (found.along_track, found.turned) == (pytest.approx(x), 0.0)
 
 
 def test_a_course_leads_to_the_path_a_lookahead_distance_ahead():
@@ -629,7 +640,7 @@ def test_a_course_leads_to_the_path_a_lookahead_distance_ahead():
         chord = np.arctan2(
             np.cos(turned) - np.cos(ahead), np.sin(ahead) - np.sin(turned)
         )
-        assert found.cross == pytest.approx(0.0, abs=1e-9)
+        assert found.cross_track == pytest.approx(0.0, abs=1e-9)
         assert found.course == pytest.approx(chord)
     aside = fix(500.0, 30.0, leg, SHIP, asked)
     assert aside == pytest.approx((500.0, 30.0, -np.arctan(30.0 / lookahead), 0.0))
@@ -648,7 +659,7 @@ def test_legs_of_a_drawn_path_leave_room_for_the_turns_at_their_ends(legs, least
         tight = asked._replace(leg_lengths=path_following.Range(least - 0.01, 9.0))
         with pytest.raises(
             InputError,
-            match=f"the least: {least - 0.01:g} found, .* >= {least:g}; ship lengths",
+            match=f"the least: .* >= {least:g} .*got {least - 0.01:g}",
         ):
             path_following.check(tight, None)
 
@@ -663,7 +674,7 @@ def test_paths_of_a_list_are_filled_up_to_the_longest_on_their_last_leg():
     assert one.tolist() == [2.0, 0.0, 0.0, 30.0, 0.0]
     assert path_following.plan_length(Settings(waypoints=found)) == 8
     assert path_following.plan_length(Settings(n_legs=5)) == 12
-    with pytest.raises(InputError, match="waypoints: row 1 repeats"):
+    with pytest.raises(InputError, match="waypoints: row 1: expected another"):
         path_following.listed([[[0, 0], [30, 0]], [[1, 1], [1, 1]]])
 
 
@@ -673,9 +684,7 @@ def test_each_listed_path_has_to_leave_room_for_its_turns():
     path_following.check(
         Settings(waypoints=paths), None
     )  # lengths of an unknown ship are not known
-    with pytest.raises(
-        InputError, match=r"rows 1 and 2 are 500 m apart, expected at least 643.7"
-    ):
+    with pytest.raises(InputError, match=r"rows 1 and 2: .*at least 643.7.*got 500 m"):
         path_following.check(Settings(waypoints=paths), mariner)
     path_following.check(Settings(waypoints=paths, turn_radius=3.0), mariner)
 
@@ -683,33 +692,33 @@ def test_each_listed_path_has_to_leave_room_for_its_turns():
 def test_a_corridor_is_wider_than_the_ship_whose_beam_is_known():
     mariner = shipgym.load_model("mariner")
     least = 0.5 * 23.17 / 160.93
-    path_following.check_path(Settings(corridor=1.01 * least), mariner)
+    path_following.check(Settings(corridor=1.01 * least), mariner)
     with pytest.raises(InputError) as caught:
-        path_following.check_path(Settings(corridor=0.07), mariner)
+        path_following.check(Settings(corridor=0.07), mariner)
     assert (
         str(caught.value)
-        == "corridor: 0.07 ship lengths to each side is 22.5 m wide, expected more than"
-        " the beam of 'mariner', 23.2 m"
+        == "corridor: expected more than the beam of 'mariner', 23.2 m, got 22.5 m, 0.07"
+        " ship lengths to each side"
     )
-    path_following.check_path(Settings(corridor=0.07), None)
+    path_following.check(Settings(corridor=0.07), None)
     bare = replace(mariner, particulars=replace(mariner.particulars, beam=None))
-    path_following.check_path(Settings(corridor=0.07), bare)
+    path_following.check(Settings(corridor=0.07), bare)
     with pytest.raises(
         InputError,
-        match="ground: 1 found, expected a number > 1; in ship lengths, beyond the c",
+        match="ground: expected a number > 1 .in ship lengths, beyond the c",
     ):
-        path_following.check_path(Settings(ground=1.0), None)
+        path_following.check(Settings(ground=1.0), None)
 
 
 def test_turns_and_distances_of_a_plan():
     plan = np.array([0.0, 0.0, 300.0, 0.0, 300.0, 400.0, 300.0, 900.0, 0.0, 900.0])
-    assert path_following.between(1, 2, plan) == pytest.approx((400.0, np.pi / 2))
-    assert path_following.between(0, 2, plan) == pytest.approx(
+    assert planned_legs.between(1, 2, plan) == pytest.approx((400.0, np.pi / 2))
+    assert planned_legs.between(0, 2, plan) == pytest.approx(
         (500.0, np.arctan2(400.0, 300.0))
     )
-    turns = [path_following.change_of_course(number, plan) for number in range(5)]
+    turns = [planned_legs.change_of_course(number, plan) for number in range(5)]
     assert turns == pytest.approx([0.0, np.pi / 2, 0.0, np.pi / 2, 0.0])
-    assert [path_following.next_turn(number, plan) for number in range(5)] == [
+    assert [planned_legs.next_turn(number, plan) for number in range(5)] == [
         1,
         3,
         3,
@@ -770,13 +779,13 @@ def test_a_step_on_the_last_leg_earns_way_up_to_its_end_only():
 
 def test_reversals_are_counted_by_the_minute():
     asked, plan = Settings(reversal_deg=2.0, reversal_weight=0.3), LINE.ravel()
-    work = RudderWork(1.0, np.radians(5.0), 4.0)
-    state = on_path(RADIUS, plan)._replace(work=work)
+    work = RudderActivity(1.0, np.radians(5.0), 4.0)
+    state = on_path(RADIUS, plan)._replace(rudder_activity=work)
     interval = Interval(0.5, 100.0, 0.0, 0.0, 1.0, 0.0, 0.0)
     for back, count in ((1.9, 4.0), (2.1, 5.0)):
         motion = Motion(*[0.0] * 9, np.radians(5.0 - back), 0.0)
         after, reward, *_ = path_following.step(motion, state, interval, SHIP, asked)
-        assert after.work.reversals == count
+        assert after.rudder_activity.reversals == count
         assert after.reversals_per_minute == pytest.approx(count * 60.0 / 50.0)
         assert reward.reversals == pytest.approx(-0.3 * (count - 4.0))
     first, *_ = path_following.step(

@@ -18,7 +18,7 @@ from shipgym import InputError, ShipVecEnv, check_task, check_vector_env, regist
 from shipgym.envs import task_checker
 from shipgym.envs.engine import Engine
 from shipgym.python_files import load_file
-from shipgym.tasks.contract import NO_NUMBERS, Numbers, Seen, Setting
+from shipgym.tasks.contract import NO_NUMBERS, Numbers, ObservationSpec, Setting
 from shipgym.tasks.definition import no_worst_cost, read_definition
 from shipgym.tasks.source import (
     annotated,
@@ -244,7 +244,7 @@ WRONG = [
         "begin: 3 arguments found, expected a function begin",
     ),
     (
-        "g_sin: Annotated[float, Seen(-1.0, 1.0)]",
+        "g_sin: Annotated[float, ObservationSpec(-1.0, 1.0)]",
         "g_sin: float",
         "Observation.heading_sin: no bounds",
     ),
@@ -932,7 +932,10 @@ def test_the_last_lane_of_many_is_compared_with_one_alone():
 
 
 def test_what_is_beyond_its_bounds_in_more_than_a_twentieth_of_the_steps_is_remarked():
-    seen = {"helm.sway": Seen(-2.0, 2.0), "extras.roll": Seen(-3.0, 3.0)}
+    seen = {
+        "helm.sway": ObservationSpec(-2.0, 2.0),
+        "extras.roll": ObservationSpec(-3.0, 3.0),
+    }
     task = SimpleNamespace(definition=SimpleNamespace(seen=seen))
     inside = [2.0 + 5e-7, -2.0 - 5e-7] * 47 + [0.0]  # rounding makes no remark
     often, seldom = [2.1, -4.0, 2.1, 2.1, 2.1, 2.1], [2.1] * 5
@@ -1105,8 +1108,8 @@ def test_bounds_of_an_observation_are_finite_and_in_order(tmp_path):
         ),
     }.items():
         text = FAIRWAY.replace(
-            "g_sin: Annotated[float, Seen(-1.0, 1.0)]",
-            f"g_sin: Annotated[float, Seen({bounds})]",
+            "g_sin: Annotated[float, ObservationSpec(-1.0, 1.0)]",
+            f"g_sin: Annotated[float, ObservationSpec({bounds})]",
         )
         path = written(tmp_path, "fairway.py", text)
         (problem,) = check_task(path).problems
@@ -1115,7 +1118,9 @@ def test_bounds_of_an_observation_are_finite_and_in_order(tmp_path):
     path = written(
         tmp_path,
         "fairway.py",
-        FAIRWAY.replace("g_sin: Annotated[float, Seen(-1.0, 1.0)]", "g_sin: float"),
+        FAIRWAY.replace(
+            "g_sin: Annotated[float, ObservationSpec(-1.0, 1.0)]", "g_sin: float"
+        ),
     )
     with pytest.raises(
         InputError,
@@ -1154,7 +1159,7 @@ def test_names_that_the_engine_has_in_info_are_not_reported(tmp_path):
 )
 def test_two_fields_of_one_name_are_refused(tmp_path, old, new, message):
     inner = (
-        "class Inner(NamedTuple):\n    limit: Annotated[float, Seen(0.0,"
+        "class Inner(NamedTuple):\n    limit: Annotated[float, ObservationSpec(0.0,"
         " 1.0)]\n\n\nclass Observation("
     )
     text = FAIRWAY.replace("class Observation(", inner).replace(old, new, 1)
