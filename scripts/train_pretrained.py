@@ -111,7 +111,9 @@ class Run:
                 self.say(f"{steps}, cost {costs}")
 
         result = train(
-            make_plan(TrainingRequest(self.algorithm, task=self.task.name, seed=self.seed)),
+            make_plan(
+                TrainingRequest(self.algorithm, task=self.task.name, seed=self.seed)
+            ),
             self.folder,
             resume=(self.folder / run_folder.RUN).is_file(),
             on_progress=on_progress,

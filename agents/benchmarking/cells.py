@@ -76,7 +76,8 @@ class Cell:
     def values(self, figure: str) -> Floats:
         """Return a figure of all episodes that have it."""
         values = np.concatenate([run.figures[figure] for run in self.runs])
-        return values[np.isfinite(values)]
+        finite: Floats = values[np.isfinite(values)]
+        return finite
 
     @classmethod
     def from_dict(cls, content: Any, n_episodes: int, where: str) -> Self:

@@ -79,7 +79,8 @@ class Draws:
 
     def shares(self, task: int) -> Floats:
         """Share of each episode of a task in a draw, shape (n_draws, n_episodes)."""
-        return self.counts[task] / self.n_episodes
+        shares: Floats = self.counts[task] / self.n_episodes
+        return shares
 
     def runs(self, task: int, n_runs: int, controller: int) -> Integers:
         """Draw training runs of a controller in a task, shape (n_draws, n_runs)."""
@@ -224,7 +225,8 @@ def improvement(
 def _wins(costs: Floats, other_costs: Floats) -> Floats:
     """Wins of each run over each other run, shape (n_runs, n_others, n_episodes)."""
     first, second = costs[:, None], other_costs[None]
-    return (first < second) + 0.5 * (first == second)
+    wins: Floats = (first < second) + 0.5 * (first == second)
+    return wins
 
 
 def _drawn_wins(

@@ -288,7 +288,8 @@ def path_following(run: Rollout) -> dict[str, Floats]:
 def _ever(run: Rollout, name: str) -> Floats:
     """Flag that says whether another was set in an episode, 1 or 0, shape (n,)."""
     flags: Flags = during(run, name) > 0.0
-    return np.any(flags, axis=0).astype(np.float64)
+    ever: Floats = np.any(flags, axis=0).astype(np.float64)
+    return ever
 
 
 def during(run: Rollout, name: str) -> Floats:

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from agents.benchmarking.contestants import Contestant
 from rich.console import Console
 
 from agents import load_agent, load_results

@@ -206,10 +206,8 @@ def read_definition(source: Any, reward: Any = None) -> TaskDefinition:
     reward : str, Path or module, optional
         The path of a file, or a module, whose reward takes the place of the task's.
     """
-    if isinstance(source, TaskDefinition):
-        definition = source
-    else:
-        definition = _definition(source)
+    known = isinstance(source, TaskDefinition)
+    definition = source if known else _definition(source)
     if reward is not None:
         definition = _with_reward(definition, reward)
     _check_names(definition)

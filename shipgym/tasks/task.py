@@ -159,8 +159,9 @@ class Task:
             names += sensors.settings
         for name in names:
             if names.count(name) > 1 or name in VECTOR_OPTIONS:
-                is_sensors = sensors is not None and name in sensors.settings
-                source = sensors.source if is_sensors else definition.source
+                source = definition.source
+                if sensors is not None and name in sensors.settings:
+                    source = sensors.source
                 raise InputError(
                     f"{source}: Settings.{name}: expected a name of its own, got that of"
                     " another keyword; rename it"
@@ -184,7 +185,7 @@ class Task:
     @cached_property
     def seas(self) -> tuple[Weather, ...]:
         """Weathers of which each episode has one."""
-        seas = self.sea if isinstance(self.sea, list | tuple) else [self.sea]
+        seas = [self.sea] if isinstance(self.sea, str | Weather) else self.sea
         return tuple(as_weather(sea, "sea", None) for sea in seas)
 
     @property

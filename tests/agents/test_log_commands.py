@@ -184,9 +184,7 @@ def test_columns_that_are_not_used_are_listed(log, monkeypatch, capsys):
     ],
 )
 def test_a_name_is_a_channels_where_its_unit_is_one_of_it(name, channel, unit):
-    found = guess_columns(
-        LogTable(Path("log"), {name: np.zeros(3)}, range(3))
-    )
+    found = guess_columns(LogTable(Path("log"), {name: np.zeros(3)}, range(3)))
     assert [(one.channel, one.unit) for one in found] == (
         [(channel, unit)] if channel else []
     )

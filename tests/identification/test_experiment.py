@@ -182,7 +182,7 @@ def test_a_grey_box_that_explains_her_trials_is_certain_of_her_coefficients() ->
 def test_what_cannot_be_advised_is_named(ship: ShipModel) -> None:
     with pytest.raises(InputError, match="criterion"):
         advise(ship, [gentle(ship)], criterion="A")
-    with pytest.raises(InputError, match="coefficient: .*'Y_v'"):
+    with pytest.raises(InputError, match=r"coefficient: .*'Y_v'"):
         advise(ship, [gentle(ship)], coefficient="Y_v")
     for criterion in ("D", "E"):
         with pytest.raises(

@@ -307,7 +307,7 @@ def test_a_ship_without_a_rudder_is_refused(monkeypatch):
     )
     for name in (COURSE, PATH):
         with pytest.raises(
-            InputError, match="model: expected .* rudder, got 'drifting'"
+            InputError, match=r"model: expected .* rudder, got 'drifting'"
         ):
             gymnasium.make(name, model=drifting)
 

@@ -705,7 +705,7 @@ def test_a_corridor_is_wider_than_the_ship_whose_beam_is_known():
     path_following.check(Settings(corridor=0.07), bare)
     with pytest.raises(
         InputError,
-        match="ground: expected a number > 1 .in ship lengths, beyond the c",
+        match=r"ground: expected a number > 1 .in ship lengths, beyond the c",
     ):
         path_following.check(Settings(ground=1.0), None)
 
