@@ -1,4 +1,4 @@
-"""Golden sections `demo`, `pretrained` and `identification`: what whole chains come to."""
+"""Golden sections `demo` and `identification`: numbers at the end of whole chains."""
 
 from __future__ import annotations
 
@@ -13,21 +13,14 @@ from typing import Any
 import numpy as np
 
 import shipgym
-from agents import benchmark
-from agents.suites.suite import load_suite
 from identification import identify
-from tests.golden.made_up import asked
-from tests.golden.store import Floats, numbers_in, vector
+from identification.reading import full_name, identify_arguments
+from tests.golden.store import Floats, numbers_in
 
 ROOT = Path(__file__).parents[2]
 SHIP_FILE = ROOT / "examples" / "mariner" / "ship.toml"
 #: Parts of names in metrics.json that tell of the run, not of the ship.
 OF_THE_RUN = ("time", "duration", "version", "path", "software")
-
-CONTROLLERS = ("pid", "lq", "ppo")
-TASKS = tuple(task.name for task in load_suite().tasks if task.on == "ship")
-EPISODES = 3
-KEYS = ("controller", "task", "run", "seed")
 
 METHODS: Mapping[str, Mapping[str, Any]] = {
     "default": {},
@@ -77,25 +70,19 @@ def record_demo(_: str) -> dict[str, Floats]:
     return numbers_in(metrics, left_out=OF_THE_RUN)
 
 
-def record_pretrained(task: str) -> dict[str, Floats]:
-    """All figures of a few scored episodes of a task, steered by PID, LQ and the pretrained agent."""
-    result = benchmark(list(CONTROLLERS), tasks=[task], episodes=EPISODES)
-    return {
-        f"{one} {name}": vector(result.figures(one, task, name))
-        for one in CONTROLLERS
-        for name in result.episodes
-        if name not in KEYS
-    }
-
-
 def record_identification(method: str) -> dict[str, Floats]:
     """Coefficients of the example's ship, each with its standard error, and the errors of predictions."""
     ship = shipgym.ShipFile.load(SHIP_FILE)
+    options = METHODS[method]
+    kernel = "kernel" in options
+    by_full_name = {
+        full_name(name, "golden", kernel): value for name, value in options.items()
+    }
     result = identify(
         ship.trials(),
         particulars=ship.particulars,
         steering=ship.steering,
-        **asked(METHODS[method]),
+        **identify_arguments(by_full_name),
     )
     errors = result.standard_errors
     found = {

@@ -1,4 +1,4 @@
-"""Golden results of the engine: recorded before it is rebuilt, compared after each step of the rebuilding.
+"""Golden results: numbers recorded once, compared after each change of the code.
 
     python tests/golden/record.py             # write tests/golden/results/SECTION.npz
     python tests/golden/record.py --compare   # exit code 1 beyond the tolerance
@@ -30,20 +30,8 @@ for library in ("OMP", "OPENBLAS", "MKL"):
 
 from tests.golden import (  # noqa: E402 - the folder above has to be found first
     chains,
-    controllers,
     environments,
-    estimators,
-    fits,
-    indices,
-    models,
-    policies,
-    readers,
-    regression,
-    rollouts,
-    seas,
     ships,
-    validation,
-    verification,
     voyages,
 )
 from tests.golden.store import (  # noqa: E402
@@ -82,38 +70,12 @@ SECTIONS = {
         environments.cases, environments.record, environments.TOLERANCES
     ),
     "voyages": Section(voyages.cases, voyages.record, environments.TOLERANCES),
-    "seas": Section(seas.cases, seas.record, {"": 1e-9}),
     "derivatives": Section(ships.all_ships, ships.record_derivatives, {"": 1e-9}),
     "manoeuvres": Section(ships.shipped, ships.record_manoeuvres, {"": 1e-9}),
-    "readers": Section(readers.QUESTIONS.cases, readers.QUESTIONS.record, {"": 1e-6}),
-    "models": Section(models.QUESTIONS.cases, models.QUESTIONS.record, {"": 1e-6}),
-    "indices": Section(indices.QUESTIONS.cases, indices.QUESTIONS.record, {"": 1e-6}),
-    "controllers": Section(
-        controllers.cases, controllers.record, controllers.TOLERANCES
-    ),
-    "policies": Section(policies.cases, policies.record, policies.TOLERANCES),
-    "bridge": Section(
-        lambda: policies.BRIDGE, policies.record_bridge, policies.TOLERANCES
-    ),
-    "rollouts": Section(rollouts.cases, rollouts.record, rollouts.TOLERANCES),
-    "verification": Section(
-        verification.cases, verification.record, verification.TOLERANCES
-    ),
-    "demo": Section(lambda: ["mariner"], chains.record_demo, {"": 1e-6}),
-    "pretrained": Section(lambda: chains.TASKS, chains.record_pretrained, {"": 1e-6}),
     "identification": Section(
         lambda: chains.METHODS, chains.record_identification, chains.TOLERANCES
     ),
-    "estimators": Section(
-        estimators.PARTS.cases, estimators.PARTS.record, estimators.TOLERANCES
-    ),
-    "regression": Section(
-        regression.PARTS.cases, regression.PARTS.record, regression.TOLERANCES
-    ),
-    "validation": Section(
-        validation.PARTS.cases, validation.PARTS.record, validation.TOLERANCES
-    ),
-    "fits": Section(fits.cases, fits.record, fits.TOLERANCES),
+    "demo": Section(lambda: ["mariner"], chains.record_demo, {"": 1e-6}),
 }
 
 

@@ -2,13 +2,16 @@
 
 import pytest
 
+from tests.golden import ships, voyages
 from tests.golden.record import beyond_tolerance
 
 QUICK = [
     ("environments", "CourseKeeping"),
     ("environments", "PathFollowing"),
     ("environments", "CourseKeeping single"),
-    ("derivatives", "mariner-tls-svm"),
+    *(("voyages", case) for case in voyages.cases()),
+    *(("derivatives", ship) for ship in ships.all_ships()),
+    *(("identification", method) for method in ("default", "ls", "rm-svm")),
 ]
 
 
