@@ -117,7 +117,7 @@ def test_the_walks_name_what_stands_in_the_files():
         defined = [
             node.name
             for node in ast.walk(tree)
-            if isinstance(node, ast.FunctionDef | ast.ClassDef)
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
         ]
         assert name in defined, f"{file}: {name}"
 
