@@ -185,7 +185,9 @@ class Task:
     @cached_property
     def seas(self) -> tuple[Weather, ...]:
         """Weathers of which each episode has one."""
-        seas = [self.sea] if isinstance(self.sea, str | Weather) else self.sea
+        seas: Any = [self.sea]
+        if isinstance(self.sea, Sequence) and not isinstance(self.sea, str):
+            seas = self.sea
         return tuple(as_weather(sea, "sea", None) for sea in seas)
 
     @property

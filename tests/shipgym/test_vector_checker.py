@@ -365,7 +365,7 @@ WRONG = [
     (
         Walkers,
         UNMASKED,
-        r"step, more: infos\['_l'\] is None, expected a mask of 2 truth values",
+        r"step, more: infos\['_l'\] is None, expected a mask of 2 booleans",
     ),
     (
         Walkers,
