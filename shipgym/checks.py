@@ -65,7 +65,7 @@ def quoted(words: Iterable[str]) -> str:
 
 
 def did_you_mean(word: str, options: Iterable[str]) -> str:
-    """Hint such as ``" Did you mean 'beam'?"``; empty if no option looks like `word`."""
+    """Hint such as ``" Did you mean 'beam'?"``; empty if no option is like `word`."""
     by_lower_case = {option.lower(): option for option in options}
     text = str(word).strip().lower()
     close = difflib.get_close_matches(text, list(by_lower_case), n=1, cutoff=0.6)
@@ -80,7 +80,7 @@ def check_keys(
     where: str,
     required: Iterable[str] = (),
 ) -> None:
-    """Refuse a key not among `allowed`, naming the nearest, and a missing required one."""
+    """Refuse an unknown key, naming the nearest, and a missing required one."""
     for key in mapping:
         if key not in allowed:
             raise InputError(
@@ -97,7 +97,7 @@ def check_keys(
 def check_fields(
     content: Mapping[str, Any], names: Collection[str], where: str, remedy: str
 ) -> None:
-    """Refuse an unknown field of a file, and a missing one of `names` with its `remedy`."""
+    """Refuse an unknown field of a file, and a missing one, with its `remedy`."""
     check_keys(content, names, where)
     for name in names:
         if name not in content:
@@ -118,7 +118,7 @@ def check_table(
     allowed: Collection[str] | None = None,
     required: Iterable[str] = (),
 ) -> Mapping[str, Any]:
-    """Return `value`, which must be a table (a mapping by strings), of these keys if given."""
+    """Return `value`, which must be a table, of the keys `allowed` if given."""
     if not isinstance(value, Mapping):
         raise unexpected(where, "a table of keys and values", value)
     if allowed is not None:
@@ -140,7 +140,7 @@ def check_text(value: Any, where: str) -> str:
 def check_choice(
     value: Any, options: Collection[str], where: str, also: str = ""
 ) -> str:
-    """Return `value`, which must be one of `options`; `also` ends the list in messages."""
+    """Return `value`, one of `options`; `also` ends the list of them in messages."""
     if isinstance(value, str) and value in options:
         return value
     hint = did_you_mean(value, options) if isinstance(value, str) else ""

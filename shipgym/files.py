@@ -38,7 +38,7 @@ LARGEST_NUMBER = 1e100  # magnitude: products of three such numbers are still fi
 _UNWRITABLE = re.compile("[\0\ud800-\udfff]")
 
 
-# ---- writing ---------------------------------------------------------------------------
+# ---- writing
 
 
 def make_folder(folder: Path) -> None:
@@ -62,15 +62,15 @@ def write_text(text: str, path: Path) -> None:
 
 
 def write_json(fields: Mapping[str, Any], path: Path, indent: int | None = 1) -> None:
-    """Write JSON atomically (`atomic_path`); ValueError for numbers that are not finite."""
+    """Write JSON atomically (`atomic_path`); ValueError for nan and infinities."""
     write_text(json.dumps(fields, indent=indent, allow_nan=False) + "\n", path)
 
 
-# ---- reading ---------------------------------------------------------------------------
+# ---- reading
 
 
 def check_readable(path: Path, what: str) -> None:
-    """Refuse a missing, special or unreadable file; `what` it is, such as "CSV file"."""
+    """Refuse a missing, special or unreadable file; `what` it is: "CSV file"."""
     with _opened(path, what):
         pass
 
@@ -217,7 +217,7 @@ def named_values(texts: Iterable[str], where: str, example: str) -> dict[str, An
     return found
 
 
-# ---- limits of what JSON and TOML hold -------------------------------------------------
+# ---- limits of what JSON and TOML hold
 
 
 def check_content(

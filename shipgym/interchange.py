@@ -1,4 +1,4 @@
-"""Trials and episodes as pandas frames and Minari datasets, and back to the same numbers.
+"""Trials and episodes as pandas frames and Minari datasets, and back unchanged.
 
 Time series are columns: the channels of a trial by their names, the series of an
 episode by group and name, such as `states.x`, `commands.delta`,

@@ -1,4 +1,4 @@
-"""Users' Python files, such as tasks and ships, executed only when a user names them."""
+"""Users' Python files, such as tasks and ships, executed when a user names them."""
 
 import hashlib
 import sys
@@ -72,7 +72,7 @@ def working_folder() -> Iterator[None]:
 
 
 def _not_executed(path: Path, resolved: str, error: BaseException) -> InputError:
-    """Error for a file whose execution failed: the last line in it, and in what it imports."""
+    """Error of a file that failed: its last line, and that of what it imports."""
     frames = extract_tb(error.__traceback__)
     passed = [frame.lineno for frame in frames if frame.filename == resolved]
     line = passed[-1] if passed else getattr(error, "lineno", None)
@@ -111,7 +111,7 @@ def refuse_closure(function: Any) -> None:
 
 
 def asked(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Call a user's function; an error in it becomes an InputError naming file and line."""
+    """Call a user's function; InputError names file and line of an error in it."""
     try:
         return function(*arguments)
     except InputError:

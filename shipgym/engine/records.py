@@ -77,7 +77,7 @@ def field_types(record: Record, notes: bool = False) -> dict[str, Any]:
 
 @cache
 def leaves(record: Record, prefix: str = "") -> tuple[str, ...]:
-    """Paths of all numbers of a record and those within it, such as `u`, `helm.gain`."""
+    """Paths of all numbers of a record and those within it: `u`, `helm.gain`."""
     paths: list[str] = []
     for name, kind in field_types(record).items():
         path = prefix + name

@@ -21,7 +21,9 @@ STAGGER = 5  # step at which a row is begun anew by hand
 
 
 def check_vector_env(
-    make: Make, make_single: MakeSingle | None = None, n_steps: int = STEPS
+    make: Make,
+    make_single: MakeSingle | None = None,
+    n_steps: int = STEPS,
 ) -> None:
     """Check that a vector environment meets the requirements of Gymnasium's interface.
 
@@ -140,7 +142,9 @@ def _check_array(name: str, array: Any, kind: Any, n: int) -> None:
 
 
 def _check_observations(
-    env: VectorEnv[Any, Any, Any], observations: Any, where: str
+    env: VectorEnv[Any, Any, Any],
+    observations: Any,
+    where: str,
 ) -> None:
     space = env.observation_space
     _expect(
@@ -261,7 +265,9 @@ def _check_autoreset(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
 
 
 def _check_final(
-    env: VectorEnv[Any, Any, Any], infos: dict[str, Any], done: NDArray[np.bool_]
+    env: VectorEnv[Any, Any, Any],
+    infos: dict[str, Any],
+    done: NDArray[np.bool_],
 ) -> None:
     for key in ("final_obs", "final_info"):
         _expect(key in infos, f"an episode ended and infos have no '{key}'")
@@ -279,7 +285,9 @@ def _check_final(
 
 
 def _check_partial_reset(
-    env: VectorEnv[Any, Any, Any], before: Any, done: NDArray[np.bool_]
+    env: VectorEnv[Any, Any, Any],
+    before: Any,
+    done: NDArray[np.bool_],
 ) -> None:
     kept = np.copy(before)
     after, _ = env.reset(options={"reset_mask": done.copy()})

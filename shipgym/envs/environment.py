@@ -1,10 +1,12 @@
 """Base of environments of one ship and of many: options, copies, states, resets."""
 
+from __future__ import annotations
+
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import gymnasium
 import numpy as np
@@ -19,7 +21,6 @@ from shipgym.checks import (
     quoted,
     unexpected,
 )
-from shipgym.envs.artist import Artist
 from shipgym.envs.engine import Engine, as_array, episode_key
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
@@ -27,6 +28,9 @@ from shipgym.instruments.sensor_set import read_sensors
 from shipgym.ships import ShipModel, load_model
 from shipgym.tasks.definition import read_definition
 from shipgym.tasks.task import RUDDER_ORDERS, Task
+
+if TYPE_CHECKING:
+    from shipgym.envs.artist import Artist
 
 Space = gymnasium.spaces.Box | gymnasium.spaces.Discrete
 DEFAULT_MODEL = "mariner-tls-svm"
@@ -96,7 +100,9 @@ def spaces(task: Task, model: ShipModel) -> tuple[gymnasium.spaces.Box, Space]:
 
 
 def rudder_orders(
-    numbers: Any, shape: tuple[int, ...], where: str
+    numbers: Any,
+    shape: tuple[int, ...],
+    where: str,
 ) -> NDArray[np.float32]:
     """Discrete rudder orders by their numbers, as a column for each row.
 
@@ -165,8 +171,9 @@ class ShipsEnv:
             threads=given.get("threads", 1),
         )
         self._asked: dict[str, Any] = {}
-        rows = range(num_envs) if self.render_mode else ()
-        self._artists = [Artist(self.render_mode, row) for row in rows]
+        self._artists: list[Artist] = []
+        if self.render_mode is not None:
+            self._artists = _artists(self.render_mode, num_envs)
         observed = self.task.observed(self.model)
         self.observation_names = tuple(quantity.name for quantity in observed)
         self.observation_scales = np.array([quantity.scale for quantity in observed])
@@ -317,8 +324,17 @@ class ShipsEnv:
                 artist.note(self._engine)
 
 
+def _artists(mode: str, num_envs: int) -> list[Artist]:
+    from shipgym.envs.artist import Artist  # needed for pictures alone
+
+    return [Artist(mode, row) for row in range(num_envs)]
+
+
 def rebuild(
-    kind: Any, arguments: dict[str, Any], state: Any, attributes: dict[str, Any]
+    kind: Any,
+    arguments: dict[str, Any],
+    state: Any,
+    attributes: dict[str, Any],
 ) -> Any:
     """Make an environment again."""
     env = kind(**arguments)

@@ -142,8 +142,8 @@ class Episode:
         actions = check_finite(self.actions, "actions")
         if actions.ndim != 2 or len(actions) != n_steps:
             raise InputError(
-                f"actions: expected shape ({n_steps}, n_actions), a row for each reward,"
-                f" got {actions.shape}"
+                f"actions: expected shape ({n_steps}, n_actions), a row for each"
+                f" reward, got {actions.shape}"
             )
         self._set("rewards", rewards)
         self._set("actions", actions)

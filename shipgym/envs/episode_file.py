@@ -14,8 +14,8 @@ Format 1:
   m or null}, and "turn_radius" in m where its turns are arcs
 - `states`: {name: n + 1 values}, SI units: at the beginning and after each of the n
   steps
-- `commands`: {"delta": n values in rad, "n": n values in 1/s}, of each step; what is not
-  known is absent
+- `commands`: {"delta": n values in rad, "n": n values in 1/s}, of each step; what is
+  not known is absent
 - `actions`: n rows, as the agent gave them
 - `rewards`: n values; `reward_parts`: {name: n values}
 - `info`: {name: n + 1 values}: what else it reported, at the beginning and after each

@@ -1,4 +1,4 @@
-"""The state of many ships by lane: laid out, read, written, copied between two steps."""
+"""State of many ships by lane: laid out, read, written, copied between two steps."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -20,10 +20,7 @@ from shipgym.errors import InputError
 from shipgym.sea.weather_column import weather_column
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
-from shipgym.trials.sensors import SEA_TRIAL
 
-#: Settings of a bridge's instruments: the channel of a sea trial whose noise each takes.
-SENSOR_NOISE = {"heading": "psi", "yaw_rate": "r", "speed": "u", "position": "x"}
 ANSWER = ("reward", "terminated", "truncated")  # outcomes before those of `info`
 
 
@@ -65,35 +62,26 @@ class Lanes:
         self.windy = program.windy
         self.dt = task.interval(model)
         self.flag_names = [name for name in task.info_names if name in task.flags]
-        observed = [quantity.path for quantity in task.observed(model)]
         self._output_pool = OutputPool(
             num_envs,
-            n_observed=len(observed),
+            n_observed=len(task.observed(model)),
             n_outcomes=ANSWER_OUTCOMES + len(task.info_names),
             n_flags=ANSWER_FLAGS + len(self.flag_names),
         )
 
-        tiles = -(-num_envs // LANES)
-        columns = ship_columns(own, self.windy, task, model, drawn)
-        pool = columns if drawn else np.zeros((0, columns.shape[1]))
-        shares = lane_shares(tiles, threads)
+        n_tiles = -(-num_envs // LANES)
+        shares = lane_shares(n_tiles, threads)
         self.n_shares = len(shares)
-        n_plan = int(task.definition.plan_length(task.settings))
-        n_state = program.state_rows.n_rows + n_plan
-        n_random = program.random_rows.n_rows
-        n_results = program.result_rows.n_rows
-
+        columns = ship_columns(own, self.windy, task, model, drawn)
+        n_ship_rows = columns.shape[1]
+        pool = columns if drawn else np.zeros((0, n_ship_rows))
         tables = self._allocate(
-            states=np.zeros((tiles, n_state * LANES)),
-            random=np.zeros((tiles, n_random * LANES), dtype=np.uint64),
-            ships=ship_tiles(columns, tiles, len(own) > 1),
+            ships=ship_tiles(columns, n_tiles, len(own) > 1),
             pool=pool.reshape(1, -1),
             settings=np.array([self._settings()]),
-            results=np.zeros((self.n_shares, n_results * LANES)),
             shares=shares,
-            actions=np.zeros((task.n_commands, num_envs), dtype=np.float32),
-            chosen=np.zeros((1, num_envs), dtype=np.bool_),
-            **self._output_rows(observed),
+            **self._empty_tables(n_tiles),
+            **self._output_rows(),
         )
         self._states = tables["states"]
         self._random = lanes_of(tables["random"])
@@ -101,22 +89,38 @@ class Lanes:
         self._actions = tables["actions"]
         self._chosen = tables["chosen"][0]
 
-    def _allocate(self, **contents: NDArray[Any]) -> dict[str, NDArray[Any]]:
-        """Copy tables into one block of memory, which loops take; return views of it."""
-        shapes: dict[str, tuple[Any, int, int]] = {}
-        for name, content in contents.items():
-            rows, columns = content.shape
-            shapes[name] = (content.dtype, rows, columns)
-        n_arguments = len(leaves(Arguments))
-        blocks, end = allocated(shapes, first=n_arguments)
-        arguments = Arguments(**blocks, **self._output_pool.blocks)
+    def _empty_tables(self, n_tiles: int) -> dict[str, NDArray[Any]]:
+        """Zeros of states, random numbers, results, actions and chosen lanes."""
+        program = self.program
+        n_plan = int(self.task.definition.plan_length(self.task.settings))
+        n_state = program.state_rows.n_rows + n_plan
+        n_random = program.random_rows.n_rows
+        n_results = program.result_rows.n_rows
+        return {
+            "states": np.zeros((n_tiles, n_state * LANES)),
+            "random": np.zeros((n_tiles, n_random * LANES), dtype=np.uint64),
+            "results": np.zeros((self.n_shares, n_results * LANES)),
+            "actions": np.zeros(
+                (self.task.n_commands, self.num_envs),
+                dtype=np.float32,
+            ),
+            "chosen": np.zeros((1, self.num_envs), dtype=np.bool_),
+        }
 
+    def _allocate(self, **contents: NDArray[Any]) -> dict[str, NDArray[Any]]:
+        """Copy tables into one block of memory, for loops; return views of it."""
+        n_arguments = len(leaves(Arguments))
+        blocks, end = allocated(contents, first=n_arguments)
+        arguments = Arguments(**blocks, **self._output_pool.blocks)
         self._memory = zeros(end)
-        self._memory[:n_arguments].view(np.int64)[:] = flat(arguments)
+        head = self._memory[:n_arguments].view(np.int64)
+        head[:] = flat(arguments)
+
         tables = {}
         for name, content in contents.items():
-            tables[name] = table_in(self._memory, blocks[name], content.dtype)
-            tables[name][:] = content
+            table = table_in(self._memory, blocks[name], content.dtype)
+            table[:] = content
+            tables[name] = table
         return tables
 
     def _settings(self) -> list[float]:
@@ -130,29 +134,23 @@ class Lanes:
             least_shaft=task.least_shaft(self.model),
         )
         sensors = self.program.sensors
-        noise = {}
-        if sensors.noise:
-            for name, channel in SENSOR_NOISE.items():
-                noise[name] = SEA_TRIAL[channel].noise * task.noise
+        noise = bridge_noise(task.noise) if sensors.noise else {}
         sensor_settings = task.sensor_settings or sensors.make_settings(noise)
         return [*flat(rules), *flat(sensor_settings), *flat(task.settings)]
 
-    def _output_rows(self, observed: Sequence[str]) -> dict[str, NDArray[np.int64]]:
+    def _output_rows(self) -> dict[str, NDArray[np.int64]]:
         """Entries of a tile's results at which rows of outputs begin, shape (1, n)."""
-        program = self.program
-        rows = program.result_rows
-        observations = [rows["observation"].row(path) for path in observed]
+        rows = self.program.result_rows
+        observed = []
+        for quantity in self.task.observed(self.model):
+            observed.append(rows["observation"].row(quantity.path))
         answer = [rows["outcome"].row(name) for name in ANSWER]
-        info = [program.info_row(name) for name in self.task.info_names]
-        flags = [program.info_row(name) for name in self.flag_names]
-        outputs = {
-            "observed": observations,
-            "informed": answer + info,
-            "flagged": answer[1:] + flags,
-        }
+        info = [self.program.info_row(name) for name in self.task.info_names]
+        flags = [self.program.info_row(name) for name in self.flag_names]
         return {
-            name: LANES * np.array([numbers], dtype=np.int64)
-            for name, numbers in outputs.items()
+            "observed": _first_entries(observed),
+            "informed": _first_entries(answer + info),
+            "flagged": _first_entries(answer[1:] + flags),
         }
 
     @property
@@ -162,7 +160,7 @@ class Lanes:
 
     @property
     def steps(self) -> Floats:
-        """Control intervals of each lane's episode so far, shape (num_envs,), a copy."""
+        """Control intervals of each lane's episode, shape (num_envs,), a copy."""
         return self.read("steps")
 
     def read(self, name: str) -> Floats:
@@ -222,7 +220,7 @@ class Lanes:
         return weather
 
     def _ship_number(self, name: str) -> Floats:
-        """One number of the ships, or of their sea, for each lane, shape (num_envs,)."""
+        """Number of the ships, or of their sea, for each lane, shape (num_envs,)."""
         layout = self.program.ship_rows
         is_ships = name in layout["ship"].present
         record = "ship" if is_ships else "sea_parameters"
@@ -315,7 +313,7 @@ class Lanes:
             raise InputError("state: observations: expected finite numbers")
 
     def memory(self) -> dict[str, NDArray[Any]]:
-        """All that the steps to come depend on beside their commands, copies by name."""
+        """All that later steps depend on except their commands, copies by name."""
         return {
             "states": self._states.copy(),
             "keys": self._random.copy(),
@@ -323,7 +321,7 @@ class Lanes:
         }
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from what `memory` gave, of this engine or one of the same arguments."""
+        """Go on from the `memory` of this engine, or one of the same arguments."""
         self._states[:] = memory["states"]
         self._random[:] = memory["keys"]
         self._ships[:] = memory["ships"]
@@ -342,9 +340,27 @@ def _check_made_for(given: Any, made_for: Mapping[str, Any]) -> None:
             )
 
 
+def _first_entries(rows: Sequence[int]) -> NDArray[np.int64]:
+    """First entries of rows in a tile, shape (1, n_rows)."""
+    numbers = np.array([rows], dtype=np.int64)
+    return LANES * numbers
+
+
 def lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:
     """Tiles with an axis for their lanes, shape (n_tiles, n_rows, 64), a view."""
     return tiles.reshape(len(tiles), -1, LANES)
+
+
+def bridge_noise(multiple: float) -> dict[str, float]:
+    """Settings of a bridge's noise, in multiples of that of a sea trial's sensors."""
+    # imports all that reads trials, which is needed for noise alone
+    from shipgym.trials.sensors import SEA_TRIAL
+
+    channels = {"heading": "psi", "yaw_rate": "r", "speed": "u", "position": "x"}
+    noise = {}
+    for name, channel in channels.items():
+        noise[name] = multiple * SEA_TRIAL[channel].noise
+    return noise
 
 
 def lane_shares(tiles: int, threads: int) -> NDArray[np.int64]:
@@ -355,7 +371,11 @@ def lane_shares(tiles: int, threads: int) -> NDArray[np.int64]:
 
 
 def ship_columns(
-    pool: Pool, windy: bool, task: Task, base: ShipModel, drawn: bool
+    pool: Pool,
+    windy: bool,
+    task: Task,
+    base: ShipModel,
+    drawn: bool,
 ) -> Floats:
     """Numbers of ships and of the seas they meet, a row each.
 
@@ -399,9 +419,11 @@ def envelope_numbers(model: ShipModel) -> Floats:
         triangle = data.shape[np.triu_indices(4)]
         return np.concatenate([data.low, data.high, data.centre, triangle])
 
-    infinite = np.full(len(Four._fields), np.inf)
-    centre_and_shape = np.zeros(len(Four._fields) + len(Triangle._fields))
-    return np.concatenate([-infinite, infinite, centre_and_shape])
+    n_bounds = len(Four._fields)
+    infinite = np.full(n_bounds, np.inf)
+    centre = np.zeros(n_bounds)
+    triangle = np.zeros(len(Triangle._fields))
+    return np.concatenate([-infinite, infinite, centre, triangle])
 
 
 def ship_tiles(columns: Floats, tiles: int, own: bool) -> Floats:

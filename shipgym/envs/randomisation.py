@@ -72,6 +72,15 @@ class Randomisation:
         not loaded by its coefficients.
         """
         models = [model]
+        if self.ensemble:
+            models += self._others(model)
+        if self.model_uncertainty or self.speed_range or self.loading_range:
+            return self._drawn(models, seas)
+        return list(product(models, seas))
+
+    def _others(self, model: ShipModel) -> list[ShipModel]:
+        """Load the ensemble; InputError for a model of another structure."""
+        models = []
         for given in self.ensemble:
             other = given if isinstance(given, ShipModel) else load_model(given)
             if other.compiled is not model.compiled:
@@ -81,20 +90,25 @@ class Randomisation:
                     " environment for each"
                 )
             models.append(other)
-        if not (self.model_uncertainty or self.speed_range or self.loading_range):
-            return list(product(models, seas))
+        return models
 
+    def _drawn(self, models: Sequence[ShipModel], seas: Sequence[Weather]) -> Pool:
+        """Draw ships of each model in turn, and give each round a sea."""
         random = np.random.default_rng(POOL_SEED)
-        rounds = -(-POOL_SIZE // len(models))
-        drawn = []
-        for one in models:
-            same = [one] * rounds
-            drawn.append(one.sample(rounds, random) if self.model_uncertainty else same)
+        n_rounds = -(-POOL_SIZE // len(models))
+        samples = []
+        for model in models:
+            drawn = [model] * n_rounds
+            if self.model_uncertainty:
+                drawn = model.sample(n_rounds, random)
+            samples.append(drawn)
+
         paces = self._paces(models)
         pool: Pool = []
-        for round_number, in_turn in enumerate(zip(*drawn, strict=True)):
+        for round_number, in_turn in enumerate(zip(*samples, strict=True)):
             sea = seas[round_number % len(seas)]
-            for ship in in_turn[: POOL_SIZE - len(pool)]:
+            left = POOL_SIZE - len(pool)
+            for ship in in_turn[:left]:
                 pool.append((self._varied(ship, paces, random), sea))
         return pool
 
@@ -146,8 +160,8 @@ def _loaded(ship: ShipModel, displacement: float) -> ShipModel:
     if not isinstance(ship.dynamics, Structure):
         raise InputError(
             "loading_range: expected a ship whose equations are a table of"
-            f" coefficients, got {ship.name!r}; name its loading conditions as models of"
-            " their own in `ensemble`"
+            f" coefficients, got {ship.name!r}; name its loading conditions as models"
+            " of their own in `ensemble`"
         )
     lighter = {}
     for name, value in ship.coefficients.items():

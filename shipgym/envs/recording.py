@@ -131,7 +131,10 @@ class _Recorded:
     """
 
     def __init__(
-        self, env: gymnasium.Env[Any, Any], since_seed: int, info: Mapping[str, Any]
+        self,
+        env: gymnasium.Env[Any, Any],
+        since_seed: int,
+        info: Mapping[str, Any],
     ) -> None:
         ship: Any = env.unwrapped
         self._ship = ship
@@ -256,8 +259,8 @@ def _folder(folder: Path, prefix: str, overwrite: bool) -> Path:
     earlier = sorted(folder.glob(f"{escape(prefix)}-[0-9]*.json"))
     if earlier and not overwrite:
         raise InputError(
-            f"folder: {folder} holds '{earlier[0].name}' of an earlier recording; choose"
-            " another folder or overwrite=True"
+            f"folder: {folder} holds '{earlier[0].name}' of an earlier recording;"
+            " choose another folder or overwrite=True"
         )
     return folder
 

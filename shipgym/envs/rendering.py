@@ -330,7 +330,11 @@ class _Brush:
         self._draw.polygon(self._surface, colour, _fine(points))
 
     def circle(
-        self, colour: Colour, centre: Any, radius: float, width: int = 0
+        self,
+        colour: Colour,
+        centre: Any,
+        radius: float,
+        width: int = 0,
     ) -> None:
         self._draw.circle(
             self._surface,

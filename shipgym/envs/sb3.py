@@ -143,7 +143,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         self._touched: list[int] = []  # rows whose dictionary is to be emptied
 
     def reset(self) -> NDArray[np.float32]:
-        """Begin an episode in each row: with the seeds of `seed`, once, or else the next.
+        """Begin an episode in each row: the next, or by the seeds of `seed`, once.
 
         Raises InputError if there are options: as the single environments, these know
         none.

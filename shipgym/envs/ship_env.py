@@ -125,7 +125,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         """
         super().reset(seed=seed)
         episodes = self._engine.episodes + np.uint64(1)
-        state = self._take(options)
+        state = self._take(options) if options or self._asked else None
         if state is not None:
             self.set_state(state)
         else:

@@ -78,9 +78,11 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
 
 
 def _plain_engine(
-    model: ShipModel, task: Task, randomisation: Randomisation
+    model: ShipModel,
+    task: Task,
+    randomisation: Randomisation,
 ) -> tuple[Engine, dict[str, list[float]]]:
-    """Engine in plain Python, and by path all that it observes, before it is clipped."""
+    """Engine in plain Python, and its observations before they are clipped, by path."""
     seen: dict[str, list[float]] = {}
     for quantity in task.observed(model):
         seen[quantity.path] = []
@@ -122,7 +124,7 @@ def _orders(engine: Engine, step: int) -> Floats:
 
 
 def _sail_in_python(plain: Engine) -> None:
-    """Take some steps in plain Python; InputError names the line and step of an error."""
+    """Take some steps in plain Python; InputError names line and step of an error."""
     for step in range(PLAIN_STEPS):
         try:
             asked(plain.step, _orders(plain, step))
@@ -182,7 +184,7 @@ def _differ(
     agreement: float,
     ways: tuple[str, str],
 ) -> Iterator[str]:
-    """First difference of an engine's lanes from those of another by the same orders."""
+    """First difference of an engine's lanes from another's under the same orders."""
     names = ["reward"]
     for quantity in one.task.observed(one.model):
         names.append(f"Observation.{quantity.path}")
