@@ -82,7 +82,9 @@ class _Trace:
             self.add(value)
 
     def _visit_all(
-        self, values: Iterable[Any], attributes: tuple[str, ...] = ()
+        self,
+        values: Iterable[Any],
+        attributes: tuple[str, ...] = (),
     ) -> None:
         for value in values:
             self.visit(value, attributes)

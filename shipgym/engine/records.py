@@ -71,7 +71,9 @@ def is_list(kind: Any) -> bool:
 def field_types(record: Record, notes: bool = False) -> dict[str, Any]:
     """Types of a record's fields by name; `notes`: with what `Annotated` adds."""
     return get_type_hints(
-        record, globalns=vars(sys.modules[record.__module__]), include_extras=notes
+        record,
+        globalns=vars(sys.modules[record.__module__]),
+        include_extras=notes,
     )
 
 

@@ -7,11 +7,12 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
-from numpy.typing import NDArray
 
+from shipgym.arrays import Flags
 from shipgym.errors import InputError
 
-Make = Callable[[], VectorEnv[Any, Any, Any]]
+Vectors = VectorEnv[Any, Any, Any]
+Make = Callable[[], Vectors]
 Space = gymnasium.Space[Any]
 MakeSingle = Callable[[], gymnasium.Env[Any, Any]]
 Episode = list[tuple[Any, Any, Any, Any]]
@@ -65,7 +66,7 @@ def _expect(condition: bool, promise: str) -> None:
         raise InputError(f"vector environment: {promise}")
 
 
-def autoreset_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
+def autoreset_mode(env: Vectors) -> AutoresetMode:
     """Autoreset mode that an environment's metadata name; InputError without one."""
     mode = env.metadata.get("autoreset_mode")
     if not isinstance(mode, AutoresetMode):
@@ -76,7 +77,7 @@ def autoreset_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
     return mode
 
 
-def _check_spaces(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+def _check_spaces(env: Vectors, n_steps: int) -> None:
     autoreset_mode(env)
     n = env.num_envs
     _expect(isinstance(n, int) and n >= 1, f"num_envs is {n!r}, expected >= 1")
@@ -94,7 +95,7 @@ def _check_batched(which: str, single: Space, batch: Space, n: int) -> None:
     )
 
 
-def _check_reset(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+def _check_reset(env: Vectors, n_steps: int) -> None:
     answer = env.reset(seed=SEED)
     _expect(
         isinstance(answer, tuple) and len(answer) == 2,
@@ -105,7 +106,7 @@ def _check_reset(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
     _check_infos(env, infos, "reset")
 
 
-def _check_steps(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+def _check_steps(env: Vectors, n_steps: int) -> None:
     env.action_space.seed(SEED)
     env.reset(seed=SEED)
     kept: list[tuple[Any, Any]] = []
@@ -142,7 +143,7 @@ def _check_array(name: str, array: Any, kind: Any, n: int) -> None:
 
 
 def _check_observations(
-    env: VectorEnv[Any, Any, Any],
+    env: Vectors,
     observations: Any,
     where: str,
 ) -> None:
@@ -153,7 +154,7 @@ def _check_observations(
     )
 
 
-def _check_infos(env: VectorEnv[Any, Any, Any], infos: Any, where: str) -> None:
+def _check_infos(env: Vectors, infos: Any, where: str) -> None:
     _expect(
         isinstance(infos, dict),
         f"{where}: infos are {type(infos)}, expected a dict of arrays",
@@ -177,7 +178,7 @@ def _check_infos(env: VectorEnv[Any, Any, Any], infos: Any, where: str) -> None:
             )
 
 
-def _check_seeds(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+def _check_seeds(env: Vectors, n_steps: int) -> None:
     by_row = [SEED + row for row in range(env.num_envs)]
     first = _rollout(env, SEED, n_steps)
     _expect(
@@ -195,7 +196,7 @@ def _check_seeds(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
     )
 
 
-def _rollout(env: VectorEnv[Any, Any, Any], seed: Any, n_steps: int) -> Episode:
+def _rollout(env: Vectors, seed: Any, n_steps: int) -> Episode:
     goes_on = autoreset_mode(env) is not AutoresetMode.DISABLED
     env.action_space.seed(SEED)
     observations, _ = env.reset(seed=seed)
@@ -218,7 +219,7 @@ def _same(one: Episode, other: Episode) -> bool:
     return True
 
 
-def _check_actions(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+def _check_actions(env: Vectors, n_steps: int) -> None:
     env.reset(seed=SEED)
     actions = env.action_space.sample()
     wrong = [np.concatenate([actions, actions])]
@@ -234,7 +235,7 @@ def _check_actions(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
         )
 
 
-def _check_autoreset(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+def _check_autoreset(env: Vectors, n_steps: int) -> None:
     mode = autoreset_mode(env)
     env.action_space.seed(SEED)
     env.reset(seed=SEED)
@@ -265,9 +266,9 @@ def _check_autoreset(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
 
 
 def _check_final(
-    env: VectorEnv[Any, Any, Any],
+    env: Vectors,
     infos: dict[str, Any],
-    done: NDArray[np.bool_],
+    done: Flags,
 ) -> None:
     for key in ("final_obs", "final_info"):
         _expect(key in infos, f"an episode ended and infos have no '{key}'")
@@ -285,9 +286,9 @@ def _check_final(
 
 
 def _check_partial_reset(
-    env: VectorEnv[Any, Any, Any],
+    env: Vectors,
     before: Any,
-    done: NDArray[np.bool_],
+    done: Flags,
 ) -> None:
     kept = np.copy(before)
     after, _ = env.reset(options={"reset_mask": done.copy()})

@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_number, check_whole
 from shipgym.engine.compiling import entry_of
 from shipgym.engine.episode_program import EpisodeProgram, episode_program
@@ -104,25 +104,31 @@ class Engine(Lanes):
             len(own) == 1,
         )
         super().__init__(program, model, task, num_envs, own, drawn, threads)
+        self._begin_all(loop or self._compiled)
+
+    def _begin_all(self, loop: Callable[[EpisodeProgram], Any]) -> None:
+        """Begin an episode in each lane, with the loop of the program."""
         self._orders = self._actions.T
-        self.all_lanes = np.ones(num_envs, dtype=np.bool_)
+        self.all_lanes = np.ones(self.num_envs, dtype=np.bool_)
         self.all_lanes.flags.writeable = False
         # threads begin when there is a share for them
         self._threads = ThreadPoolExecutor(max(self.n_shares - 1, 1), "shipgym")
         self.renew_outputs()
         # last, when nothing is left that may be refused
-        self._run = (loop or self._compiled)(program)
-        self.reset(np.arange(num_envs))
+        self._run = loop(self.program)
+        self.reset(np.arange(self.num_envs))
 
     def _compiled(self, program: EpisodeProgram) -> Any:
         """Return the loop of a program; InputError names what does not compile."""
         try:
             run = entry_of(program.run)
         except InputError as error:
+            # plain Python often says better what is wrong
             fault = fault_in_python(self.model, self.task)
             raise InputError(fault or str(error)) from None
-        cost = asked(program.task.worst_cost, self.task.settings)
-        where = f"{program.task.reward_source}: worst_cost"
+        task = program.task
+        cost = asked(task.worst_cost, self.task.settings)
+        where = f"{task.reward_source}: worst_cost"
         check_number(cost, where, at_least=0.0)
         return run
 
@@ -168,11 +174,12 @@ class Engine(Lanes):
         return n_ended
 
     def _run_shares(self, asked: int) -> int:
-        """Let threads step their shares of the ships; the first is done by this one."""
+        """Let threads step their shares of the ships."""
         run = partial(self._run, self._memory, self.outputs.memory)
         others = []
         for share in range(1, self.n_shares):
             others.append(self._threads.submit(run, share, asked))
+        # the first share is this thread's, which would wait for the others otherwise
         n_ended: int = run(0, asked)
         for other in others:
             n_ended += other.result()
@@ -215,7 +222,7 @@ class Engine(Lanes):
         self._begin(chosen, BEGIN)
         return self.observations
 
-    def begin_next(self, chosen: NDArray[np.bool_]) -> None:
+    def begin_next(self, chosen: Flags) -> None:
         """Begin the next episode in the lanes of a mask, shape (num_envs,).
 
         Reward and ends of the last step stay.
@@ -227,7 +234,7 @@ class Engine(Lanes):
         outputs.outcomes[:ANSWER_OUTCOMES] = answer
         outputs.flags[:ANSWER_FLAGS] = ends
 
-    def _begin(self, chosen: NDArray[np.bool_], asked: int) -> None:
+    def _begin(self, chosen: Flags, asked: int) -> None:
         self._chosen[:] = chosen
         try:
             self._run(self._memory, self.outputs.memory, 0, asked)
@@ -250,9 +257,7 @@ class Engine(Lanes):
             )
         self._orders[...] = array
 
-    def step(
-        self, actions: ArrayLike
-    ) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+    def step(self, actions: ArrayLike) -> tuple[Observation, Floats, Flags, Flags]:
         """Take one control interval by orders (`order`).
 
         A lane whose episode is over stays as it is and earns 0. Returns float32

@@ -13,6 +13,7 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
+from shipgym.arrays import Flags
 from shipgym.checks import (
     check_choice,
     check_keys,
@@ -155,7 +156,10 @@ class ShipsEnv:
         self.render_mode = given["render_mode"]
         if self.render_mode is not None:
             check_choice(
-                self.render_mode, render_modes, "render_mode", also=", or None"
+                self.render_mode,
+                render_modes,
+                "render_mode",
+                also=", or None",
             )
 
         self.model, self.task, randomisation = read_options(
@@ -264,12 +268,16 @@ class ShipsEnv:
 
     def _engine_for(self, asked: Mapping[str, Any]) -> Engine:
         """Return its own engine, or one with other waypoints or a certain ship."""
+        own = self._own_engine
         if not asked:
-            return self._own_engine
+            return own
         task = self.task
         if "waypoints" in asked:
             task = task.changed(waypoints=asked["waypoints"])
-        return self._own_engine.rebuild(task=task, model_index=asked.get("model_index"))
+        return own.rebuild(
+            task=task,
+            model_index=asked.get("model_index"),
+        )
 
     def _take(self, options: Mapping[str, Any] | None, *more: str) -> Any:
         """Do what the options of a reset ask for, until the next; return a given state.
@@ -313,15 +321,16 @@ class ShipsEnv:
         keys = [episode_key(self.np_random) for _ in rows]
         return np.array(keys, dtype=np.uint64)
 
-    def _draw(self, mask: NDArray[np.bool_] | None = None) -> None:
+    def _draw(self, mask: Flags | None = None) -> None:
         """Let the wakes grow, or begin where an episode did; in the rows of a mask."""
+        engine = self._engine
         for row, artist in enumerate(self._artists):
             if mask is not None and not mask[row]:
                 continue
-            if self._engine.steps[row] == 0:
-                artist.begin(self._engine)
+            if engine.steps[row] == 0:
+                artist.begin(engine)
             else:
-                artist.note(self._engine)
+                artist.note(engine)
 
 
 def _artists(mode: str, num_envs: int) -> list[Artist]:

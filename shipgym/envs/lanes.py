@@ -213,9 +213,10 @@ class Lanes:
         names += ["current_north", "current_east"]
         weather = {name: self.read(name) for name in names}
 
+        mean_speed = self._ship_number("wind_speed")
         wind_north = self.read("wind_north")
         wind_east = self.read("wind_east")
-        weather["wind_speed"] = self._ship_number("wind_speed") + self.read("gust")
+        weather["wind_speed"] = mean_speed + self.read("gust")
         weather["wind_from"] = np.arctan2(wind_east, wind_north)
         return weather
 
@@ -408,7 +409,10 @@ def _scale_factors(task: Task, ship: Ship) -> list[float]:
     factors = []
     for path in task.definition.observations:
         scale = task.scale(path, ship)
-        factors.append(1.0 / scale if scale else 0.0)
+        if scale == 0.0:
+            factors.append(0.0)
+        else:
+            factors.append(1.0 / scale)
     return factors
 
 

@@ -105,5 +105,8 @@ def named_rows(
 
     The row of a flag takes the place of that of its number.
     """
-    rows = [*outcomes[ANSWER_OUTCOMES:], *flags[ANSWER_FLAGS:]]
-    return dict(zip([*names, *flag_names], rows, strict=True))
+    numbers = outcomes[ANSWER_OUTCOMES:]
+    rows = dict(zip(names, numbers, strict=True))
+    truths = flags[ANSWER_FLAGS:]
+    rows.update(zip(flag_names, truths, strict=True))
+    return rows

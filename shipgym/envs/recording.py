@@ -82,14 +82,18 @@ class RecordEpisode(
         self._recorded: _Recorded | None = None
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode, after writing one that is cut off so."""
         self._write()
         observation, info = super().reset(seed=seed, options=options)
         self.episode_number += 1
-        self._since_seed += 1
-        if seed is not None:
+        if seed is None:
+            self._since_seed += 1
+        else:
             self._since_seed = 0
         if self._trigger is None or self._trigger(self.episode_number):
             self._recorded = _Recorded(self.env, self._since_seed, info)

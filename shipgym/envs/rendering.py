@@ -168,9 +168,11 @@ class Renderer:
     def _draw_grid(self, chart: _Chart) -> None:
         line = self._brush.line
         for down in chart.grid_lines(axis=0):
-            line(GRID, (0.0, down), (SIZE, down))
+            left = (0.0, down)
+            line(GRID, left, (SIZE, down))
         for right in chart.grid_lines(axis=1):
-            line(GRID, (right, 0.0), (right, SIZE))
+            top = (right, 0.0)
+            line(GRID, top, (right, SIZE))
 
     def _draw_path(self, chart: _Chart, scene: Scene) -> None:
         if scene.waypoints is None:

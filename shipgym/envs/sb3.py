@@ -12,6 +12,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, unexpected
 from shipgym.envs.ship_vector_env import Infos, ShipVectorEnv
 from shipgym.errors import InputError
@@ -24,6 +25,7 @@ VecEnv: Any = library(
     "stable_baselines3.common.vec_env", "rl", "ShipVecEnv needs it"
 ).VecEnv
 
+Observations = NDArray[np.float32]
 Indices = None | int | Sequence[int]
 Vectors = VectorEnv[Any, Any, Any]
 
@@ -59,7 +61,7 @@ class Row:
         return self
 
     @property
-    def waypoints(self) -> NDArray[np.float64] | None:
+    def waypoints(self) -> Floats | None:
         """North and east of this episode's path, m, shape (n, 2); None without one."""
         return self._env.waypoints(self._number)
 
@@ -142,7 +144,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         self._infos: list[dict[str, Any]] = [{} for _ in self._rows]
         self._touched: list[int] = []  # rows whose dictionary is to be emptied
 
-    def reset(self) -> NDArray[np.float32]:
+    def reset(self) -> Observations:
         """Begin an episode in each row: the next, or by the seeds of `seed`, once.
 
         Raises InputError if there are options: as the single environments, these know
@@ -156,7 +158,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
             )
 
         seeds = None if None in self._seeds else self._seeds
-        observations: NDArray[np.float32]
+        observations: Observations
         observations, infos = self.vector_env.reset(seed=seeds)
         self._reset_seeds()
         self.reset_infos = [_info_of(infos, row) for row in range(self.num_envs)]
@@ -175,9 +177,9 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
     def step_wait(
         self,
     ) -> tuple[
-        NDArray[np.float32],
-        NDArray[np.float32],
-        NDArray[np.bool_],
+        Observations,
+        Observations,
+        Flags,
         list[dict[str, Any]],
     ]:
         """Take one control interval; where an episode ends the next begins.
@@ -289,7 +291,9 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         return results
 
     def env_is_wrapped(
-        self, wrapper_class: type[gymnasium.Wrapper], indices: Indices = None
+        self,
+        wrapper_class: type[gymnasium.Wrapper],
+        indices: Indices = None,
     ) -> list[bool]:
         """Return for some rows whether they do what a wrapper does.
 
@@ -305,9 +309,9 @@ def _info_of(infos: Infos, row: int) -> dict[str, Any]:
     """One row of Gymnasium's arrays, as the single environment's info."""
     info = {}
     for name, values in infos.items():
-        is_mask_or_final = name.startswith(("_", "final_"))
-        if not is_mask_or_final and not isinstance(values, dict):
-            info[name] = values[row].item()
+        if name.startswith(("_", "final_")) or isinstance(values, dict):
+            continue  # masks, and what ended episodes showed last
+        info[name] = values[row].item()
     return info
 
 

@@ -102,7 +102,10 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         return self._engine.path_metres("turn_radius")
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode, straight ahead at service speed.
 
@@ -192,9 +195,11 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
 
     def _order(self, action: Any) -> None:
         """Set the command; InputError for an invalid action."""
+        # as the action space has it: to be taken without a look at its numbers
+        is_array = isinstance(action, np.ndarray) and action.dtype is FLOAT32
         if self._discrete:
             action = rudder_orders(action, (), "action")[0]
-        elif not isinstance(action, np.ndarray) or action.dtype is not FLOAT32:
+        elif not is_array:
             action = as_numbers(action, "action")
         if action.shape != self._command.shape:
             commands = "the commanded rudder"

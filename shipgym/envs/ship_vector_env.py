@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_keys, quoted, unexpected
 from shipgym.envs.engine import episode_keys
 from shipgym.envs.environment import (
@@ -24,7 +24,6 @@ from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import VECTOR_OPTIONS
 
-Flags = NDArray[np.bool_]
 Observation = NDArray[np.float32]
 Infos = dict[str, Any]
 
@@ -263,6 +262,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         for row in np.flatnonzero(ended).tolist():
             final_obs[row] = outputs.observations[row].copy()
 
+        # zero in the rows that go on, as in Gymnasium's vector environments
         outcomes = np.where(ended, outputs.outcomes, 0.0)
         flags = outputs.flags & ended
         final_info = named_rows(outcomes, flags, self._names, self._flags)

@@ -108,6 +108,7 @@ def _orders(engine: Engine, step: int) -> Floats:
     """Orders of a beginner: to and fro, hard over, nothing; the same for a lane."""
     n_lanes = engine.num_envs
     lanes = np.arange(n_lanes)
+    # each lane swings in a way of its own
     frequency = 0.11 * (1.0 + 0.3 * (lanes % 7))
     swing = np.sin(frequency * step + lanes)
     kinds = np.stack(
@@ -126,8 +127,9 @@ def _orders(engine: Engine, step: int) -> Floats:
 def _sail_in_python(plain: Engine) -> None:
     """Take some steps in plain Python; InputError names line and step of an error."""
     for step in range(PLAIN_STEPS):
+        orders = _orders(plain, step)
         try:
-            asked(plain.step, _orders(plain, step))
+            asked(plain.step, orders)
         except InputError as error:
             raise InputError(f"{error}, at step {step + 1} in plain Python") from error
 
@@ -152,7 +154,8 @@ def _not_finite(engine: Engine) -> Iterator[str]:
 
 
 def _numbers(
-    engine: Engine, observations: NDArray[np.float32]
+    engine: Engine,
+    observations: NDArray[np.float32],
 ) -> dict[str, NDArray[Any]]:
     """Numbers of the task's state, of the reward and of observations by name."""
     numbers: dict[str, NDArray[Any]] = {}
@@ -168,12 +171,12 @@ def _numbers(
 
 def _source_of(name: str, task: Task) -> str:
     """File that a number comes from, for messages."""
+    definition = task.definition
     if name.startswith("reward_"):
-        return task.definition.reward_source
-    source = task.definition.source
-    if name.startswith("Observation.") and task.sensors is not None:
-        return f"{source}, or the sensors of {task.sensors.source}"
-    return source
+        return definition.reward_source
+    if task.sensors is None or not name.startswith("Observation."):
+        return definition.source
+    return f"{definition.source}, or the sensors of {task.sensors.source}"
 
 
 def _differ(
@@ -198,7 +201,11 @@ def _differ(
         results = np.column_stack([rewards, observations])[lanes]
         expected = np.column_stack([other_rewards, other_observations])
         close = np.isclose(
-            results, expected, rtol=agreement, atol=agreement, equal_nan=True
+            results,
+            expected,
+            rtol=agreement,
+            atol=agreement,
+            equal_nan=True,
         )
         wrong = np.argwhere(~close)
         if len(wrong):

@@ -144,7 +144,8 @@ class TaskDefinition(Configurable):
         kinds = field_types(self.State, notes=True)
         flags = []
         for name in self.reported:
-            if bool in getattr(kinds[name], "__metadata__", ()):
+            notes = getattr(kinds[name], "__metadata__", ())
+            if bool in notes:
                 flags.append(name)
         return tuple(flags)
 
@@ -298,22 +299,21 @@ def _check_observation(spec: ObservationSpec | None, where: str) -> None:
 
 def _check_names(definition: TaskDefinition) -> None:
     """Refuse two fields of one name; those of records within count as the record's."""
-    names_of = {
-        "Reward": ("end", *definition.reward_names),
-        "Settings": tuple(definition.settings),
-        "Observation": last_names(definition.observations),
-    }
-    for record, names in names_of.items():
-        name, count = Counter(names).most_common(1)[0] if names else ("", 0)
-        if count < 2:
-            continue
-        is_reward = record == "Reward"
-        where = definition.reward_source if is_reward else definition.source
-        also = "; the engine has one of that name" if name == "end" else ""
-        raise InputError(
-            f"{where}: {record}: expected names that differ, got two fields"
-            f" {name!r}{also}"
-        )
+    source = definition.source
+    rewards = ("end", *definition.reward_names)
+    observations = last_names(definition.observations)
+    _check_differ(rewards, f"{definition.reward_source}: Reward")
+    _check_differ(definition.settings, f"{source}: Settings")
+    _check_differ(observations, f"{source}: Observation")
+
+
+def _check_differ(names: Iterable[str], where: str) -> None:
+    for name, count in Counter(names).items():
+        if count > 1:
+            also = "; the engine has one of that name" if name == "end" else ""
+            raise InputError(
+                f"{where}: expected names that differ, got two fields {name!r}{also}"
+            )
 
 
 def rewarded_step(

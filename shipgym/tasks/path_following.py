@@ -263,8 +263,9 @@ def listed(waypoints: Any) -> Numbers:
 
 def plan_length(settings: Settings) -> int:
     """Length of a plan, which holds north and east of each waypoint."""
-    n_waypoints = int(settings.n_legs) + 1
-    if len(settings.waypoints):
+    if len(settings.waypoints) == 0:
+        n_waypoints = int(settings.n_legs) + 1
+    else:
         n_waypoints = int(settings.waypoints[0])
     return 2 * n_waypoints
 
@@ -408,10 +409,7 @@ def step(
 
     error = wrap(at.course - motion.psi)
     integral = integrated(state.integral, error, interval, ship, settings.weights)
-    smallest = (pi / 180.0) * settings.reversal_deg
-    activity, reversed_now = rudder_activity(
-        state.rudder_activity, motion.delta, smallest
-    )
+    activity, reversed_now = activity_after(motion, state, settings)
     travel = fabs(motion.delta - interval.rudder_before)
     after = State(
         leg=leg,
@@ -436,6 +434,16 @@ def step(
         steering=steering_reward(motion, interval, ship, settings.weights),
     )
     return after, reward, aground, arrived
+
+
+def activity_after(
+    motion: Motion,
+    state: State,
+    settings: Settings,
+) -> tuple[RudderActivity, float]:
+    """How the rudder has been turned so far, and 1 if it has just been reversed."""
+    smallest = (pi / 180.0) * settings.reversal_deg
+    return rudder_activity(state.rudder_activity, motion.delta, smallest)
 
 
 def at_the_end(at: Fix, leg: Leg) -> bool:

@@ -192,14 +192,16 @@ def make_settings(
         bounds = setting or UNBOUNDED
         if is_record(kind) and kind._field_defaults:
             values[name] = make_settings(kind, options, listed)
-        elif name in options:
-            value = options[name]
-            if is_list(kind):
-                values[name] = _list_of_numbers(value, name, bounds, listed)
-            elif is_record(kind):
-                values[name] = _small_record(kind, value, name, bounds)
-            else:
-                values[name] = checked_setting(value, name, bounds)
+            continue
+        if name not in options:
+            continue
+        value = options[name]
+        if is_list(kind):
+            values[name] = _list_of_numbers(value, name, bounds, listed)
+        elif is_record(kind):
+            values[name] = _small_record(kind, value, name, bounds)
+        else:
+            values[name] = checked_setting(value, name, bounds)
     return record(**values)
 
 

@@ -136,6 +136,7 @@ class Task:
         known = cls.option_names(task, sensors)
         check_keys(options, known, f"{task.name} options")
 
+        # an option belongs to the task, to all tasks or to the sensor set
         own = _chosen(options, task.settings)
         common = _chosen(options, cls.common_names())
         common.setdefault("episode_steps", task.episode_steps)
@@ -158,7 +159,9 @@ class Task:
 
     @classmethod
     def option_names(
-        cls, definition: TaskDefinition, sensors: SensorSet | None = None
+        cls,
+        definition: TaskDefinition,
+        sensors: SensorSet | None = None,
     ) -> tuple[str, ...]:
         """Keywords of a task with a sensor set; InputError if two have one name."""
         names = [*definition.settings, *cls.common_names()]
