@@ -138,7 +138,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             self._begun = True
             self._engine.begin(self._keys, episodes)
             self._draw_and_show()
-        return self._observation.copy(), self._info(self._outcomes.tolist())
+        numbers = self._outcomes[ANSWER_OUTCOMES:].tolist()
+        return self._observation.copy(), self._info(numbers)
 
     def step(
         self, action: Any
@@ -172,11 +173,10 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
                 "finite numbers in [-1, 1], parts of the limits",
                 self._command.tolist(),
             )
-        outcomes = self._outcomes.tolist()
-        reward, terminated, truncated = outcomes[:ANSWER_OUTCOMES]
+        reward, terminated, truncated, *numbers = self._outcomes.tolist()
         if not isfinite(reward):
             self._engine.refuse_rewards()
-        info = self._info(outcomes)
+        info = self._info(numbers)
         if self._artists:
             self._draw_and_show()
         return self._observation.copy(), reward, terminated > 0.0, truncated > 0.0, info
@@ -186,8 +186,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         if self.render_mode == "human":
             self.render()
 
-    def _info(self, outcomes: list[float]) -> dict[str, Any]:
-        numbers = outcomes[ANSWER_OUTCOMES:]
+    def _info(self, numbers: list[float]) -> dict[str, Any]:
         info: dict[str, Any] = dict(zip(self._names, numbers, strict=True))
         for flag in self._flags:
             info[flag] = info[flag] > 0.0
