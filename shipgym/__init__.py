@@ -1,4 +1,4 @@
-"""Ships for people who steer them with software: trials, models, manoeuvres and environments.
+"""Ships to be steered by software: trials, models, manoeuvres and environments.
 
 Importing shipgym registers its environments with Gymnasium. The public names stand in
 `__init__.pyi`; each is imported when it is first used.

@@ -17,4 +17,5 @@ def finite(number: float) -> float | None:
 
 def integral(t: Floats, rate: NDArray[Any]) -> NDArray[Any]:
     """Integral over time from zero by the trapezoid rule, shape (n_samples,)."""
-    return np.concatenate([[0.0], np.cumsum(0.5 * np.diff(t) * (rate[1:] + rate[:-1]))])
+    trapezoids = 0.5 * np.diff(t) * (rate[1:] + rate[:-1])
+    return np.concatenate([[0.0], np.cumsum(trapezoids)])

@@ -65,13 +65,17 @@ def quoted(words: Iterable[str]) -> str:
 
 
 def did_you_mean(word: str, options: Iterable[str]) -> str:
-    """Hint such as ``" Did you mean 'beam'?"``; empty if no option looks like `word`."""
+    """Hint such as ``" Did you mean 'beam'?"``; empty if no option is like `word`."""
     by_lower_case = {option.lower(): option for option in options}
+    known = list(by_lower_case)
     text = str(word).strip().lower()
-    close = difflib.get_close_matches(text, list(by_lower_case), n=1, cutoff=0.6)
+    close = difflib.get_close_matches(text, known, n=1)
     if not close and len(text) > 2:
-        close = [option for option in by_lower_case if text in option]
-    return f" Did you mean '{by_lower_case[close[0]]}'?" if close else ""
+        close = [option for option in known if text in option]
+    if not close:
+        return ""
+    nearest = by_lower_case[close[0]]
+    return f" Did you mean '{nearest}'?"
 
 
 def check_keys(
@@ -80,7 +84,7 @@ def check_keys(
     where: str,
     required: Iterable[str] = (),
 ) -> None:
-    """Refuse a key not among `allowed`, naming the nearest, and a missing required one."""
+    """Refuse an unknown key, naming the nearest, and a missing required one."""
     for key in mapping:
         if key not in allowed:
             raise InputError(
@@ -95,9 +99,12 @@ def check_keys(
 
 
 def check_fields(
-    content: Mapping[str, Any], names: Collection[str], where: str, remedy: str
+    content: Mapping[str, Any],
+    names: Collection[str],
+    where: str,
+    remedy: str,
 ) -> None:
-    """Refuse an unknown field of a file, and a missing one of `names` with its `remedy`."""
+    """Refuse an unknown field of a file, and a missing one, with its `remedy`."""
     check_keys(content, names, where)
     for name in names:
         if name not in content:
@@ -118,7 +125,7 @@ def check_table(
     allowed: Collection[str] | None = None,
     required: Iterable[str] = (),
 ) -> Mapping[str, Any]:
-    """Return `value`, which must be a table (a mapping by strings), of these keys if given."""
+    """Return `value`, which must be a table, of the keys `allowed` if given."""
     if not isinstance(value, Mapping):
         raise unexpected(where, "a table of keys and values", value)
     if allowed is not None:
@@ -138,9 +145,12 @@ def check_text(value: Any, where: str) -> str:
 
 
 def check_choice(
-    value: Any, options: Collection[str], where: str, also: str = ""
+    value: Any,
+    options: Collection[str],
+    where: str,
+    also: str = "",
 ) -> str:
-    """Return `value`, which must be one of `options`; `also` ends the list in messages."""
+    """Return `value`, one of `options`; `also` ends the list of them in messages."""
     if isinstance(value, str) and value in options:
         return value
     hint = did_you_mean(value, options) if isinstance(value, str) else ""
@@ -204,17 +214,23 @@ def check_number(
 
 
 def _no_such_number(
-    value: Any, where: str, bounds: Mapping[str, float | None], hint: str
+    value: Any,
+    where: str,
+    bounds: Mapping[str, float | None],
+    hint: str,
 ) -> InputError:
-    stated = [
-        f"{sign} {bound:g}" for sign, bound in bounds.items() if bound is not None
-    ]
+    stated = []
+    for sign, bound in bounds.items():
+        if bound is not None:
+            stated.append(f"{sign} {bound:g}")
     expected = f"a number {' and '.join(stated)}".rstrip()
     if hint:
         expected += f" ({hint})"
+    if isinstance(value, str):
+        remedy = "write the number without quotes"
+        return unexpected(where, expected, value, remedy)
     if isinstance(value, bool) or not isinstance(value, Real):
-        quotes = "write the number without quotes" if isinstance(value, str) else ""
-        return unexpected(where, expected, value, quotes)
+        return unexpected(where, expected, value)
     return InputError(f"{where}: expected {expected}, got {_as_float(value):g}")
 
 
@@ -229,7 +245,12 @@ def _as_float(value: Any) -> float:
 
 
 def check_whole(
-    value: Any, where: str, *, at_least: int, at_most: float = math.inf, hint: str = ""
+    value: Any,
+    where: str,
+    *,
+    at_least: int,
+    at_most: float = math.inf,
+    hint: str = "",
 ) -> int:
     """Return `value`, which must be an integer from `at_least` to `at_most`."""
     whole = isinstance(value, Integral) and not isinstance(value, bool)
@@ -271,53 +292,71 @@ def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]
 
 
 def check_array(
-    value: Any, shape: tuple[int | None, ...], where: str
+    value: Any,
+    shape: tuple[int | None, ...],
+    where: str,
 ) -> NDArray[np.float64]:
     """Return the numbers of nested lists as an array of a shape; None is any length.
 
     Strings, booleans, numbers that are not finite and rows that differ in length are
     refused.
     """
-    size, *within = shape
+    size, *row_shape = shape
     if not isinstance(value, list) or size not in (None, len(value)):
         count = "" if size is None else f"{size} "
-        kind = "lists" if within else "numbers"
+        kind = "lists" if row_shape else "numbers"
         found = f"{len(value)} entries" if isinstance(value, list) else shown(value)
         raise InputError(f"{where}: expected a list of {count}{kind}, got {found}")
+    if not row_shape:
+        return _check_numbers(value, where)
 
-    if not within:
-        for i, number in enumerate(value):
-            if isinstance(number, bool) or not isinstance(number, int | float):
-                raise unexpected(f"{where}[{i}]", "a number", number)
-        return check_finite(value, where)
-
-    if within[0] is None and value and isinstance(value[0], list):
-        within[0] = len(value[0])  # all rows are as long as the first
-    rows = [
-        check_array(row, tuple(within), f"{where}[{i}]") for i, row in enumerate(value)
-    ]
+    has_lists = bool(value) and isinstance(value[0], list)
+    if row_shape[0] is None and has_lists:
+        row_shape[0] = len(value[0])  # all rows are as long as the first
+    rows = []
+    for i, row in enumerate(value):
+        rows.append(check_array(row, tuple(row_shape), f"{where}[{i}]"))
     return np.array(rows)
+
+
+def _check_numbers(values: list[Any], where: str) -> NDArray[np.float64]:
+    for i, number in enumerate(values):
+        if isinstance(number, bool) or not isinstance(number, int | float):
+            raise unexpected(f"{where}[{i}]", "a number", number)
+    return check_finite(values, where)
 
 
 def check_shape(value: Any, shape: Shape, where: str) -> None:
     """Refuse nested JSON values that differ from a shape; further keys are allowed."""
     if isinstance(shape, dict):
-        table = check_table(value, where)
-        for key in table if ANY_KEY in shape else shape:
-            if key not in table:
-                raise InputError(
-                    f"{where}: '{key}' is missing, expected {quoted(shape)}"
-                )
-            expected = shape.get(key, shape.get(ANY_KEY, ()))
-            check_shape(table[key], expected, f"{where}.{key}")
+        _check_table_shape(value, shape, where)
     elif isinstance(shape, list):
-        if not isinstance(value, list):
-            raise unexpected(where, "a list", value)
-        if len(shape) > 1 and len(value) != len(shape):
-            raise unexpected(where, f"a list of {len(shape)}", value)
-        kinds = shape if len(shape) > 1 else shape * len(value)
-        for i, (entry, kind) in enumerate(zip(value, kinds, strict=True)):
-            check_shape(entry, kind, f"{where}[{i}]")
+        _check_list_shape(value, shape, where)
     elif type(value) not in shape:
-        words = dict.fromkeys(_WORDS.get(kind, kind.__name__) for kind in shape)
-        raise unexpected(where, " or ".join(words), value)
+        words = []
+        for kind in shape:
+            words.append(_WORDS.get(kind, kind.__name__))
+        expected = " or ".join(dict.fromkeys(words))
+        raise unexpected(where, expected, value)
+
+
+def _check_table_shape(value: Any, shape: dict[str, Shape], where: str) -> None:
+    table = check_table(value, where)
+    keys = table if ANY_KEY in shape else shape
+    for key in keys:
+        if key not in table:
+            raise InputError(f"{where}: '{key}' is missing, expected {quoted(shape)}")
+        expected = shape[key] if key in shape else shape[ANY_KEY]
+        check_shape(table[key], expected, f"{where}.{key}")
+
+
+def _check_list_shape(value: Any, shape: list[Shape], where: str) -> None:
+    if not isinstance(value, list):
+        raise unexpected(where, "a list", value)
+    shapes = shape
+    if len(shape) == 1:
+        shapes = shape * len(value)
+    elif len(value) != len(shape):
+        raise unexpected(where, f"a list of {len(shape)}", value)
+    for i, (entry, entry_shape) in enumerate(zip(value, shapes, strict=True)):
+        check_shape(entry, entry_shape, f"{where}[{i}]")

@@ -18,8 +18,9 @@ class InputError(ValueError):
 
     def __init__(self, message: str, instead: Sequence[tuple[str, str]] = ()) -> None:
         half = LONGEST_MESSAGE // 2
-        long = len(message) > LONGEST_MESSAGE
-        super().__init__(f"{message[:half]} ... {message[-half:]}" if long else message)
+        if len(message) > LONGEST_MESSAGE:
+            message = f"{message[:half]} ... {message[-half:]}"
+        super().__init__(message)
         self.instead = tuple(instead)
 
 
@@ -37,10 +38,9 @@ class UnstableModelError(RuntimeError):
 
 
 class ManoeuvreError(RuntimeError):
-    """A manoeuvre, so far in `trial`, never reached its switch heading or final speed."""
+    """A manoeuvre, so far in `trial`, that missed its switch heading or final speed."""
 
-    def __init__(
-        self, message: str, trial: Any
-    ) -> None:  # a Trial's own file imports this one
+    # `Any`, because the file of `Trial` imports this one
+    def __init__(self, message: str, trial: Any) -> None:
         super().__init__(message)
         self.trial = trial

@@ -11,5 +11,8 @@ def library(name: str, extra: str, use: str = "") -> Any:
     try:
         return import_module(name)
     except ModuleNotFoundError as error:
-        what = f"{name.partition('.')[0]} is not installed{use and f', {use}'}"
-        raise InputError(f"{what}: pip install 'shipgym[{extra}]'") from error
+        package, _, _ = name.partition(".")
+        missing = f"{package} is not installed"
+        if use:
+            missing += f", {use}"
+        raise InputError(f"{missing}: pip install 'shipgym[{extra}]'") from error

@@ -38,7 +38,7 @@ LARGEST_NUMBER = 1e100  # magnitude: products of three such numbers are still fi
 _UNWRITABLE = re.compile("[\0\ud800-\udfff]")
 
 
-# ---- writing ---------------------------------------------------------------------------
+# ---- writing
 
 
 def make_folder(folder: Path) -> None:
@@ -62,15 +62,15 @@ def write_text(text: str, path: Path) -> None:
 
 
 def write_json(fields: Mapping[str, Any], path: Path, indent: int | None = 1) -> None:
-    """Write JSON atomically (`atomic_path`); ValueError for numbers that are not finite."""
+    """Write JSON atomically (`atomic_path`); ValueError for nan and infinities."""
     write_text(json.dumps(fields, indent=indent, allow_nan=False) + "\n", path)
 
 
-# ---- reading ---------------------------------------------------------------------------
+# ---- reading
 
 
 def check_readable(path: Path, what: str) -> None:
-    """Refuse a missing, special or unreadable file; `what` it is, such as "CSV file"."""
+    """Refuse a missing, special or unreadable file; `what` it is: "CSV file"."""
     with _opened(path, what):
         pass
 
@@ -104,7 +104,9 @@ def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
             found = "no regular file (a device, a pipe or a socket)"
             raise InputError(f"{path}: expected a {what}, got {found}")
         with open(
-            path, "rb", opener=lambda name, flags: os.open(name, flags | at_once)
+            path,
+            "rb",
+            opener=lambda name, flags: os.open(name, flags | at_once),
         ) as file:
             yield file
     except InputError:
@@ -206,22 +208,31 @@ def named_values(texts: Iterable[str], where: str, example: str) -> dict[str, An
     """Parse texts `name=value`, with values as in TOML; returns them by name."""
     found: dict[str, Any] = {}
     for text in texts:
-        name, sign, value = (part.strip() for part in text.partition("="))
+        name, sign, value = text.partition("=")
+        name = name.strip()
         if not sign or not name:
             raise unexpected(where, f"name=value, such as {where} {example}", text)
-        found[name] = toml_value(value)
-        if found[name] == value:  # not TOML, or more than a file may hold
-            with suppress(ValueError):
-                found[name] = float(value)  # such as .5 or nan
-            check_content({name: found[name]}, where, infinite=True)
+        found[name] = _named_value(name, value.strip(), where)
     return found
 
 
-# ---- limits of what JSON and TOML hold -------------------------------------------------
+def _named_value(name: str, text: str, where: str) -> Any:
+    value = toml_value(text)
+    if value == text:  # not TOML, or more than a file may hold
+        with suppress(ValueError):
+            value = float(text)  # such as .5 or nan
+        check_content({name: value}, where, infinite=True)
+    return value
+
+
+# ---- limits of what JSON and TOML hold
 
 
 def check_content(
-    value: Any, where: str, infinite: bool = False, depth: int = 1
+    value: Any,
+    where: str,
+    infinite: bool = False,
+    depth: int = 1,
 ) -> None:
     """Refuse what no file of this project holds, before its fields are looked at.
 
@@ -235,15 +246,22 @@ def check_content(
         raise _too_deep(f"{where}:")
     entries = value.items() if isinstance(value, dict) else enumerate(value)
     for key, item in entries:
-        if isinstance(key, str) and (len(key) > LONGEST_KEY or _UNWRITABLE.search(key)):
-            expected = f"keys of at most {LONGEST_KEY} characters"
-            raise unexpected(where, expected, key)
+        if isinstance(key, str):
+            _check_key(key, where)
         if isinstance(item, dict | list):
-            check_content(item, _place(where, key, depth), infinite, depth + 1)
+            place = _place(where, key, depth)
+            check_content(item, place, infinite, depth + 1)
             continue
         expected = _expected(key, item, infinite)
         if expected:
-            raise unexpected(_place(where, key, depth), expected, item)
+            place = _place(where, key, depth)
+            raise unexpected(place, expected, item)
+
+
+def _check_key(key: str, where: str) -> None:
+    if len(key) > LONGEST_KEY or _UNWRITABLE.search(key):
+        expected = f"keys of at most {LONGEST_KEY} characters"
+        raise unexpected(where, expected, key)
 
 
 def _place(where: str, key: str | int, depth: int) -> str:
@@ -312,5 +330,6 @@ def _unrepeated(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     table = dict(pairs)
     if len(table) < len(pairs):
         keys = Counter(key for key, _ in pairs)
-        raise KeyError(keys.most_common(1)[0][0])
+        ((repeated, _),) = keys.most_common(1)
+        raise KeyError(repeated)
     return table

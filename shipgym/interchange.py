@@ -1,4 +1,4 @@
-"""Trials and episodes as pandas frames and Minari datasets, and back to the same numbers.
+"""Trials and episodes as pandas frames and Minari datasets, and back unchanged.
 
 Time series are columns: the channels of a trial by their names, the series of an
 episode by group and name, such as `states.x`, `commands.delta`,
@@ -60,7 +60,9 @@ def from_frame(frame: DataFrame) -> Trial | Episode:
 
 
 def to_minari(
-    episodes: Sequence[Episode], dataset_id: str, **metadata: Any
+    episodes: Sequence[Episode],
+    dataset_id: str,
+    **metadata: Any,
 ) -> MinariDataset:
     """Write episodes of one environment as a Minari dataset.
 
@@ -108,7 +110,10 @@ def to_minari(
 
     options = {"data_format": "arrow", "eval_env": env, **metadata}
     dataset = minari.create_dataset_from_buffers(
-        dataset_id, buffers, env=env, **options
+        dataset_id,
+        buffers,
+        env=env,
+        **options,
     )
     facts = [{ATTRIBUTE: _facts(episode)} for episode in episodes]
     dataset.storage.update_episode_metadata(facts, range(len(facts)))
@@ -170,7 +175,10 @@ def _padded(series: Mapping[str, Floats], length: int) -> dict[str, Floats]:
 
 
 def _rebuild(
-    t: Floats, series: Mapping[str, Floats], attributes: Mapping[Any, Any], remedy: str
+    t: Floats,
+    series: Mapping[str, Floats],
+    attributes: Mapping[Any, Any],
+    remedy: str,
 ) -> Trial | Episode:
     """Trial or episode of `_series` and `_facts`; padding is cut off."""
     try:

@@ -1,4 +1,4 @@
-"""Users' Python files, such as tasks and ships, executed only when a user names them."""
+"""Users' Python files, such as tasks and ships, executed when a user names them."""
 
 import hashlib
 import sys
@@ -72,15 +72,16 @@ def working_folder() -> Iterator[None]:
 
 
 def _not_executed(path: Path, resolved: str, error: BaseException) -> InputError:
-    """Error for a file whose execution failed: the last line in it, and in what it imports."""
-    frames = extract_tb(error.__traceback__)
-    passed = [frame.lineno for frame in frames if frame.filename == resolved]
-    line = passed[-1] if passed else getattr(error, "lineno", None)
-    place = f"{path}, line {line}" if line else path
-    ours = ("<", resolved, *LIBRARIES)
-    others = [frame for frame in frames if not frame.filename.startswith(ours)]
-    within = f" ({others[-1].filename}, line {others[-1].lineno})" if others else ""
-    why = f"{type(error).__name__}: {error}{within}"
+    """Error of a file that failed: its last line, and that of what it imports."""
+    line = getattr(error, "lineno", None)  # of a SyntaxError
+    imported = ""
+    for frame in extract_tb(error.__traceback__):
+        if frame.filename == resolved:
+            line = frame.lineno
+        elif not frame.filename.startswith(("<", resolved, *LIBRARIES)):
+            imported = f" ({frame.filename}, line {frame.lineno})"
+    place = f"{path}, line {line}" if line else str(path)
+    why = f"{type(error).__name__}: {error}{imported}"
     return InputError(f"{place}: cannot be executed: {why}")
 
 
@@ -111,7 +112,7 @@ def refuse_closure(function: Any) -> None:
 
 
 def asked(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Call a user's function; an error in it becomes an InputError naming file and line."""
+    """Call a user's function; InputError names file and line of an error in it."""
     try:
         return function(*arguments)
     except InputError:
@@ -127,10 +128,14 @@ def place_of(function: Any, error: BaseException | None = None) -> str:
     code = getattr(function, "__code__", None)
     if code is None:
         return repr(function)
-    file, line, name = code.co_filename, code.co_firstlineno, code.co_name
-    for frame in extract_tb(error.__traceback__) if error else ():
-        if frame.filename == code.co_filename or not frame.filename.startswith(
-            LIBRARIES
-        ):
-            file, line, name = frame.filename, frame.lineno or line, frame.name
+    file = code.co_filename
+    line = code.co_firstlineno
+    name = code.co_name
+    frames = extract_tb(error.__traceback__) if error else []
+    for frame in frames:
+        is_library = frame.filename.startswith(LIBRARIES)
+        if frame.filename == code.co_filename or not is_library:
+            file = frame.filename
+            line = frame.lineno or line
+            name = frame.name
     return f"{file}, line {line}, in {name}"

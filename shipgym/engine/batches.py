@@ -13,6 +13,7 @@ from shipgym.engine.hooks import (
     load_ship,
     store_motion,
 )
+from shipgym.engine.lane_records import WindAccelerations
 from shipgym.engine.motion import CALM, Push, sail
 from shipgym.engine.records import LANES
 from shipgym.engine.trajectories import NO_LIMIT, replaced, with_gear
@@ -44,7 +45,12 @@ def advance_batch(states: Any, commands: Any, h: float, steps: int, ships: Any) 
 
 
 def sail_segment(
-    state: Any, ships: Any, offsets: Any, inputs: Any, samples: Any, out: Any
+    state: Any,
+    ships: Any,
+    offsets: Any,
+    inputs: Any,
+    samples: Any,
+    out: Any,
 ) -> None:
     """Move a tile of ships through a stretch of a measured trial.
 
@@ -83,10 +89,7 @@ def sail_between(state: Any, ships: Any, offsets: Any, begin: Any, end: Any) -> 
     h = last.time - first.time
     rate = fabs(last.rudder - first.rudder) / h
     shaft = 0.5 * (first.shaft + last.shaft)
-    surge = 0.5 * (first.wind.surge + last.wind.surge)
-    sway = 0.5 * (first.wind.sway + last.wind.sway)
-    yaw = 0.5 * (first.wind.yaw + last.wind.yaw)
-    wind = Push(surge, sway, yaw, 0.0, 0.0, 0.0)
+    wind = mean_push(first.wind, last.wind)
     for lane in range(LANES):
         own = load_ship(ships, lane)
         ship = with_gear(own, NO_LIMIT, rate)
@@ -96,6 +99,18 @@ def sail_between(state: Any, ships: Any, offsets: Any, begin: Any, end: Any) -> 
         motion = sail(motion, rudder, shaft, h, wind, coefficients, ship)
         motion = replaced(motion, motion.psi, rudder, motion.n)
         store_motion(state, lane, motion)
+
+
+def mean_push(first: WindAccelerations, last: WindAccelerations) -> Push:
+    """Mean of the accelerations by wind at two points."""
+    return Push(
+        u=0.5 * (first.surge + last.surge),
+        v=0.5 * (first.sway + last.sway),
+        r=0.5 * (first.yaw + last.yaw),
+        p=0.0,
+        north=0.0,
+        east=0.0,
+    )
 
 
 def keep_sample(state: Any, row: int, out: Any) -> None:

@@ -26,14 +26,11 @@ DIGEST = 32  # bytes of a SHA-256, at the beginning of a file
 
 
 def cache_folder() -> Path:
-    """Where compiled loops are kept; below ``~`` if nobody knows where the user's home is."""
+    """Folder of compiled loops; below ``~`` if the user's home is not known."""
+    folder = os.environ.get(CACHE_VARIABLE)
     try:
-        return Path(
-            os.environ.get(CACHE_VARIABLE) or user_cache_path("shipgym")
-        ).expanduser()
-    except (
-        RuntimeError
-    ):  # of a user without an entry in the list of users, in a container
+        return Path(folder or user_cache_path("shipgym")).expanduser()
+    except RuntimeError:  # of a user who is not in the list of users, in a container
         return Path("~", ".cache", "shipgym")
 
 

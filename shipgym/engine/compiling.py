@@ -1,8 +1,8 @@
 """How loops are compiled for a ship, a sea and a task, and kept on disk, never stale.
 
 A loop and the functions that it names are copied with their hooks filled
-(`shipgym.engine.specialise`) and handed to `numba.njit`. The machine code is kept under a
-name that hashes all that it depends on (`shipgym.engine.fingerprint`): a file that is
+(`shipgym.engine.specialise`) and handed to `numba.njit`. The machine code is kept under
+a name that hashes all that it depends on (`shipgym.engine.fingerprint`): a file that is
 there is right, whoever made it and when. So a cache that was filled beforehand and may
 only be read is used as it is.
 """
@@ -112,7 +112,7 @@ def plain_python() -> bool:
 
 
 class Compilation(Specialisation):
-    """Copies of functions that loops call, compiled; those of other loops are shared."""
+    """Compiled copies of functions that loops call; loops share them."""
 
     def inner(self, function: Any, inlined: bool, checked: bool) -> Any:
         """Compile a function that others call."""

@@ -1,4 +1,4 @@
-"""Machine code of a loop in a file, named by all it depends on, and checked when read."""
+"""Machine code of a loop in a file, named by all that it depends on."""
 
 import hashlib
 import pickle

@@ -39,7 +39,7 @@ from shipgym.engine.judging import (
 )
 from shipgym.engine.lane_records import Commands, SeaRandom
 from shipgym.engine.memory import bool_in, float32_in, int64_row_in
-from shipgym.engine.motion import HAS_SEA
+from shipgym.engine.motion import HAS_SEA, Motion
 from shipgym.engine.random import BEGIN_WORDS, rng_state, uniform
 from shipgym.engine.records import LANES
 from shipgym.engine.sailing import are_finite, take_commands
@@ -156,19 +156,30 @@ def begin_lane(tile: Tile, lane: int) -> None:
     ship = load_ship(tile.ships, lane)
     plan = plan_of(state, lane)
     motion, task_state = task_begin(ship, settings.task, random, plan)
+    commands = Commands(
+        rudder_command=0.0,
+        shaft_command=1.0,
+        rudder_before=0.0,
+    )
     store_motion(state, lane, motion)
-    store_commands(state, lane, Commands(0.0, 1.0, 0.0))
+    store_commands(state, lane, commands)
     store_task(tile, lane, task_state)
     if HAS_SEA:
-        word = rng_state(random.key, random.episode)
-        parameters = load_sea_parameters(tile.ships, lane)
-        store_sea(state, lane, begin_sea(motion, word, parameters))
-        store_sea_random(tile.random, lane, SeaRandom(word + BEGIN_WORDS))
+        begin_sea_of(tile, lane, motion, random)
 
     interval = last_interval(tile, lane)
     memory = sample(tile, lane, motion, interval, settings)
     store_memory(state, lane, memory)
     observe_lane(tile, lane)
+
+
+def begin_sea_of(tile: Tile, lane: int, motion: Motion, random: Random) -> None:
+    """Draw the sea around the ship of a lane."""
+    word = rng_state(random.key, random.episode)
+    parameters = load_sea_parameters(tile.ships, lane)
+    sea = begin_sea(motion, word, parameters)
+    store_sea(tile.state, lane, sea)
+    store_sea_random(tile.random, lane, SeaRandom(word + BEGIN_WORDS))
 
 
 def clear_lane(tile: Any, lane: int) -> None:
@@ -181,10 +192,11 @@ def draw_ship(tile: Tile, lane: int, random: Random) -> None:
     """Put a ship of the pool in a lane, if there is a pool."""
     ships = tile.ships
     pool = tile.pool
-    if len(pool) > 0:
-        n_rows = len(ships) // LANES
-        n_pool = len(pool) // n_rows
-        drawn = uniform(random.key, random.episode, SHIP_DRAW, 0.0, float(n_pool))
-        first = int(drawn) * n_rows
-        for row in range(n_rows):
-            ships[row * LANES + lane] = pool[first + row]
+    if len(pool) == 0:
+        return
+    n_rows = len(ships) // LANES
+    n_pool = len(pool) // n_rows
+    drawn = uniform(random.key, random.episode, SHIP_DRAW, 0.0, float(n_pool))
+    first = int(drawn) * n_rows
+    for row in range(n_rows):
+        ships[row * LANES + lane] = pool[first + row]

@@ -32,7 +32,8 @@ COMPILER = ("compiling", "specialise")
 
 def fingerprint(function: Any, hooks: Hooks) -> str:
     """Hash a function with its hooks filled."""
-    return traced(function, hooks)[0]
+    digest, _ = traced(function, hooks)
+    return digest
 
 
 def traced(function: Any, hooks: Hooks) -> tuple[str, tuple[Any, ...]]:
@@ -59,12 +60,15 @@ class _Trace:
 
     def visit(self, value: Any, attributes: tuple[str, ...] = ()) -> None:
         """Take a value, and of modules what is called by one of the `attributes`."""
-        if isinstance(value, np.ndarray):
-            self.add((value.dtype, value.shape, value.strides, value.tobytes()))
+        if isinstance(value, FunctionType):
+            self._visit_function(value)
         elif isinstance(value, ModuleType):
             self._visit_module(value, attributes)
+        elif isinstance(value, np.ndarray):
+            self.add((value.dtype, value.shape, value.strides, value.tobytes()))
         elif isinstance(value, tuple | list):
-            self.add((type(value).__qualname__, getattr(value, "_fields", len(value))))
+            fields = getattr(value, "_fields", len(value))
+            self.add((type(value).__qualname__, fields))
             self._visit_all(value, attributes)
         elif is_record(value):
             self.add((value.__name__, value._fields))
@@ -72,24 +76,25 @@ class _Trace:
             self.records.append(value)
         elif isinstance(value, EnumType):
             self.add((value.__qualname__, dict(value.__members__)))
-        elif isinstance(value, FunctionType):
-            self._visit_function(value)
         elif isinstance(value, type) or callable(value):
             self._visit_compiled(value)
         else:
             self.add(value)
 
     def _visit_all(
-        self, values: Iterable[Any], attributes: tuple[str, ...] = ()
+        self,
+        values: Iterable[Any],
+        attributes: tuple[str, ...] = (),
     ) -> None:
         for value in values:
             self.visit(value, attributes)
 
     def _visit_module(self, module: ModuleType, attributes: tuple[str, ...]) -> None:
         self.add(module.__name__)
-        if self._is_new((module, attributes)):
-            named = [vars(module).get(name) for name in attributes]
-            self._visit_all(named, attributes)
+        if not self._is_new((module, attributes)):
+            return
+        for name in attributes:
+            self.visit(vars(module).get(name), attributes)
 
     def _visit_function(self, function: FunctionType) -> None:
         self.add(is_inlined(function))
@@ -105,7 +110,8 @@ class _Trace:
         python = getattr(value, "py_func", None) or getattr(value, "_defn", None)
         jitclass = getattr(value, "class_type", None)
         if python is not None:  # of `numba.njit`, or an intrinsic
-            self.add((type(value).__name__, getattr(value, "targetoptions", None)))
+            options = getattr(value, "targetoptions", None)
+            self.add((type(value).__name__, options))
             self._visit_python(python)
         elif jitclass is not None:
             self.add(jitclass.struct)
@@ -120,13 +126,16 @@ class _Trace:
             return
         self._visit_code(function.__code__, function.__doc__)
         self.visit(function.__defaults__)
-        self._visit_all((function.__kwdefaults__ or {}).items())
+        keyword_defaults = function.__kwdefaults__ or {}
+        self._visit_all(keyword_defaults.items())
+
         attributes: list[str] = []
         for code in nested_code(function.__code__):
             attributes += code.co_names
         for name, value in captured_globals(function, self.hooks):
+            hook = function.__globals__.get(name)
             self.add(name)
-            self.add(is_inlined(function.__globals__.get(name)))  # a hook may say so
+            self.add(is_inlined(hook))  # a hook may say so
             self.visit(value, tuple(attributes))
 
     def _visit_code(self, code: CodeType, doc: str | None) -> None:

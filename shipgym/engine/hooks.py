@@ -7,8 +7,9 @@ it. `CompiledShip.hooks`, `sea_hooks` and `EpisodeProgram.hooks` give them.
 
 Functions that load and store records are written from the rows of each record
 (`shipgym.engine.record_code`). They take an array and a lane; where it is a vector and
-not a tile, the lane does not matter and is left out by who reads it. Two more hooks, `accelerations` and `shaft_acceleration`, have a body of their own
-and stand in `shipgym.engine.motion`.
+not a tile, the lane does not matter and is left out by who reads it. Two more hooks,
+`accelerations` and `shaft_acceleration`, have a body of their own and stand in
+`shipgym.engine.motion`.
 """
 
 from __future__ import annotations
@@ -295,7 +296,9 @@ def add_row(point: Point, sums: Sums, terms: Any, row: int) -> Sums:
 
 
 def sum_accelerations(
-    motion: Motion, sums: Sums, ship: Ship
+    motion: Motion,
+    sums: Sums,
+    ship: Ship,
 ) -> tuple[float, float, float]:
     """Accelerations in surge, sway and yaw by the sums over the whole table."""
     raise NotImplementedError(SHIP)
@@ -351,28 +354,43 @@ def readings(motion: Motion, sea: Sea, memory: Any) -> Readings:
 
 @called
 def task_begin(
-    ship: Ship, settings: Any, random: Random, plan: Floats
+    ship: Ship,
+    settings: Any,
+    random: Random,
+    plan: Floats,
 ) -> tuple[Motion, Any]:
     """Return how an episode begins: motion of the ship, and state of the task."""
     raise NotImplementedError(TASK)
 
 
 def task_step(
-    motion: Motion, task_state: Any, interval: Interval, ship: Ship, settings: Any
+    motion: Motion,
+    task_state: Any,
+    interval: Interval,
+    ship: Ship,
+    settings: Any,
 ) -> tuple[Any, Any, bool, bool]:
     """Return state and reward of an interval, whether it failed, and has arrived."""
     raise NotImplementedError(TASK)
 
 
 def observe(
-    readings: Readings, task_state: Any, interval: Interval, ship: Ship, settings: Any
+    readings: Readings,
+    task_state: Any,
+    interval: Interval,
+    ship: Ship,
+    settings: Any,
 ) -> Any:
     """Return what the autopilot sees, an `Observation` in SI units."""
     raise NotImplementedError(TASK)
 
 
 def due(
-    motion: Motion, task_state: Any, interval: Interval, ship: Ship, settings: Any
+    motion: Motion,
+    task_state: Any,
+    interval: Interval,
+    ship: Ship,
+    settings: Any,
 ) -> bool:
     """Return whether an event is due, such as a new set-point."""
     raise NotImplementedError(TASK)
@@ -401,14 +419,22 @@ def worst_cost(settings: Any) -> float:
 
 
 def step_of_task(
-    motion: Motion, task_state: Any, interval: Interval, ship: Ship, settings: Any
+    motion: Motion,
+    task_state: Any,
+    interval: Interval,
+    ship: Ship,
+    settings: Any,
 ) -> tuple[Any, Any, bool, bool]:
     """Return what `task_step` does, with a reward that is not used."""
     raise NotImplementedError(TASK)
 
 
 def reward_of_another(
-    motion: Motion, task_state: Any, interval: Interval, ship: Ship, settings: Any
+    motion: Motion,
+    task_state: Any,
+    interval: Interval,
+    ship: Ship,
+    settings: Any,
 ) -> Any:
     """Return the `Reward` of the other file."""
     raise NotImplementedError(TASK)

@@ -110,16 +110,20 @@ def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
         observation = observe(seen, task_state, interval, ship, settings.task)
         store_observation(tile.result, lane, observation, scale)
 
-        real = lane < tile.lanes
         is_due = due(motion, task_state, interval, ship, settings.task)
         goes_on = not (over | just_ended)
+        real = lane < tile.lanes
         n_due += 1 if is_due & goes_on & real else 0
         n_ended += 1 if just_ended & real else 0
     return n_due, n_ended
 
 
 def past_interval(
-    tile: Tile, lane: int, motion: Motion, data: Envelope, rules: Rules
+    tile: Tile,
+    lane: int,
+    motion: Motion,
+    data: Envelope,
+    rules: Rules,
 ) -> Interval:
     """Return the interval that is over, with how far the ship is from known data."""
     commands = load_commands(tile.state, lane)
@@ -161,8 +165,11 @@ def judge(
     outcome = outcome_of(interval, counters, failed, arrived, earned, settings)
 
     just_ended = outcome.terminated + outcome.truncated > 0.0
-    ended = pick(just_ended, 1.0, counters.ended)
-    counters = EpisodeCounters(counters.steps, ended, counters.ran_away)
+    counters = EpisodeCounters(
+        steps=counters.steps,
+        ended=pick(just_ended, 1.0, counters.ended),
+        ran_away=counters.ran_away,
+    )
     store_counters(tile.state, lane, counters)
     store_outcome(tile.result, lane, outcome)
     store_reward(tile.result, lane, reward)
@@ -207,7 +214,11 @@ def store_task(tile: Tile, lane: int, task_state: Any) -> None:
 
 
 def sample(
-    tile: Tile, lane: int, motion: Motion, interval: Interval, settings: AllSettings
+    tile: Tile,
+    lane: int,
+    motion: Motion,
+    interval: Interval,
+    settings: AllSettings,
 ) -> Any:
     """Return the memory of the instruments after a sample."""
     memory = load_memory(tile.state, lane)

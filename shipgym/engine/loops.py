@@ -1,4 +1,4 @@
-"""The loops over ships without a task, compiled for a ship when they are first asked for."""
+"""Loops over ships without a task, compiled for a ship at the first call."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

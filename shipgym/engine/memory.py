@@ -1,4 +1,4 @@
-"""The memory of an engine: all its arrays in one, so that a loop takes them in one argument.
+"""Memory of an engine: all its arrays in one, which a loop takes as one argument.
 
 To look at a dozen arrays takes the interpreter longer than to sail a ship. So tables of
 an engine lie one after another in one array of float64, and begin with the record of
@@ -37,9 +37,8 @@ class Arguments(NamedTuple):
     pool: Block  # float64 (1, n_pool * n_ship_rows), of which each episode draws one
     settings: Block  # float64 (1, n): of engine, sensor set and task
     results: Block  # float64 (n_shares, n_result_rows * 64): room for those of a tile
-    shares: (
-        Block  # int64 (n_shares, 2): first tile of a thread, and that behind its last
-    )
+    # int64 (n_shares, 2): first tile of a thread, and that behind its last
+    shares: Block
     actions: Block  # float32 (n_commands, n_ships)
     chosen: Block  # bool (1, n_ships): lanes in which an episode is to begin
     # int64 (1, n): entries of a tile's results at which the rows of outputs begin
@@ -47,9 +46,8 @@ class Arguments(NamedTuple):
     informed: Block
     flagged: Block
     observations: Block  # float32 (n_ships, n_observations)
-    outcomes: (
-        Block  # float64 (n_outcomes, n_ships): reward, terminated, truncated, info
-    )
+    # float64 (n_outcomes, n_ships): reward, terminated, truncated, info
+    outcomes: Block
     flags: Block  # bool (n_flags, n_ships): terminated, truncated, those of info
 
 
@@ -84,19 +82,19 @@ def bool_in(memory: Any, at: Block) -> Any:
 
 
 def allocated(
-    shapes: Mapping[str, tuple[DTypeLike, int, int]], first: int = 0
+    tables: Mapping[str, NDArray[Any]],
+    first: int = 0,
 ) -> tuple[dict[str, Block], int]:
-    """Blocks of tables by name, one after another, and the entry at which they end.
+    """Blocks for tables by name, one after another, and the entry at which they end.
 
-    Of each table are given its type, rows and columns; the first begins at `first` or
-    at the next cache line.
+    The first begins at `first` or at the next cache line.
     """
     blocks = {}
-    for name, (dtype, rows, columns) in shapes.items():
+    for name, table in tables.items():
         first = LINE * ceil(first / LINE)
+        rows, columns = table.shape
         blocks[name] = Block(first, rows, columns)
-        per_word = WORD // np.dtype(dtype).itemsize
-        first += ceil(rows * columns / per_word)
+        first += ceil(table.nbytes / WORD)
     return blocks, first
 
 

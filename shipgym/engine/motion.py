@@ -97,7 +97,9 @@ NO_RATES = Rates(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def accelerations(
-    motion: Motion, coefficients: Any, ship: Ship
+    motion: Motion,
+    coefficients: Any,
+    ship: Ship,
 ) -> tuple[float, float, float, float, float]:
     """Accelerations in surge, sway, yaw, roll and of the memory of yaw.
 
@@ -107,7 +109,10 @@ def accelerations(
 
 
 def shaft_acceleration(
-    n: float, command: float, coefficients: Any, ship: Ship
+    n: float,
+    command: float,
+    coefficients: Any,
+    ship: Ship,
 ) -> float:
     """Acceleration of a shaft whose speed is a state, 1/s^2.
 
@@ -125,7 +130,11 @@ def gear_rate(delta: float, order: float, ship: Ship) -> float:
 
 
 def rudder_after(
-    delta: float, rate: float, order: float, h: float, ship: Ship
+    delta: float,
+    rate: float,
+    order: float,
+    h: float,
+    ship: Ship,
 ) -> float:
     """Rudder angle a time h later.
 
@@ -252,7 +261,12 @@ def start_of_step(motion: Motion, shaft: float) -> Motion:
 
 
 def end_of_step(
-    motion: Motion, start: Motion, slopes: Rates, held: Held, h: float, ship: Ship
+    motion: Motion,
+    start: Motion,
+    slopes: Rates,
+    held: Held,
+    h: float,
+    ship: Ship,
 ) -> Motion:
     """State after a step of h seconds from `motion`, which is `start` in its own frame.
 
@@ -298,7 +312,7 @@ def sail(
     cosine cost little; the way made is turned to north and east at the end.
     """
     order = clip(rudder, -ship.rudder_limit, ship.rudder_limit)
-    held = Held(order, shaft, push)
+    held = Held(order=order, shaft=shaft, push=push)
     start = start_of_step(motion, shaft)
 
     k1 = rates(start, held, coefficients, ship)

@@ -34,12 +34,12 @@ def explanation(error: Exception, what: str, functions: Iterable[Any] = ()) -> s
     """
     text = COLOUR.sub("", str(error))
     reason = _reason(text)
-    callee = CALLEE.search(text)  # what stands behind it is about who calls it
-    own = text[: callee.start()] if callee else text
+    own = text
     code = None
-    for function in functions:
-        if callee and repr(function) == callee[0]:
-            code = function.__code__
+    callee = CALLEE.search(text)
+    if callee:
+        own = text[: callee.start()]  # what stands behind it is about who calls it
+        code = _code_of(callee[0], functions)
 
     file, line = _place(own)
     if code is not None:
@@ -47,35 +47,64 @@ def explanation(error: Exception, what: str, functions: Iterable[Any] = ()) -> s
         line = line or _line_of(code, reason)
     elif not file:
         file, line = _looked_at(error)
-    written = re.search(r"^def (\w+)\(", own, re.MULTILINE)
-    name = written[1] if written else code.co_name if code else ""
+    name = _name(own, code)
 
     where = f" in {name}" if name else ""
     if file:
         where += f" ({file}, line {line})"
     for found, meant in PLAINLY.items():
         reason = re.sub(found, meant, reason)
-    return f"{what}: cannot be compiled{where}: {reason.partition(' Raised from ')[0]}"
+    reason, _, _ = reason.partition(" Raised from ")
+    return f"{what}: cannot be compiled{where}: {reason}"
+
+
+def _code_of(text: str, functions: Iterable[Any]) -> CodeType | None:
+    """Code of the function that a text names; None if it is not among them."""
+    code = None
+    for function in functions:
+        if repr(function) == text:
+            code = function.__code__
+    return code
+
+
+def _name(text: str, code: CodeType | None) -> str:
+    """Name of the function that a text shows, or of the code; empty if neither."""
+    written = re.search(r"^def (\w+)\(", text, re.MULTILINE)
+    if written:
+        return written[1]
+    return code.co_name if code else ""
 
 
 def _reason(text: str) -> str:
     """Line of the reason; of a function without an implementation, for which types."""
-    lines = [line.strip() for line in text.splitlines() if line.strip()]
-    reasons = [line for line in lines if not line.startswith("Failed in")]
-    reason = reasons[0] if reasons else "no reason given"
-    if reason.endswith(" found for signature:"):
-        asked = [line.removeprefix(">>> ") for line in lines if line[:4] == ">>> "]
-        reason = ": ".join([reason.removesuffix(" found for signature:"), *asked[:1]])
-    return reason
+    stripped = [line.strip() for line in text.splitlines()]
+    lines = [line for line in stripped if line]
+    reason = "no reason given"
+    for line in lines:
+        if not line.startswith("Failed in"):
+            reason = line
+            break
+
+    missing, found, _ = reason.partition(" found for signature:")
+    if not found:
+        return reason
+    for line in lines:
+        if line.startswith(">>> "):
+            signature = line.removeprefix(">>> ")
+            return f"{missing}: {signature}"
+    return missing
 
 
 def _place(text: str) -> tuple[str, int]:
     """First file and line of a user's that a text names, or of anybody's."""
     places = []
     for at, at_line, within, within_line in PLACE.findall(text):
-        places.append((at or within, int(at_line or within_line)))
+        file = at or within
+        line = int(at_line or within_line)
+        places.append((file, line))
     for file, line in places:
-        if not str(Path(file).resolve()).startswith(LIBRARIES):
+        resolved = str(Path(file).resolve())
+        if not resolved.startswith(LIBRARIES):
             return file, line
     return places[0] if places else ("", 0)
 
@@ -91,9 +120,11 @@ def _line_of(code: CodeType, reason: str) -> int:
 
 def _looked_at(error: Exception) -> tuple[str, int]:
     """File and line that Numba was looking at when it failed, as far as known."""
-    for frame, _ in reversed([*walk_tb(error.__traceback__)]):
+    frames = [frame for frame, _ in walk_tb(error.__traceback__)]
+    for frame in reversed(frames):
         for name in ("inst", "self"):
-            place: Any = getattr(frame.f_locals.get(name), "loc", None)
+            looked_at = frame.f_locals.get(name)
+            place: Any = getattr(looked_at, "loc", None)
             if hasattr(place, "filename"):
                 return place.filename, place.line
     return "", 0

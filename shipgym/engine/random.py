@@ -43,7 +43,11 @@ def episode_word(key: np.uint64, episode: np.uint64) -> np.uint64:
 
 
 def uniform(
-    key: np.uint64, episode: np.uint64, draw: np.uint64, low: float, high: float
+    key: np.uint64,
+    episode: np.uint64,
+    draw: np.uint64,
+    low: float,
+    high: float,
 ) -> float:
     """Return a number in [low, high), a function of the three words alone."""
     word = mix(episode_word(key, episode) + draw * GOLDEN)

@@ -86,10 +86,11 @@ def clipped_storer(rows: Rows, bounds: Mapping[str, tuple[float, float]]) -> Fun
     names: dict[str, Any] = {}
     lines = []
     for path, row in rows.numbers.items():
+        low, high = bounds[path]
         entry = _entry(row, LANES, names)
-        low, high = map(float, bounds[path])
         scaled = f"record.{path} * scale.{path}"
-        lines.append(f"{entry} = min(max({scaled}, {low!r}), {high!r})")
+        at_least = f"max({scaled}, {float(low)!r})"
+        lines.append(f"{entry} = min({at_least}, {float(high)!r})")
     name = f"store_{rows.record.__name__}"
     return _function(name, "array, lane, record, scale", lines, names)
 
@@ -143,7 +144,10 @@ def _constructed(
 
 
 def _function(
-    name: str, arguments: str, body: list[str], names: Mapping[str, Any]
+    name: str,
+    arguments: str,
+    body: list[str],
+    names: Mapping[str, Any],
 ) -> Function:
     """Make a function of its source, which is kept for tracebacks."""
     lines = [f"def {name}({arguments}):"]
@@ -152,10 +156,12 @@ def _function(
     for line in body or ["pass"]:
         lines.append(f"    {line}")
     source = "\n".join(lines) + "\n"
+
     digest = hashlib.sha256(source.encode()).hexdigest()
     file = f"<{name} {digest[:12]}>"
     linecache.cache[file] = (len(source), None, source.splitlines(True), file)
     namespace = {"__name__": __name__, "uintp": np.uintp, **names}
-    exec(compile(source, file, "exec"), namespace)
+    code = compile(source, file, "exec")
+    exec(code, namespace)
     function: Function = namespace[name]
     return function

@@ -71,13 +71,15 @@ def is_list(kind: Any) -> bool:
 def field_types(record: Record, notes: bool = False) -> dict[str, Any]:
     """Types of a record's fields by name; `notes`: with what `Annotated` adds."""
     return get_type_hints(
-        record, globalns=vars(sys.modules[record.__module__]), include_extras=notes
+        record,
+        globalns=vars(sys.modules[record.__module__]),
+        include_extras=notes,
     )
 
 
 @cache
 def leaves(record: Record, prefix: str = "") -> tuple[str, ...]:
-    """Paths of all numbers of a record and those within it, such as `u`, `helm.gain`."""
+    """Paths of all numbers of a record and those within it: `u`, `helm.gain`."""
     paths: list[str] = []
     for name, kind in field_types(record).items():
         path = prefix + name

@@ -62,15 +62,19 @@ def take_commands(tile: Tile, actions: Any, n_ships: int) -> None:
 
         held = load_commands(state, lane)
         motion = load_motion(state, lane)
-        steps, ended, _ = load_counters(state, lane)
-        over = ended != 0.0
+        before = load_counters(state, lane)
+        over = before.ended != 0.0
         keeps_shaft = over | (shafts == 0)
         commands = Commands(
             rudder_command=pick(over, held.rudder_command, rudder),
             shaft_command=pick(keeps_shaft, held.shaft_command, shaft),
             rudder_before=motion.delta,
         )
-        counters = EpisodeCounters(steps + (1.0 - ended), ended, 0.0)
+        counters = EpisodeCounters(
+            steps=before.steps + (1.0 - before.ended),
+            ended=before.ended,
+            ran_away=0.0,
+        )
         store_commands(state, lane, commands)
         store_counters(state, lane, counters)
 
@@ -110,19 +114,27 @@ def end_substep(tile: Tile, lane: int, after: Motion, h: float, ship: Ship) -> N
     """
     state = tile.state
     before = load_motion(state, lane)
-    sea = load_sea(state, lane)
-    steps, ended, ran_away = load_counters(state, lane)
-    over = ended != 0.0
+    counters = load_counters(state, lane)
+    over = counters.ended != 0.0
     away = lost(after, ship)
 
     motion = pick(away | over, before, after)
-    ran_away = pick(away, 1.0, ran_away)
-    counters = EpisodeCounters(steps, ended, ran_away)
+    counters = EpisodeCounters(
+        steps=counters.steps,
+        ended=counters.ended,
+        ran_away=pick(away, 1.0, counters.ran_away),
+    )
+    if HAS_SEA:
+        evolve_sea(tile, lane, motion, h, over)
     store_motion(state, lane, motion)
     store_counters(state, lane, counters)
-    if HAS_SEA:
-        parameters = load_sea_parameters(tile.ships, lane)
-        word = load_sea_random(tile.random, lane).rng_state
-        evolved = evolve(motion, h, sea, word, parameters)
-        store_sea(state, lane, pick(over, sea, evolved))
-        store_sea_random(tile.random, lane, SeaRandom(word + EVOLVE_WORDS))
+
+
+def evolve_sea(tile: Tile, lane: int, motion: Motion, h: float, over: bool) -> None:
+    """Let the sea around a ship go on for h seconds, unless her episode is over."""
+    sea = load_sea(tile.state, lane)
+    parameters = load_sea_parameters(tile.ships, lane)
+    word = load_sea_random(tile.random, lane).rng_state
+    evolved = evolve(motion, h, sea, word, parameters)
+    store_sea(tile.state, lane, pick(over, sea, evolved))
+    store_sea_random(tile.random, lane, SeaRandom(word + EVOLVE_WORDS))

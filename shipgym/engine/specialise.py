@@ -2,10 +2,10 @@
 
 A ship, a sea, a task is written as plain functions on named tuples, without decorators.
 `specialise` takes a loop over many ships that is written against hooks
-(`shipgym.engine.hooks`). It copies the loop, and each function that it names, with other
-globals: hooks are replaced by the functions that fill them, constants such as `HAS_SEA`
-by their values. The copies are handed to `numba.njit`. The originals stay what they are,
-to be called from Python.
+(`shipgym.engine.hooks`). It copies the loop, and each function that it names, with
+other globals: hooks are replaced by the functions that fill them, constants such as
+`HAS_SEA` by their values. The copies are handed to `numba.njit`. The originals stay
+what they are, to be called from Python.
 """
 
 import dis
@@ -56,13 +56,17 @@ def named_globals(function: Any, hooks: Hooks) -> Iterator[tuple[str, Any]]:
 
 def captured_globals(function: Any, hooks: Hooks) -> Iterator[tuple[str, Any]]:
     """Globals that a function names, and variables of a function around it."""
+    own = function.__globals__
+    takes_hooks = is_shipped(function)  # a user's names are the user's
     for name in loaded_names(function.__code__):
-        if is_shipped(function) and name in hooks:  # a user's names are the user's
+        if takes_hooks and name in hooks:
             yield name, hooks[name]
-        elif name in function.__globals__:
-            yield name, function.__globals__[name]
+        elif name in own:
+            yield name, own[name]
+
     cells = function.__closure__ or ()
-    for name, cell in zip(function.__code__.co_freevars, cells, strict=True):
+    variables = function.__code__.co_freevars
+    for name, cell in zip(variables, cells, strict=True):
         yield name, cell.cell_contents
 
 

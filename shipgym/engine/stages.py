@@ -76,9 +76,12 @@ def start_of(tile: Tile, lane: int, ship: Ship) -> tuple[Motion, Held]:
     commands = load_commands(tile.state, lane)
     limit = ship.rudder_limit
     rudder = commands.rudder_command * limit
-    order = clip(rudder, -limit, limit)
     shaft = commands.shaft_command * ship.shaft
-    held = Held(order, shaft, push_of(tile, lane))
+    held = Held(
+        order=clip(rudder, -limit, limit),
+        shaft=shaft,
+        push=push_of(tile, lane),
+    )
     return start_of_step(motion, shaft), held
 
 
@@ -100,7 +103,7 @@ def begin_stage(tile: Tile, reach: float, groups: int) -> None:
 
 
 def sum_rows(tile: Tile, groups: int) -> None:
-    """Sum over the rows of the tables, four at once, so that sums are stored less often."""
+    """Sum over the rows of the tables, four at once, to store sums less often."""
     _, shared = ship_of(tile, FIRST_LANE)
     for row in range(0, N_ROWS, 4):
         for lane in range(groups * GROUP):

@@ -24,7 +24,10 @@ def sail_step(
     coefficients: Any,
     ship: Ship,
 ) -> Motion:
-    """State h seconds later; called, not inlined, because a zigzag names it five times."""
+    """State h seconds later.
+
+    Called, not inlined, because a zigzag names it five times.
+    """
     return sail(motion, rudder, n, h, pushed, coefficients, ship)
 
 
@@ -38,7 +41,7 @@ def switched(
     coefficients: Any,
     ship: Ship,
 ) -> Motion:
-    """State after a step in which the heading crosses a threshold and the rudder reverses.
+    """State after a step in which the rudder reverses when the heading has moved.
 
     The instant is found by regula falsi on the heading after part of the step; the miss
     of the end that stays is halved each time, as the Illinois variant does where an end

@@ -25,7 +25,7 @@ from shipgym.engine.hooks import (
     store_sea,
     store_sea_channels,
 )
-from shipgym.engine.lane_records import SeaChannels
+from shipgym.engine.lane_records import SeaChannels, WindAccelerations
 from shipgym.engine.mathematics import clip, sin_cos
 from shipgym.engine.motion import (
     CALM,
@@ -148,7 +148,11 @@ def record_sea(out: Any, row: int, sea: Any, parameters: Any) -> None:
 
 
 def derivatives(
-    states: Any, commands: Any, depths: Any, numbers: Any, out: Any
+    states: Any,
+    commands: Any,
+    depths: Any,
+    numbers: Any,
+    out: Any,
 ) -> None:
     """Time derivative of each state; `commands` holds rudder angle and shaft speed."""
     ship = load_ship(numbers)
@@ -204,8 +208,26 @@ def simulate(
     return len(commands)
 
 
+def push_of_wind(wind: WindAccelerations) -> Push:
+    """Accelerations by wind in still water."""
+    return Push(
+        u=wind.surge,
+        v=wind.sway,
+        r=wind.yaw,
+        p=0.0,
+        north=0.0,
+        east=0.0,
+    )
+
+
 def open_loop(
-    out: Any, t: Any, delta: Any, n: Any, wind: Any, longest_step: float, numbers: Any
+    out: Any,
+    t: Any,
+    delta: Any,
+    n: Any,
+    wind: Any,
+    longest_step: float,
+    numbers: Any,
 ) -> int:
     """Follow a rudder that is measured at times t, and straight between the samples.
 
@@ -225,8 +247,7 @@ def open_loop(
         h = interval / steps
         rate = fabs(rudder - delta[i]) / interval
         ship = with_gear(own, NO_LIMIT, rate)
-        by_wind = load_wind(wind[i])
-        pushed = Push(by_wind.surge, by_wind.sway, by_wind.yaw, 0.0, 0.0, 0.0)
+        pushed = push_of_wind(load_wind(wind[i]))
 
         for k in range(steps):
             shaft = n[i] + change * (k + 0.5) / steps

@@ -1,4 +1,4 @@
-"""What an environment's picture shows: the scene of one lane of an engine, and the wake behind its ship."""
+"""Scene of one lane of an engine, and the wake behind its ship."""
 
 from math import atan2, degrees, hypot, pi
 
@@ -30,16 +30,15 @@ class Artist:
     def note(self, engine: Engine) -> None:
         """Note where the ship is."""
         state = engine.physical_state()
-        self._wake.append(
-            (float(state["x"][self._lane]), float(state["y"][self._lane]))
-        )
+        north = float(state["x"][self._lane])
+        east = float(state["y"][self._lane])
+        self._wake.append((north, east))
         del self._wake[:-WAKE_POINTS]
 
     def picture(self, engine: Engine) -> NDArray[np.uint8]:
-        """The picture, uint8 array of shape (600, 600, 3)."""
-        return self._renderer.draw(
-            scene(engine, self._lane, np.array(self._wake).reshape(-1, 2))
-        )
+        """Draw the lane, uint8 array of shape (600, 600, 3)."""
+        wake = np.array(self._wake).reshape(-1, 2)
+        return self._renderer.draw(scene(engine, self._lane, wake))
 
     def close(self) -> None:
         """Close the window, if there is one."""
@@ -47,13 +46,21 @@ class Artist:
 
 
 def scene(engine: Engine, lane: int, wake: Floats) -> Scene:
-    """What a picture of one lane shows."""
-    state = {
-        name: float(values[lane]) for name, values in engine.physical_state().items()
-    }
+    """Scene of one lane."""
+    state = {}
+    for name, values in engine.physical_state().items():
+        state[name] = float(values[lane])
     particulars = engine.model.particulars
-    length, wind = particulars["length"], state.get("wind_speed", 0.0)
-    north, east = state.get("current_north", 0.0), state.get("current_east", 0.0)
+    length = particulars["length"]
+
+    wind = None
+    if state.get("wind_speed"):
+        wind = (state["wind_speed"], state["wind_from"])
+    current = None
+    north = state.get("current_north", 0.0)
+    east = state.get("current_east", 0.0)
+    if north or east:
+        current = (hypot(north, east), atan2(east, north))
     return Scene(
         x=state["x"],
         y=state["y"],
@@ -67,8 +74,8 @@ def scene(engine: Engine, lane: int, wake: Floats) -> Scene:
         waypoints=engine.waypoints(lane),
         turn_radius=engine.path_metres("turn_radius"),
         corridor=engine.path_metres("corridor"),
-        wind=(wind, state["wind_from"]) if wind else None,
-        current=(hypot(north, east), atan2(east, north)) if north or east else None,
+        wind=wind,
+        current=current,
         readouts=_readouts(engine, lane, state),
     )
 
@@ -76,22 +83,27 @@ def scene(engine: Engine, lane: int, wake: Floats) -> Scene:
 def _readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, str]:
     """Speed, errors and the last reward."""
     speed = hypot(state["u"], state["v"])
+    heading = state["psi"]
     lines = {
         "speed": f"{speed:.1f} m/s, {speed / KNOT:.1f} kn",
-        "heading": _bearing(state["psi"]),
+        "heading": _bearing(heading),
     }
     if "set_point" in state:
-        error = (state["set_point"] - state["psi"] + pi) % (2.0 * pi) - pi
-        lines |= {
-            "to steer": _bearing(state["set_point"]),
-            "heading error": f"{degrees(error):+.1f} deg",
-        }
-    lines["rudder"] = f"{degrees(state['delta']):+.1f} deg"
+        set_point = state["set_point"]
+        error = (set_point - heading + pi) % (2.0 * pi) - pi
+        lines["to steer"] = _bearing(set_point)
+        lines["heading error"] = f"{degrees(error):+.1f} deg"
+    rudder_deg = degrees(state["delta"])
+    lines["rudder"] = f"{rudder_deg:+.1f} deg"
     if "cross_track" in engine.task.info_names:
-        lines["cross-track"] = f"{engine.info('cross_track')[lane]:+.0f} m"
-    return {**lines, "reward": f"{engine.outputs.outcomes[0, lane]:+.3f}"}
+        cross_track = engine.info("cross_track")[lane]
+        lines["cross-track"] = f"{cross_track:+.0f} m"
+    reward = engine.outputs.outcomes[0, lane]
+    lines["reward"] = f"{reward:+.3f}"
+    return lines
 
 
 def _bearing(angle: float) -> str:
-    """An angle as a compass shows it."""
-    return f"{round(degrees(angle) * 10.0) % 3600 / 10.0:05.1f} deg"
+    """Angle as a compass shows it."""
+    tenths = round(degrees(angle) * 10.0) % 3600
+    return f"{tenths / 10.0:05.1f} deg"

@@ -1,4 +1,4 @@
-"""A conformance suite for vector environments, which Gymnasium's own checker refuses."""
+"""Conformance suite for vector environments, which Gymnasium's own checker refuses."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -7,11 +7,13 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
-from numpy.typing import NDArray
 
+from shipgym.arrays import Flags
 from shipgym.errors import InputError
 
-Make = Callable[[], VectorEnv[Any, Any, Any]]
+Vectors = VectorEnv[Any, Any, Any]
+Make = Callable[[], Vectors]
+Space = gymnasium.Space[Any]
 MakeSingle = Callable[[], gymnasium.Env[Any, Any]]
 Episode = list[tuple[Any, Any, Any, Any]]
 SEED = 1234
@@ -20,7 +22,9 @@ STAGGER = 5  # step at which a row is begun anew by hand
 
 
 def check_vector_env(
-    make: Make, make_single: MakeSingle | None = None, n_steps: int = STEPS
+    make: Make,
+    make_single: MakeSingle | None = None,
+    n_steps: int = STEPS,
 ) -> None:
     """Check that a vector environment meets the requirements of Gymnasium's interface.
 
@@ -42,14 +46,15 @@ def check_vector_env(
     n_steps : int
         Steps taken in each check; let them be enough for some episodes to end.
     """
-    for check in (
+    checks = (
         _check_spaces,
         _check_reset,
         _check_steps,
         _check_seeds,
         _check_actions,
         _check_autoreset,
-    ):
+    )
+    for check in checks:
         with closing(make()) as env:
             check(env, n_steps)
     if make_single is not None:
@@ -61,8 +66,8 @@ def _expect(condition: bool, promise: str) -> None:
         raise InputError(f"vector environment: {promise}")
 
 
-def autoreset_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
-    """How an environment says that it begins the next episode; InputError where it does not say."""
+def autoreset_mode(env: Vectors) -> AutoresetMode:
+    """Autoreset mode that an environment's metadata name; InputError without one."""
     mode = env.metadata.get("autoreset_mode")
     if not isinstance(mode, AutoresetMode):
         raise InputError(
@@ -72,33 +77,36 @@ def autoreset_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
     return mode
 
 
-def _check_spaces(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+def _check_spaces(env: Vectors, n_steps: int) -> None:
     autoreset_mode(env)
     n = env.num_envs
     _expect(isinstance(n, int) and n >= 1, f"num_envs is {n!r}, expected >= 1")
-    for which in ("observation", "action"):
-        single, batch = (
-            getattr(env, f"single_{which}_space"),
-            getattr(env, f"{which}_space"),
-        )
-        expected = gymnasium.vector.utils.batch_space(single, env.num_envs)
-        what = (
-            f"{which}_space is {batch}, expected {expected}: single_{which}_space"
-            " batched"
-        )
-        _expect(batch == expected, what)
+    _check_batched(
+        "observation", env.single_observation_space, env.observation_space, n
+    )
+    _check_batched("action", env.single_action_space, env.action_space, n)
 
 
-def _check_reset(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+def _check_batched(which: str, single: Space, batch: Space, n: int) -> None:
+    expected = gymnasium.vector.utils.batch_space(single, n)
+    _expect(
+        batch == expected,
+        f"{which}_space is {batch}, expected {expected}: single_{which}_space batched",
+    )
+
+
+def _check_reset(env: Vectors, n_steps: int) -> None:
     answer = env.reset(seed=SEED)
-    pair = isinstance(answer, tuple) and len(answer) == 2
-    _expect(pair, f"reset returned {type(answer)}, expected (observations, infos)")
+    _expect(
+        isinstance(answer, tuple) and len(answer) == 2,
+        f"reset returned {type(answer)}, expected (observations, infos)",
+    )
     observations, infos = answer
     _check_observations(env, observations, "reset")
     _check_infos(env, infos, "reset")
 
 
-def _check_steps(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+def _check_steps(env: Vectors, n_steps: int) -> None:
     env.action_space.seed(SEED)
     env.reset(seed=SEED)
     kept: list[tuple[Any, Any]] = []
@@ -107,37 +115,37 @@ def _check_steps(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
         _expect(len(answer) == 5, f"step returned {len(answer)} values, expected 5")
         observations, rewards, terminated, truncated, infos = answer
         _check_observations(env, observations, "step")
-        for name, array in {
-            "rewards": rewards,
-            "terminated": terminated,
-            "truncated": truncated,
-        }.items():
-            kind = np.floating if name == "rewards" else np.bool_
-            found = (getattr(array, "shape", None), getattr(array, "dtype", None))
-            right = found[0] == (env.num_envs,) and np.issubdtype(found[1], kind)
-            _expect(
-                right,
-                f"step: {name} of shape and type {found}, expected ({env.num_envs},)"
-                f" {kind}",
-            )
+        _check_array("rewards", rewards, np.floating, env.num_envs)
+        _check_array("terminated", terminated, np.bool_, env.num_envs)
+        _check_array("truncated", truncated, np.bool_, env.num_envs)
         _expect(
             bool(np.all(np.isfinite(rewards))),
             f"step: rewards {rewards} are not all finite",
         )
         _check_infos(env, infos, "step")
+
         for before, copy in kept:
             _expect(
                 np.array_equal(before, copy),
                 "step changed an array that an earlier step had returned",
             )
-        kept = [
-            (array, np.copy(array))
-            for array in (observations, rewards, terminated, truncated)
-        ]
+        arrays = (observations, rewards, terminated, truncated)
+        kept = [(array, np.copy(array)) for array in arrays]
+
+
+def _check_array(name: str, array: Any, kind: Any, n: int) -> None:
+    shape = getattr(array, "shape", None)
+    dtype = getattr(array, "dtype", None)
+    _expect(
+        shape == (n,) and np.issubdtype(dtype, kind),
+        f"step: {name} of shape and type {(shape, dtype)}, expected ({n},) {kind}",
+    )
 
 
 def _check_observations(
-    env: VectorEnv[Any, Any, Any], observations: Any, where: str
+    env: Vectors,
+    observations: Any,
+    where: str,
 ) -> None:
     space = env.observation_space
     _expect(
@@ -146,7 +154,7 @@ def _check_observations(
     )
 
 
-def _check_infos(env: VectorEnv[Any, Any, Any], infos: Any, where: str) -> None:
+def _check_infos(env: Vectors, infos: Any, where: str) -> None:
     _expect(
         isinstance(infos, dict),
         f"{where}: infos are {type(infos)}, expected a dict of arrays",
@@ -155,65 +163,63 @@ def _check_infos(env: VectorEnv[Any, Any, Any], infos: Any, where: str) -> None:
         if key.startswith("_"):
             continue
         mask = infos.get(f"_{key}")
-        right = (
-            isinstance(mask, np.ndarray)
-            and mask.shape == (env.num_envs,)
-            and mask.dtype == np.bool_
+        is_flags = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
+        _expect(
+            is_flags and mask.shape == (env.num_envs,),
+            f"{where}: infos['_{key}'] is {mask!r}, expected a mask of {env.num_envs}"
+            " booleans",
         )
-        expected = f"expected a mask of {env.num_envs} truth values"
-        _expect(right, f"{where}: infos['_{key}'] is {mask!r}, {expected}")
         if isinstance(value, dict):
             _check_infos(env, value, f"{where}, {key}")
         else:
-            rows = isinstance(value, np.ndarray) and len(value) == env.num_envs
             _expect(
-                rows,
+                isinstance(value, np.ndarray) and len(value) == env.num_envs,
                 f"{where}: infos['{key}'] is {value!r}, expected an entry for each row",
             )
 
 
-def _check_seeds(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
-    seeds = (SEED, SEED, [SEED + i for i in range(env.num_envs)], SEED + 10_000)
-    first, again, of_list, other = (_rollout(env, seed, n_steps) for seed in seeds)
+def _check_seeds(env: Vectors, n_steps: int) -> None:
+    by_row = [SEED + row for row in range(env.num_envs)]
+    first = _rollout(env, SEED, n_steps)
     _expect(
-        _same(first, again),
+        _same(first, _rollout(env, SEED, n_steps)),
         "reset with the same seed and the same actions gave another episode",
     )
     _expect(
-        _same(first, of_list),
+        _same(first, _rollout(env, by_row, n_steps)),
         "reset(seed=s) gave another episode than reset(seed=[s, s + 1, ...])",
     )
+    other = _rollout(env, SEED + 10_000, n_steps)
     _expect(
         not _same(first[:1], other[:1]),
         "reset with another seed gave the same first observations",
     )
 
 
-def _rollout(env: VectorEnv[Any, Any, Any], seed: Any, n_steps: int) -> Episode:
+def _rollout(env: Vectors, seed: Any, n_steps: int) -> Episode:
+    goes_on = autoreset_mode(env) is not AutoresetMode.DISABLED
     env.action_space.seed(SEED)
     observations, _ = env.reset(seed=seed)
     nothing = np.zeros(env.num_envs)
-    course: Episode = [(observations, nothing, nothing, nothing)]
+    episode: Episode = [(observations, nothing, nothing, nothing)]
     for _ in range(n_steps):
-        *outcome, _ = env.step(env.action_space.sample())
-        course.append(tuple(outcome))
-        if autoreset_mode(env) is AutoresetMode.DISABLED and np.any(
-            outcome[2] | outcome[3]
-        ):
+        action = env.action_space.sample()
+        observations, rewards, terminated, truncated, _ = env.step(action)
+        episode.append((observations, rewards, terminated, truncated))
+        if not goes_on and np.any(terminated | truncated):
             break
-    return course
+    return episode
 
 
 def _same(one: Episode, other: Episode) -> bool:
-    steps = zip(one, other, strict=True)
-    return all(
-        np.array_equal(a, b)
-        for left, right in steps
-        for a, b in zip(left, right, strict=True)
-    )
+    for step, other_step in zip(one, other, strict=True):
+        for array, other_array in zip(step, other_step, strict=True):
+            if not np.array_equal(array, other_array):
+                return False
+    return True
 
 
-def _check_actions(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+def _check_actions(env: Vectors, n_steps: int) -> None:
     env.reset(seed=SEED)
     actions = env.action_space.sample()
     wrong = [np.concatenate([actions, actions])]
@@ -229,21 +235,15 @@ def _check_actions(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
         )
 
 
-def _check_autoreset(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+def _check_autoreset(env: Vectors, n_steps: int) -> None:
     mode = autoreset_mode(env)
     env.action_space.seed(SEED)
     env.reset(seed=SEED)
     ended = np.zeros(env.num_envs, dtype=np.bool_)
-    first_row = np.arange(env.num_envs) == 0
     for step in range(n_steps):
-        observations, rewards, terminated, truncated, infos = env.step(
-            env.action_space.sample()
-        )
+        action = env.action_space.sample()
+        observations, rewards, terminated, truncated, infos = env.step(action)
         done = terminated | truncated
-        if (
-            mode is AutoresetMode.DISABLED and step == STAGGER
-        ):  # so that episodes do not all end together
-            done = done | first_row
         if mode is AutoresetMode.NEXT_STEP:
             _expect(
                 not np.any(done & ended),
@@ -253,15 +253,22 @@ def _check_autoreset(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
                 not np.any(rewards[ended]),
                 "the step that begins an episode earned something, expected 0",
             )
-        elif mode is AutoresetMode.SAME_STEP and np.any(done):
-            _check_final(env, infos, done)
-        elif mode is AutoresetMode.DISABLED and np.any(done):
-            observations = _check_partial_reset(env, observations, done)
+        elif mode is AutoresetMode.SAME_STEP:
+            if np.any(done):
+                _check_final(env, infos, done)
+        else:
+            if step == STAGGER:  # so that episodes do not all end together
+                done = done.copy()
+                done[0] = True
+            if np.any(done):
+                _check_partial_reset(env, observations, done)
         ended = done
 
 
 def _check_final(
-    env: VectorEnv[Any, Any, Any], infos: dict[str, Any], done: NDArray[np.bool_]
+    env: Vectors,
+    infos: dict[str, Any],
+    done: Flags,
 ) -> None:
     for key in ("final_obs", "final_info"):
         _expect(key in infos, f"an episode ended and infos have no '{key}'")
@@ -270,15 +277,19 @@ def _check_final(
             np.array_equal(mask, done),
             f"infos['_{key}'] is {mask}, expected {done}: the ended rows",
         )
-    for i in np.flatnonzero(done):
-        final = infos["final_obs"][i]
-        seen = final in env.single_observation_space
-        _expect(seen, f"infos['final_obs'][{i}] is {final}, not an observation")
+    for row in np.flatnonzero(done):
+        final = infos["final_obs"][row]
+        _expect(
+            final in env.single_observation_space,
+            f"infos['final_obs'][{row}] is {final}, not an observation",
+        )
 
 
 def _check_partial_reset(
-    env: VectorEnv[Any, Any, Any], before: Any, done: NDArray[np.bool_]
-) -> Any:
+    env: Vectors,
+    before: Any,
+    done: Flags,
+) -> None:
     kept = np.copy(before)
     after, _ = env.reset(options={"reset_mask": done.copy()})
     _check_observations(env, after, "reset with a mask")
@@ -290,25 +301,22 @@ def _check_partial_reset(
         not np.array_equal(after[done], kept[done]),
         "reset with a mask left a row within it as it was",
     )
-    return after
 
 
 def _check_rows(make: Make, make_single: MakeSingle, n_steps: int) -> None:
     with closing(make()) as env:
+        mode = autoreset_mode(env)
+        episode = _rollout(env, SEED, n_steps)
         singles = [make_single] * env.num_envs
-        with closing(
-            SyncVectorEnv(singles, autoreset_mode=autoreset_mode(env))
-        ) as reference:
-            steps = zip(
-                _rollout(env, SEED, n_steps),
-                _rollout(reference, SEED, n_steps),
-                strict=False,
-            )
-    for found, expected in (
-        (one[i], other[i]) for one, other in steps for i in range(len(one))
-    ):
-        for row, (shown, due) in enumerate(zip(found, expected, strict=True)):
-            alone = f"expected {due} of the single environment with seed {SEED + row}"
-            _expect(
-                bool(np.array_equal(shown, due)), f"row {row} shows {shown}, {alone}"
-            )
+        with closing(SyncVectorEnv(singles, autoreset_mode=mode)) as reference:
+            expected_episode = _rollout(reference, SEED, n_steps)
+
+    for step, expected_step in zip(episode, expected_episode, strict=False):
+        for array, expected_array in zip(step, expected_step, strict=True):
+            for row, expected in enumerate(expected_array):
+                found = array[row]
+                _expect(
+                    bool(np.array_equal(found, expected)),
+                    f"row {row} shows {found}, expected {expected} of the single"
+                    f" environment with seed {SEED + row}",
+                )

@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_number, check_whole
 from shipgym.engine.compiling import entry_of
 from shipgym.engine.episode_program import EpisodeProgram, episode_program
@@ -19,7 +19,7 @@ from shipgym.engine.records import LANES
 from shipgym.envs.lanes import Lanes
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES
 from shipgym.envs.plain_python import plain_loop
-from shipgym.envs.randomisation import Randomisation
+from shipgym.envs.randomisation import Pool, Randomisation
 from shipgym.errors import InputError
 from shipgym.python_files import asked
 from shipgym.ships import ShipModel
@@ -82,18 +82,19 @@ class Engine(Lanes):
         task = task or course_keeping_task()
         task.check_fits(model)
 
-        self.pool = (randomisation or Randomisation()).ships(model, task.seas)
+        randomisation = randomisation or Randomisation()
+        self.pool = randomisation.ships(model, task.seas)
         drawn = len(self.pool) > 1
-        if drawn and len(ships) > 1:
-            raise InputError(
-                "models: expected a ship for each lane or a pool of ships, got both"
-            )
         windy = any(not sea.calm for _, sea in self.pool)
         if model_index is not None:
-            last = len(self.pool) - 1
-            check_whole(model_index, "model_index", at_least=0, at_most=last)
-            self.pool = [self.pool[model_index]] * len(self.pool)
-        own = self.pool if drawn else [(ship, task.seas[0]) for ship in ships]
+            self.pool = _only(model_index, self.pool)
+        own = [(ship, task.seas[0]) for ship in ships]
+        if drawn:
+            if len(ships) > 1:
+                raise InputError(
+                    "models: expected a ship for each lane or a pool of ships, got both"
+                )
+            own = self.pool
 
         program = episode_program(
             model.compiled,
@@ -103,6 +104,10 @@ class Engine(Lanes):
             len(own) == 1,
         )
         super().__init__(program, model, task, num_envs, own, drawn, threads)
+        self._begin_all(loop or self._compiled)
+
+    def _begin_all(self, loop: Callable[[EpisodeProgram], Any]) -> None:
+        """Begin an episode in each lane, with the loop of the program."""
         self._orders = self._actions.T
         self.all_lanes = np.ones(self.num_envs, dtype=np.bool_)
         self.all_lanes.flags.writeable = False
@@ -110,27 +115,29 @@ class Engine(Lanes):
         self._threads = ThreadPoolExecutor(max(self.n_shares - 1, 1), "shipgym")
         self.renew_outputs()
         # last, when nothing is left that may be refused
-        self._run = (loop or self._compiled)(program)
-        self.reset(np.arange(num_envs))
+        self._run = loop(self.program)
+        self.reset(np.arange(self.num_envs))
 
     def _compiled(self, program: EpisodeProgram) -> Any:
         """Return the loop of a program; InputError names what does not compile."""
         try:
             run = entry_of(program.run)
         except InputError as error:
+            # plain Python often says better what is wrong
             fault = fault_in_python(self.model, self.task)
             raise InputError(fault or str(error)) from None
-        cost = asked(program.task.worst_cost, self.task.settings)
-        where = f"{program.task.reward_source}: worst_cost"
+        task = program.task
+        cost = asked(task.worst_cost, self.task.settings)
+        where = f"{task.reward_source}: worst_cost"
         check_number(cost, where, at_least=0.0)
         return run
 
     def renew_outputs(self) -> None:
-        """Write the next outputs into new arrays: those that were given stay as they are."""
+        """Write the next outputs into new arrays; given ones do not change."""
         self.outputs = self._output_pool.take()
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go on from what `get_state` gave, of this engine or one of the same arguments.
+        """Go on from the `get_state` of this engine, or one of the same arguments.
 
         InputError for another state.
         """
@@ -167,14 +174,15 @@ class Engine(Lanes):
         return n_ended
 
     def _run_shares(self, asked: int) -> int:
-        """Let threads step their shares of the ships; the first is done by this one."""
+        """Let threads step their shares of the ships."""
         run = partial(self._run, self._memory, self.outputs.memory)
-        others = [
-            self._threads.submit(run, share, asked) for share in range(1, self.n_shares)
-        ]
+        others = []
+        for share in range(1, self.n_shares):
+            others.append(self._threads.submit(run, share, asked))
+        # the first share is this thread's, which would wait for the others otherwise
         n_ended: int = run(0, asked)
-        for share in others:
-            n_ended += share.result()
+        for other in others:
+            n_ended += other.result()
         return n_ended
 
     def step_of_one(self) -> Callable[[], int]:
@@ -194,7 +202,10 @@ class Engine(Lanes):
         return self.begin(episode_keys(seeds))
 
     def begin(
-        self, keys: ArrayLike, episodes: ArrayLike = 0, mask: ArrayLike = True
+        self,
+        keys: ArrayLike,
+        episodes: ArrayLike = 0,
+        mask: ArrayLike = True,
     ) -> Observation:
         """Begin an episode in the lanes of a mask; return observations as `reset` does.
 
@@ -205,13 +216,13 @@ class Engine(Lanes):
         lanes = np.flatnonzero(chosen)
         tiles, lanes_in_tile = np.divmod(lanes, LANES)
         for row, words in enumerate((keys, episodes)):
-            of_all = np.asarray(words).astype(np.uint64)
-            of_all = np.broadcast_to(of_all, (self.num_envs,))
-            self._random[tiles, row, lanes_in_tile] = of_all[lanes]
+            numbers = np.asarray(words).astype(np.uint64)
+            of_lanes = np.broadcast_to(numbers, (self.num_envs,))
+            self._random[tiles, row, lanes_in_tile] = of_lanes[lanes]
         self._begin(chosen, BEGIN)
         return self.observations
 
-    def begin_next(self, chosen: NDArray[np.bool_]) -> None:
+    def begin_next(self, chosen: Flags) -> None:
         """Begin the next episode in the lanes of a mask, shape (num_envs,).
 
         Reward and ends of the last step stay.
@@ -223,16 +234,14 @@ class Engine(Lanes):
         outputs.outcomes[:ANSWER_OUTCOMES] = answer
         outputs.flags[:ANSWER_FLAGS] = ends
 
-    def _begin(self, chosen: NDArray[np.bool_], asked: int) -> None:
+    def _begin(self, chosen: Flags, asked: int) -> None:
         self._chosen[:] = chosen
         try:
             self._run(self._memory, self.outputs.memory, 0, asked)
         except IndexError as error:  # of a user's function
-            why = (
-                fault_in_python(self.model, self.task)
-                or f"{self.task.definition.source}: begin: {error}"
-            )
-            raise InputError(why) from None
+            fault = fault_in_python(self.model, self.task)
+            source = self.task.definition.source
+            raise InputError(fault or f"{source}: begin: {error}") from None
 
     def order(self, actions: ArrayLike) -> None:
         """Set the commands for the next step, which refuses those that are not finite.
@@ -248,13 +257,12 @@ class Engine(Lanes):
             )
         self._orders[...] = array
 
-    def step(
-        self, actions: ArrayLike
-    ) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+    def step(self, actions: ArrayLike) -> tuple[Observation, Floats, Flags, Flags]:
         """Take one control interval by orders (`order`).
 
-        A lane whose episode is over stays as it is and earns 0. Returns float32 observations of shape (num_envs, n_observations), rewards, and
-        whether episodes were terminated and truncated, of shape (num_envs,); copies.
+        A lane whose episode is over stays as it is and earns 0. Returns float32
+        observations of shape (num_envs, n_observations), rewards, and whether episodes
+        were terminated and truncated, of shape (num_envs,); copies.
         """
         self.order(actions)
         self.advance()
@@ -267,18 +275,19 @@ class Engine(Lanes):
 
     def refuse_rewards(self) -> None:
         """Raise an InputError that names the last reward that is not finite."""
-        parts_at_fault = np.argwhere(~np.isfinite(self.reward_parts))
-        if len(parts_at_fault):
-            lane, part = parts_at_fault[0]
+        at_fault = np.argwhere(~np.isfinite(self.reward_parts))
+        if len(at_fault):
+            lane, part = at_fault[0]
         else:  # finite numbers whose sum is not
             lane = np.argmax(~np.isfinite(self.outputs.outcomes[0]))
             part = 0
         name = self.task.reward_parts[part]
+        reward = self.info(name)[lane]
+        step = self.steps[lane]
         raise InputError(
-            f"{self.task.definition.reward_source}: {name} is {self.info(name)[lane]}"
-            f" in lane {lane} at step {self.steps[lane]:g}, expected a finite number;"
-            " look for a division by zero or a root of a negative number"
-            " (shipgym.check_task helps)"
+            f"{self.task.definition.reward_source}: {name} is {reward} in lane {lane} at"
+            f" step {step:g}, expected a finite number; look for a division by zero or"
+            " a root of a negative number (shipgym.check_task helps)"
         )
 
     @property
@@ -288,58 +297,67 @@ class Engine(Lanes):
 
     @property
     def observations(self) -> Observation:
-        """What the autopilots see, float32 array of shape (num_envs, n_observations), a copy."""
+        """Observations, float32, shape (num_envs, n_observations), a copy."""
         return self.outputs.observations.copy()
 
     def info(self, name: str) -> Floats:
-        """One entry of `info` for each lane, shape (num_envs,), a view of the last step."""
+        """Entry of `info` for each lane, shape (num_envs,), a view of the last step."""
         row = ANSWER_OUTCOMES + self.task.info_names.index(name)
         entry: Floats = self.outputs.outcomes[row]
         return entry
 
     @property
     def reward_parts(self) -> Floats:
-        """Parts of the last rewards in the order of the task's, shape (num_envs, n_parts)."""
+        """Parts of the last rewards, shape (num_envs, n_parts)."""
         return np.stack([self.info(name) for name in self.task.reward_parts], axis=-1)
 
 
+def _only(model_index: int, pool: Pool) -> Pool:
+    """Pool of which each episode has the same ship; InputError for another number."""
+    last = len(pool) - 1
+    check_whole(model_index, "model_index", at_least=0, at_most=last)
+    return [pool[model_index]] * len(pool)
+
+
 def _check_ships(
-    ships: Sequence[ShipModel], num_envs: int, allow_unstable: bool
+    ships: Sequence[ShipModel],
+    num_envs: int,
+    allow_unstable: bool,
 ) -> None:
-    """Refuse another number of ships than lanes, several structures, unstable models."""
+    """Refuse too many or few ships, several structures, unstable models."""
     if len(ships) not in (1, num_envs):
         raise InputError(
             f"models: expected 1, or one for each of {num_envs} lanes, got {len(ships)}"
         )
     refuse_unstable(ships, allow_unstable)
-    if any(other.compiled is not ships[0].compiled for other in ships):
+    first = ships[0]
+    if any(other.compiled is not first.compiled for other in ships):
         raise InputError("models: expected one structure in one engine, got several")
 
 
 def fault_in_python(model: ShipModel, task: Task) -> str:
-    """Say what plain Python finds wrong with a task in its first step; empty if nothing.
+    """Fault that plain Python finds in the first step of a task; empty if none.
 
     Errors of arithmetic are passed over: compiled code goes on with infinities and NaN.
     """
-    still = np.zeros((1, task.n_commands))
     try:
         with warnings.catch_warnings(action="ignore"):
-            asked(
-                lambda: Engine(
-                    model, 1, task, allow_unstable=True, loop=plain_loop
-                ).step(still)
-            )
+            asked(_first_step, model, task)
     except InputError as error:
-        return (
-            ""
-            if isinstance(error.__cause__, ArithmeticError | ValueError)
-            else str(error)
-        )
+        if isinstance(error.__cause__, ArithmeticError | ValueError):
+            return ""
+        return str(error)
     return ""
 
 
+def _first_step(model: ShipModel, task: Task) -> None:
+    """Take a step in plain Python."""
+    engine = Engine(model, 1, task, allow_unstable=True, loop=plain_loop)
+    engine.step(np.zeros((1, task.n_commands)))
+
+
 def as_array(actions: Any) -> NDArray[Any]:
-    """Actions as an array; one of objects where NumPy cannot read them, such as ragged lists."""
+    """Actions as an array; of objects where NumPy cannot read them, as ragged lists."""
     try:
         return np.asarray(actions)
     except (TypeError, ValueError, RuntimeError):
@@ -359,10 +377,10 @@ def as_numbers(actions: Any, where: str) -> NDArray[Any]:
 def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:
     """Keys of episodes for seeds of environments, of the same shape."""
     array = np.asarray(seeds)
-    keys = [
-        episode_key(gymnasium.utils.seeding.np_random(int(seed))[0])
-        for seed in array.ravel()
-    ]
+    keys = []
+    for seed in array.ravel().tolist():
+        random, _ = gymnasium.utils.seeding.np_random(int(seed))
+        keys.append(episode_key(random))
     return np.array(keys, dtype=np.uint64).reshape(array.shape)
 
 
@@ -376,20 +394,21 @@ def refuse_unstable(models: Iterable[ShipModel], allow_unstable: bool = False) -
 
     InputError, or a warning if `allow_unstable`.
     """
-    marked = ""
     for model in models:
         provenance = model.provenance or {}
         if provenance.get("stable") is False:
-            marked = marked or model.name
-    if not marked:
-        return
+            _refuse_or_warn(model.name, allow_unstable)
+            return
+
+
+def _refuse_or_warn(name: str, allow_unstable: bool) -> None:
     found = (
-        f"model {marked!r} was found unstable when it was identified: it runs away"
-        " where ships do not"
+        f"model {name!r} was found unstable when it was identified: it runs away where"
+        " ships do not"
     )
     if not allow_unstable:
         raise InputError(
             f"{found}, expected a stable one; identify it from more trials or with the"
             " guard, or give allow_unstable=True to sail it all the same"
         )
-    warnings.warn(f"{found}, do not trust what is learned or tuned on it", stacklevel=4)
+    warnings.warn(f"{found}, do not trust what is learned or tuned on it", stacklevel=5)

@@ -1,25 +1,27 @@
-"""What environments of one ship and of many have in common: options, copies, states, resets."""
+"""Base of environments of one ship and of many: options, copies, states, resets."""
+
+from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import gymnasium
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
+from shipgym.arrays import Flags
 from shipgym.checks import (
     check_choice,
     check_keys,
     check_table,
     did_you_mean,
     quoted,
-    shown,
+    unexpected,
 )
-from shipgym.envs.artist import Artist
 from shipgym.envs.engine import Engine, as_array, episode_key
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
@@ -28,6 +30,9 @@ from shipgym.ships import ShipModel, load_model
 from shipgym.tasks.definition import read_definition
 from shipgym.tasks.task import RUDDER_ORDERS, Task
 
+if TYPE_CHECKING:
+    from shipgym.envs.artist import Artist
+
 Space = gymnasium.spaces.Box | gymnasium.spaces.Discrete
 DEFAULT_MODEL = "mariner-tls-svm"
 DEFAULT_TASK = "CourseKeeping"
@@ -35,13 +40,18 @@ ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
 
 
 class UnknownKeywordError(InputError, TypeError):
-    """A keyword that an environment does not take; libraries probe for it by its being a TypeError."""
+    """Keyword that an environment does not take.
+
+    It is a TypeError, because libraries probe for keywords by that.
+    """
 
     def __init__(self, message: str, known: Sequence[str] = ()) -> None:
-        if known:  # made anew by Gymnasium, it has the message alone
-            hint = f"{did_you_mean(message, known)} Known keys: {quoted(known)}; it is"
-            wrong = f"unexpected keyword argument '{message}'"
-            message = f"environment options: unknown key '{message}'.{hint} an {wrong}"
+        if known:  # raised again by Gymnasium, it has the message alone
+            hint = did_you_mean(message, known)
+            message = (
+                f"environment options: unknown key '{message}'.{hint} Known keys:"
+                f" {quoted(known)}; it is an unexpected keyword argument '{message}'"
+            )
         super().__init__(message)
 
 
@@ -51,26 +61,26 @@ def read_options(
     options: Mapping[str, Any],
     taken: Sequence[str] = (),
 ) -> tuple[ShipModel, Task, Randomisation]:
-    """The ship, the task and what is randomised, by an environment's keywords.
+    """Read the ship, the task and what is randomised from an environment's keywords.
 
-    `taken`: keywords that its caller takes beside them, for messages. Raises InputError
-    for an unknown model or keyword, or a value out of its range.
+    `taken`: further keywords of its caller, for messages. Raises InputError for an
+    unknown model or keyword, or a value out of its range.
     """
     definition = read_definition(task, options.get("reward"))
     sensors = options.get("sensors")
-    own = Task.option_names(
-        definition, None if sensors is None else read_sensors(sensors)
-    )
-    known = list(dict.fromkeys([*taken, "reward", *own, *Randomisation.names()]))
+    if sensors is not None:
+        sensors = read_sensors(sensors)
+    own = Task.option_names(definition, sensors)
+    known = dict.fromkeys([*taken, "reward", *own, *Randomisation.names()])
     for name in options:
         if name not in known:
-            raise UnknownKeywordError(name, known)
+            raise UnknownKeywordError(name, list(known))
+
     randomisation, rest = Randomisation.take_from(options)
     rest.pop("reward", None)
     if not isinstance(model, str | Path | ShipModel):
-        raise InputError(
-            f"model: {model!r} found, expected a name, the path of a model file, or a"
-            " ShipModel"
+        raise unexpected(
+            "model", "a name, the path of a model file, or a ShipModel", model
         )
     ship = model if isinstance(model, ShipModel) else load_model(model)
     return ship, Task.of(definition, **rest), randomisation
@@ -79,36 +89,34 @@ def read_options(
 def spaces(task: Task, model: ShipModel) -> tuple[gymnasium.spaces.Box, Space]:
     """Observation and action space of a task for a ship."""
     observed = task.observed(model)
-    low, high = np.array(
-        [(quantity.low, quantity.high) for quantity in observed], dtype=np.float32
-    ).T
-    actions: Space = gymnasium.spaces.Box(
-        -1.0, 1.0, (task.n_commands,), dtype=np.float32
+    observations = gymnasium.spaces.Box(
+        low=np.array([quantity.low for quantity in observed], dtype=np.float32),
+        high=np.array([quantity.high for quantity in observed], dtype=np.float32),
+        dtype=np.float32,
     )
     if task.action == "rudder-discrete":
-        actions = gymnasium.spaces.Discrete(len(RUDDER_ORDERS))
-    return gymnasium.spaces.Box(low, high, dtype=np.float32), actions
+        return observations, gymnasium.spaces.Discrete(len(RUDDER_ORDERS))
+    shape = (task.n_commands,)
+    return observations, gymnasium.spaces.Box(-1.0, 1.0, shape, dtype=np.float32)
 
 
 def rudder_orders(
-    numbers: Any, shape: tuple[int, ...], where: str
+    numbers: Any,
+    shape: tuple[int, ...],
+    where: str,
 ) -> NDArray[np.float32]:
-    """Discrete rudder orders by their numbers, as a column for each row; InputError for others."""
-    array, last = as_array(numbers), len(ORDERS) - 1
-    if (
-        array.shape != shape
-        or array.dtype.kind not in "iu"
-        or array.min() < 0
-        or array.max() > last
-    ):
-        what, each = (
-            (f"int of shape {shape}", "rudder orders")
-            if shape
-            else ("a whole number", "a rudder order")
-        )
-        raise InputError(
-            f"{where}: {numbers!r} found, expected {what} from 0 to {last}: {each}"
-        )
+    """Discrete rudder orders by their numbers, as a column for each row.
+
+    InputError for other numbers, or another shape.
+    """
+    array = as_array(numbers)
+    last = len(ORDERS) - 1
+    is_whole = array.shape == shape and array.dtype.kind in "iu"
+    if not is_whole or array.min() < 0 or array.max() > last:
+        expected = f"an integer from 0 to {last}: a rudder order"
+        if shape:
+            expected = f"integers of shape {shape} from 0 to {last}: rudder orders"
+        raise unexpected(where, expected, numbers)
     ordered: NDArray[np.float32] = ORDERS[array.reshape(-1, 1)]
     return ordered
 
@@ -141,43 +149,46 @@ class ShipsEnv:
     ) -> tuple[gymnasium.spaces.Box, Space]:
         """Take the arguments of its making; returns the spaces of one ship."""
         options = arguments.pop("options")
-        given = {
-            name: arguments[name]
-            for name in arguments
-            if name not in ("self", "__class__")
-        }
+        given = dict(arguments)
+        for name in ("self", "__class__"):
+            given.pop(name, None)
         self._arguments = given | options
-        num_envs, threads = given.get("num_envs", 1), given.get("threads", 1)
         self.render_mode = given["render_mode"]
         if self.render_mode is not None:
             check_choice(
-                self.render_mode, render_modes, "render_mode", also=", or None"
+                self.render_mode,
+                render_modes,
+                "render_mode",
+                also=", or None",
             )
+
         self.model, self.task, randomisation = read_options(
             given["task"], given["model"], options, taken
         )
-        engine = Engine(
+        num_envs = given.get("num_envs", 1)
+        self._own_engine = Engine(
             self.model,
             num_envs,
             self.task,
             randomisation,
-            given["allow_unstable"],
-            threads,
+            allow_unstable=given["allow_unstable"],
+            threads=given.get("threads", 1),
         )
-        self._own_engine, self._asked = engine, dict[str, Any]()
-        drawn = range(num_envs) if self.render_mode else ()
-        self._artists = [Artist(self.render_mode, row) for row in drawn]
+        self._asked: dict[str, Any] = {}
+        self._artists: list[Artist] = []
+        if self.render_mode is not None:
+            self._artists = _artists(self.render_mode, num_envs)
         observed = self.task.observed(self.model)
         self.observation_names = tuple(quantity.name for quantity in observed)
         self.observation_scales = np.array([quantity.scale for quantity in observed])
         self._discrete = self.task.action == "rudder-discrete"
         self._begun = False  # and not closed since
         self._keys: NDArray[np.uint64] | None = None  # of each row's episodes
-        self._use(engine)
+        self._use(self._own_engine)
         return spaces(self.task, self.model)
 
     def _made(self) -> None:
-        """Called last when an environment is made: what is not there yet are attributes of the user's."""
+        """End making an environment: attributes that are added later are the user's."""
         self._by_arguments = frozenset([*vars(self), "_by_arguments"])
 
     def _use(self, engine: Engine) -> None:
@@ -198,25 +209,25 @@ class ShipsEnv:
         return self._engine.dt
 
     def __reduce__(self) -> Any:
-        attributes = {
-            name: value
-            for name, value in vars(self).items()
-            if name not in self._by_arguments
-        }
+        attributes = {}
+        for name, value in vars(self).items():
+            if name not in self._by_arguments:
+                attributes[name] = value
         state = self.get_state() if self._begun else None
         return rebuild, (type(self), self._arguments, state, attributes)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Any:
-        make, (kind, arguments, state, attributes) = self.__reduce__()
-        return make(kind, arguments, state, copy.deepcopy(attributes, memo))
+        _, (kind, arguments, state, attributes) = self.__reduce__()
+        return rebuild(kind, arguments, state, copy.deepcopy(attributes, memo))
 
     def _counters(self) -> dict[str, Any]:
-        """What a state has beside the engine's, whole numbers."""
+        """Integers that a state holds in addition to the engine's."""
         return {"row_keys": np.array(self._keys)}
 
     def get_state(self) -> dict[str, Any]:
-        """All that `set_state` needs to go on from here: episodes, their random numbers, what was shown last.
+        """All that `set_state` needs to go on from here.
 
+        These are the episodes, their random numbers, and the outputs of the last step.
         Raises InputError before the first `reset`.
         """
         if not self._begun:
@@ -228,22 +239,24 @@ class ShipsEnv:
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go on from what `get_state` of an environment made by the same arguments gave.
+        """Go on from what `get_state` gave, of an environment by the same arguments.
 
         Raises InputError for a state of another task, version, ship or number of ships,
         or one with a number that is not finite; nothing is changed then.
         """
-        names = ("asked", "engine", *self._counters())
-        check_table(state, "state", names, names)
-        for name in self._counters():
-            if np.asarray(state[name]).dtype.kind not in "biu":  # whole numbers
-                raise InputError(
-                    f"state: {name} {shown(state[name])} found, expected what"
-                    " `get_state` gave"
-                )
-        engine = self._engine_for(check_table(state["asked"], "state: asked"))
+        counters = self._counters()
+        names = ("asked", "engine", *counters)
+        check_table(state, "state", names, required=names)
+        for name in counters:
+            if np.asarray(state[name]).dtype.kind not in "biu":
+                expected = "integers, as `get_state` gave them"
+                raise unexpected(f"state: {name}", expected, state[name])
+
+        asked = check_table(state["asked"], "state: asked")
+        engine = self._engine_for(asked)
         engine.set_state(state["engine"])
-        self._asked, self._begun = state["asked"], True
+        self._asked = dict(asked)
+        self._begun = True
         self._use(engine)
         self._recall(state)
         for artist in self._artists:
@@ -254,46 +267,49 @@ class ShipsEnv:
         self._keys = counters["row_keys"].copy()
 
     def _engine_for(self, asked: Mapping[str, Any]) -> Engine:
-        """The environment's own engine, or one with other waypoints or a certain ship."""
+        """Return its own engine, or one with other waypoints or a certain ship."""
+        own = self._own_engine
         if not asked:
-            return self._own_engine
-        task = (
-            self.task.changed(waypoints=asked["waypoints"])
-            if "waypoints" in asked
-            else self.task
+            return own
+        task = self.task
+        if "waypoints" in asked:
+            task = task.changed(waypoints=asked["waypoints"])
+        return own.rebuild(
+            task=task,
+            model_index=asked.get("model_index"),
         )
-        return self._own_engine.rebuild(task=task, model_index=asked.get("model_index"))
 
     def _take(self, options: Mapping[str, Any] | None, *more: str) -> Any:
-        """Do what the options of a reset ask for, until the next; returns a state that is asked for.
+        """Do what the options of a reset ask for, until the next; return a given state.
 
         Raises InputError for other options, or a value that does not fit.
         """
-        given = {
-            name: value for name, value in (options or {}).items() if value is not None
-        }
-        check_keys(
-            given,
-            (*["waypoints"] * self.task.follows_path, "model_index", "state", *more),
-            "options",
-        )
-        if "state" in given and len(given) > 1:
-            raise InputError(
-                f"options: 'state' found together with {sorted({*given} - {'state'})},"
-                " expected it alone"
-            )
-        asked = {
-            name: value
-            for name, value in given.items()
-            if name in ("waypoints", "model_index")
-        }
-        if (asked or self._asked) and "state" not in given:
+        asked = {}
+        for name, value in (options or {}).items():
+            if value is not None:
+                asked[name] = value
+        known = ["model_index", "state", *more]
+        if self.task.follows_path:
+            known.insert(0, "waypoints")
+        check_keys(asked, known, "options")
+
+        state = asked.pop("state", None)
+        if state is not None:
+            if asked:
+                raise InputError(
+                    "options: expected 'state' alone, got it together with"
+                    f" {sorted(asked)}"
+                )
+            return state
+        for name in more:
+            asked.pop(name, None)
+        if asked or self._asked:
             self._use(self._engine_for(asked))
             self._asked = asked
-        return given.get("state")
+        return None
 
     def _refuse_step(self) -> NoReturn:
-        """Raise the InputError of an environment that was not reset yet, or is closed."""
+        """Raise the InputError of an environment that was not reset, or is closed."""
         raise InputError(
             "step: no episode has begun, or the environment was closed; call reset"
             " first"
@@ -301,23 +317,35 @@ class ShipsEnv:
 
     def _drawn_keys(self) -> NDArray[np.uint64]:
         """Keys of episodes from the environment's own random numbers."""
-        return np.array(
-            [episode_key(self.np_random) for _ in range(self._engine.num_envs)],
-            dtype=np.uint64,
-        )
+        rows = range(self._engine.num_envs)
+        keys = [episode_key(self.np_random) for _ in rows]
+        return np.array(keys, dtype=np.uint64)
 
-    def _draw(self, mask: NDArray[np.bool_] | None = None) -> None:
-        """Let the wakes grow, or begin where an episode did; only in the rows of a mask, if there is one."""
+    def _draw(self, mask: Flags | None = None) -> None:
+        """Let the wakes grow, or begin where an episode did; in the rows of a mask."""
+        engine = self._engine
         for row, artist in enumerate(self._artists):
-            if mask is None or mask[row]:
-                begun = self._engine.steps[row] == 0
-                artist.begin(self._engine) if begun else artist.note(self._engine)
+            if mask is not None and not mask[row]:
+                continue
+            if engine.steps[row] == 0:
+                artist.begin(engine)
+            else:
+                artist.note(engine)
+
+
+def _artists(mode: str, num_envs: int) -> list[Artist]:
+    from shipgym.envs.artist import Artist  # needed for pictures alone
+
+    return [Artist(mode, row) for row in range(num_envs)]
 
 
 def rebuild(
-    kind: Any, arguments: dict[str, Any], state: Any, attributes: dict[str, Any]
+    kind: Any,
+    arguments: dict[str, Any],
+    state: Any,
+    attributes: dict[str, Any],
 ) -> Any:
-    """An environment made again."""
+    """Make an environment again."""
     env = kind(**arguments)
     vars(env).update(attributes)
     if state is not None:

@@ -1,4 +1,4 @@
-"""One episode of an environment: what ship and agent did, to be kept, replayed and identified again."""
+"""Episode of an environment: what ship and agent did, to be kept and replayed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -33,7 +33,7 @@ REQUIRED_STATES = ("x", "y", "psi", "delta")
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """What happened in one episode, immutable, SI units and the project's signs.
+    """Record of one episode, immutable, SI units and the project's signs.
 
     States and info are those at the beginning and after each of the n steps; commands,
     actions and rewards belong to the steps.
@@ -105,20 +105,24 @@ class Episode:
     def __post_init__(self) -> None:
         check_text(self.environment, "environment")
         check_text(self.model, "model")
-        most = {"rudder_limit": np.pi / 2.0, "beam": self.length}
-        for name in ("dt", "length", "rudder_limit", "beam", "corridor", "turn_radius"):
-            value = getattr(self, name)
-            if value is not None or name not in ("beam", "corridor", "turn_radius"):
-                self._set(
-                    name, check_number(value, name, above=0.0, at_most=most.get(name))
-                )
         check_table(self.arguments, "arguments")
+        check_whole(self.number, "number", at_least=0)
         if self.seed is not None:
             check_whole(self.seed, "seed", at_least=0)
-        check_whole(self.number, "number", at_least=0)
-        for name in ("terminated", "truncated", "success"):
-            if getattr(self, name) is not None or name != "success":
-                check_flag(getattr(self, name), name)
+        check_flag(self.terminated, "terminated")
+        check_flag(self.truncated, "truncated")
+        if self.success is not None:
+            check_flag(self.success, "success")
+
+        self._set_positive("dt")
+        self._set_positive("length")
+        self._set_positive("rudder_limit", at_most=np.pi / 2.0)
+        if self.beam is not None:
+            self._set_positive("beam", at_most=self.length)
+        if self.corridor is not None:
+            self._set_positive("corridor")
+        if self.turn_radius is not None:
+            self._set_positive("turn_radius")
         self._set_series()
         if self.waypoints is not None:
             path = PlannedPath(self.waypoints)
@@ -126,42 +130,47 @@ class Episode:
             if self.turn_radius is not None:
                 path.check_turns(self.turn_radius)
 
+    def _set_positive(self, name: str, at_most: float | None = None) -> None:
+        value = getattr(self, name)
+        self._set(name, check_number(value, name, above=0.0, at_most=at_most))
+
     def _set_series(self) -> None:
         rewards = series(self.rewards, "rewards", None)
-        if not len(rewards):
-            raise InputError("rewards: no step found, expected at least one step")
+        n_steps = len(rewards)
+        if n_steps == 0:
+            raise InputError("rewards: expected at least one step, got none")
         actions = check_finite(self.actions, "actions")
-        if actions.ndim != 2 or len(actions) != len(rewards):
+        if actions.ndim != 2 or len(actions) != n_steps:
             raise InputError(
-                f"actions: shape {actions.shape} found, expected ({len(rewards)},"
-                " n_actions), a row for each reward"
+                f"actions: expected shape ({n_steps}, n_actions), a row for each"
+                f" reward, got {actions.shape}"
             )
         self._set("rewards", rewards)
         self._set("actions", actions)
-        for group, more in {
-            "states": 1,
-            "info": 1,
-            "commands": 0,
-            "reward_parts": 0,
-        }.items():
-            table = check_table(getattr(self, group), group)
-            arrays = {
-                name: series(values, f"{group}.{name}", len(rewards) + more)
-                for name, values in table.items()
-            }
-            self._set(group, arrays)
+        self._set_table("states", n_steps + 1)
+        self._set_table("info", n_steps + 1)
+        self._set_table("commands", n_steps)
+        self._set_table("reward_parts", n_steps)
         missing = [name for name in REQUIRED_STATES if name not in self.states]
         if missing:
             raise InputError(
-                f"states: {quoted(missing)} missing, found {quoted(self.states)}"
+                f"states: expected {quoted(REQUIRED_STATES)} at least, got"
+                f" {quoted(self.states)}"
             )
+
+    def _set_table(self, group: str, count: int) -> None:
+        """Check series by name, each of shape (count,)."""
+        arrays = {}
+        for name, values in check_table(getattr(self, group), group).items():
+            arrays[name] = series(values, f"{group}.{name}", count)
+        self._set(group, arrays)
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
 
     @property
     def path(self) -> Floats | None:
-        """Points of the path to follow with its turns, north and east, m, shape (n, 2)."""
+        """Points of the path with its turns, north and east, m, shape (n, 2)."""
         return track(self.waypoints, self.turn_radius)
 
     @property
@@ -175,28 +184,30 @@ class Episode:
         return np.asarray(self.dt * np.arange(self.n_steps + 1), dtype=np.float64)
 
     def to_trial(self, name: str | None = None, use: str = "fit") -> Trial:
-        """What the ship did, as a trial to identify from; by default named by environment, seed and number.
+        """Return the episode as a trial to identify from.
 
-        It has the states that are channels of trials, the orders `delta_command` and
-        `n_command` constant from each sample on (the last one to the last sample too),
-        and `n` of a shaft that turns as ordered. `use` is "fit", "validate" or "skip".
-        Raises InputError for an episode of a single step, which is too short for a
-        trial.
+        By default it is named by environment, seed and number. It has the states that
+        are channels of trials, the orders `delta_command` and `n_command` constant from
+        each sample on (the last one to the last sample too), and `n` of a shaft that
+        turns as ordered. `use` is "fit", "validate" or "skip". Raises InputError for an
+        episode of a single step, which is too short for a trial.
         """
-        channels = {
-            key: values for key, values in self.states.items() if key in CHANNELS
-        }
+        channels = {}
+        for key, values in self.states.items():
+            if key in CHANNELS:
+                channels[key] = values
         channels["psi"] = np.unwrap(channels["psi"])
         for key, values in self.commands.items():
             orders = np.append(values, values[-1])
             channels[f"{key}_command"] = orders
             if key == "n":
                 channels.setdefault("n", orders)
-        own = f"{self.environment} seed {self.seed} episode {self.number}"
+
+        own_name = f"{self.environment} seed {self.seed} episode {self.number}"
         return Trial(
             self.t,
             channels,
-            name=own if name is None else name,
+            name=own_name if name is None else name,
             use=use,
             length=self.length,
         )
@@ -211,21 +222,19 @@ class Episode:
 
         Raises InputError, naming the file and the field at fault.
         """
-        content = read_json(
-            Path(path),
-            "recorded episode",
-            "record the episode again or take another copy",
-        )
+        remedy = "record the episode again or take another copy"
+        content = read_json(Path(path), "recorded episode", remedy)
         with placed(str(path)):
             return cls(**from_file(content))
 
 
 def series(values: ArrayLike, where: str, count: int | None) -> Floats:
-    """Finite numbers over time, of shape (count,), as a read-only array; InputError for others."""
+    """Finite numbers over time as a read-only array of shape (count,).
+
+    InputError for others.
+    """
     array = check_finite(values, where)
     if array.ndim != 1 or (count is not None and len(array) != count):
-        raise InputError(
-            f"{where}: shape {array.shape} found, expected"
-            f" ({'n_steps' if count is None else count},)"
-        )
+        length = "n_steps" if count is None else count
+        raise InputError(f"{where}: expected shape ({length},), got {array.shape}")
     return array

@@ -1,4 +1,4 @@
-"""The state of many ships by lane: laid out, read, written, copied between two steps."""
+"""State of many ships by lane: laid out, read, written, copied between two steps."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_table, shown
-from shipgym.engine.envelope import Envelope, Four, Triangle
+from shipgym.engine.envelope import Four, Triangle
 from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.engine.lane_records import Rules
 from shipgym.engine.memory import Arguments, allocated, table_in, zeros
@@ -20,11 +20,7 @@ from shipgym.errors import InputError
 from shipgym.sea.weather_column import weather_column
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
-from shipgym.trials.sensors import SEA_TRIAL
 
-#: Settings of a bridge's instruments, and the channel of a sea trial whose noise they
-#: take.
-SENSOR_NOISE = {"heading": "psi", "yaw_rate": "r", "speed": "u", "position": "x"}
 ANSWER = ("reward", "terminated", "truncated")  # outcomes before those of `info`
 
 
@@ -59,68 +55,73 @@ class Lanes:
         drawn: bool,
         threads: int,
     ) -> None:
-        self.model, self.task, self.num_envs = model, task, num_envs
+        self.program = program
+        self.model = model
+        self.task = task
+        self.num_envs = num_envs
         self.windy = program.windy
         self.dt = task.interval(model)
-        self.program = program
         self.flag_names = [name for name in task.info_names if name in task.flags]
-        observed = [quantity.path for quantity in task.observed(model)]
         self._output_pool = OutputPool(
             num_envs,
-            len(observed),
-            ANSWER_OUTCOMES + len(task.info_names),
-            ANSWER_FLAGS + len(self.flag_names),
+            n_observed=len(task.observed(model)),
+            n_outcomes=ANSWER_OUTCOMES + len(task.info_names),
+            n_flags=ANSWER_FLAGS + len(self.flag_names),
         )
 
-        tiles = -(-num_envs // LANES)
+        n_tiles = -(-num_envs // LANES)
+        shares = lane_shares(n_tiles, threads)
+        self.n_shares = len(shares)
         columns = ship_columns(own, self.windy, task, model, drawn)
-        pool = columns if drawn else np.zeros((0, columns.shape[1]))
-        ships = ship_tiles(columns, tiles, len(own) > 1)
-        settings = self._settings()
-        shares = lane_shares(tiles, threads)
-        rows = self._output_rows(observed)
-        plan = int(task.definition.plan_length(task.settings))
-        n_state = (program.state_rows.n_rows + plan) * LANES
-
-        shapes: dict[str, tuple[Any, int, int]] = {
-            "states": (np.float64, tiles, n_state),
-            "random": (np.uint64, tiles, program.random_rows.n_rows * LANES),
-            "ships": (np.float64, *ships.shape),
-            "pool": (np.float64, 1, pool.size),
-            "settings": (np.float64, 1, len(settings)),
-            "results": (np.float64, len(shares), program.result_rows.n_rows * LANES),
-            "shares": (np.int64, *shares.shape),
-            "actions": (np.float32, task.n_commands, num_envs),
-            "chosen": (np.bool_, 1, num_envs),
-            **{name: (np.int64, 1, len(given)) for name, given in rows.items()},
-        }
-        tables = self._allocate(shapes)
+        n_ship_rows = columns.shape[1]
+        pool = columns if drawn else np.zeros((0, n_ship_rows))
+        tables = self._allocate(
+            ships=ship_tiles(columns, n_tiles, len(own) > 1),
+            pool=pool.reshape(1, -1),
+            settings=np.array([self._settings()]),
+            shares=shares,
+            **self._empty_tables(n_tiles),
+            **self._output_rows(),
+        )
         self._states = tables["states"]
-        self._random = tables["random"].reshape(tiles, -1, LANES)
+        self._random = lanes_of(tables["random"])
         self._ships = tables["ships"]
         self._actions = tables["actions"]
         self._chosen = tables["chosen"][0]
-        self.n_shares = len(shares)
-        tables["ships"][:] = ships
-        tables["pool"][:] = pool.ravel()
-        tables["settings"][:] = settings
-        tables["shares"][:] = shares
-        for name, given in rows.items():
-            tables[name][:] = given
 
-    def _allocate(
-        self, shapes: Mapping[str, tuple[Any, int, int]]
-    ) -> dict[str, NDArray[Any]]:
-        """Make the memory for tables of such types, rows and columns; return them."""
+    def _empty_tables(self, n_tiles: int) -> dict[str, NDArray[Any]]:
+        """Zeros of states, random numbers, results, actions and chosen lanes."""
+        program = self.program
+        n_plan = int(self.task.definition.plan_length(self.task.settings))
+        n_state = program.state_rows.n_rows + n_plan
+        n_random = program.random_rows.n_rows
+        n_results = program.result_rows.n_rows
+        return {
+            "states": np.zeros((n_tiles, n_state * LANES)),
+            "random": np.zeros((n_tiles, n_random * LANES), dtype=np.uint64),
+            "results": np.zeros((self.n_shares, n_results * LANES)),
+            "actions": np.zeros(
+                (self.task.n_commands, self.num_envs),
+                dtype=np.float32,
+            ),
+            "chosen": np.zeros((1, self.num_envs), dtype=np.bool_),
+        }
+
+    def _allocate(self, **contents: NDArray[Any]) -> dict[str, NDArray[Any]]:
+        """Copy tables into one block of memory, for loops; return views of it."""
         n_arguments = len(leaves(Arguments))
-        blocks, end = allocated(shapes, first=n_arguments)
+        blocks, end = allocated(contents, first=n_arguments)
         arguments = Arguments(**blocks, **self._output_pool.blocks)
         self._memory = zeros(end)
-        self._memory[:n_arguments].view(np.int64)[:] = flat(arguments)
-        return {
-            name: table_in(self._memory, blocks[name], dtype)
-            for name, (dtype, *_) in shapes.items()
-        }
+        head = self._memory[:n_arguments].view(np.int64)
+        head[:] = flat(arguments)
+
+        tables = {}
+        for name, content in contents.items():
+            table = table_in(self._memory, blocks[name], content.dtype)
+            table[:] = content
+            tables[name] = table
+        return tables
 
     def _settings(self) -> list[float]:
         """Settings of engine, sensor set and task, one after another."""
@@ -133,25 +134,23 @@ class Lanes:
             least_shaft=task.least_shaft(self.model),
         )
         sensors = self.program.sensors
-        noise = {}
-        if sensors.noise:
-            for name, channel in SENSOR_NOISE.items():
-                noise[name] = SEA_TRIAL[channel].noise * task.noise
+        noise = bridge_noise(task.noise) if sensors.noise else {}
         sensor_settings = task.sensor_settings or sensors.make_settings(noise)
         return [*flat(rules), *flat(sensor_settings), *flat(task.settings)]
 
-    def _output_rows(self, observed: Sequence[str]) -> dict[str, list[int]]:
-        """Entries of a tile's results at which rows of outputs begin."""
-        program = self.program
-        rows = program.result_rows
-        observations = [rows["observation"].row(path) for path in observed]
+    def _output_rows(self) -> dict[str, NDArray[np.int64]]:
+        """Entries of a tile's results at which rows of outputs begin, shape (1, n)."""
+        rows = self.program.result_rows
+        observed = []
+        for quantity in self.task.observed(self.model):
+            observed.append(rows["observation"].row(quantity.path))
         answer = [rows["outcome"].row(name) for name in ANSWER]
-        info = [program.info_row(name) for name in self.task.info_names]
-        flags = [program.info_row(name) for name in self.flag_names]
+        info = [self.program.info_row(name) for name in self.task.info_names]
+        flags = [self.program.info_row(name) for name in self.flag_names]
         return {
-            "observed": [LANES * row for row in observations],
-            "informed": [LANES * row for row in answer + info],
-            "flagged": [LANES * row for row in answer[1:] + flags],
+            "observed": _first_entries(observed),
+            "informed": _first_entries(answer + info),
+            "flagged": _first_entries(answer[1:] + flags),
         }
 
     @property
@@ -161,7 +160,7 @@ class Lanes:
 
     @property
     def steps(self) -> Floats:
-        """Control intervals of each lane's episode so far, shape (num_envs,), a copy."""
+        """Control intervals of each lane's episode, shape (num_envs,), a copy."""
         return self.read("steps")
 
     def read(self, name: str) -> Floats:
@@ -170,15 +169,20 @@ class Lanes:
         Its name is that of a field of `Motion`, `Commands`, `EpisodeCounters`, the
         state of the task or `Sea`: `u`, `rudder_command`, `steps`.
         """
-        row = self.program.row(name) * LANES
-        return self._states[:, row : row + LANES].reshape(-1)[: self.num_envs].copy()
+        lanes = self._row(name).reshape(-1)
+        return lanes[: self.num_envs].copy()
 
     def write(self, name: str, values: ArrayLike) -> None:
         """Write one number of the state in all lanes, see `read`."""
-        row = self.program.row(name) * LANES
-        lanes = self._states[:, row : row + LANES].copy().reshape(-1)
+        row = self._row(name)
+        lanes = row.copy().reshape(-1)
         lanes[: self.num_envs] = values
-        self._states[:, row : row + LANES] = lanes.reshape(-1, LANES)
+        row[:] = lanes.reshape(-1, LANES)
+
+    def _row(self, name: str) -> Floats:
+        """One number of the state in all tiles, shape (n_tiles, 64), a view."""
+        first = LANES * self.program.row(name)
+        return self._states[:, first : first + LANES]
 
     def physical_state(self) -> dict[str, Floats]:
         """State, set-point, commands and, unless it is calm, weather, in SI units.
@@ -191,42 +195,56 @@ class Lanes:
         state = {name: self.read(name) for name in self.model.state_names}
         if "heading_setpoint" in self.program.state_rows["task_state"].present:
             state["set_point"] = self.read("heading_setpoint")
-        limit = self._ship_number("rudder_limit")
-        state["delta_command"] = self.read("rudder_command") * limit
+
+        rudder_command = self.read("rudder_command")
+        state["delta_command"] = rudder_command * self._ship_number("rudder_limit")
         if "n" in self.model.command_names:
-            shaft = self._ship_number("shaft")
-            state["n_command"] = self.read("shaft_command") * shaft
-        return {**state, **self._weather_now()} if self.windy else state
+            shaft_command = self.read("shaft_command")
+            state["n_command"] = shaft_command * self._ship_number("shaft")
+        if self.windy:
+            state |= self._weather_now()
+        return state
 
     def _weather_now(self) -> dict[str, Floats]:
         """Weather of each lane, by the names of the channels of trials."""
-        roll = ["phi_wave", "p_wave"] if "phi" in self.model.state_names else []
-        names = ["psi_wave", "r_wave", *roll, "current_north", "current_east"]
-        now = {name: self.read(name) for name in names}
-        now["wind_speed"] = self._ship_number("wind_speed") + self.read("gust")
-        now["wind_from"] = np.arctan2(self.read("wind_east"), self.read("wind_north"))
-        return now
+        names = ["psi_wave", "r_wave"]
+        if "phi" in self.model.state_names:
+            names += ["phi_wave", "p_wave"]
+        names += ["current_north", "current_east"]
+        weather = {name: self.read(name) for name in names}
+
+        mean_speed = self._ship_number("wind_speed")
+        wind_north = self.read("wind_north")
+        wind_east = self.read("wind_east")
+        weather["wind_speed"] = mean_speed + self.read("gust")
+        weather["wind_from"] = np.arctan2(wind_east, wind_north)
+        return weather
 
     def _ship_number(self, name: str) -> Floats:
-        """One number of the ships, or of their sea, for each lane, shape (num_envs,)."""
+        """Number of the ships, or of their sea, for each lane, shape (num_envs,)."""
         layout = self.program.ship_rows
-        record = "ship" if name in layout["ship"].present else "sea_parameters"
+        is_ships = name in layout["ship"].present
+        record = "ship" if is_ships else "sea_parameters"
         row = layout[record].row(name)
         if self.program.shared:
             return np.full(self.num_envs, self._ships[0, row])
-        lanes = self._ships[:, row * LANES : (row + 1) * LANES]
-        return lanes.reshape(-1)[: self.num_envs].copy()
+
+        lanes = lanes_of(self._ships)[:, row].reshape(-1)
+        return lanes[: self.num_envs].copy()
 
     def waypoints(self, lane: int = 0) -> Floats | None:
         """North and east of the path of a lane's episode, m, shape (n, 2).
 
         None where there is none.
         """
-        plan = lanes_of(self._states)[:, self.program.state_rows.n_rows :]
-        if plan.shape[1] == 0 or "waypoints" not in self.task.definition.settings:
+        if not self.task.follows_path:
             return None
-        tile, lane = divmod(lane, LANES)
-        return plan[tile, :, lane].reshape(-1, 2).copy()
+        plans = lanes_of(self._states)[:, self.program.state_rows.n_rows :]
+        tile, lane_in_tile = divmod(lane, LANES)
+        plan = plans[tile, :, lane_in_tile]
+        if len(plan) == 0:
+            return None
+        return plan.reshape(-1, 2).copy()
 
     def path_metres(self, name: str) -> float | None:
         """Return a setting of the path that is in ship lengths, in m.
@@ -263,34 +281,31 @@ class Lanes:
         InputError says what differs.
         """
         own = self.get_state()
-        made_for = own.pop("made_for")
-        check_table(state, "state", ("made_for", *own), required=("made_for", *own))
-        given = check_table(state["made_for"], "state: made_for")
-        for name, expected in made_for.items():
-            if given.get(name) != expected:
-                raise InputError(
-                    f"state: {name}: expected {shown(expected)}, got"
-                    f" {shown(given.get(name))}: a state fits an environment made by"
-                    " the same arguments in the same version"
-                )
+        check_table(state, "state", own, required=own)
+        expected_rows = own["made_for"]["rows"]
+        _check_made_for(state["made_for"], own.pop("made_for"))
         for name, expected in own.items():
             if np.shape(state[name]) != np.shape(expected):
                 raise InputError(
                     f"state: {name}: expected shape {np.shape(expected)}, got"
                     f" {np.shape(state[name])}"
                 )
+
         same_ship = np.array_equal(state["ships"], self._ships, equal_nan=True)
         if self.program.shared and not same_ship:
             raise InputError(
                 f"state: expected that of this {self.model.name!r}, got another ship's"
             )
-        self._check_finite(state, made_for["rows"])
+        self._check_finite(state, expected_rows)
 
     def _check_finite(self, state: Mapping[str, Any], rows: Sequence[str]) -> None:
         """Refuse numbers that are not finite in the lanes that hold ships."""
         by_lane = np.moveaxis(lanes_of(state["states"]), 1, 2)
-        lanes = by_lane.reshape(-1, by_lane.shape[-1])[: self.num_envs]
-        for lane, row in np.argwhere(~np.isfinite(lanes))[:1]:
+        n_rows = by_lane.shape[-1]
+        lanes = by_lane.reshape(-1, n_rows)[: self.num_envs]
+        wrong = np.argwhere(~np.isfinite(lanes))
+        if len(wrong):
+            lane, row = wrong[0]
             name = rows[row] if row < len(rows) else "plan"
             raise InputError(
                 f"state: {name}: expected finite numbers, got none in row {lane}"
@@ -299,7 +314,7 @@ class Lanes:
             raise InputError("state: observations: expected finite numbers")
 
     def memory(self) -> dict[str, NDArray[Any]]:
-        """All that the steps to come depend on beside their commands, copies by name."""
+        """All that later steps depend on except their commands, copies by name."""
         return {
             "states": self._states.copy(),
             "keys": self._random.copy(),
@@ -307,10 +322,29 @@ class Lanes:
         }
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from what `memory` gave, of this engine or one of the same arguments."""
+        """Go on from the `memory` of this engine, or one of the same arguments."""
         self._states[:] = memory["states"]
         self._random[:] = memory["keys"]
         self._ships[:] = memory["ships"]
+
+
+def _check_made_for(given: Any, made_for: Mapping[str, Any]) -> None:
+    """Refuse a state that was made for another task, ship or number of ships."""
+    table = check_table(given, "state: made_for")
+    for name, expected in made_for.items():
+        found = table.get(name)
+        if found != expected:
+            raise InputError(
+                f"state: {name}: expected {shown(expected)}, got {shown(found)}: a"
+                " state fits an environment made by the same arguments in the same"
+                " version"
+            )
+
+
+def _first_entries(rows: Sequence[int]) -> NDArray[np.int64]:
+    """First entries of rows in a tile, shape (1, n_rows)."""
+    numbers = np.array([rows], dtype=np.int64)
+    return LANES * numbers
 
 
 def lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:
@@ -318,14 +352,31 @@ def lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:
     return tiles.reshape(len(tiles), -1, LANES)
 
 
+def bridge_noise(multiple: float) -> dict[str, float]:
+    """Settings of a bridge's noise, in multiples of that of a sea trial's sensors."""
+    # imports all that reads trials, which is needed for noise alone
+    from shipgym.trials.sensors import SEA_TRIAL
+
+    channels = {"heading": "psi", "yaw_rate": "r", "speed": "u", "position": "x"}
+    noise = {}
+    for name, channel in channels.items():
+        noise[name] = multiple * SEA_TRIAL[channel].noise
+    return noise
+
+
 def lane_shares(tiles: int, threads: int) -> NDArray[np.int64]:
     """First tile of each thread, and that behind its last, shape (n_shares, 2)."""
-    ends = np.linspace(0, tiles, min(threads, tiles) + 1).astype(np.int64)
+    n_shares = min(threads, tiles)
+    ends = np.linspace(0, tiles, n_shares + 1).astype(np.int64)
     return np.stack([ends[:-1], ends[1:]], axis=1)
 
 
 def ship_columns(
-    pool: Pool, windy: bool, task: Task, base: ShipModel, drawn: bool
+    pool: Pool,
+    windy: bool,
+    task: Task,
+    base: ShipModel,
+    drawn: bool,
 ) -> Floats:
     """Numbers of ships and of the seas they meet, a row each.
 
@@ -338,40 +389,55 @@ def ship_columns(
     for model, sea in pool:
         numbers = model.ship_numbers(task.water_depth, step)
         if drawn and model.particulars["length"] == base.particulars["length"]:
-            numbers[Ship._fields.index("scale_speed")] = base.particulars["speed"]
+            scale_speed = Ship._fields.index("scale_speed")
+            numbers[scale_speed] = base.particulars["speed"]
+
         kind = (id(model.particulars), id(sea))
         if windy and kind not in known:
             known[kind] = weather_column(model, sea, step, task.water_depth)
+        sea_parameters = known.get(kind, np.zeros(0))
 
         ship = Ship(*numbers[: len(Ship._fields)].tolist())
-        scales = [task.scale(path, ship) for path in task.definition.observations]
-        factors = [1.0 / scale if scale else 0.0 for scale in scales]
-        parameters = known.get(kind, np.zeros(0))
-        columns.append([*numbers, *envelope_numbers(model), *parameters, *factors])
+        factors = _scale_factors(task, ship)
+        envelope = envelope_numbers(model)
+        columns.append([*numbers, *envelope, *sea_parameters, *factors])
     return np.stack(columns)
+
+
+def _scale_factors(task: Task, ship: Ship) -> list[float]:
+    """Observations of quantities of 1; 0 for those that are not made of such a ship."""
+    factors = []
+    for path in task.definition.observations:
+        scale = task.scale(path, ship)
+        if scale == 0.0:
+            factors.append(0.0)
+        else:
+            factors.append(1.0 / scale)
+    return factors
 
 
 def envelope_numbers(model: ShipModel) -> Floats:
     """Numbers of `Envelope` of a model's data; without data everything is inside."""
-    if model.envelope is None:
-        everything = Envelope(
-            low=Four(-np.inf, -np.inf, -np.inf, -np.inf),
-            high=Four(np.inf, np.inf, np.inf, np.inf),
-            centre=Four(0.0, 0.0, 0.0, 0.0),
-            shape=Triangle(*[0.0] * len(Triangle._fields)),
-        )
-        return np.array(flat(everything))
     data = model.envelope
-    triangle = data.shape[np.triu_indices(4)]
-    return np.concatenate([data.low, data.high, data.centre, triangle])
+    if data is not None:
+        triangle = data.shape[np.triu_indices(4)]
+        return np.concatenate([data.low, data.high, data.centre, triangle])
+
+    n_bounds = len(Four._fields)
+    infinite = np.full(n_bounds, np.inf)
+    centre = np.zeros(n_bounds)
+    triangle = np.zeros(len(Triangle._fields))
+    return np.concatenate([-infinite, infinite, centre, triangle])
 
 
 def ship_tiles(columns: Floats, tiles: int, own: bool) -> Floats:
     """Return one vector for all lanes, or a tile for each tile of states."""
     if len(columns) == 1 and not own:
         return columns.copy()
-    missing = max(tiles * LANES - len(columns), 0)
+    n_lanes = tiles * LANES
+    missing = max(n_lanes - len(columns), 0)
     filling = np.tile(columns[:1], (missing, 1))
-    lanes = np.concatenate([columns[: tiles * LANES], filling])
-    by_row = lanes.reshape(tiles, LANES, -1).transpose(0, 2, 1)
+    lanes = np.concatenate([columns[:n_lanes], filling])
+    by_tile = lanes.reshape(tiles, LANES, -1)
+    by_row = by_tile.transpose(0, 2, 1)
     return np.ascontiguousarray(by_row).reshape(tiles, -1)

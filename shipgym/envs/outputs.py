@@ -44,14 +44,18 @@ class OutputPool:
     """
 
     def __init__(
-        self, num_envs: int, n_observed: int, n_outcomes: int, n_flags: int
+        self,
+        num_envs: int,
+        n_observed: int,
+        n_outcomes: int,
+        n_flags: int,
     ) -> None:
-        shapes: dict[str, tuple[Any, int, int]] = {
-            "observations": (np.float32, num_envs, n_observed),
-            "outcomes": (np.float64, n_outcomes, num_envs),
-            "flags": (np.bool_, n_flags, num_envs),
+        tables: dict[str, NDArray[Any]] = {
+            "observations": np.zeros((num_envs, n_observed), dtype=np.float32),
+            "outcomes": np.zeros((n_outcomes, num_envs)),
+            "flags": np.zeros((n_flags, num_envs), dtype=np.bool_),
         }
-        self.blocks, self._size = allocated(shapes)
+        self.blocks, self._size = allocated(tables)
         self._shapes = [(at.rows, at.columns) for at in self.blocks.values()]
         self._firsts = [WORD * at.first for at in self.blocks.values()]
         self._free: list[bytearray] = []
@@ -62,16 +66,22 @@ class OutputPool:
         lease = _Lease(self._size, np.float64, memory)
         lease.memory = memory
         lease.free = self._free
+
         observations, outcomes, flags = self._shapes
         first_observation, first_outcome, first_flag = self._firsts
         ends = np.ndarray(flags, np.bool_, lease, first_flag)
         return Outputs(
-            np.ndarray(self._size, np.float64, lease),
-            np.ndarray(observations, np.float32, lease, first_observation),
-            np.ndarray(outcomes, np.float64, lease, first_outcome),
-            ends,
-            ends[0],
-            ends[1],
+            memory=np.ndarray(self._size, np.float64, lease),
+            observations=np.ndarray(
+                observations,
+                np.float32,
+                lease,
+                first_observation,
+            ),
+            outcomes=np.ndarray(outcomes, np.float64, lease, first_outcome),
+            flags=ends,
+            terminated=ends[0],
+            truncated=ends[1],
         )
 
 
@@ -86,11 +96,17 @@ class _Lease(np.ndarray[Any, Any]):
 
 
 def named_rows(
-    outcomes: Any, flags: Any, names: Sequence[str], flag_names: Sequence[str]
+    outcomes: Any,
+    flags: Any,
+    names: Sequence[str],
+    flag_names: Sequence[str],
 ) -> dict[str, Any]:
     """Rows of outcomes and flags by name, but for the answer of a step.
 
     The row of a flag takes the place of that of its number.
     """
-    rows = [*outcomes[ANSWER_OUTCOMES:], *flags[ANSWER_FLAGS:]]
-    return dict(zip([*names, *flag_names], rows, strict=True))
+    numbers = outcomes[ANSWER_OUTCOMES:]
+    rows = dict(zip(names, numbers, strict=True))
+    truths = flags[ANSWER_FLAGS:]
+    rows.update(zip(flag_names, truths, strict=True))
+    return rows

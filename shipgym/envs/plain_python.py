@@ -1,6 +1,6 @@
 """Episodes in plain Python, which look at what functions of task and sensors return."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from numbers import Integral, Real
 from typing import Any
@@ -19,7 +19,8 @@ from shipgym.tasks.contract import Readings
 
 
 def plain_loop(
-    program: EpisodeProgram, hooks: Mapping[str, Callable[..., Any]] | None = None
+    program: EpisodeProgram,
+    hooks: Mapping[str, Callable[..., Any]] | None = None,
 ) -> Any:
     """Return the loop of a program in plain Python, `hooks` in place of its own.
 
@@ -45,9 +46,11 @@ def plain_loop(
 
 def _checked(program: EpisodeProgram, name: str, form: Any) -> Callable[..., Any]:
     """Return a function of the task or the sensor set whose results are looked at."""
-    function = Specialisation(program.hooks).copy(program.hooks[name])
+    specialisation = Specialisation(program.hooks)
+    function = specialisation.copy(program.hooks[name])
     # of a task with another's reward, what differs from its own step
-    own = function.__globals__.get("reward_of_another", function)
+    namespace = function.__globals__
+    own = namespace.get("reward_of_another", function)
     return partial(_result_of, function, own, form)
 
 
@@ -68,23 +71,40 @@ def _fault(given: Any, form: Any, name: str) -> str:
     A form is a record, float, bool, or a tuple of forms.
     """
     if isinstance(form, tuple):
-        if isinstance(given, tuple) and len(given) == len(form):
-            for k, (item, kind) in enumerate(zip(given, form, strict=True), start=1):
-                if fault := _fault(item, kind, f"result {k}"):
-                    return fault
-            return ""
-    elif is_record(form):
-        if type(given) is form:
-            record: Record = form
-            fields = field_types(record).items()
-            for item, (field, kind) in zip(given, fields, strict=True):
-                kind = kind if is_record(kind) else float
-                if fault := _fault(item, kind, f"{form.__name__}.{field}"):
-                    return fault
-            return ""
-    elif isinstance(given, np.bool_ | (Integral if form is bool else Real)):
+        if not isinstance(given, tuple) or len(given) != len(form):
+            return _other(given, form, name)
+        return _fault_within(given, form, [f"result {k + 1}" for k in range(len(form))])
+    if is_record(form):
+        if type(given) is not form:
+            return _other(given, form, name)
+        record: Record = form
+        kinds = []
+        names = []
+        for field, kind in field_types(record).items():
+            kinds.append(kind if is_record(kind) else float)
+            names.append(f"{record.__name__}.{field}")
+        return _fault_within(given, kinds, names)
+    numbers = Integral if form is bool else Real
+    if isinstance(given, np.bool_ | numbers):
         return ""
+    return _other(given, form, name)
+
+
+def _other(given: Any, form: Any, name: str) -> str:
     return f"{name} is {_words(given)}, expected {_words(form)}"
+
+
+def _fault_within(
+    given: Sequence[Any],
+    forms: Sequence[Any],
+    names: Sequence[str],
+) -> str:
+    """Say where the first of several values differs from its form; empty if none."""
+    for value, form, name in zip(given, forms, names, strict=True):
+        fault = _fault(value, form, name)
+        if fault:
+            return fault
+    return ""
 
 
 def _words(given: Any) -> str:
@@ -92,8 +112,11 @@ def _words(given: Any) -> str:
     if given is None:
         return "nothing"
     if type(given) is tuple:
-        return f"({', '.join(map(_words, given))})"
+        words = [_words(item) for item in given]
+        return f"({', '.join(words)})"
     kind = given if isinstance(given, type) else type(given)
     if issubclass(kind, bool | np.bool_):
         return "true or false"
-    return "a number" if issubclass(kind, Real) else kind.__name__
+    if issubclass(kind, Real):
+        return "a number"
+    return kind.__name__

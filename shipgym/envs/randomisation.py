@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from shipgym.checks import check_choice, check_number
+from shipgym.checks import check_choice, check_number, unexpected
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipModel, load_model
@@ -39,74 +39,92 @@ class Randomisation:
     loading_range: Range | None = None
 
     def __post_init__(self) -> None:
+        kinds = ("covariance", "posterior")
         if self.model_uncertainty is not None:
-            check_choice(
-                self.model_uncertainty, ("covariance", "posterior"), "model_uncertainty"
-            )
+            check_choice(self.model_uncertainty, kinds, "model_uncertainty")
         if isinstance(self.ensemble, str | Path | ShipModel):
-            raise InputError(
-                f"ensemble: {self.ensemble!r} found, expected a list of models"
-            )
-        for name in ("speed_range", "loading_range"):
-            if (given := getattr(self, name)) is not None:
-                _check_range(given, name)
+            raise unexpected("ensemble", "a list of models", self.ensemble)
+        if self.speed_range is not None:
+            _check_range(self.speed_range, "speed_range")
+        if self.loading_range is not None:
+            _check_range(self.loading_range, "loading_range")
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
-        """Its keywords."""
+        """Keywords of the fields."""
         return tuple(item.name for item in fields(cls))
 
     @classmethod
     def take_from(cls, options: Mapping[str, Any]) -> tuple[Self, dict[str, Any]]:
-        """What is randomised among an environment's options, and the others."""
-        own = {key: value for key, value in options.items() if key in cls.names()}
-        return cls(**own), {
-            key: value for key, value in options.items() if key not in own
-        }
+        """Make it of an environment's options; return the other options too."""
+        others = dict(options)
+        own = {}
+        for name in cls.names():
+            if name in others:
+                own[name] = others.pop(name)
+        return cls(**own), others
 
     def ships(self, model: ShipModel, seas: Sequence[Weather]) -> Pool:
-        """The pool of ships and seas that episodes are drawn from; a single one where nothing differs.
+        """Pool of ships and seas that episodes are drawn from.
 
-        The same for the same arguments. Raises InputError if a model cannot be drawn
-        from, has another structure, or is not loaded by its coefficients.
+        It is the same for the same arguments, and a single pair where nothing differs.
+        Raises InputError if a model cannot be drawn from, has another structure, or is
+        not loaded by its coefficients.
         """
-        models = [
-            model,
-            *(
-                one if isinstance(one, ShipModel) else load_model(one)
-                for one in self.ensemble
-            ),
-        ]
-        for other in models[1:]:
+        models = [model]
+        if self.ensemble:
+            models += self._others(model)
+        if self.model_uncertainty or self.speed_range or self.loading_range:
+            return self._drawn(models, seas)
+        return list(product(models, seas))
+
+    def _others(self, model: ShipModel) -> list[ShipModel]:
+        """Load the ensemble; InputError for a model of another structure."""
+        models = []
+        for given in self.ensemble:
+            other = given if isinstance(given, ShipModel) else load_model(given)
             if other.compiled is not model.compiled:
                 raise InputError(
-                    f"ensemble: {other.name!r} has other equations than {model.name!r},"
-                    " expected models of one structure; make an environment for each"
+                    f"ensemble: expected models of one structure, got {other.name!r},"
+                    f" which has other equations than {model.name!r}; make an"
+                    " environment for each"
                 )
-        if not (self.model_uncertainty or self.speed_range or self.loading_range):
-            return list(product(models, seas))
+            models.append(other)
+        return models
+
+    def _drawn(self, models: Sequence[ShipModel], seas: Sequence[Weather]) -> Pool:
+        """Draw ships of each model in turn, and give each round a sea."""
         random = np.random.default_rng(POOL_SEED)
-        turns = -(-POOL_SIZE // len(models))
-        drawn = [
-            one.sample(turns, random) if self.model_uncertainty else [one] * turns
-            for one in models
-        ]
-        ships = [ship for turn in zip(*drawn, strict=True) for ship in turn]
-        in_turn = [
-            (ship, seas[i // len(models) % len(seas)])
-            for i, ship in enumerate(ships[:POOL_SIZE])
-        ]
+        n_rounds = -(-POOL_SIZE // len(models))
+        samples = []
+        for model in models:
+            drawn = [model] * n_rounds
+            if self.model_uncertainty:
+                drawn = model.sample(n_rounds, random)
+            samples.append(drawn)
+
         paces = self._paces(models)
-        return [(self._varied(ship, paces, random), sea) for ship, sea in in_turn]
+        pool: Pool = []
+        for round_number, in_turn in enumerate(zip(*samples, strict=True)):
+            sea = seas[round_number % len(seas)]
+            left = POOL_SIZE - len(pool)
+            for ship in in_turn[:left]:
+                pool.append((self._varied(ship, paces, random), sea))
+        return pool
 
     def _paces(self, models: Sequence[ShipModel]) -> dict[int, list[Particulars]]:
-        """Particulars at each approach speed, one object each, because the weather is worked out for each."""
-        parts = np.linspace(*(self.speed_range or (1.0, 1.0)), N_SPEEDS)
-        known = {id(one.particulars): one.particulars for one in models}
-        return {
-            key: [replace(own, speed=part * own["speed"]) for part in parts.tolist()]
-            for key, own in known.items()
-        }
+        """Particulars of each model at each approach speed.
+
+        Each is one object, because the weather is worked out once for an object.
+        """
+        least, largest = self.speed_range or (1.0, 1.0)
+        parts = np.linspace(least, largest, N_SPEEDS).tolist()
+        paces = {}
+        for model in models:
+            own = model.particulars
+            speeds = [part * own["speed"] for part in parts]
+            paces[id(own)] = [replace(own, speed=speed) for speed in speeds]
+        return paces
 
     def _varied(
         self,
@@ -114,37 +132,38 @@ class Randomisation:
         paces: dict[int, list[Particulars]],
         random: np.random.Generator,
     ) -> ShipModel:
-        """A ship at a speed and of a loading within the ranges."""
+        """Ship at a speed and of a loading within the ranges."""
         if self.loading_range:
             ship = _loaded(ship, random.uniform(*self.loading_range))
         if self.speed_range:
-            own, pace = (
-                ship.particulars,
-                paces[id(ship.particulars)][random.integers(N_SPEEDS)],
+            own = ship.particulars
+            pace = paces[id(own)][random.integers(N_SPEEDS)]
+            part = pace["speed"] / own["speed"]
+            ship = replace(
+                ship,
+                particulars=pace,
+                service_shaft_speed=part * ship.service_shaft_speed,
             )
-            shaft = (
-                pace["speed"] / own["speed"] * ship.service_shaft_speed
-            )  # in proportion
-            ship = replace(ship, particulars=pace, service_shaft_speed=shaft)
         return ship
 
 
 def _check_range(given: Any, name: str) -> None:
     if not isinstance(given, Sequence) or len(given) != 2:
-        raise InputError(
-            f"{name}: {given!r} found, expected the least and the largest, two numbers"
-        )
-    check_number(given[0], f"{name}: the least", above=0.0)
-    check_number(given[1], f"{name}: the largest", at_least=given[0])
+        raise unexpected(name, "the least and the largest, two numbers", given)
+    least, largest = given
+    check_number(least, f"{name}: the least", above=0.0)
+    check_number(largest, f"{name}: the largest", at_least=least)
 
 
 def _loaded(ship: ShipModel, displacement: float) -> ShipModel:
-    """A ship that forces accelerate less, the heavier it is."""
+    """Ship that forces accelerate less, the heavier it is."""
     if not isinstance(ship.dynamics, Structure):
         raise InputError(
-            f"loading_range: the equations of {ship.name!r} are not a table of"
-            " coefficients; name its loading conditions as models of their own in"
-            " `ensemble`"
+            "loading_range: expected a ship whose equations are a table of"
+            f" coefficients, got {ship.name!r}; name its loading conditions as models"
+            " of their own in `ensemble`"
         )
-    lighter = {name: value / displacement for name, value in ship.coefficients.items()}
+    lighter = {}
+    for name, value in ship.coefficients.items():
+        lighter[name] = value / displacement
     return replace(ship, coefficients=lighter, covariance=None)

@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_text
+from shipgym.checks import check_text, unexpected
 from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
 from shipgym.files import make_folder
@@ -82,13 +82,19 @@ class RecordEpisode(
         self._recorded: _Recorded | None = None
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode, after writing one that is cut off so."""
         self._write()
         observation, info = super().reset(seed=seed, options=options)
         self.episode_number += 1
-        self._since_seed = 0 if seed is not None else self._since_seed + 1
+        if seed is None:
+            self._since_seed += 1
+        else:
+            self._since_seed = 0
         if self._trigger is None or self._trigger(self.episode_number):
             self._recorded = _Recorded(self.env, self._since_seed, info)
         return observation, info
@@ -96,7 +102,7 @@ class RecordEpisode(
     def step(
         self, action: Action
     ) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
-        """One step; the one that ends an episode writes its files."""
+        """Take one step; the one that ends an episode writes its files."""
         observation, reward, terminated, truncated, info = super().step(action)
         if self._recorded is not None:
             self._recorded.add(action, float(reward), terminated, truncated, info)
@@ -110,14 +116,16 @@ class RecordEpisode(
         super().close()
 
     def _write(self) -> None:
-        recorded, self._recorded = self._recorded, None
+        recorded = self._recorded
+        self._recorded = None
         if recorded is None or not recorded.rewards:
             return
         name = f"{self._prefix}-{self.episode_number:05d}"
         episode = recorded.episode()
         episode.save(self._folder / f"{name}.json")
         if self._trials and episode.n_steps > 1:
-            episode.to_trial(name).to_csv(self._folder / f"{name}.csv")
+            trial = episode.to_trial(name)
+            trial.to_csv(self._folder / f"{name}.csv")
 
 
 class _Recorded:
@@ -127,36 +135,39 @@ class _Recorded:
     """
 
     def __init__(
-        self, env: gymnasium.Env[Any, Any], since_seed: int, info: Mapping[str, Any]
+        self,
+        env: gymnasium.Env[Any, Any],
+        since_seed: int,
+        info: Mapping[str, Any],
     ) -> None:
         ship: Any = env.unwrapped
-        self._ship, self._model = ship, ship.model
+        self._ship = ship
         self._actions: list[Floats] = []
         self.rewards: list[float] = []
         self._states: list[dict[str, float]] = [ship.physical_state()]
         self._parts: list[dict[str, float]] = []
         self._numbers = [_numbers(info)]
         self._outcome: dict[str, Any] = {}
-        waypoints, spec, seed = (
-            getattr(ship, "waypoints", None),
-            env.spec,
-            ship.np_random_seed,
-        )
+
+        model: ShipModel = ship.model
+        self._command_names = model.command_names
+        seed = ship.np_random_seed
+        if seed is not None and seed < 0:  # of a generator put in by hand
+            seed = None
+        waypoints = getattr(ship, "waypoints", None)
+        if waypoints is not None:
+            waypoints = np.array(waypoints, dtype=float)
         self._facts: dict[str, Any] = {
-            "environment": type(ship).__name__ if spec is None else spec.id,
-            "arguments": {} if spec is None else plain(spec.kwargs),
-            "model": self._model.name,
+            "environment": env.spec.id if env.spec else type(ship).__name__,
+            "arguments": plain(env.spec.kwargs) if env.spec else {},
+            "model": model.name,
             "number": since_seed,
             "dt": float(ship.dt),
-            "seed": (
-                None if seed is None or seed < 0 else int(seed)
-            ),  # no seed of a generator put in by hand
-            "length": self._model.particulars["length"],
-            "beam": self._model.particulars["beam"],
-            "rudder_limit": math.radians(self._model.steering.rudder_limit_deg),
-            "waypoints": (
-                None if waypoints is None else np.array(waypoints, dtype=float)
-            ),
+            "seed": seed,
+            "length": model.particulars["length"],
+            "beam": model.particulars["beam"],
+            "rudder_limit": math.radians(model.steering.rudder_limit_deg),
+            "waypoints": waypoints,
             "turn_radius": getattr(ship, "turn_radius", None),
             "corridor": getattr(ship, "corridor", None),
         }
@@ -169,34 +180,33 @@ class _Recorded:
         truncated: bool,
         info: Mapping[str, Any],
     ) -> None:
-        """One more step and what came of it."""
+        """Add one more step and what came of it."""
         self._actions.append(np.array(action, dtype=float).reshape(-1))
         self.rewards.append(reward)
         self._states.append(self._ship.physical_state())
-        self._parts.append(
-            {key: float(info[key]) for key in info if key.startswith(REWARD)}
-        )
         self._numbers.append(_numbers(info))
-        success = next(
-            (bool(info[key]) for key in SUCCESS if info.get(key) is not None), None
-        )
+        parts = {}
+        for name, value in info.items():
+            if name.startswith(REWARD):
+                parts[name] = float(value)
+        self._parts.append(parts)
         self._outcome = {
             "terminated": bool(terminated),
             "truncated": bool(truncated),
-            "success": success,
+            "success": _success(info),
         }
 
     def episode(self) -> Episode:
-        """All of it."""
-        orders = self._model.command_names
+        """Make the episode."""
+        states = _columns(self._states)
+        commands = {}
+        for name in self._command_names:
+            commands[name] = states[f"{name}_command"][1:]
         return Episode(
-            states=_columns(self._states),
+            states=states,
             actions=np.array(self._actions),
             rewards=np.array(self.rewards),
-            commands={
-                name: np.array([s[f"{name}_command"] for s in self._states[1:]])
-                for name in orders
-            },
+            commands=commands,
             reward_parts=_columns(self._parts),
             info=_columns(self._numbers),
             **self._facts,
@@ -204,55 +214,66 @@ class _Recorded:
         )
 
 
+def _success(info: Mapping[str, Any]) -> bool | None:
+    """Success that `info` reports; None without one."""
+    for name in SUCCESS:
+        if info.get(name) is not None:
+            return bool(info[name])
+    return None
+
+
 def _numbers(info: Mapping[str, Any]) -> dict[str, float]:
-    """The single finite numbers in `info`, without the parts of the reward and the success."""
-    return {
-        key: float(value)
-        for key, value in info.items()
-        if not key.startswith(REWARD)
-        and key not in SUCCESS
-        and isinstance(value, (bool, int, float, np.number, np.bool_))
-        and math.isfinite(value)
-    }
+    """Finite numbers in `info`, without the parts of the reward and the success."""
+    numbers = {}
+    for name, value in info.items():
+        if name.startswith(REWARD) or name in SUCCESS:
+            continue
+        is_number = isinstance(value, (bool, int, float, np.number, np.bool_))
+        if is_number and math.isfinite(value):
+            numbers[name] = float(value)
+    return numbers
 
 
 def _columns(rows: list[dict[str, float]]) -> dict[str, Floats]:
     """Values over time by name; a name that some step lacks is left out."""
-    names = [name for name in rows[-1] if all(name in row for row in rows)]
-    return {name: np.array([row[name] for row in rows], dtype=float) for name in names}
+    columns = {}
+    for name in rows[-1]:
+        if all(name in row for row in rows):
+            columns[name] = np.array([row[name] for row in rows], dtype=float)
+    return columns
 
 
 def _check_environment(env: Any) -> None:
     if not isinstance(env, gymnasium.Env):
-        raise InputError(
-            f"env: {env!r} found, expected a single environment; give each its own"
-            " recorder"
-        )
+        expected = "a single environment"
+        raise unexpected("env", expected, env, "give each its own recorder")
     for name in ("physical_state", "model", "dt"):
         if not hasattr(env.unwrapped, name):
             raise InputError(
-                f"env: {env.unwrapped} has no '{name}', expected an environment of"
-                " shipgym"
+                f"env: expected an environment of shipgym, got {env.unwrapped}, which"
+                f" has no '{name}'"
             )
 
 
 def _folder(folder: Path, prefix: str, overwrite: bool) -> Path:
+    """Make the folder of recordings; InputError where it holds earlier ones."""
     if Path(check_text(prefix, "name_prefix")).name != prefix:
-        raise InputError(
-            f"name_prefix: {prefix!r} found, expected the beginning of a file's name"
-        )
+        raise unexpected("name_prefix", "the beginning of a file's name", prefix)
     make_folder(folder)
-    there = next(iter(sorted(folder.glob(f"{escape(prefix)}-[0-9]*.json"))), None)
-    if there is not None and not overwrite:
+    earlier = sorted(folder.glob(f"{escape(prefix)}-[0-9]*.json"))
+    if earlier and not overwrite:
         raise InputError(
-            f"folder: {folder} holds '{there.name}' of an earlier recording; choose"
-            " another folder or overwrite=True"
+            f"folder: {folder} holds '{earlier[0].name}' of an earlier recording;"
+            " choose another folder or overwrite=True"
         )
     return folder
 
 
 def plain(value: Any) -> Any:
-    """An argument of an environment as JSON can hold it: a model by its name, a weather by its fields."""
+    """Argument of an environment as JSON can hold it.
+
+    A model is its name, a weather its fields.
+    """
     if isinstance(value, ShipModel):
         return value.name
     if isinstance(value, np.generic | np.ndarray):
@@ -265,4 +286,6 @@ def plain(value: Any) -> Any:
         return repr(value)
     if value is None or isinstance(value, bool | int | float | str):
         return value
-    return plain(value.to_dict()) if hasattr(value, "to_dict") else str(value)
+    if hasattr(value, "to_dict"):
+        return plain(value.to_dict())
+    return str(value)

@@ -1,4 +1,7 @@
-"""The native vector environment as a `VecEnv` of stable-baselines3, which takes none of Gymnasium's."""
+"""Native vector environment as a `VecEnv` of stable-baselines3.
+
+It takes none of Gymnasium's vector environments.
+"""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -9,7 +12,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
-from shipgym.checks import check_choice
+from shipgym.arrays import Flags, Floats
+from shipgym.checks import check_choice, unexpected
 from shipgym.envs.ship_vector_env import Infos, ShipVectorEnv
 from shipgym.errors import InputError
 from shipgym.extras import library
@@ -21,6 +25,7 @@ VecEnv: Any = library(
     "stable_baselines3.common.vec_env", "rl", "ShipVecEnv needs it"
 ).VecEnv
 
+Observations = NDArray[np.float32]
 Indices = None | int | Sequence[int]
 Vectors = VectorEnv[Any, Any, Any]
 
@@ -39,7 +44,7 @@ SPACES = ("observation_space", "action_space")  # of one ship
 
 
 class Row:
-    """What the single environment of one row would show; other attributes may be set by `set_attr`."""
+    """Attributes of the single environment of one row, and those of `set_attr`."""
 
     def __init__(self, env: ShipVectorEnv, number: int) -> None:
         self._env = env
@@ -56,19 +61,17 @@ class Row:
         return self
 
     @property
-    def waypoints(self) -> NDArray[np.float64] | None:
-        """North and east of this episode's path, m, shape (n, 2); None in course keeping."""
+    def waypoints(self) -> Floats | None:
+        """North and east of this episode's path, m, shape (n, 2); None without one."""
         return self._env.waypoints(self._number)
 
     def physical_state(self) -> dict[str, float]:
-        """State, course to steer and weather by name, SI units (see `Engine.physical_state`)."""
-        return {
-            name: float(values[self._number])
-            for name, values in self._env.physical_state().items()
-        }
+        """State, set-point and weather by name, SI units (`Engine.physical_state`)."""
+        state = self._env.physical_state()
+        return {name: float(values[self._number]) for name, values in state.items()}
 
     def render(self) -> Any:
-        """A picture, uint8 array of shape (600, 600, 3); None without a render mode."""
+        """Picture, uint8 array of shape (600, 600, 3); None without a render mode."""
         pictures = self._env.render()
         return None if pictures is None else pictures[self._number]
 
@@ -76,8 +79,10 @@ class Row:
 FIXED = {*SHARED, *SPACES, *(name for name in vars(Row) if not name.startswith("_"))}
 
 
-class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
-    """Ships under a task as a vector environment of stable-baselines3, equal to its DummyVecEnv of them.
+class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
+    """Ships under a task as a vector environment of stable-baselines3.
+
+    It equals stable-baselines3's DummyVecEnv of the single environments.
 
     The list of infos is the same in every step, and its dictionaries are empty but for
     episodes that ended: those hold what the single environment's `info` does,
@@ -126,16 +131,21 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
         self.info_names = tuple(info_names)
         for name in self.info_names:
             check_choice(name, self._ships.task.info_names, "info_names")
-        self._infos: list[dict[str, Any]] = [{} for _ in range(n)]
-        self._touched: list[int] = []  # rows whose dictionary is to be emptied
-        self._returns, self._lengths = np.zeros(n), np.zeros(n, dtype=np.int64)
+
+        self._returns = np.zeros(n)
+        self._lengths = np.zeros(n, dtype=np.int64)
         self._actions: Any = None
         self._started = time.time()
+        self._forget_infos()
         if seed is not None:
             self.seed(seed)
 
-    def reset(self) -> NDArray[np.float32]:
-        """Begin an episode in each row: with the seeds of `seed`, once, or else the next.
+    def _forget_infos(self) -> None:
+        self._infos: list[dict[str, Any]] = [{} for _ in self._rows]
+        self._touched: list[int] = []  # rows whose dictionary is to be emptied
+
+    def reset(self) -> Observations:
+        """Begin an episode in each row: the next, or by the seeds of `seed`, once.
 
         Raises InputError if there are options: as the single environments, these know
         none.
@@ -143,92 +153,113 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
         options = [given for given in self._options if given]
         self._reset_options()
         if options:
-            raise InputError(
-                f"options: {options[0]!r} found, expected none; name them when it is"
-                " made"
+            raise unexpected(
+                "options", "none", options[0], "name them when the ships are made"
             )
-        observations: NDArray[np.float32]
-        observations, infos = self.vector_env.reset(
-            seed=None if None in self._seeds else self._seeds
-        )
+
+        seeds = None if None in self._seeds else self._seeds
+        observations: Observations
+        observations, infos = self.vector_env.reset(seed=seeds)
         self._reset_seeds()
         self.reset_infos = [_info_of(infos, row) for row in range(self.num_envs)]
-        self._infos = [{} for _ in range(self.num_envs)]
-        self._returns[:], self._lengths[:], self._touched = 0.0, 0, []
+        self._returns[:] = 0.0
+        self._lengths[:] = 0
+        self._forget_infos()
         return observations
 
     def step_async(self, actions: Any) -> None:
-        """Take the actions of the next `step_wait`, of shape (num_envs, n_commands) or (num_envs,)."""
+        """Take the actions of the next `step_wait`.
+
+        Their shape is (num_envs, n_commands), or (num_envs,).
+        """
         self._actions = actions
 
     def step_wait(
         self,
     ) -> tuple[
-        NDArray[np.float32],
-        NDArray[np.float32],
-        NDArray[np.bool_],
+        Observations,
+        Observations,
+        Flags,
         list[dict[str, Any]],
     ]:
-        """One control interval; where an episode ends the next begins and the observation is its first.
+        """Take one control interval; where an episode ends the next begins.
 
-        Observations and rewards are float32, infos the same list in each step. Raises
-        InputError if an action is not a number or their shape is another.
+        The observation is the first of the next episode then. Observations and rewards
+        are float32, infos the same list in each step. Raises InputError if an action is
+        not a number or their shape is another.
         """
         observations, rewards, terminated, truncated, infos = self.vector_env.step(
             self._actions
         )
+        dones = terminated | truncated
         self._returns += rewards
         self._lengths += 1
         for row in self._touched:
             self._infos[row] = {}
-        dones = terminated | truncated
-        self._touched = np.flatnonzero(dones).tolist() if dones.any() else []
-        if self.info_names:  # new dictionaries of what is asked for in every step
-            columns = [infos[name].tolist() for name in self.info_names]
-            for row, values in enumerate(zip(*columns, strict=True)):
-                self._infos[row] = dict(zip(self.info_names, values, strict=True))
+        self._touched = []
+        if self.info_names:
+            self._show(infos)
+        if dones.any():
+            self._touched = np.flatnonzero(dones).tolist()
         for row in self._touched:
             self._infos[row] = self._last_info(row, infos, bool(truncated[row]))
             self.reset_infos[row] = _info_of(infos, row)
-            self._returns[row], self._lengths[row] = 0.0, 0
+            self._returns[row] = 0.0
+            self._lengths[row] = 0
         return observations, rewards.astype(np.float32), dones, self._infos
 
+    def _show(self, infos: Infos) -> None:
+        """Put what is asked for in every step into new dictionaries."""
+        columns = [infos[name].tolist() for name in self.info_names]
+        for row, values in enumerate(zip(*columns, strict=True)):
+            self._infos[row] = dict(zip(self.info_names, values, strict=True))
+
     def _last_info(self, row: int, infos: Infos, truncated: bool) -> dict[str, Any]:
-        """The info of a row whose episode ended."""
+        """Info of a row whose episode ended."""
         info = _info_of(infos["final_info"], row)
         if "success" in info:
             info["is_success"] = info["success"]  # read by stable-baselines3's log
         info["terminal_observation"] = infos["final_obs"][row]
         info["TimeLimit.truncated"] = truncated
-        elapsed = round(time.time() - self._started, 6)
-        total, length = round(float(self._returns[row]), 6), int(self._lengths[row])
-        info["episode"] = {"r": total, "l": length, "t": elapsed}
+        info["episode"] = {
+            "r": round(float(self._returns[row]), 6),
+            "l": int(self._lengths[row]),
+            "t": round(time.time() - self._started, 6),
+        }
         return info
 
     def memory(self) -> dict[str, NDArray[Any]]:
-        """All that the steps to come depend on beside their actions, copies by name; after a `reset`."""
-        return {
-            "returns": self._returns.copy(),
-            "lengths": self._lengths.copy(),
-        } | self._ships.memory()
+        """All that later steps depend on except their actions, copies by name.
+
+        Only after a `reset`.
+        """
+        own = {"returns": self._returns.copy(), "lengths": self._lengths.copy()}
+        return own | self._ships.memory()
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from the `memory` of an environment made with the same arguments, in place of a `reset`."""
-        self._returns[:], self._lengths[:] = memory["returns"], memory["lengths"]
+        """Go on from the `memory` of an environment by the same arguments.
+
+        It takes the place of a `reset`.
+        """
+        self._returns[:] = memory["returns"]
+        self._lengths[:] = memory["lengths"]
         self._ships.remember(memory)
-        self.reset_infos = [{} for _ in range(self.num_envs)]
-        self._infos, self._touched = [{} for _ in range(self.num_envs)], []
+        self.reset_infos = [{} for _ in self._rows]
+        self._forget_infos()
 
     def close(self) -> None:
         """Close the vector environment."""
         self.vector_env.close()
 
     def get_images(self) -> Sequence[Any]:
-        """A picture of each row; None without a render mode."""
+        """Picture of each row; None without a render mode."""
         return self.vector_env.render() or [None] * self.num_envs
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
-        """An attribute of the single environments of some rows (see `Row`), or what `set_attr` set."""
+        """Attribute of the single environments of some rows, or what `set_attr` set.
+
+        See `Row`.
+        """
         return [getattr(row, attr_name) for row in self._chosen(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
@@ -238,8 +269,9 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
         """
         if attr_name in FIXED:
             raise InputError(
-                f"set_attr: {attr_name!r} is fixed when the ships are made, expected a"
-                " name of your own; make a new ShipVecEnv with another argument"
+                f"set_attr: expected a name of your own, got {attr_name!r}, which is"
+                " fixed when the ships are made; make a new ShipVecEnv with another"
+                " argument"
             )
         for row in self._chosen(indices):
             setattr(row, attr_name, value)
@@ -251,16 +283,22 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
         indices: Indices = None,
         **method_kwargs: Any,
     ) -> list[Any]:
-        """What a method of the single environments of some rows returns (see `Row`)."""
-        return [
-            getattr(row, method_name)(*method_args, **method_kwargs)
-            for row in self._chosen(indices)
-        ]
+        """Call a method of the single environments of some rows (see `Row`)."""
+        results = []
+        for row in self._chosen(indices):
+            method = getattr(row, method_name)
+            results.append(method(*method_args, **method_kwargs))
+        return results
 
     def env_is_wrapped(
-        self, wrapper_class: type[gymnasium.Wrapper], indices: Indices = None
+        self,
+        wrapper_class: type[gymnasium.Wrapper],
+        indices: Indices = None,
     ) -> list[bool]:
-        """Whether the rows do what a wrapper does: Monitor's episode statistics, yes; nothing else."""
+        """Return for some rows whether they do what a wrapper does.
+
+        They keep the episode statistics of Monitor, and do nothing else.
+        """
         return [wrapper_class is Monitor for _ in self._chosen(indices)]
 
     def _chosen(self, indices: Indices) -> list[Row]:
@@ -269,41 +307,45 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
 
 def _info_of(infos: Infos, row: int) -> dict[str, Any]:
     """One row of Gymnasium's arrays, as the single environment's info."""
-    return {
-        name: values[row].item()
-        for name, values in infos.items()
-        if not name.startswith(("_", "final_")) and not isinstance(values, dict)
-    }
+    info = {}
+    for name, values in infos.items():
+        if name.startswith(("_", "final_")) or isinstance(values, dict):
+            continue  # masks, and what ended episodes showed last
+        info[name] = values[row].item()
+    return info
 
 
 def _native(env: str | Vectors, num_envs: int | None, options: dict[str, Any]) -> Any:
-    """The native vector environment by its id, or as given."""
+    """Native vector environment by its id, or as given."""
+    made: Any = env
     if isinstance(env, str):
         if "autoreset_mode" in options:
             raise InputError(
-                "autoreset_mode: found, expected none; stable-baselines3 begins"
-                " episodes in the same step"
+                "autoreset_mode: expected none, because stable-baselines3 begins"
+                f" episodes in the same step, got {options['autoreset_mode']!r}"
             )
-        n = 1 if num_envs is None else num_envs
-        made: Any = gymnasium.make_vec(
-            env, num_envs=n, autoreset_mode=AutoresetMode.SAME_STEP, **options
+        made = gymnasium.make_vec(
+            env,
+            num_envs=1 if num_envs is None else num_envs,
+            autoreset_mode=AutoresetMode.SAME_STEP,
+            **options,
         )
-    else:
-        made = env
-        if num_envs is not None or options:
-            raise InputError(
-                f"num_envs, options: {sorted(options) or num_envs} found with an"
-                " environment that is made already; give them where it is made, or"
-                " give its id"
-            )
+    elif num_envs is not None or options:
+        raise InputError(
+            "num_envs, options: expected none with an environment that is made already,"
+            f" got {sorted(options) or num_envs}; give them where it is made, or give"
+            " its id"
+        )
+
     if not isinstance(getattr(made, "unwrapped", None), ShipVectorEnv):
         raise InputError(
-            f"env: {made!r} found, expected the id of an environment of shipgym or what"
-            " gymnasium.make_vec makes of it, also wrapped"
+            "env: expected the id of an environment of shipgym or what"
+            f" gymnasium.make_vec makes of it, also wrapped, got {made!r}"
         )
-    if made.metadata["autoreset_mode"] is not AutoresetMode.SAME_STEP:
+    mode = made.metadata["autoreset_mode"]
+    if mode is not AutoresetMode.SAME_STEP:
         raise InputError(
-            f"env: autoreset_mode {made.metadata['autoreset_mode'].name} found,"
-            " expected SAME_STEP: gymnasium.make_vec(..., autoreset_mode='SameStep')"
+            f"env: expected autoreset_mode SAME_STEP, got {mode.name}:"
+            " gymnasium.make_vec(..., autoreset_mode='SameStep')"
         )
     return made

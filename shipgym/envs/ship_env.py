@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.arrays import Floats
+from shipgym.checks import unexpected
 from shipgym.engine.episodes import REFUSED
 from shipgym.envs.engine import Engine, as_numbers
 from shipgym.envs.environment import (
@@ -67,27 +68,27 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         allow_unstable: bool = False,
         **options: Any,
     ) -> None:
-        seen, commands = self._make(
-            locals(), ENV_OPTIONS, self.metadata["render_modes"]
+        arguments = locals()
+        observation_space, action_space = self._make(
+            arguments, ENV_OPTIONS, self.metadata["render_modes"]
         )
-        self.observation_space, self.action_space = seen, commands  # type: ignore[assignment]
+        self.observation_space = observation_space  # type: ignore[assignment]
+        self.action_space = action_space
         self._names = self.task.info_names
-        self._flags = [
-            (name, k) for k, name in enumerate(self._names) if name in self.task.flags
-        ]
+        flags = self.task.flags
+        self._flags = [name for name in self._names if name in flags]
         self._made()
 
     def _use(self, engine: Engine) -> None:
         super()._use(engine)
-        self._seen, self._outcomes = (
-            engine.outputs.observations[0],
-            engine.outputs.outcomes[:, 0],
-        )
-        self._advance, self._command = engine.step_of_one(), engine.command[:, 0]
+        self._observation = engine.outputs.observations[0]
+        self._outcomes = engine.outputs.outcomes[:, 0]
+        self._command = engine.command[:, 0]
+        self._advance = engine.step_of_one()
 
     @property
     def waypoints(self) -> Floats | None:
-        """North and east of this episode's path, m, shape (n, 2); None in course keeping."""
+        """North and east of this episode's path, m, shape (n, 2); None without one."""
         return self._engine.waypoints()
 
     @property
@@ -101,7 +102,10 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         return self._engine.path_metres("turn_radius")
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode, straight ahead at service speed.
 
@@ -124,17 +128,18 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         """
         super().reset(seed=seed)
         episodes = self._engine.episodes + np.uint64(1)
-        if (state := self._take(options)) is not None:
+        state = self._take(options) if options or self._asked else None
+        if state is not None:
             self.set_state(state)
         else:
             if seed is not None or self._keys is None:
-                self._keys, episodes = self._drawn_keys(), np.zeros(1, dtype=np.uint64)
+                self._keys = self._drawn_keys()
+                episodes[:] = 0
             self._begun = True
             self._engine.begin(self._keys, episodes)
-            self._draw()
-            if self.render_mode == "human":
-                self.render()
-        return self._seen.copy(), self._info(self._outcomes[ANSWER_OUTCOMES:].tolist())
+            self._draw_and_show()
+        numbers = self._outcomes[ANSWER_OUTCOMES:].tolist()
+        return self._observation.copy(), self._info(numbers)
 
     def step(
         self, action: Any
@@ -163,54 +168,58 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             self._refuse_step()
         self._order(action)
         if self._advance() == REFUSED:
-            wrong = next(
-                number for number in self._command.tolist() if not isfinite(number)
+            raise unexpected(
+                "action",
+                "finite numbers in [-1, 1], parts of the limits",
+                self._command.tolist(),
             )
-            raise InputError(
-                f"action: {wrong} found, expected numbers in [-1, 1]: parts of the"
-                " limit"
-            )
-        values = self._outcomes.tolist()
-        if not isfinite(values[0]):
+        reward, terminated, truncated, *numbers = self._outcomes.tolist()
+        if not isfinite(reward):
             self._engine.refuse_rewards()
-        info = self._info(values[ANSWER_OUTCOMES:])
+        info = self._info(numbers)
         if self._artists:
-            self._draw()
-            if self.render_mode == "human":
-                self.render()
-        return self._seen.copy(), values[0], values[1] > 0.0, values[2] > 0.0, info
+            self._draw_and_show()
+        return self._observation.copy(), reward, terminated > 0.0, truncated > 0.0, info
 
-    def _info(self, values: list[float]) -> dict[str, Any]:
-        info: dict[str, Any] = dict(zip(self._names, values))  # noqa: B905 - as many, by construction
-        for flag, k in self._flags:
-            info[flag] = values[k] > 0.0
+    def _draw_and_show(self) -> None:
+        self._draw()
+        if self.render_mode == "human":
+            self.render()
+
+    def _info(self, numbers: list[float]) -> dict[str, Any]:
+        info: dict[str, Any] = dict(zip(self._names, numbers, strict=True))
+        for flag in self._flags:
+            info[flag] = info[flag] > 0.0
         return info
 
     def _order(self, action: Any) -> None:
-        """Set the command, refusing what is none."""
+        """Set the command; InputError for an invalid action."""
+        # as the action space has it: to be taken without a look at its numbers
+        is_array = isinstance(action, np.ndarray) and action.dtype is FLOAT32
         if self._discrete:
             action = rudder_orders(action, (), "action")[0]
-        elif not isinstance(action, np.ndarray) or action.dtype is not FLOAT32:
+        elif not is_array:
             action = as_numbers(action, "action")
         if action.shape != self._command.shape:
-            what = "the commanded rudder" + (
-                " and shaft speed" if len(self._command) > 1 else ""
-            )
+            commands = "the commanded rudder"
+            if len(self._command) > 1:
+                commands += " and shaft speed"
             raise InputError(
-                f"action: shape {action.shape} found, expected {self._command.shape}:"
-                f" {what}"
+                f"action: expected shape {self._command.shape}, {commands}, got shape"
+                f" {action.shape}"
             )
         self._command[...] = action
 
     def physical_state(self) -> dict[str, float]:
-        """State, course to steer and weather by name, SI units (see `Engine.physical_state`)."""
-        return {
-            name: float(value[0])
-            for name, value in self._engine.physical_state().items()
-        }
+        """State, set-point and weather by name, SI units (`Engine.physical_state`)."""
+        state = self._engine.physical_state()
+        return {name: float(values[0]) for name, values in state.items()}
 
     def render(self) -> Any:
-        """The ship on her chart, uint8 array of shape (600, 600, 3); None without a render mode."""
+        """Picture of the ship on her chart, uint8 array of shape (600, 600, 3).
+
+        None in a window, and without a render mode.
+        """
         pictures = [artist.picture(self._engine) for artist in self._artists]
         return pictures[0] if self.render_mode == "rgb_array" else None
 

@@ -1,4 +1,4 @@
-"""Many ships under a task as one of Gymnasium's vector environments, on the compiled kernels."""
+"""Many ships under a task as one of Gymnasium's vector environments."""
 
 from collections.abc import Mapping, Sequence
 from math import isfinite
@@ -10,8 +10,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from shipgym.arrays import Floats
-from shipgym.checks import check_keys, quoted
+from shipgym.arrays import Flags, Floats
+from shipgym.checks import check_keys, quoted, unexpected
 from shipgym.envs.engine import episode_keys
 from shipgym.envs.environment import (
     DEFAULT_MODEL,
@@ -24,13 +24,14 @@ from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import VECTOR_OPTIONS
 
-Flags = NDArray[np.bool_]
 Observation = NDArray[np.float32]
 Infos = dict[str, Any]
 
 
 class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
-    """Many ships under a task; row i is the single environment reset with `seed + i`, bit for bit.
+    """Many ships under a task.
+
+    Row i is the single environment reset with `seed + i`, bit for bit.
 
     Raises InputError for an unknown model or keyword, or an argument out of its range.
 
@@ -72,22 +73,27 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             steps = options.setdefault("episode_steps", max_episode_steps)
             if steps != max_episode_steps:
                 raise InputError(
-                    f"max_episode_steps: {max_episode_steps!r} found together with"
-                    f" episode_steps {steps!r}"
+                    f"max_episode_steps: expected episode_steps, {steps!r}, or none of"
+                    f" the two, got {max_episode_steps!r}"
                 )
-        seen, commands = self._make(arguments, VECTOR_OPTIONS, ["rgb_array"])
+        observation_space, action_space = self._make(
+            arguments, VECTOR_OPTIONS, ["rgb_array"]
+        )
         self.num_envs = int(num_envs)
         self.metadata = {
             "render_modes": ["rgb_array"],
             "render_fps": 30,
             "autoreset_mode": mode,
         }
-        self.single_observation_space, self.single_action_space = seen, commands
-        self.observation_space = batch_space(seen, self.num_envs)
-        self.action_space = batch_space(commands, self.num_envs)
-        self._names, self._flags = self.task.info_names, self._engine.flag_names
+        self.single_observation_space = observation_space
+        self.single_action_space = action_space
+        self.observation_space = batch_space(observation_space, self.num_envs)
+        self.action_space = batch_space(action_space, self.num_envs)
+
+        self.autoreset_mode = mode  # read by TorchRL
+        self._names = self.task.info_names
+        self._flags = self._engine.flag_names
         self._masks = {f"_{name}": self._engine.all_lanes for name in self._names}
-        self._mode = self.autoreset_mode = mode  # the latter is read by TorchRL
         self._own_reward = not self.task.definition.shipped
         self._some_over = False  # NEXT_STEP: whether episodes ended in the last step
         self._made()
@@ -115,8 +121,9 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             Row i has the seed `seed + i`, or number i of the sequence. Without one the
             next episodes begin.
         options : dict, optional
-            `reset_mask`, bool array of shape (num_envs,): rows to begin anew, the
-            others go on. Or, for all rows, those of the single environment.
+            `reset_mask`, bool array of shape (num_envs,): rows in which an episode is
+            to begin, the others go on. Or, for all rows, those of the single
+            environment.
 
         Returns
         -------
@@ -127,57 +134,66 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         super().reset(seed=seed if isinstance(seed, int) else None)
         mask = self._mask(options)
         episodes = self._engine.episodes + np.uint64(1)
-        if mask.all() and (state := self._take(options, "reset_mask")) is not None:
+        state = self._take(options, "reset_mask") if mask.all() else None
+        if state is not None:
             self.set_state(state)
             return self._engine.outputs.observations, self._infos()
-        if self._keys is None:
-            self._keys = self._drawn_keys()
-            episodes[:] = 0
-        seeded = self._seeds(seed)
-        for row in np.flatnonzero(mask).tolist():
-            if (number := seeded[row]) is not None:
-                self._keys[row], episodes[row] = episode_keys(number), 0
-        before = self._engine.outputs
-        self._engine.renew_outputs()
-        self._engine.outputs.take(
-            before
-        )  # rows that are not begun anew keep what they show
+
+        engine = self._engine
+        self._keys, episodes = self._next_episodes(seed, mask, episodes)
+        shown_before = engine.outputs
+        engine.renew_outputs()
+        engine.outputs.take(shown_before)  # of rows that go on
         self._begun = True
-        self._engine.begin(self._keys, episodes, mask)
+        engine.begin(self._keys, episodes, mask)
         self._draw(mask)
         infos = self._infos()
-        infos.update({name: mask.copy() for name in self._masks})
-        return self._engine.outputs.observations, infos
+        for name in self._masks:
+            infos[name] = mask.copy()
+        return engine.outputs.observations, infos
+
+    def _next_episodes(
+        self,
+        seed: int | Sequence[int | None] | None,
+        mask: Flags,
+        numbers: NDArray[np.uint64],
+    ) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+        """Keys and numbers of the next episodes, `numbers` where no key changes."""
+        keys = self._keys
+        if keys is None:
+            keys = self._drawn_keys()
+            numbers[:] = 0
+        seeds = self._seeds(seed)
+        for row in np.flatnonzero(mask).tolist():
+            row_seed = seeds[row]
+            if row_seed is not None:
+                keys[row] = episode_keys(row_seed)
+                numbers[row] = 0
+        return keys, numbers
 
     def _infos(self) -> Infos:
         """Rows of the last step's arrays by name, with their masks."""
         outputs = self._engine.outputs
-        return (
-            named_rows(outputs.outcomes, outputs.flags, self._names, self._flags)
-            | self._masks
-        )
+        rows = named_rows(outputs.outcomes, outputs.flags, self._names, self._flags)
+        return rows | self._masks
 
     def _mask(self, options: dict[str, Any] | None) -> Flags:
-        mask = (options or {}).get("reset_mask", self._engine.all_lanes)
-        if (
-            not isinstance(mask, np.ndarray)
-            or mask.shape != (self.num_envs,)
-            or mask.dtype != np.bool_
-        ):
-            raise InputError(
-                f"options: reset_mask {mask!r} found, expected a bool array of"
-                f" {self.num_envs}"
-            )
+        """Rows in which an episode is to begin; InputError for another mask."""
+        options = options or {}
+        mask: Any = options.get("reset_mask", self._engine.all_lanes)
+        is_flags = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
+        if not is_flags or mask.shape != (self.num_envs,):
+            expected = f"a bool array of {self.num_envs}"
+            raise unexpected("options: reset_mask", expected, mask)
         if not mask.any():
             raise InputError(
-                "options: reset_mask is False in all rows, expected one at least to"
-                " begin anew"
+                "options: reset_mask: expected True in one row at least, got none"
             )
         if not mask.all():
             check_keys(
-                options or {}, ["reset_mask"], "options with a reset_mask of some rows"
+                options, ["reset_mask"], "options with a reset_mask of some rows"
             )
-        return mask
+        return np.asarray(mask)
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
         if seed is None:
@@ -186,21 +202,21 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             return [int(seed) + row for row in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise InputError(
-                f"seed: {len(seed)} found, expected one for each of {self.num_envs}"
-                " rows"
+                f"seed: expected one for each of {self.num_envs} rows, got {len(seed)}"
             )
         return seed
 
     def step(self, actions: Any) -> tuple[Observation, Floats, Flags, Flags, Infos]:  # type: ignore[override]
-        """One control interval of all rows.
+        """Take one control interval in all rows.
 
         Raises InputError if an action is not a number or their shape is another, a
         reward of your own is not finite, or no episode has begun.
 
         Parameters
         ----------
-        actions : array of shape (num_envs, n_commands), or int array of shape (num_envs,)
-            See the single environment.
+        actions : array of shape (num_envs, n_commands)
+            See the single environment; rudder orders are an int array of shape
+            (num_envs,).
 
         Returns
         -------
@@ -213,44 +229,48 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         """
         if not self._begun:
             self._refuse_step()
+        if self._discrete:
+            actions = rudder_orders(actions, (self.num_envs,), "actions")
         engine = self._engine
-        engine.order(
-            rudder_orders(actions, (self.num_envs,), "actions")
-            if self._discrete
-            else actions
-        )
-        ended = engine.advance(self._some_over, anew=True)
+        engine.order(actions)
+        n_ended = engine.advance(self._some_over, anew=True)
         outputs = engine.outputs
-        if self._own_reward and not isfinite(outputs.outcomes[0].sum()):
+        rewards = outputs.outcomes[0]
+        if self._own_reward and not isfinite(rewards.sum()):
             engine.refuse_rewards()
+
         infos = self._infos()
-        if self._mode is AutoresetMode.NEXT_STEP:
-            self._some_over = ended > 0
-        elif ended and self._mode is AutoresetMode.SAME_STEP:
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP:
+            self._some_over = n_ended > 0
+        elif n_ended and self.autoreset_mode is AutoresetMode.SAME_STEP:
             infos |= self._final()
             engine.begin_next(outputs.terminated | outputs.truncated)
         self._draw()
         return (
             outputs.observations,
-            outputs.outcomes[0],
+            rewards,
             outputs.terminated,
             outputs.truncated,
             infos,
         )
 
     def _final(self) -> Infos:
-        """What episodes that ended showed last."""
+        """Last observations and infos of episodes that ended."""
         outputs = self._engine.outputs
         ended = outputs.terminated | outputs.truncated
         final_obs = np.full(self.num_envs, None, dtype=object)
         for row in np.flatnonzero(ended).tolist():
             final_obs[row] = outputs.observations[row].copy()
-        kept = np.where(ended, outputs.outcomes, 0.0), outputs.flags & ended
-        final_info = named_rows(*kept, self._names, self._flags)
+
+        # zero in the rows that go on, as in Gymnasium's vector environments
+        outcomes = np.where(ended, outputs.outcomes, 0.0)
+        flags = outputs.flags & ended
+        final_info = named_rows(outcomes, flags, self._names, self._flags)
+        masks = {f"_{name}": ended for name in final_info}
         return {
             "final_obs": final_obs,
             "_final_obs": ended,
-            "final_info": final_info | {f"_{name}": ended for name in final_info},
+            "final_info": final_info | masks,
             "_final_info": ended,
         }
 
@@ -259,41 +279,51 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self._engine.write(name, values)
 
     def memory(self) -> dict[str, NDArray[Any]]:
-        """All that the steps to come depend on beside their commands, copies by name; after a `reset`."""
+        """All that later steps depend on except their commands, copies by name.
+
+        Only after a `reset`.
+        """
         return self._counters() | self._engine.memory()
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from what `memory` of an environment made alike gave, in place of a `reset`."""
+        """Go on from the `memory` of an environment by the same arguments.
+
+        It takes the place of a `reset`.
+        """
         self._begun = True
         self._recall(memory)
         self._engine.remember(memory)
 
     def physical_state(self) -> dict[str, Floats]:
-        """State, course to steer and weather by name, SI units, each of shape (num_envs,)."""
+        """State, set-point and weather by name, SI units, each of shape (num_envs,)."""
         return self._engine.physical_state()
 
     def waypoints(self, row: int = 0) -> Floats | None:
-        """North and east of the path of a row's episode, m, shape (n, 2); None in course keeping."""
+        """North and east of the path of a row's episode, m, shape (n, 2).
+
+        None in course keeping.
+        """
         return self._engine.waypoints(row)
 
     def render(self) -> tuple[Any, ...] | None:
-        """A picture of each row, uint8 arrays of shape (600, 600, 3); None without a render mode."""
+        """Picture of each row, uint8 arrays of shape (600, 600, 3).
+
+        None without a render mode.
+        """
         if self.render_mode is None:
             return None
         return tuple(artist.picture(self._engine) for artist in self._artists)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Nothing stays open; to step again takes a `reset`."""
+        """Leave nothing open; to step again takes a `reset`."""
         self._begun = False
 
 
 def _mode(given: AutoresetMode | str) -> AutoresetMode:
-    by_name = {
-        name: mode for mode in AutoresetMode for name in (mode, mode.value, mode.name)
-    }
+    by_name: dict[AutoresetMode | str, AutoresetMode] = {}
+    for mode in AutoresetMode:
+        by_name |= {mode: mode, mode.value: mode, mode.name: mode}
     if given not in by_name:
-        raise InputError(
-            f"autoreset_mode: {given!r} found, expected one of"
-            f" {quoted(m.value for m in AutoresetMode)}"
-        )
+        modes = quoted(mode.value for mode in AutoresetMode)
+        raise unexpected("autoreset_mode", f"one of {modes}", given)
     return by_name[given]

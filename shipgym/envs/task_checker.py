@@ -1,4 +1,4 @@
-"""What is wrong with a task: a battery for any task, reward or sensor set of a user's own."""
+"""Battery of checks for a task, reward or sensor set of a user's own."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -20,8 +20,10 @@ from shipgym.python_files import asked
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 
-STEPS, PLAIN_STEPS = 400, 40
-LANES, PLAIN_LANES = 70, 3  # more than a tile
+STEPS = 400
+LANES = 70  # more than a tile
+PLAIN_STEPS = 40  # in plain Python
+PLAIN_LANES = 3
 AGREEMENT = 1e-5  # of compiled and plain results, whose last digits differ
 BEYOND = 1e-6  # of a bound, what rounding makes
 OFTEN = 0.05  # part of the observations beyond their bounds that is worth a remark
@@ -43,10 +45,9 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
     package's; options are keywords of the environment, `model`, `reward` and `sensors`
     among them.
     """
+    ship = options.pop("model", DEFAULT_MODEL)
     try:
-        model, given, randomisation = read_options(
-            task, options.pop("model", DEFAULT_MODEL), options
-        )
+        model, given, randomisation = read_options(task, ship, options)
         plain, seen = _plain_engine(model, given, randomisation)
         _sail_in_python(plain)
         few = Engine(model, PLAIN_LANES, given, randomisation)
@@ -54,37 +55,44 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
         one = Engine(model, 1, given, randomisation)
     except InputError as error:
         return TaskCheck(str(task), (str(error),))
-    problems = [
-        *_not_finite(many),
-        *_differ(
-            few,
-            plain,
-            slice(None),
-            PLAIN_STEPS,
-            AGREEMENT,
-            ("compiled", "in plain Python"),
-        ),
-        *_differ(
-            many, one, slice(-1, None), STEPS // 4, 0.0, ("among many ships", "alone")
-        ),
-    ]
-    return TaskCheck(given.name, tuple(problems), tuple(_often_clipped(given, seen)))
+
+    compiled_and_plain = _differ(
+        few,
+        plain,
+        lanes=slice(None),
+        steps=PLAIN_STEPS,
+        agreement=AGREEMENT,
+        ways=("compiled", "in plain Python"),
+    )
+    many_and_one = _differ(
+        many,
+        one,
+        lanes=slice(-1, None),
+        steps=STEPS // 4,
+        agreement=0.0,
+        ways=("among many ships", "alone"),
+    )
+    problems = [*_not_finite(many), *compiled_and_plain, *many_and_one]
+    remarks = _often_clipped(given, seen)
+    return TaskCheck(given.name, tuple(problems), tuple(remarks))
 
 
 def _plain_engine(
-    model: ShipModel, task: Task, randomisation: Randomisation
+    model: ShipModel,
+    task: Task,
+    randomisation: Randomisation,
 ) -> tuple[Engine, dict[str, list[float]]]:
-    """An engine in plain Python, and all that it observes, before it is clipped, by path."""
-    seen: dict[str, list[float]] = {
-        quantity.path: [] for quantity in task.observed(model)
-    }
+    """Engine in plain Python, and its observations before they are clipped, by path."""
+    seen: dict[str, list[float]] = {}
+    for quantity in task.observed(model):
+        seen[quantity.path] = []
     paths = leaves(task.definition.Observation)
 
     def noted(store: Any, tile: Any, lane: int, record: Any, scale: Any) -> None:
         if lane < PLAIN_LANES:
-            for path, value, factor in zip(
-                paths, flat(record), flat(scale), strict=True
-            ):
+            values = flat(record)
+            factors = flat(scale)
+            for path, value, factor in zip(paths, values, factors, strict=True):
                 if path in seen:
                     seen[path].append(value * factor)
         store(tile, lane, record, scale)
@@ -97,61 +105,78 @@ def _plain_engine(
 
 
 def _orders(engine: Engine, step: int) -> Floats:
-    """What a beginner orders: nothing, hard over, to and fro; the same for the same lane."""
-    lanes = np.arange(engine.num_envs)
-    swing = np.sin(0.11 * step * (1.0 + 0.3 * (lanes % 7)) + lanes)
-    kinds = np.stack([swing, np.sign(swing), np.zeros(len(lanes)), np.ones(len(lanes))])
-    rudder = kinds[lanes % 4, np.arange(len(lanes))]
+    """Orders of a beginner: to and fro, hard over, nothing; the same for a lane."""
+    n_lanes = engine.num_envs
+    lanes = np.arange(n_lanes)
+    # each lane swings in a way of its own
+    frequency = 0.11 * (1.0 + 0.3 * (lanes % 7))
+    swing = np.sin(frequency * step + lanes)
+    kinds = np.stack(
+        [
+            swing,
+            np.sign(swing),
+            np.zeros(n_lanes),
+            np.ones(n_lanes),
+        ]
+    )
+    kind = lanes % len(kinds)
+    rudder = kinds[kind, lanes]
     return np.repeat(rudder[:, None], engine.task.n_commands, axis=1)
 
 
 def _sail_in_python(plain: Engine) -> None:
-    """Some steps in plain Python; the first error is an InputError that names its line and the step."""
+    """Take some steps in plain Python; InputError names line and step of an error."""
     for step in range(PLAIN_STEPS):
+        orders = _orders(plain, step)
         try:
-            asked(plain.step, _orders(plain, step))
+            asked(plain.step, orders)
         except InputError as error:
             raise InputError(f"{error}, at step {step + 1} in plain Python") from error
 
 
 def _not_finite(engine: Engine) -> Iterator[str]:
-    """Parts of the reward, of the state and observations that are no finite numbers, each once."""
-    seen = engine.reset(np.arange(engine.num_envs))
-    definition = engine.task.definition
-    names = [
-        path
-        for path in leaves(definition.State)
-        if path in engine.program.state_rows["task_state"].present
-    ]
+    """Numbers of reward, state and observations that are not finite, each once."""
+    observations = engine.reset(np.arange(engine.num_envs))
     found: set[str] = set()
     for step in range(min(STEPS, engine.task.episode_steps) + 1):
         if step > 0:
-            seen, *_ = engine.step(_orders(engine, step - 1))
-        numbers: dict[str, NDArray[Any]] = {
-            f"State.{name}": engine.read(name) for name in names
-        }
-        numbers |= {name: engine.info(name) for name in engine.task.reward_parts}
-        observed = engine.task.observed(engine.model)
-        numbers |= {
-            f"Observation.{quantity.path}": seen[:, k]
-            for k, quantity in enumerate(observed)
-        }
-        for name, values in numbers.items():
-            if name not in found and not np.isfinite(values).all():
-                found.add(name)
-                lane = int(np.argmax(~np.isfinite(values)))
-                source = (
-                    definition.reward_source
-                    if name.startswith("reward_")
-                    else definition.source
-                )
-                if name.startswith("Observation.") and engine.task.sensors is not None:
-                    source = f"{source}, or the sensors of {engine.task.sensors.source}"
-                where = f"in lane {lane} at step {step}"
-                yield (
-                    f"{source}: {name} is {values[lane]} {where}, expected finite"
-                    " numbers"
-                )
+            observations, *_ = engine.step(_orders(engine, step - 1))
+        for name, values in _numbers(engine, observations).items():
+            wrong = ~np.isfinite(values)
+            if name in found or not wrong.any():
+                continue
+            found.add(name)
+            lane = int(np.argmax(wrong))
+            yield (
+                f"{_source_of(name, engine.task)}: {name} is {values[lane]} in lane"
+                f" {lane} at step {step}, expected finite numbers"
+            )
+
+
+def _numbers(
+    engine: Engine,
+    observations: NDArray[np.float32],
+) -> dict[str, NDArray[Any]]:
+    """Numbers of the task's state, of the reward and of observations by name."""
+    numbers: dict[str, NDArray[Any]] = {}
+    for path in engine.program.state_rows["task_state"].present:
+        numbers[f"State.{path}"] = engine.read(path)
+    for name in engine.task.reward_parts:
+        numbers[name] = engine.info(name)
+    observed = engine.task.observed(engine.model)
+    for quantity, values in zip(observed, observations.T, strict=True):
+        numbers[f"Observation.{quantity.path}"] = values
+    return numbers
+
+
+def _source_of(name: str, task: Task) -> str:
+    """File that a number comes from, for messages."""
+    definition = task.definition
+    if name.startswith("reward_"):
+        return definition.reward_source
+    if task.sensors is None or not name.startswith("Observation."):
+        return definition.source
+    return f"{definition.source}, or the sensors of {task.sensors.source}"
 
 
 def _differ(
@@ -162,54 +187,54 @@ def _differ(
     agreement: float,
     ways: tuple[str, str],
 ) -> Iterator[str]:
-    """Observations and rewards of an engine's lanes that are not those of another, steered alike."""
+    """First difference of an engine's lanes from another's under the same orders."""
+    names = ["reward"]
+    for quantity in one.task.observed(one.model):
+        names.append(f"Observation.{quantity.path}")
+
     seeds = np.arange(one.num_envs)
-    seen, expected = one.reset(seeds)[lanes], other.reset(seeds[lanes])
-    earned: Floats = np.zeros(other.num_envs)
-    due = earned
-    paths = [
-        f"Observation.{quantity.path}" for quantity in one.task.observed(one.model)
-    ]
+    rewards: Floats = np.zeros(one.num_envs)
+    other_rewards: Floats = np.zeros(other.num_envs)
+    observations = one.reset(seeds)
+    other_observations = other.reset(seeds[lanes])
     for step in range(min(steps, one.task.episode_steps) + 1):
-        first, second = (
-            np.column_stack([earned, seen]),
-            np.column_stack([due, expected]),
+        results = np.column_stack([rewards, observations])[lanes]
+        expected = np.column_stack([other_rewards, other_observations])
+        close = np.isclose(
+            results,
+            expected,
+            rtol=agreement,
+            atol=agreement,
+            equal_nan=True,
         )
-        wrong = np.argwhere(
-            ~np.isclose(first, second, rtol=agreement, atol=agreement, equal_nan=True)
-        )
-        for lane, k in wrong[:1]:
-            name, found, expects = (
-                ["reward", *paths][k],
-                first[lane, k],
-                second[lane, k],
-            )
+        wrong = np.argwhere(~close)
+        if len(wrong):
+            lane, column = wrong[0]
             yield (
-                f"{name} is {found} {ways[0]} and {expects} {ways[1]} in lane"
-                f" {seeds[lanes][lane]} at step {step}; look for what differs, such as"
-                " a global that changes"
+                f"{names[column]} is {results[lane, column]} {ways[0]} and"
+                f" {expected[lane, column]} {ways[1]} in lane {seeds[lanes][lane]} at"
+                f" step {step}; look for what differs, such as a global that changes"
             )
             return
+
         orders = _orders(one, step)
-        seen, earned, *_ = one.step(orders)
-        seen, earned = seen[lanes], earned[lanes]
-        expected, due, *_ = other.step(orders[lanes])
+        observations, rewards, *_ = one.step(orders)
+        other_observations, other_rewards, *_ = other.step(orders[lanes])
 
 
 def _often_clipped(task: Task, seen: dict[str, list[float]]) -> Iterator[str]:
     """Observations that are often beyond their bounds."""
-    for path, values in seen.items():
+    for path, observed in seen.items():
         spec = task.definition.observations[path]
-        low, high = spec.low, spec.high
-        beyond = [
-            value for value in values if value < low - BEYOND or value > high + BEYOND
-        ]
-        part = len(beyond) / len(values)
+        values = np.array(observed)
+        is_beyond = (values < spec.low - BEYOND) | (values > spec.high + BEYOND)
+        part = np.mean(is_beyond)
         if part > OFTEN:
-            furthest = max(beyond, key=abs)
+            beyond = values[is_beyond]
+            furthest = beyond[np.abs(beyond).argmax()]
             yield (
                 f"Observation.{path}: {furthest:.3g} found in units of its scale,"
-                f" beyond its bounds {low:g} to {high:g} in {100.0 * part:.0f} % of the"
-                " steps, and clipped; give it wider bounds or a larger scale if more"
-                " is to be seen"
+                f" beyond its bounds {spec.low:g} to {spec.high:g} in"
+                f" {100.0 * part:.0f} % of the steps, and clipped; give it wider bounds"
+                " or a larger scale if more is to be seen"
             )

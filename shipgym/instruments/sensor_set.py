@@ -44,10 +44,18 @@ def read_sensors(source: Any) -> SensorSet:
     if isinstance(source, SensorSet):
         return source
     namespace, where = read_source(source)
+    check_namespace(namespace, where, ("Settings", "Memory"), FUNCTIONS)
+    return _sensors_of(namespace, where)
+
+
+def _sensors_of(namespace: Any, where: str) -> SensorSet:
     return SensorSet(
-        where,
-        where,
-        **check_namespace(namespace, where, ("Settings", "Memory"), FUNCTIONS),
+        name=where,
+        source=where,
+        Settings=namespace.Settings,
+        Memory=namespace.Memory,
+        measure=namespace.measure,
+        readings=namespace.readings,
     )
 
 
@@ -55,5 +63,6 @@ def read_sensors(source: Any) -> SensorSet:
 def shipped_sensors(windy: bool, noise: bool, filtered: bool) -> SensorSet:
     """Choose a shipped sensor set: without error in calm water, else a bridge's."""
     if windy or noise or filtered:
-        return replace(read_sensors(bridge), noise=noise, filter=filtered)
-    return read_sensors(perfect)
+        sensors = _sensors_of(bridge, str(bridge.__file__))
+        return replace(sensors, noise=noise, filter=filtered)
+    return _sensors_of(perfect, str(perfect.__file__))

@@ -101,19 +101,28 @@ class Observation(NamedTuple):
 
 
 def begin(
-    ship: Ship, settings: Settings, random: Random, plan: Numbers
+    ship: Ship,
+    settings: Settings,
+    random: Random,
+    plan: Numbers,
 ) -> tuple[Motion, State]:
     """Begin an episode on a random heading, with a first set-point."""
     heading = drawn(random, 0, -pi, pi)
     motion = at_service_speed(0.0, 0.0, heading, ship)
-    state = changed(State(heading, 0.0, 0.0, 0.0, 0.0), 0.0, settings, random)
-    error = wrap(state.heading_setpoint - heading)
+    before = State(
+        heading_setpoint=heading,
+        next_change=0.0,
+        changes=0.0,
+        integral=0.0,
+        heading_error=0.0,
+    )
+    state = changed(before, 0.0, settings, random)
     return motion, State(
         heading_setpoint=state.heading_setpoint,
         next_change=state.next_change,
         changes=1.0,
         integral=0.0,
-        heading_error=error,
+        heading_error=wrap(state.heading_setpoint - heading),
     )
 
 
@@ -139,7 +148,11 @@ def changed(state: State, steps: float, settings: Settings, random: Random) -> S
 
 
 def due(
-    motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings
+    motion: Motion,
+    state: State,
+    interval: Interval,
+    ship: Ship,
+    settings: Settings,
 ) -> bool:
     """Return whether the set-point changes."""
     return interval.steps >= state.next_change
@@ -159,7 +172,11 @@ def on_event(
 
 
 def step(
-    motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings
+    motion: Motion,
+    state: State,
+    interval: Interval,
+    ship: Ship,
+    settings: Settings,
 ) -> tuple[State, Reward, bool, bool]:
     """Judge an interval: its cost, and whether control is lost."""
     weights = settings.weights
@@ -188,7 +205,11 @@ def worst_cost(settings: Settings) -> float:
 
 
 def observe(
-    readings: Readings, state: State, interval: Interval, ship: Ship, settings: Settings
+    readings: Readings,
+    state: State,
+    interval: Interval,
+    ship: Ship,
+    settings: Settings,
 ) -> Observation:
     """Observe what every autopilot does."""
     return Observation(

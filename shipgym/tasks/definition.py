@@ -2,6 +2,7 @@
 
 import importlib
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -109,7 +110,8 @@ class TaskDefinition(Configurable):
     source : str
         Place of the file, for messages.
     Settings, State, Reward, Observation : type
-    begin, step, observe, due, on_event, worst_cost, plan_length, check, listed : callable
+    begin, step, observe : callable
+    due, on_event, worst_cost, plan_length, check, listed : callable
     reported : tuple of str
         Fields of the state that `info` has.
     episode_steps : int
@@ -142,7 +144,8 @@ class TaskDefinition(Configurable):
         kinds = field_types(self.State, notes=True)
         flags = []
         for name in self.reported:
-            if bool in getattr(kinds[name], "__metadata__", ()):
+            notes = getattr(kinds[name], "__metadata__", ())
+            if bool in notes:
                 flags.append(name)
         return tuple(flags)
 
@@ -210,44 +213,71 @@ def read_definition(source: Any, reward: Any = None) -> TaskDefinition:
     definition = source if known else _definition(source)
     if reward is not None:
         definition = _with_reward(definition, reward)
-    _check_names(definition)
     return _KNOWN.setdefault(definition, definition)
 
 
 def _definition(source: Any) -> TaskDefinition:
     if isinstance(source, str) and source in TASKS:
-        source = importlib.import_module(TASKS[source])
-    elif isinstance(source, str) and Path(source).suffix != ".py":
+        module = importlib.import_module(TASKS[source])
+        return _definition_of(module, str(module.__file__))
+    if isinstance(source, str) and Path(source).suffix != ".py":
         raise InputError(
             f"task: expected the path of a .py file or one of {quoted(TASKS)}, got"
             f" {source!r}.{did_you_mean(source, TASKS)}"
         )
-    namespace, where = read_source(source)
-    optional = [name for name in FUNCTIONS if name not in NEEDED]
-    found = check_namespace(namespace, where, RECORDS, FUNCTIONS, optional)
-    name = check_text(getattr(namespace, "NAME", Path(where).stem), f"{where}: NAME")
-    reported = _reported(namespace, found["State"], f"{where}: REPORTED")
-    steps = getattr(namespace, "EPISODE_STEPS", TaskDefinition.episode_steps)
-    check_whole(steps, f"{where}: EPISODE_STEPS", at_least=1)
 
-    definition = TaskDefinition(
-        name=name, source=where, reported=reported, episode_steps=steps, **found
-    )
+    namespace, where = read_source(source)
+    _check_task(namespace, where)
+    definition = _definition_of(namespace, where)
     for path, spec in definition.observations.items():
         _check_observation(spec, f"{where}: Observation.{path}")
+    _check_names(definition)
     return definition
 
 
-def _reported(namespace: Any, state: Any, where: str) -> tuple[str, ...]:
+def _definition_of(namespace: Any, where: str) -> TaskDefinition:
+    """Take what is defined in a namespace, defaults in place of what is not."""
+    found = {}
+    for name in (*RECORDS, *FUNCTIONS):
+        if hasattr(namespace, name):
+            found[name] = getattr(namespace, name)
+    return TaskDefinition(
+        name=getattr(namespace, "NAME", Path(where).stem),
+        source=where,
+        reported=tuple(getattr(namespace, "REPORTED", ())),
+        episode_steps=getattr(namespace, "EPISODE_STEPS", TaskDefinition.episode_steps),
+        **found,
+    )
+
+
+def _check_task(namespace: Any, where: str) -> None:
+    """Refuse a namespace that lacks what a task defines, or has it in another form."""
+    check_namespace(
+        namespace,
+        where,
+        records=RECORDS,
+        functions=FUNCTIONS,
+        optional=[name for name in FUNCTIONS if name not in NEEDED],
+    )
+    _check_reported(namespace, where)
+    if hasattr(namespace, "NAME"):
+        check_text(namespace.NAME, f"{where}: NAME")
+    if hasattr(namespace, "EPISODE_STEPS"):
+        steps = namespace.EPISODE_STEPS
+        check_whole(steps, f"{where}: EPISODE_STEPS", at_least=1)
+
+
+def _check_reported(namespace: Any, where: str) -> None:
     """Check which fields of a state are to be reported."""
     reported = getattr(namespace, "REPORTED", ())
+    where = f"{where}: REPORTED"
     expected = f"a tuple of fields of State, none of {TAKEN}"
     if not isinstance(reported, tuple | list):
         raise unexpected(where, expected, reported)
+    fields = namespace.State._fields
     for name in reported:
-        if name not in state._fields or name in TAKEN:
+        if name not in fields or name in TAKEN:
             raise unexpected(where, expected, name)
-    return tuple(reported)
 
 
 def _check_observation(spec: ObservationSpec | None, where: str) -> None:
@@ -269,26 +299,29 @@ def _check_observation(spec: ObservationSpec | None, where: str) -> None:
 
 def _check_names(definition: TaskDefinition) -> None:
     """Refuse two fields of one name; those of records within count as the record's."""
-    names_of = {
-        "Reward": ("end", *definition.reward_names),
-        "Settings": tuple(definition.settings),
-        "Observation": last_names(definition.observations),
-    }
-    for record, names in names_of.items():
-        twice = [name for name in names if names.count(name) > 1]
-        if twice:
-            where = definition.source
-            if record == "Reward":
-                where = definition.reward_source
-            also = "; the engine has one of that name" if twice[0] == "end" else ""
+    source = definition.source
+    rewards = ("end", *definition.reward_names)
+    observations = last_names(definition.observations)
+    _check_differ(rewards, f"{definition.reward_source}: Reward")
+    _check_differ(definition.settings, f"{source}: Settings")
+    _check_differ(observations, f"{source}: Observation")
+
+
+def _check_differ(names: Iterable[str], where: str) -> None:
+    for name, count in Counter(names).items():
+        if count > 1:
+            also = "; the engine has one of that name" if name == "end" else ""
             raise InputError(
-                f"{where}: {record}: expected names that differ, got two fields"
-                f" {twice[0]!r}{also}"
+                f"{where}: expected names that differ, got two fields {name!r}{also}"
             )
 
 
 def rewarded_step(
-    motion: Any, state: Any, interval: Any, ship: Any, settings: Any
+    motion: Any,
+    state: Any,
+    interval: Any,
+    ship: Any,
+    settings: Any,
 ) -> Any:
     """Step of a task with the reward of another file."""
     after, _, failed, arrived = step_of_task(motion, state, interval, ship, settings)
@@ -305,11 +338,18 @@ def _with_reward(definition: TaskDefinition, source: Any) -> TaskDefinition:
     namespace, where = read_source(source)
     has_step = hasattr(namespace, "step") and not hasattr(namespace, "reward")
     name = "step" if has_step else "reward"
-    functions = {name: MOMENT, "worst_cost": ("settings",)}
-    found = check_namespace(namespace, where, ("Reward",), functions, ("worst_cost",))
-    if name == "reward":
+    found = check_namespace(
+        namespace,
+        where,
+        records=("Reward",),
+        functions={name: MOMENT, "worst_cost": ("settings",)},
+        optional=("worst_cost",),
+    )
+    if not has_step:
         found["step"] = _filled(definition.step, found.pop("reward"))
-    return replace(definition, **found)
+    rewarded = replace(definition, **found)
+    _check_names(rewarded)
+    return rewarded
 
 
 def _filled(step: Any, reward: Any) -> FunctionType:

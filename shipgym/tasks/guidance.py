@@ -47,7 +47,7 @@ class Path:
 
     @cached_property
     def turns(self) -> Floats:
-        """Change of course after each leg, rad, positive to starboard; 0 at the last."""
+        """Change of course after each leg, rad, to starboard; 0 at the last."""
         return np.append(wrapped(np.diff(self.courses)), 0.0)
 
     @property
@@ -62,25 +62,28 @@ class Path:
         """
         sharpest_deg = 150.0  # beyond it a path doubles back
         turns = np.abs(self.turns)
-        for k, turn_deg in enumerate(np.degrees(turns)):
+        for row, turn_deg in enumerate(np.degrees(turns), start=1):
             if turn_deg > sharpest_deg:
                 raise InputError(
-                    f"waypoints: row {k + 1}: expected a turn of {sharpest_deg:.0f} deg"
+                    f"waypoints: row {row}: expected a turn of {sharpest_deg:.0f} deg"
                     f" at most, got {turn_deg:.0f} deg: the path doubles back"
                 )
 
         # waypoints without a turn divide a leg
-        corners = [0, *(np.flatnonzero(turns > NO_TURN) + 1), self.n_legs]
-        ends = np.append(0.0, np.cumsum(self.lengths))[corners]
-        tangents = radius * np.tan(0.5 * np.append(0.0, turns)[corners])
-        for k, length in enumerate(np.diff(ends)):
+        has_turn = turns[:-1] > NO_TURN
+        corners = [0, *np.flatnonzero(has_turn) + 1, self.n_legs]
+        along_track = np.append(0.0, np.cumsum(self.lengths))
+        lengths = np.diff(along_track[corners])
+        turns_at = np.append(0.0, turns)[corners]
+        tangents = radius * np.tan(0.5 * turns_at)
+        for k, length in enumerate(lengths):
             needed = tangents[k] + tangents[k + 1]
             if length < needed * (1.0 - 1e-9):
                 raise InputError(
                     f"waypoints: rows {corners[k]} and {corners[k + 1]}: expected a"
-                    f" distance of at least {needed:.6g} m, which turns with a radius of"
-                    f" {radius:.6g} m take, got {length:.6g} m; set them further apart,"
-                    " or set a smaller turn_radius"
+                    f" distance of at least {needed:.6g} m, which turns with a radius"
+                    f" of {radius:.6g} m take, got {length:.6g} m; set them further"
+                    " apart, or set a smaller turn_radius"
                 )
 
 
@@ -98,24 +101,30 @@ def track(waypoints: Floats | None, turn_radius: float | None) -> Floats | None:
     if waypoints is None or turn_radius is None:
         return waypoints
     path = Path(waypoints)
-    pieces = [path.waypoints[:1]]
-    for k, corner in enumerate(path.waypoints[1:-1]):
+    first, *corners, last = path.waypoints
+    pieces = [[first]]
+    for k, corner in enumerate(corners):
         arc = _arc(path.courses[k], path.turns[k])
         pieces.append(corner + turn_radius * arc)
-    return np.concatenate([*pieces, path.waypoints[-1:]])
+    pieces.append([last])
+    return np.concatenate(pieces)
 
 
 def _arc(course: float, turn: float) -> Floats:
     """Points of a turn of radius 1 about its corner, north and east, shape (n, 2)."""
-    between = np.radians(5.0)
-    n_points = 2 + int(abs(turn) / between)
+    spacing = np.radians(5.0)
+    n_points = 2 + int(abs(turn) / spacing)
     courses = course + np.linspace(0.0, turn, n_points)
     sine = np.sin(course)
     cosine = np.cos(course)
+
+    # from where the turn begins, and that less the tangent to the corner
     side = np.sign(turn)
     tangent = abs(np.tan(0.5 * turn))
-    north = side * (np.sin(courses) - sine) - tangent * cosine
-    east = side * (cosine - np.cos(courses)) - tangent * sine
+    north = side * (np.sin(courses) - sine)
+    east = side * (cosine - np.cos(courses))
+    north -= tangent * cosine
+    east -= tangent * sine
     return np.stack([north, east], axis=-1)
 
 

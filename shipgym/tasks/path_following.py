@@ -32,6 +32,7 @@ from shipgym.tasks.contract import (
 )
 from shipgym.tasks.guidance import Path
 from shipgym.tasks.planned_legs import (
+    Fix,
     Leg,
     fix,
     leg_after,
@@ -220,8 +221,8 @@ def check_corridor(corridor: float, model: Any) -> None:
     width = 2.0 * corridor * model.particulars["length"]
     if beam is not None and width <= beam:
         raise InputError(
-            f"corridor: expected more than the beam of {model.name!r}, {beam:.1f} m, got"
-            f" {width:.1f} m, {corridor:g} ship lengths to each side"
+            f"corridor: expected more than the beam of {model.name!r}, {beam:.1f} m,"
+            f" got {width:.1f} m, {corridor:g} ship lengths to each side"
         )
 
 
@@ -249,34 +250,38 @@ def listed(waypoints: Any) -> Numbers:
         paths = list(waypoints)
 
     points = [Path(path).waypoints for path in paths]
-    most = max(map(len, points))
+    most = max(len(path) for path in points)
     numbers = [np.array([most])]
     for path in points:
         *before, start, end = path
         missing = most - len(path)
         last_leg = np.linspace(start, end, 2 + missing)
-        numbers += [*before, last_leg.ravel()]
+        numbers += before
+        numbers.append(last_leg.ravel())
     return np.concatenate(numbers, dtype=np.float64)
 
 
 def plan_length(settings: Settings) -> int:
     """Length of a plan, which holds north and east of each waypoint."""
-    n_waypoints = int(settings.n_legs) + 1
-    if len(settings.waypoints):
+    if len(settings.waypoints) == 0:
+        n_waypoints = int(settings.n_legs) + 1
+    else:
         n_waypoints = int(settings.waypoints[0])
     return 2 * n_waypoints
 
 
 def lay_path(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> None:
     """Write the waypoints of an episode into its plan: of a listed path, or drawn."""
-    n_paths = (len(settings.waypoints) - 1) // len(plan)
-    if n_paths > 0:
-        chosen = int(drawn(random, PATH_DRAW, 0.0, float(n_paths)))
-        first = 1 + len(plan) * chosen
-        for k in range(len(plan)):
-            plan[k] = settings.waypoints[first + k]
-    else:
+    waypoints = settings.waypoints
+    if len(waypoints) == 0:
         draw_path(ship, settings, random, plan)
+        return
+    size = len(plan)
+    n_paths = (len(waypoints) - 1) // size
+    chosen = int(drawn(random, PATH_DRAW, 0.0, float(n_paths)))
+    first = 1 + size * chosen
+    for k in range(size):
+        plan[k] = waypoints[first + k]
 
 
 def draw_path(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> None:
@@ -289,11 +294,13 @@ def draw_path(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> 
     for k in range(len(plan) // 2):
         plan[2 * k] = north
         plan[2 * k + 1] = east
-        length = ship.length * drawn(random, 1 + 2 * k, shortest, longest)
+        lengths = drawn(random, 1 + 2 * k, shortest, longest)
+        turn = drawn(random, 2 + 2 * k, -largest, largest)
         sine, cosine = sin_cos(course)
+        length = ship.length * lengths
         north += length * cosine
         east += length * sine
-        course += drawn(random, 2 + 2 * k, -largest, largest)
+        course += turn
 
 
 def start(leg: Leg, ship: Ship, settings: Settings, random: Random) -> Motion:
@@ -302,13 +309,19 @@ def start(leg: Leg, ship: Ship, settings: Settings, random: Random) -> Motion:
     largest = pi / 12.0
     aside = drawn(random, START_DRAW, -furthest, furthest)
     askew = drawn(random, START_DRAW + 1, -largest, largest)
-    x = leg.north - aside * leg.sine
-    y = leg.east + aside * leg.cosine
-    return at_service_speed(x, y, leg.course + askew, ship)
+    return at_service_speed(
+        x=leg.north - aside * leg.sine,
+        y=leg.east + aside * leg.cosine,
+        psi=leg.course + askew,
+        ship=ship,
+    )
 
 
 def begin(
-    ship: Ship, settings: Settings, random: Random, plan: Numbers
+    ship: Ship,
+    settings: Settings,
+    random: Random,
+    plan: Numbers,
 ) -> tuple[Motion, State]:
     """Begin an episode near the first waypoint."""
     lay_path(ship, settings, random, plan)
@@ -333,7 +346,11 @@ def begin(
 
 
 def due(
-    motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings
+    motion: Motion,
+    state: State,
+    interval: Interval,
+    ship: Ship,
+    settings: Settings,
 ) -> bool:
     """Return whether the next turn is over."""
     radius = settings.turn_radius * ship.length
@@ -376,52 +393,92 @@ def on_event(
 
 
 def step(
-    motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings
+    motion: Motion,
+    state: State,
+    interval: Interval,
+    ship: Ship,
+    settings: Settings,
 ) -> tuple[State, Reward, bool, bool]:
     """Judge an interval: its costs, and whether the ship is aground or has arrived."""
     leg = state.leg
     at = fix(motion.x, motion.y, leg, ship, settings)
-    error = wrap(at.course - motion.psi)
-    integral = integrated(state.integral, error, interval, ship, settings.weights)
-    is_last = leg.turn == 0.0
-    made_good = pick(is_last, min(at.along_track, leg.turn_at), at.along_track)
     off = fabs(at.cross_track) / ship.length
     within = off <= settings.corridor
     aground = off > settings.ground
-    arrived = is_last & (at.along_track >= leg.turn_at) & within
+    arrived = at_the_end(at, leg) & within
 
+    error = wrap(at.course - motion.psi)
+    integral = integrated(state.integral, error, interval, ship, settings.weights)
+    activity, reversed_now = activity_after(motion, state, settings)
     travel = fabs(motion.delta - interval.rudder_before)
-    smallest = (pi / 180.0) * settings.reversal_deg
-    activity, reversed_now = rudder_activity(
-        state.rudder_activity, motion.delta, smallest
-    )
-    minutes = max(interval.steps, 1.0) * interval.dt / 60.0
-
-    progress = (made_good - state.distance_made_good) * (1.0 / interval.dt)
-    by_corridor = off * (1.0 / settings.corridor)
-    by_scale = travel * (180.0 / pi) / settings.weights.heading_scale_deg
-    reward = Reward(
-        cross_track=-by_corridor * by_corridor,
-        progress=clip(progress / ship.scale_speed, 1.0 - WORST_PROGRESS, 1.0) - 1.0,
-        rudder_travel=-settings.rudder_travel_weight * by_scale,
-        reversals=-settings.reversal_weight * reversed_now,
-        steering=steering_reward(motion, interval, ship, settings.weights),
-    )
     after = State(
         leg=leg,
         heading_setpoint=at.course,
         integral=integral,
         heading_error=error,
         cross_track=at.cross_track,
-        distance_made_good=made_good,
+        distance_made_good=made_good(at, leg),
         success=pick(arrived, 1.0, 0.0),
         in_corridor=pick(within, 1.0, 0.0),
         grounded=pick(aground, 1.0, 0.0),
         rudder_activity=activity,
         rudder_travel=state.rudder_travel + travel,
-        reversals_per_minute=activity.reversals / minutes,
+        reversals_per_minute=activity.reversals / minutes_of(interval),
+    )
+    made_now = after.distance_made_good - state.distance_made_good
+    reward = Reward(
+        cross_track=cross_track_reward(off, settings),
+        progress=progress_reward(made_now, interval, ship),
+        rudder_travel=rudder_travel_reward(travel, settings),
+        reversals=-settings.reversal_weight * reversed_now,
+        steering=steering_reward(motion, interval, ship, settings.weights),
     )
     return after, reward, aground, arrived
+
+
+def activity_after(
+    motion: Motion,
+    state: State,
+    settings: Settings,
+) -> tuple[RudderActivity, float]:
+    """How the rudder has been turned so far, and 1 if it has just been reversed."""
+    smallest = (pi / 180.0) * settings.reversal_deg
+    return rudder_activity(state.rudder_activity, motion.delta, smallest)
+
+
+def at_the_end(at: Fix, leg: Leg) -> bool:
+    """Return whether a ship has come to the end of the path, or passed it."""
+    is_last = leg.turn == 0.0
+    return is_last & (at.along_track >= leg.turn_at)
+
+
+def made_good(at: Fix, leg: Leg) -> float:
+    """Distance made good along the path, m, which the end of the path bounds."""
+    is_last = leg.turn == 0.0
+    return pick(is_last, min(at.along_track, leg.turn_at), at.along_track)
+
+
+def minutes_of(interval: Interval) -> float:
+    """Minutes since the start, of one interval at least."""
+    return max(interval.steps, 1.0) * interval.dt / 60.0
+
+
+def cross_track_reward(off: float, settings: Settings) -> float:
+    """Cost of a distance from the path, in ship lengths, with the sign turned."""
+    by_corridor = off * (1.0 / settings.corridor)
+    return -by_corridor * by_corridor
+
+
+def progress_reward(made_now: float, interval: Interval, ship: Ship) -> float:
+    """Cost of way made along the path in an interval, m, that is missing."""
+    progress = made_now * (1.0 / interval.dt)
+    return clip(progress / ship.scale_speed, 1.0 - WORST_PROGRESS, 1.0) - 1.0
+
+
+def rudder_travel_reward(travel: float, settings: Settings) -> float:
+    """Cost of rudder travel in an interval, rad, with the sign turned."""
+    by_scale = travel * (180.0 / pi) / settings.weights.heading_scale_deg
+    return -settings.rudder_travel_weight * by_scale
 
 
 def worst_cost(settings: Settings) -> float:
@@ -432,11 +489,13 @@ def worst_cost(settings: Settings) -> float:
 
 def over_ground(course: float, readings: Readings, ship: Ship) -> tuple[float, float]:
     """Sine and cosine of a course less the course over ground; both 0 without way."""
-    standstill = 1e-6 * ship.scale_speed
     ahead = readings.ahead
     aside = readings.aside
-    square = max(ahead * ahead + aside * aside, standstill * standstill)
-    per_speed = 1.0 / sqrt(square)
+    standstill = 1e-6 * ship.scale_speed
+    square = ahead * ahead + aside * aside
+    speed = sqrt(max(square, standstill * standstill))
+    per_speed = 1.0 / speed
+
     sine, cosine = sin_cos(course - readings.track_psi)
     across = sine * ahead - cosine * aside
     along = cosine * ahead + sine * aside
@@ -444,7 +503,11 @@ def over_ground(course: float, readings: Readings, ship: Ship) -> tuple[float, f
 
 
 def observe(
-    readings: Readings, state: State, interval: Interval, ship: Ship, settings: Settings
+    readings: Readings,
+    state: State,
+    interval: Interval,
+    ship: Ship,
+    settings: Settings,
 ) -> Observation:
     """Observe the path from where the instruments show the ship."""
     leg = state.leg

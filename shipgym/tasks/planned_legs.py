@@ -44,6 +44,27 @@ class Fix(NamedTuple):
     turned: float  # rad, of the next turn, without its sign
 
 
+class OnLeg(NamedTuple):
+    """Position from the first waypoint of a leg."""
+
+    ahead: float  # m, along the leg
+    aside: float  # m, to starboard of it
+
+
+class OnArc(NamedTuple):
+    """Position on the arc of a turn."""
+
+    turned: float  # rad, from the beginning of the turn, without its sign
+    cross_track: float  # m, to starboard
+
+
+class Waypoint(NamedTuple):
+    """Point of a plan."""
+
+    north: float  # m
+    east: float  # m
+
+
 class Course(NamedTuple):
     """Straight line from one waypoint to another."""
 
@@ -51,16 +72,33 @@ class Course(NamedTuple):
     direction: float  # rad
 
 
+def waypoint(number: int, plan: Numbers) -> Waypoint:
+    """Return a waypoint of a plan."""
+    north = plan[2 * number]
+    east = plan[2 * number + 1]
+    return Waypoint(north, east)
+
+
+def last_waypoint(plan: Numbers) -> int:
+    """Number of the last waypoint of a plan."""
+    return len(plan) // 2 - 1
+
+
 def between(number: int, other: int, plan: Numbers) -> Course:
     """Length and direction from a waypoint to another."""
-    north = plan[2 * other] - plan[2 * number]
-    east = plan[2 * other + 1] - plan[2 * number + 1]
-    return Course(sqrt(north * north + east * east), arctan2(east, north))
+    start = waypoint(number, plan)
+    end = waypoint(other, plan)
+    north = end.north - start.north
+    east = end.east - start.east
+    return Course(
+        length=sqrt(north * north + east * east),
+        direction=arctan2(east, north),
+    )
 
 
 def change_of_course(number: int, plan: Numbers) -> float:
     """Change of course at a waypoint, rad; 0 at the first and the last."""
-    if number == 0 or 2 * number + 2 >= len(plan):
+    if number == 0 or number >= last_waypoint(plan):
         return 0.0
     before = between(number - 1, number, plan)
     after = between(number, number + 1, plan)
@@ -69,7 +107,7 @@ def change_of_course(number: int, plan: Numbers) -> float:
 
 def next_turn(number: int, plan: Numbers) -> int:
     """Return the next waypoint with a turn, or the last."""
-    last = len(plan) // 2 - 1
+    last = last_waypoint(plan)
     number = min(number + 1, last)
     while number < last and fabs(change_of_course(number, plan)) < NO_TURN:
         number += 1
@@ -82,7 +120,7 @@ def tangent(turn: float, radius: float) -> float:
 
 
 def leg_from(number: int, along_track: float, radius: float, plan: Numbers) -> Leg:
-    """Leg behind the turn at a waypoint, which is over at a place along the track, m."""
+    """Leg behind the turn at a waypoint, which ends at a place along the track, m."""
     first = next_turn(number, plan)
     second = next_turn(first, plan)
     turn = change_of_course(first, plan)
@@ -90,6 +128,7 @@ def leg_from(number: int, along_track: float, radius: float, plan: Numbers) -> L
     taken = tangent(turn, radius)
     taken_by_second = tangent(second_turn, radius)
 
+    start = waypoint(number, plan)
     leg = between(number, first, plan)
     begins = along_track - tangent(change_of_course(number, plan), radius)
     turn_at = begins + leg.length - taken
@@ -100,8 +139,8 @@ def leg_from(number: int, along_track: float, radius: float, plan: Numbers) -> L
     sine, cosine = sin_cos(leg.direction)
     return Leg(
         number=float(number),
-        north=plan[2 * number],
-        east=plan[2 * number + 1],
+        north=start.north,
+        east=start.east,
         cosine=cosine,
         sine=sine,
         course=leg.direction,
@@ -124,32 +163,55 @@ def fix(x: float, y: float, leg: Leg, ship: Ship, settings: Any) -> Fix:
     """
     radius = settings.turn_radius * ship.length
     lookahead = settings.lookahead * ship.length
-    north = x - leg.north
-    east = y - leg.east
-    ahead = north * leg.cosine + east * leg.sine
-    aside = east * leg.cosine - north * leg.sine
+    here = on_leg(x, y, leg)
+    past = here.ahead - (leg.turn_at - leg.begins)
+    arc = on_arc(past, here.aside, leg, radius)
 
-    # from the centre of the turn: along the leg, and towards the leg
-    side = copysign(1.0, leg.turn)
-    past = ahead - (leg.turn_at - leg.begins)
-    outward = radius - side * aside
-    # from there to the middle of the arc, and across that
-    across = past * leg.half_cosine - outward * leg.half_sine
-    to_middle = past * leg.half_sine + outward * leg.half_cosine
-    reach = max(to_middle, INNERMOST * radius)
-    turned = 0.5 * fabs(leg.turn) + arctan2(across, reach)
-    inside = radius - sqrt(across * across + reach * reach) + (reach - to_middle)
-
-    on_arc = (past > 0.0) & (leg.turn != 0.0)
-    along_track = pick(on_arc, leg.turn_at + radius * turned, leg.begins + ahead)
-    cross_track = pick(on_arc, side * inside, aside)
+    is_turning = (past > 0.0) & (leg.turn != 0.0)
+    straight_on = leg.begins + here.ahead
+    round_turn = leg.turn_at + radius * arc.turned
+    along_track = pick(is_turning, round_turn, straight_on)
+    cross_track = pick(is_turning, arc.cross_track, here.aside)
 
     half_ahead = along_track + 0.5 * lookahead
     first = part_of(leg.turn, half_ahead - leg.turn_at, radius)
     second = part_of(leg.second_turn, half_ahead - leg.second_at, radius)
     back = arctan2(cross_track, lookahead)
-    course = leg.course + first + (second - back)
-    return Fix(along_track, cross_track, course, pick(on_arc, turned, 0.0))
+    return Fix(
+        along_track=along_track,
+        cross_track=cross_track,
+        course=leg.course + first + (second - back),
+        turned=pick(is_turning, arc.turned, 0.0),
+    )
+
+
+def on_leg(x: float, y: float, leg: Leg) -> OnLeg:
+    """Position from the first waypoint of a leg, along it and across."""
+    north = x - leg.north
+    east = y - leg.east
+    return OnLeg(
+        ahead=north * leg.cosine + east * leg.sine,
+        aside=east * leg.cosine - north * leg.sine,
+    )
+
+
+def on_arc(past: float, aside: float, leg: Leg, radius: float) -> OnArc:
+    """Position on the turn behind a leg, `past` its beginning and `aside` the leg, m."""
+    # from the centre of the turn: along the leg, and towards the leg
+    side = copysign(1.0, leg.turn)
+    outward = radius - side * aside
+    # from there to the middle of the arc, and across that
+    across = past * leg.half_cosine - outward * leg.half_sine
+    to_middle = past * leg.half_sine + outward * leg.half_cosine
+    reach = max(to_middle, INNERMOST * radius)
+
+    half_turn = 0.5 * fabs(leg.turn)
+    from_centre = sqrt(across * across + reach * reach)
+    inside = radius - from_centre + (reach - to_middle)
+    return OnArc(
+        turned=half_turn + arctan2(across, reach),
+        cross_track=side * inside,
+    )
 
 
 def part_of(turn: float, along_track: float, radius: float) -> float:
@@ -168,7 +230,7 @@ def turn_is_over(leg: Leg, along_track: float, radius: float) -> bool:
 
 
 def leg_after(leg: Leg, radius: float, plan: Numbers) -> Leg:
-    """Leg behind the turn of another, on a plan of which a checkpoint may say anything."""
-    last = len(plan) // 2 - 2
-    number = min(max(0, int(leg.number)), last)
+    """Leg behind the turn of another; a checkpoint may hold any numbers."""
+    last_leg = last_waypoint(plan) - 1
+    number = min(max(0, int(leg.number)), last_leg)
     return leg_from(next_turn(number, plan), turn_end(leg, radius), radius, plan)

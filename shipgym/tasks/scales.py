@@ -40,7 +40,9 @@ def observation_scales(model: ShipModel) -> Floats:
     for annotation in field_types(Helm, notes=True).values():
         spec: ObservationSpec = annotation.__metadata__[0]
         scale = spec.scale
-        scales.append(scale(ship, settings) if callable(scale) else scale)
+        if callable(scale):
+            scale = scale(ship, settings)
+        scales.append(scale)
     return np.array(scales)
 
 
@@ -55,8 +57,8 @@ def control_interval(model: ShipModel) -> float:
 def rounded_interval(length_time: float) -> float:
     """Control interval of a ship that travels her length in a time, s."""
     wanted = length_time / STEPS_PER_LENGTH
-    power = 10.0 ** np.floor(np.log10(wanted))
-    intervals = power * np.array([1.0, 2.0, 5.0, 10.0])
+    decade = np.floor(np.log10(wanted))
+    intervals = 10.0**decade * np.array([1.0, 2.0, 5.0, 10.0])
     off = np.abs(np.log(intervals / wanted))
-    nearest = intervals[off.argmin()]
-    return float(nearest)
+    nearest = off.argmin()
+    return float(intervals[nearest])

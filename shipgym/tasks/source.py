@@ -1,4 +1,4 @@
-"""Files such as tasks, rewards and sensor sets: read, checked, and their settings made."""
+"""Files of tasks, rewards and sensor sets: read, checked, their settings made."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,8 +23,11 @@ def read_source(source: Any) -> tuple[Any, str]:
     namespace = source
     if isinstance(source, str | Path):
         namespace = load_file(Path(source))
-    place = getattr(namespace, "__file__", None)
-    return namespace, str(place or getattr(namespace, "__name__", source))
+    file = getattr(namespace, "__file__", None)
+    if file:
+        return namespace, str(file)
+    name = getattr(namespace, "__name__", source)
+    return namespace, str(name)
 
 
 def kept_source(source: Any) -> Any:
@@ -41,7 +44,7 @@ def check_namespace(
     functions: Mapping[str, Sequence[str]],
     optional: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """Records and functions of a namespace by name, without optional ones that it lacks.
+    """Records and functions of a namespace by name; optional ones may be absent.
 
     `functions` has the arguments of each. Raises InputError naming the file, the name
     and what is expected.
@@ -141,13 +144,15 @@ class Configurable:
 
         InputError for an unknown keyword, or a value out of its range.
         """
+        if not options:
+            return self.Settings()
         check_keys(options, self.settings, f"{self.name} options")
         listed = getattr(self, "listed", np.asarray)
         return make_settings(self.Settings, options, listed)
 
 
 def annotated(record: Record, kind: type) -> Iterator[tuple[str, Any, Any]]:
-    """Name, type and annotation of a kind of each field of a record, None without one."""
+    """Name, type and annotation, if any, of a kind of each field of a record."""
     for name, hint in field_types(record, notes=True).items():
         notes = getattr(hint, "__metadata__", ())
         field_type = hint.__origin__ if notes else hint
@@ -165,14 +170,17 @@ def keywords(record: Record) -> Iterator[tuple[str, Setting, Any]]:
     """
     defaults = record._field_defaults  # type: ignore[attr-defined]
     for name, kind, setting in annotated(record, Setting):
-        if is_record(kind) and kind._field_defaults:
+        has_keywords = is_record(kind) and kind._field_defaults
+        if has_keywords:
             yield from keywords(kind)
         else:
             yield name, setting or UNBOUNDED, defaults.get(name)
 
 
 def make_settings(
-    record: Record, options: Mapping[str, Any], listed: Callable[[Any], Any]
+    record: Record,
+    options: Mapping[str, Any],
+    listed: Callable[[Any], Any],
 ) -> Any:
     """Make a record of settings, given ones in place of its defaults.
 
@@ -184,14 +192,16 @@ def make_settings(
         bounds = setting or UNBOUNDED
         if is_record(kind) and kind._field_defaults:
             values[name] = make_settings(kind, options, listed)
-        elif name in options:
-            value = options[name]
-            if is_list(kind):
-                values[name] = _list_of_numbers(value, name, bounds, listed)
-            elif is_record(kind):
-                values[name] = _small_record(kind, value, name, bounds)
-            else:
-                values[name] = checked_setting(value, name, bounds)
+            continue
+        if name not in options:
+            continue
+        value = options[name]
+        if is_list(kind):
+            values[name] = _list_of_numbers(value, name, bounds, listed)
+        elif is_record(kind):
+            values[name] = _small_record(kind, value, name, bounds)
+        else:
+            values[name] = checked_setting(value, name, bounds)
     return record(**values)
 
 
@@ -210,27 +220,33 @@ def checked_setting(value: Any, name: str, bounds: Setting) -> float:
 
 def _small_record(kind: Any, value: Any, name: str, bounds: Setting) -> Any:
     """Make a record, such as a range, of a sequence of its numbers."""
-    words = [f"the {word}" for word in kind._fields]
+    fields = kind._fields
     is_sequence = isinstance(value, Sequence) and not isinstance(value, str)
-    if not is_sequence or len(value) != len(words):
-        raise unexpected(name, " and ".join(words), value)
+    if not is_sequence or len(value) != len(fields):
+        expected = " and ".join(f"the {field}" for field in fields)
+        raise unexpected(name, expected, value)
     numbers = []
-    for word, number in zip(words, value, strict=True):
-        numbers.append(checked_setting(number, f"{name}: {word}", bounds))
+    for field, number in zip(fields, value, strict=True):
+        place = f"{name}: the {field}"
+        numbers.append(checked_setting(number, place, bounds))
     return kind(*numbers)
 
 
 def _list_of_numbers(
-    value: Any, name: str, bounds: Setting, listed: Callable[[Any], Any]
+    value: Any,
+    name: str,
+    bounds: Setting,
+    listed: Callable[[Any], Any],
 ) -> Any:
     if value is None:
         return np.zeros(0)
-    given = np.asarray(asked(listed, value))
-    if given.ndim != 1:
+    array = np.asarray(asked(listed, value))
+    if array.ndim != 1:
         raise unexpected(name, "a list", value)
-    if len(given) == 0:
+    if len(array) == 0:
         raise InputError(f"{name}: expected one number at least, or None, got none")
     numbers = []
-    for i, number in enumerate(given.tolist()):
-        numbers.append(checked_setting(number, f"{name}: number {i}", bounds))
+    for i, number in enumerate(array.tolist()):
+        place = f"{name}: number {i}"
+        numbers.append(checked_setting(number, place, bounds))
     return np.array(numbers)

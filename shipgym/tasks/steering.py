@@ -173,9 +173,13 @@ def extras(readings: Readings, interval: Interval, ship: Ship) -> Extras:
 
 
 def integrated(
-    integral: float, error: float, interval: Interval, ship: Ship, weights: Weights
+    integral: float,
+    error: float,
+    interval: Interval,
+    ship: Ship,
+    weights: Weights,
 ) -> float:
-    """Integral of the heading error, rad s, which grows only while the error is small."""
+    """Integral of the heading error, rad s; it grows only while the error is small."""
     largest = integral_scale(ship, weights)
     is_large = fabs(error) > radians(weights.integral_zone_deg)
     gathered = pick(is_large, 0.0, error * interval.dt)
@@ -183,7 +187,9 @@ def integrated(
 
 
 def rudder_activity(
-    before: RudderActivity, rudder: float, smallest: float
+    before: RudderActivity,
+    rudder: float,
+    smallest: float,
 ) -> tuple[RudderActivity, float]:
     """Count a reversal if the rudder, rad, has come back by a smallest angle, rad.
 
@@ -202,9 +208,12 @@ def rudder_activity(
 
 
 def steering_reward(
-    motion: Motion, interval: Interval, ship: Ship, weights: Weights
+    motion: Motion,
+    interval: Interval,
+    ship: Ship,
+    weights: Weights,
 ) -> SteeringReward:
-    """Costs of rudder, rudder rate and heel, and of being where the model extrapolates."""
+    """Costs of rudder, rudder rate, heel, and of where the model extrapolates."""
     per_scale = 1.0 / radians(weights.heading_scale_deg)
     per_heel = 1.0 / radians(weights.roll_scale_deg)
     per_length = ship.length / ship.scale_speed / interval.dt

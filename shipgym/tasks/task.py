@@ -128,20 +128,28 @@ class Task:
 
         Raises InputError for a keyword that it does not have, or a value out of range.
         """
-        task = read_definition(definition, options.pop("reward", None))
+        reward = options.pop("reward", None)
+        task = read_definition(definition, reward)
         sensors = options.get("sensors")
         if sensors is not None:
             sensors = read_sensors(sensors)
-        check_keys(options, cls.option_names(task, sensors), f"{task.name} options")
+        known = cls.option_names(task, sensors)
+        check_keys(options, known, f"{task.name} options")
 
-        settings = task.make_settings(_chosen(options, task.settings))
+        # an option belongs to the task, to all tasks or to the sensor set
+        own = _chosen(options, task.settings)
         common = _chosen(options, cls.common_names())
         common.setdefault("episode_steps", task.episode_steps)
         common["sensors"] = sensors
         if sensors is not None:
-            own = _chosen(options, sensors.settings)
-            common["sensor_settings"] = sensors.make_settings(own)
-        return cls(task, settings, **common, options=options)
+            of_sensors = _chosen(options, sensors.settings)
+            common["sensor_settings"] = sensors.make_settings(of_sensors)
+        return cls(
+            definition=task,
+            settings=task.make_settings(own),
+            options=options,
+            **common,
+        )
 
     @classmethod
     def common_names(cls) -> tuple[str, ...]:
@@ -151,7 +159,9 @@ class Task:
 
     @classmethod
     def option_names(
-        cls, definition: TaskDefinition, sensors: SensorSet | None = None
+        cls,
+        definition: TaskDefinition,
+        sensors: SensorSet | None = None,
     ) -> tuple[str, ...]:
         """Keywords of a task with a sensor set; InputError if two have one name."""
         names = [*definition.settings, *cls.common_names()]
@@ -163,8 +173,8 @@ class Task:
                 if sensors is not None and name in sensors.settings:
                     source = sensors.source
                 raise InputError(
-                    f"{source}: Settings.{name}: expected a name of its own, got that of"
-                    " another keyword; rename it"
+                    f"{source}: Settings.{name}: expected a name of its own, got that"
+                    " of another keyword; rename it"
                 )
         return tuple(names)
 
@@ -209,7 +219,7 @@ class Task:
         return self.interval(model) / self.substeps(model)
 
     def check_fits(self, model: ShipModel) -> None:
-        """Refuse a ship that lacks what the task needs; InputError names the argument."""
+        """Refuse a ship that lacks what the task needs, naming the argument."""
         model.check_depth(self.water_depth)
         if self.dt is not None:
             lengths = 5.0
@@ -253,10 +263,16 @@ class Task:
         ship = ship_of(model, self.water_depth)
         observed = []
         for path, spec in self.definition.observations.items():
-            if spec.option in options:
-                name = path.rpartition(".")[2]
-                scale = self.scale(path, ship)
-                observed.append(Observed(name, spec.low, spec.high, scale, path))
+            if spec.option not in options:
+                continue
+            quantity = Observed(
+                name=path.rpartition(".")[2],
+                low=spec.low,
+                high=spec.high,
+                scale=self.scale(path, ship),
+                path=path,
+            )
+            observed.append(quantity)
         return tuple(observed)
 
     def instruments(self, windy: bool) -> SensorSet:
@@ -300,10 +316,10 @@ class Task:
         """Setting of the task by its name."""
         if name.startswith("_") or name in ("definition", "settings", "seas"):
             raise AttributeError(name)
-        records = [self.settings]
-        records += [value for value in self.settings if hasattr(value, "_fields")]
-        for record in records:
-            if name in record._fields:
+        if name in self.settings._fields:
+            return getattr(self.settings, name)
+        for record in self.settings:
+            if name in getattr(record, "_fields", ()):
                 return getattr(record, name)
         raise AttributeError(f"task {self.definition.name!r} has no setting {name!r}")
 

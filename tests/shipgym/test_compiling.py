@@ -272,7 +272,7 @@ def test_a_function_within_another_is_refused_with_what_it_uses_of_it():
         return within
 
     with pytest.raises(
-        InputError, match=r"in within: uses variables .* \(inner\), expected a function"
+        InputError, match=r"in within: expected a function at the top .* \(inner\)"
     ):
         fingerprint(around(3), {})
 

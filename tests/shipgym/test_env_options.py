@@ -298,7 +298,7 @@ def test_an_action_that_is_no_rudder_order_is_refused(wrong):
     env = make(action="rudder-discrete")
     env.reset(seed=0)
     with pytest.raises(
-        InputError, match="expected a whole number from 0 to 8: a rudder order"
+        InputError, match="expected an integer from 0 to 8: a rudder order"
     ):
         env.step(wrong)
 
@@ -453,16 +453,16 @@ def test_weights_and_scales_are_settings():
     [
         (
             {"speed_range": 0.8},
-            "speed_range: 0.8 found, expected the least and the largest, two numbers",
+            "speed_range: expected the least and the largest, two numbers, got 0.8",
         ),
         ({"speed_range": (0.8,)}, "expected the least and the largest, two numbers"),
         ({"speed_range": (0.0, 1.0)}, "speed_range: the least: expected"),
         ({"loading_range": (1.2, 0.9)}, "loading_range: the largest: expected"),
         (
             {"loading_range": (0.9, 1.1), "model": "kvlcc2"},
-            "the equations of 'kvlcc2' are not a table",
+            "expected a ship whose equations are a table of coefficients, got 'kvlcc2",
         ),
-        ({"ensemble": "kvlcc2"}, "ensemble: 'kvlcc2' found, expected a list of models"),
+        ({"ensemble": "kvlcc2"}, "ensemble: expected a list of models, got 'kvlcc2'"),
         ({"model_uncertainty": "prior"}, "model_uncertainty: expected"),
     ],
 )

@@ -149,7 +149,7 @@ def test_states_that_do_not_fit_are_refused_and_change_nothing():
             "state: made_for: expected a table",
         ),
         ({**state, "asked": "x"}, "state: asked: expected a table"),
-        ({**state, "row_keys": "x"}, "state: row_keys 'x' found"),
+        ({**state, "row_keys": "x"}, "state: row_keys: expected integers"),
         ({}, "state: field 'asked' is missing"),
         (3, "state: expected a table"),
     ]:
@@ -159,7 +159,7 @@ def test_states_that_do_not_fit_are_refused_and_change_nothing():
             env.reset(options={"state": given})
     with pytest.raises(
         InputError,
-        match=r"'state' found together with \['waypoints'\], expected it alone",
+        match=r"expected 'state' alone, got it together with \['waypoints'\]",
     ):
         env.reset(options={"state": state, "waypoints": HOOK})
     assert env.physical_state() == before
@@ -177,7 +177,9 @@ def test_waypoints_of_a_reset_hold_until_the_next(make):
     same(sailed(env), sailed(other))
     env.reset(seed=1)
     np.testing.assert_array_equal(path(), drawn)
-    with pytest.raises(InputError, match="waypoints: rows 0 and 1 are 1 m apart"):
+    with pytest.raises(
+        InputError, match="waypoints: rows 0 and 1: expected a distance of at least"
+    ):
         env.reset(options={"waypoints": [[0, 0], [1, 0], [1, 1]]})
     np.testing.assert_array_equal(path(), drawn)
 
@@ -221,7 +223,7 @@ def test_libraries_read_the_steps_of_an_episode():
         True,
     ]
     with pytest.raises(
-        InputError, match="max_episode_steps: 4 found together with episode_steps 5"
+        InputError, match=r"max_episode_steps: expected episode_steps, 5, .* got 4"
     ):
         many(max_episode_steps=4, episode_steps=5)
 
@@ -385,8 +387,7 @@ def test_what_is_no_order_is_refused(wrong):
         rudder_orders(wrong, (), "action")
     assert (
         str(caught.value)
-        == f"action: {wrong!r} found, expected a whole number from 0 to 8: a rudder"
-        " order"
+        == f"action: expected an integer from 0 to 8: a rudder order, got {wrong!r}"
     )
 
 
@@ -397,7 +398,7 @@ def test_orders_of_several_ships_are_a_column():
     for wrong in ([0, 8], [0, 8, 9], [-1, 0, 0], [0.0, 1.0, 2.0], 3):
         with pytest.raises(
             InputError,
-            match=r"expected int of shape \(3,\) from 0 to 8: rudder orders$",
+            match=r"expected integers of shape \(3,\) from 0 to 8: rudder orders",
         ):
             rudder_orders(wrong, (3,), "actions")
 

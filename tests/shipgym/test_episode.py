@@ -112,8 +112,8 @@ def test_an_episode_cannot_be_changed():
         ),
         (("ship", "beem"), 1.0, "ship: unknown key 'beem'. Did you mean 'beam'?"),
         (("path", "corridor"), -5.0, "corridor: expected"),
-        (("path", "waypoints"), [[0.0, 0.0]], "waypoints: shape (1, 2) found"),
-        (("states", "x"), [0.0, 1.0], "states.x: shape (2,) found, expected (5,)"),
+        (("path", "waypoints"), [[0.0, 0.0]], "waypoints: expected at least 2 rows"),
+        (("states", "x"), [0.0, 1.0], "states.x: expected shape (5,), got (2,)"),
         (
             ("states", "x"),
             [0.0, 1.0, None, 2.0, 3.0],
@@ -123,27 +123,31 @@ def test_an_episode_cannot_be_changed():
         (
             ("info", "cross_track"),
             [0.0] * STEPS,
-            "info.cross_track: shape (4,) found, expected (5,)",
+            "info.cross_track: expected shape (5,), got (4,)",
         ),
         (("commands", "delta"), 0.1, "commands.delta: expected a list"),
         (
             ("actions",),
             [[0.1], [0.2]],
-            "actions: shape (2, 1) found, expected (4, n_actions)",
+            "actions: expected shape (4, n_actions), a row for each reward, got (2, 1)",
         ),
         (
             ("actions",),
             [[0.1], [0.2, 0.3], [0.1], [0.1]],
             "actions[1]: expected a list of 1 numbers",
         ),
-        (("rewards",), [], "rewards: no step found"),
+        (("rewards",), [], "rewards: expected at least one step, got none"),
         (
             ("rewards",),
             [1.0, float("nan"), 1.0, 1.0],
             "rewards[1]: expected a number",
         ),
         (("outcome", "success"), "yes", "success: expected a boolean"),
-        (("states",), {"x": [0.0] * 5}, "states: 'y', 'psi', 'delta' missing"),
+        (
+            ("states",),
+            {"x": [0.0] * 5},
+            "states: expected 'x', 'y', 'psi', 'delta' at least, got 'x'",
+        ),
         (("note",), "", "unknown key 'note'"),
     ],
 )
@@ -200,7 +204,7 @@ def test_the_path_of_an_episode_is_drawn_with_its_turns():
     assert replace(EPISODE, waypoints=corner, turn_radius=None).path.tolist() == corner
     assert replace(EPISODE, waypoints=None, turn_radius=None).path is None
     with pytest.raises(
-        InputError, match=r"rows 0 and 1 are 1000 m apart, expected at least 1200 m"
+        InputError, match=r"rows 0 and 1: expected a distance of at least 1200 m"
     ):
         replace(episode, turn_radius=1200.0)
 
@@ -232,23 +236,23 @@ def test_the_path_of_an_episode_is_drawn_with_its_turns():
         ({"success": 0}, "success: expected a boolean"),
         (
             {"actions": np.zeros(STEPS)},
-            "actions: shape (4,) found, expected (4, n_actions), a row for each",
+            "actions: expected shape (4, n_actions), a row for each reward, got (4,)",
         ),
         (
             {"rewards": np.zeros((STEPS, 1))},
-            "rewards: shape (4, 1) found, expected (n_steps,)",
+            "rewards: expected shape (n_steps,), got (4, 1)",
         ),
         (
             {"rewards": np.zeros(0)},
-            "rewards: no step found, expected at least one step",
+            "rewards: expected at least one step, got none",
         ),
         (
             {"commands": {"n": np.zeros(STEPS + 1)}},
-            "commands.n: shape (5,) found, expected (4,)",
+            "commands.n: expected shape (4,), got (5,)",
         ),
         (
             {"reward_parts": {"end": np.zeros(STEPS + 1)}},
-            "reward_parts.end: shape (5,) found, expected (4,)",
+            "reward_parts.end: expected shape (4,), got (5,)",
         ),
         ({"info": [1.0]}, "info: expected a table of keys and values"),
     ],

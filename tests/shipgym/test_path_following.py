@@ -726,13 +726,13 @@ def test_turns_and_distances_of_a_plan():
         4,
     ]
     assert [
-        path_following.part_of(turn, way, 100.0)
+        planned_legs.part_of(turn, way, 100.0)
         for turn, way in ((0.5, 20.0), (-0.5, 20.0))
     ] == [
         0.2,
         -0.2,
     ]
-    assert [path_following.part_of(-0.5, way, 100.0) for way in (-9.0, 60.0)] == [
+    assert [planned_legs.part_of(-0.5, way, 100.0) for way in (-9.0, 60.0)] == [
         0.0,
         -0.5,
     ]

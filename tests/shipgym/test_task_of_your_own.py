@@ -15,10 +15,9 @@ from stable_baselines3 import PPO
 
 import shipgym
 from shipgym import InputError, ShipVecEnv, check_task, check_vector_env, register_task
-from shipgym.envs import task_checker
 from shipgym.envs.engine import Engine
 from shipgym.python_files import load_file
-from shipgym.tasks.contract import NO_NUMBERS, Numbers, ObservationSpec, Setting
+from shipgym.tasks.contract import NO_NUMBERS, Numbers, Setting
 from shipgym.tasks.definition import no_worst_cost, read_definition
 from shipgym.tasks.source import (
     annotated,
@@ -59,7 +58,7 @@ def fairway(tmp_path):
 
 
 def test_the_example_is_a_task_of_one_screen_and_sound():
-    assert FAIRWAY.count("\n") < 110
+    assert FAIRWAY.count("\n") < 120
     assert f"```python\n{FAIRWAY}```" in PAGE
     assert str(check_task(ROOT / "examples" / "fairway.py", **SHIP)) == "fairway: sound"
 
@@ -183,17 +182,18 @@ def test_sensors_of_ones_own_show_the_same_voyage_otherwise(tmp_path):
         lagged += part * (env.physical_state()["u"] - lagged)
         assert seen[4] * env.observation_scales[4] == pytest.approx(lagged, rel=1e-6)
     with pytest.raises(
-        InputError, match=r"sensors: .*my_sensors.py and noise or measurement found"
+        InputError,
+        match=r"sensors: expected .* got .*my_sensors.py and noise or measurement",
     ):
         gymnasium.make(COURSE, sensors=path, noise=1.0)
-    with pytest.raises(InputError, match="log_time_constant: 0 found"):
+    with pytest.raises(InputError, match="log_time_constant: expected a number > 0"):
         gymnasium.make(COURSE, sensors=path, log_time_constant=0.0)
     path = written(
         tmp_path, "my_sensors.py", SENSORS.replace("log_time_constant", "rudder_weight")
     )
     with pytest.raises(
         InputError,
-        match=r"my_sensors.py: Settings.rudder_weight found, which is a keyword",
+        match=r"my_sensors.py: Settings.rudder_weight: expected a name of its own",
     ):
         gymnasium.make(COURSE, sensors=path)
 
@@ -231,39 +231,43 @@ WRONG = [
     (
         "class State",
         "class Sate",
-        "fairway.py: no 'State' found, expected a NamedTuple",
+        "fairway.py: expected a NamedTuple 'State' .* got no 'State'",
     ),
     (
         "def observe",
         "def obsrve",
-        r"no 'observe' found, expected a function observe\(readings, state",
+        r"expected a function observe\(readings, state.* got no 'observe'",
     ),
     (
         "def begin(ship, settings,",
         "def begin(ship,",
-        "begin: 3 arguments found, expected a function begin",
+        "begin: expected a function begin.* got one of 3 arguments",
     ),
     (
         "g_sin: Annotated[float, ObservationSpec(-1.0, 1.0)]",
         "g_sin: float",
-        "Observation.heading_sin: no bounds",
+        "Observation.heading_sin: expected Annotated.* got no bounds",
     ),
-    ('"speeding", ', '"speding", ', "REPORTED: 'speding' found"),
+    ('"speeding", ', '"speding", ', "REPORTED: expected a tuple .* got 'speding'"),
     (
         "] = 0.7",
         "]",
-        "[Nn]on-default namedtuple field|no default found",
+        "[Nn]on-default namedtuple field|expected a default, got none",
     ),
     (
         "    speeding: Flag",
         "    speeding: str",
-        "State.speeding: .* found, expected a float",
+        "State.speeding: expected a float, got",
     ),
-    ("    delay: float", "    end: float", "Reward: two fields named 'end'"),
+    (
+        "    delay: float",
+        "    end: float",
+        "Reward: .* got two fields 'end'; the engine has one",
+    ),
     (
         "half_width: Annotated",
         "dt: Annotated",
-        "Settings.dt found, which is a keyword already",
+        "Settings.dt: expected a name of its own",
     ),
     (
         "class Reward",
@@ -284,14 +288,18 @@ WRONG = [
     (
         "return 2.0 + ",
         "return -2.0 - ",
-        "fairway.py: worst_cost: -52 found, expected a number >= 0",
+        "fairway.py: worst_cost: expected a number >= 0, got -52",
     ),
     (
         "] = 50.0",
         "] = [50.0]",
-        r"Settings.over_speed_weight: \[50.0\] found, expected a number, or",
+        r"Settings.over_speed_weight: expected a number, or .* got \[50.0\]",
     ),
-    ('5.0, "rad/s"', "5.0, 3", "Observation.yaw_rate: unit: 3 found, expected a text"),
+    (
+        '5.0, "rad/s"',
+        "5.0, 3",
+        "Observation.yaw_rate: unit: expected a non-empty string, got 3",
+    ),
     ("max(motion.u", "mox(motion.u", "line HERE, in step: NameError: name 'mox'"),
     ("Reward(-off * off, ", "Reward(", "line HERE, in step: TypeError: .*'over_speed'"),
     (
@@ -300,19 +308,9 @@ WRONG = [
         r"in step: result 2 is \(a number, a number, a number\), expected Reward",
     ),
     (
-        "Reward(-off",
-        "(0.0, -off",
-        r"in step: result 2 is \(a number, a number, a number, a number\), ",
-    ),
-    (
         "after, reward",
         "after, after",
         "line DEF, in step: result 2 is State, expected Reward.*",
-    ),
-    (
-        "    return Observation(",
-        "    return readings\n    (",
-        "in observe: what it returns is Readings, ",
     ),
     (
         "    return Observation(",
@@ -343,7 +341,7 @@ WRONG = [
     (
         "def begin",
         "def plan_length(_):\n    return -1\n\n\ndef begin",
-        "plan_length: -1 found, expected",
+        "plan_length: expected an integer of at least 0, got -1",
     ),
     (
         "def begin",
@@ -363,12 +361,12 @@ WRONG = [
     (
         "def worst_cost(settings)",
         "def worst_cost(*settings)",
-        "0 arguments or more, a generator or a co",
+        "expected a function worst_cost.* variable arguments",
     ),
     (
         "def step",
         "import numba\n\n\n@numba.njit\ndef step",
-        "step: no plain function found, expected a",
+        "step: expected a function step.* got no plain function",
     ),
     (
         "return 2.0 + ",
@@ -378,32 +376,22 @@ WRONG = [
     (
         "] = 50.0",
         "] = -50.0",
-        "Settings.over_speed_weight: default: -50 found, expected a number >= 0",
-    ),
-    (
-        "half_width: Annotated",
-        "autoreset_mode: Annotated",
-        "Settings.autoreset_mode found, which is a keyw",
-    ),
-    (
-        "REPORTED = (",
-        'REPORTED = "speeding" or (',
-        "REPORTED: 'speeding' found, expected a tuple of fields",
+        "Settings.over_speed_weight: default: expected a number >= 0, got -50",
     ),
     (
         "REPORTED = (",
         "REPORTED = 3 or (",
-        "REPORTED: 3 found, expected a tuple of fields",
+        "REPORTED: expected a tuple of fields .* got 3",
     ),
     (
         "REPORTED = (",
         'NAME = ["a"]\nREPORTED = (',
-        r"NAME: \['a'\] found, expected a text",
+        r"NAME: expected a non-empty string, got \['a'\]",
     ),
     (
         "REPORTED = (",
         "EPISODE_STEPS = -1\nREPORTED = (",
-        "fairway.py: EPISODE_STEPS: -1 found",
+        "fairway.py: EPISODE_STEPS: expected an integer of at least 1, got -1",
     ),
     (
         "REPORTED = (",
@@ -558,11 +546,11 @@ RECORD = (
     [
         (
             "",
-            r"own.py: no 'Settings' found, expected a NamedTuple 'Settings' of floats",
+            r"own.py: expected a NamedTuple 'Settings' of floats .* got no 'Settings'",
         ),
         (
             "Settings = 3\n",
-            "Settings is no NamedTuple, expected a NamedTuple 'Settings' of floats",
+            "Settings: expected a NamedTuple 'Settings' of floats, got none",
         ),
         (
             RECORD.replace("float", "flaot"),
@@ -577,26 +565,26 @@ RECORD = (
                 "from collections import namedtuple\nSettings = namedtuple('Settings',"
                 " '')\n"
             ),
-            "no annotated fields found",
+            "expected one number at least, got no annotated fields",
         ),
         (
             RECORD.replace(" = 1.0", ""),
-            "Settings.weight: no default found, expected one",
+            "Settings.weight: expected a default, got none",
         ),
         (
             RECORD.replace("1.0", "'1'"),
-            "Settings.weight: '1' found, expected a number, or a list as the last",
+            "Settings.weight: expected a number, or a list as the last field, got '1'",
         ),
         (
             RECORD + "begin = 3\n",
-            "begin: no plain function found, expected a function begin\\(ship\\)",
+            "begin: expected a function begin\\(ship\\), got no plain function",
         ),
         (
             RECORD + "def begin(ship, more): ...\n",
-            "begin: 2 arguments found, expected a function begin",
+            "begin: expected a function begin.* got one of 2 arguments",
         ),
         (RECORD + "def begin(ship): ...\n", None),
-        (RECORD, "no 'begin' found, expected a function begin"),
+        (RECORD, "expected a function begin.* got no 'begin'"),
         ("1 / 0", r"own.py, line 1: cannot be executed: ZeroDivisionError"),
     ],
 )
@@ -674,7 +662,7 @@ def test_a_record_with_a_note_of_its_own_is_a_record_all_the_same():
 
 def test_a_file_that_is_not_there_is_named(tmp_path):
     with pytest.raises(
-        InputError, match=r"none.py: no such file, expected a Python file"
+        InputError, match=r"none.py: expected a Python file, got no such file"
     ):
         read_source(tmp_path / "none.py")
 
@@ -686,7 +674,7 @@ def test_a_reward_that_is_not_finite_is_named(tmp_path):
     path = written(
         tmp_path,
         "my_reward.py",
-        text.replace("/ 0.0", "/ (state.course - state.course)"),
+        text.replace("/ 0.0", "/ (state.heading_setpoint - state.heading_setpoint)"),
     )
     message = r"reward_rudder is nan in lane 0 at step 1"
     for env in (
@@ -712,6 +700,20 @@ def test_what_fails_in_plain_python_is_told_with_its_line_and_step(tmp_path):
     )
 
 
+def test_compiled_results_that_differ_from_plain_python_are_a_problem(tmp_path):
+    text = FAIRWAY.replace("    aside = 0.5", "    aside = luck()")
+    text = text.replace(
+        "from math import fabs\n",
+        "from math import fabs\nfrom random import random as luck\n",
+    )
+    problems = check_task(written(tmp_path, "fairway.py", text), **SHIP).problems
+    assert re.match(
+        r"Observation\.\w+ is \S+ compiled and \S+ in plain Python in lane 0 at step 0;"
+        r" look for what differs",
+        problems[0],
+    )
+
+
 def test_what_is_often_clipped_is_remarked(tmp_path):
     path = written(
         tmp_path, "my_sensors.py", SENSORS.replace("r=motion.r", "r=1000.0 * motion.r")
@@ -731,9 +733,7 @@ def test_what_is_often_clipped_is_remarked(tmp_path):
 
 def test_ids_are_texts():
     for one in (None, 3, ""):
-        with pytest.raises(
-            InputError, match=r"env_id: .* found, expected a text that is not empty"
-        ):
+        with pytest.raises(InputError, match=r"env_id: expected a non-empty string"):
             register_task(one, "CourseKeeping")
 
 
@@ -760,7 +760,7 @@ def test_ids_are_taken_once(fairway, tmp_path):
         match="'harbour/Fairway' found, expected an id such as 'harbour/fairway-v0'",
     ):
         register_task("harbour/Fairway", tmp_path / "fairway.py", **SHIP)
-    with pytest.raises(InputError, match="render_mode: 'film' found"):
+    with pytest.raises(InputError, match=r"render_mode: expected .* got 'film'"):
         register_task(
             "harbour/Film-v0", tmp_path / "fairway.py", render_mode="film", **SHIP
         )
@@ -811,145 +811,14 @@ def test_an_error_of_a_file_is_told_with_its_last_line_in_it_and_the_file_may_be
     assert load_file(written(tmp_path, "other.py", "x = 3\n")) is not own
 
 
-def test_what_a_ship_shows_alone_is_compared_to_the_last_digit(monkeypatch):
-    class Shifted(Engine):
-        def reset(self, seeds):
-            return super().reset(seeds) + (1e-6 if self.num_envs == 1 else 0.0)
-
-    monkeypatch.setattr(task_checker, "Engine", Shifted)
-    (problem,) = check_task("CourseKeeping", model="mariner").problems
-    assert re.match(
-        r"Observation.helm.heading_error_sin is \S+ among many ships and \S+ alone in"
-        r" lane 69 at step 0; ",
-        problem,
-    )
-
-
 def test_a_task_that_is_none_is_told_by_its_name():
     found = check_task("CourseKeping")
     assert found.name == "CourseKeping"
     assert found.problems[0].startswith(
-        "task: 'CourseKeping' found, expected the path of a .py file or one of"
+        "task: expected the path of a .py file or one of"
     )
     assert found.problems[0].endswith(" Did you mean 'CourseKeeping'?")
     assert not found.ok
-
-
-def test_a_beginner_steers_each_lane_the_same_however_many_there_are():
-    three, seventy = (
-        np.stack(
-            [
-                task_checker._orders(
-                    SimpleNamespace(num_envs=n, task=SimpleNamespace(n_commands=2)),
-                    step,
-                )
-                for step in range(200)
-            ]
-        )
-        for n in (3, 70)
-    )
-    np.testing.assert_array_equal(three, seventy[:, :3])
-    np.testing.assert_array_equal(seventy[..., 0], seventy[..., 1])
-    rudder = seventy[..., 0]
-    assert (rudder.min(), rudder.max()) == (-1.0, 1.0)
-    assert set(np.unique(rudder[:, 1::4])) == {-1.0, 1.0}  # hard over to and fro
-    assert not rudder[:, 2::4].any()
-    assert (rudder[:, 3::4] == 1.0).all()
-    assert (np.abs(np.diff(rudder[:, ::4], axis=0)).max(axis=0) > 0.1).all()
-    assert np.abs(np.diff(rudder[:, ::4], axis=0)).max() < 0.35  # a swing
-    assert len({tuple(lane) for lane in rudder[:, ::4].T}) > 10  # each its own
-
-
-class Shown:
-    """Stands for an engine whose observations and rewards are given step by step."""
-
-    model = None
-
-    def __init__(self, seen, rewards=None, episode_steps=9):
-        self.seen = np.asarray(seen, dtype=float)
-        self.rewards = (
-            np.zeros(self.seen.shape[:2])
-            if rewards is None
-            else np.asarray(rewards, dtype=float)
-        )
-        self.num_envs = self.seen.shape[1]
-        observed = [
-            SimpleNamespace(path=path)
-            for path in ("helm.sway", "extras.roll")[: self.seen.shape[2]]
-        ]
-        self.task = SimpleNamespace(
-            n_commands=1, episode_steps=episode_steps, observed=lambda model: observed
-        )
-
-    def reset(self, seeds):
-        self.seeds, self.step_number = seeds, 0
-        return self.seen[0]
-
-    def step(self, orders):
-        assert orders.shape == (self.num_envs, 1)
-        self.step_number += 1
-        return self.seen[self.step_number], self.rewards[self.step_number], None, None
-
-
-def differences(one, other, lanes=slice(None), steps=3, agreement=1e-5):
-    return list(
-        task_checker._differ(one, other, lanes, steps, agreement, ("here", "there"))
-    )
-
-
-def test_the_first_difference_of_two_engines_is_told_with_lane_and_step():
-    seen = np.random.default_rng(0).uniform(0.5, 1.0, (5, 3, 2))
-    seen[2, 0, 0] = np.nan  # in both
-    assert differences(Shown(seen), Shown(seen), agreement=0.0) == []
-    close, other = seen.copy(), seen.copy()
-    close[1:] *= 1.0 + 9e-6
-    assert differences(Shown(close), Shown(seen)) == []
-    other[3, 2, 1] = 0.25
-    assert differences(Shown(other), Shown(seen)) == [
-        f"Observation.extras.roll is 0.25 here and {seen[3, 2, 1]} there in lane 2 at"
-        " step 3; look for what differs, such as a global that changes"
-    ]
-    assert differences(Shown(other), Shown(seen), steps=2) == []
-    assert differences(Shown(other, episode_steps=2), Shown(seen)) == []
-    rewards = np.zeros((5, 3))
-    rewards[1, 1] = -1.0
-    (found,) = differences(Shown(other, rewards), Shown(seen))
-    assert found.startswith("reward is -1.0 here and 0.0 there in lane 1 at step 1; ")
-    other[0, 0, 0] = 0.25
-    assert (
-        " in lane 0 at step 0; " in differences(Shown(other, rewards), Shown(seen))[0]
-    )
-
-
-def test_the_last_lane_of_many_is_compared_with_one_alone():
-    many = np.random.default_rng(1).uniform(0.5, 1.0, (5, 4, 1))
-    alone = Shown(many[:, -1:])
-    assert differences(Shown(many), alone, slice(-1, None), agreement=0.0) == []
-    assert alone.seeds.tolist() == [3]
-    alone.seen = alone.seen + np.array([0.0, 0.0, 1e-12, 0.0, 0.0])[:, None, None]
-    (found,) = differences(Shown(many), alone, slice(-1, None), agreement=0.0)
-    assert " in lane 3 at step 2; " in found
-
-
-def test_what_is_beyond_its_bounds_in_more_than_a_twentieth_of_the_steps_is_remarked():
-    seen = {
-        "helm.sway": ObservationSpec(-2.0, 2.0),
-        "extras.roll": ObservationSpec(-3.0, 3.0),
-    }
-    task = SimpleNamespace(definition=SimpleNamespace(seen=seen))
-    inside = [2.0 + 5e-7, -2.0 - 5e-7] * 47 + [0.0]  # rounding makes no remark
-    often, seldom = [2.1, -4.0, 2.1, 2.1, 2.1, 2.1], [2.1] * 5
-    assert list(task_checker._often_clipped(task, {"helm.sway": inside + seldom})) == []
-    found = list(
-        task_checker._often_clipped(
-            task, {"helm.sway": inside[1:] + often, "extras.roll": inside}
-        )
-    )
-    assert found == [
-        "Observation.helm.sway: -4 found in units of its scale, beyond its bounds -2 to"
-        " 2 in 6 % of the steps, and clipped; give it wider bounds or a larger scale if"
-        " more is to be seen"
-    ]
 
 
 def test_options_of_a_task_are_kept_as_given_in_absolute_paths(tmp_path, monkeypatch):
@@ -994,28 +863,27 @@ def test_settings_are_given_by_keyword_the_others_are_their_defaults():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"count": 0}, "count: 0 found, expected a whole number of at least 1"),
-        ({"count": 2.0}, "count: 2.0 found, expected a whole number of at least 1"),
-        ({"count": 101}, "count: 101 found, expected a number >= 1 and <= 100"),
-        ({"share": 0.0}, "share: 0 found, expected a number > 0 and <= 1"),
+        ({"count": 0}, "count: expected an integer of at least 1, got 0"),
+        ({"count": 2.0}, "count: expected an integer of at least 1, got 2.0"),
+        ({"count": 101}, "count: expected a number >= 1 and <= 100, got 101"),
+        ({"share": 0.0}, "share: expected a number > 0 and <= 1, got 0"),
         (
             {"lengths": (3.0, 0.0)},
-            "lengths: the largest: 0 found, expected a number > 0",
+            "lengths: the largest: expected a number > 0, got 0",
         ),
-        ({"lengths": (0.0, 3.0)}, "lengths: the least: 0 found, expected a number > 0"),
+        ({"lengths": (0.0, 3.0)}, "lengths: the least: expected a number > 0, got 0"),
         (
             {"lengths": (1.0,)},
-            r"lengths: \(1.0,\) found, expected the least and the largest",
+            r"lengths: expected the least and the largest, got \(1.0,\)",
         ),
-        ({"lengths": "12"}, "lengths: '12' found, expected the least and the largest"),
-        ({"lengths": 3.0}, "lengths: 3.0 found, expected the least and the largest"),
+        ({"lengths": "12"}, "lengths: expected the least and the largest, got '12'"),
         (
             {"listed": [0.0, -1.5]},
-            "listed: number 1: -1.5 found, expected a number >= -1",
+            "listed: number 1: expected a number >= -1, got -1.5",
         ),
-        ({"listed": 3.0}, "listed: 3.0 found, expected a list"),
-        ({"listed": [[1.0]]}, r"listed: \[\[1.0\]\] found, expected a list"),
-        ({"listed": []}, "listed: none found, expected one at least, or None"),
+        ({"listed": 3.0}, "listed: expected a list, got 3.0"),
+        ({"listed": [[1.0]]}, r"listed: expected a list, got \[\[1.0\]\]"),
+        ({"listed": []}, "listed: expected one number at least, or None, got none"),
     ],
 )
 def test_settings_beyond_their_bounds_are_refused(options, message):
@@ -1040,11 +908,11 @@ class WithInner(NamedTuple):
 def test_a_list_stands_last_and_in_settings_alone():
     with pytest.raises(
         InputError,
-        match=r"^own: Settings.listed: .* expected a number, or a list as the last",
+        match=r"^own: Settings.listed: expected a number, or a list as the last",
     ):
         check_namespace(SimpleNamespace(Settings=ListBefore), "own", ("Settings",), {})
     with pytest.raises(
-        InputError, match=r"^own: State.inner.listed: .* found, expected a float$"
+        InputError, match=r"^own: State.inner.listed: expected a float, got"
     ):
         check_namespace(SimpleNamespace(State=WithInner), "own", ("State",), {})
     assert check_namespace(
@@ -1079,29 +947,18 @@ def test_a_task_without_events_and_plan_is_complete():
 
 def test_bounds_of_an_observation_are_finite_and_in_order(tmp_path):
     for bounds, wrong in {
-        "1.0, -1.0": "upper bound: -1 found, expected a number > 1",
-        "1.0, 1.0": "upper bound: 1 found, expected a number > 1",
-        "-float('inf'), 1.0": "lower bound: -inf found, expected a number",
-        "-1.0, float('nan')": "upper bound: nan found, expected a number > -1",
-        "'0', 1.0": (
-            "lower bound: '0' (a text; write the number without quotes) found, expected"
-            " a number"
-        ),
-        "-1.0, None": "upper bound: None found, expected a number > -1",
-        "-1.0, 1.0, option='rol'": (
-            "option: 'rol' found, expected one of '', 'roll', 'shaft', 'shaft speed'"
-        ),
-        "-1.0, 1.0, scale=0.0": "scale: 0 found, expected a number > 0",
-        "-1.0, 1.0, scale=-2.0": "scale: -2 found, expected a number > 0",
-        "-1.0, 1.0, scale=float('nan')": "scale: nan found, expected a number > 0",
-        "-1.0, 1.0, scale='8'": (
-            "scale: '8' (a text; write the number without quotes) found"
-        ),
+        "1.0, 1.0": "upper bound: expected a number > 1, got 1",
+        "-float('inf'), 1.0": "lower bound: expected a number, got -inf",
+        "-1.0, float('nan')": "upper bound: expected a number > -1, got nan",
+        "'0', 1.0": "lower bound: expected a number, got '0'",
+        "-1.0, 1.0, option='rol'": "option: expected one of '', 'roll', 'shaft'",
+        "-1.0, 1.0, scale=-2.0": "scale: expected a number > 0, got -2",
+        "-1.0, 1.0, scale='8'": "scale: expected a number > 0, got '8'",
         "-1.0, 1.0, scale=lambda ship: 1.0": (
-            "scale: 1 arguments found, expected a function of ship and sett"
+            "scale: expected a function of ship and settings, got one of 1 arguments"
         ),
         "-1.0, 1.0, scale=lambda ship, _: 0.0": (
-            "scale for 'mariner-tls-svm': 0 found, expected a number > 0"
+            "scale for 'mariner-tls-svm': expected a number > 0, got 0"
         ),
         "-1.0, 1.0, scale=lambda ship, _: ship.w": (
             "AttributeError: 'Ship' object has no attribute 'w'"
@@ -1115,18 +972,6 @@ def test_bounds_of_an_observation_are_finite_and_in_order(tmp_path):
         (problem,) = check_task(path).problems
         assert problem.startswith(str(path)), problem
         assert wrong in problem, problem
-    path = written(
-        tmp_path,
-        "fairway.py",
-        FAIRWAY.replace(
-            "g_sin: Annotated[float, ObservationSpec(-1.0, 1.0)]", "g_sin: float"
-        ),
-    )
-    with pytest.raises(
-        InputError,
-        match=r"Observation.heading_sin: no bounds found, expected Annotated\[f",
-    ):
-        read_definition(path)
 
 
 def test_names_that_the_engine_has_in_info_are_not_reported(tmp_path):
@@ -1136,7 +981,7 @@ def test_names_that_the_engine_has_in_info_are_not_reported(tmp_path):
     with pytest.raises(
         InputError,
         match=(
-            r"REPORTED: 'truncated' found, expected a tuple of fields of State, none of"
+            r"REPORTED: expected a tuple of fields of State, none of .* got 'truncated'"
         ),
     ):
         read_definition(written(tmp_path, "fairway.py", text))
@@ -1148,12 +993,12 @@ def test_names_that_the_engine_has_in_info_are_not_reported(tmp_path):
         (
             "    delay: float",
             "    end: float",
-            "two fields named 'end' found, .* the engine has one of that name$",
+            "got two fields 'end'; the engine has one of that name$",
         ),
         (
             "    to_zone: Annotated",
             "    limit_: Inner\n    to_zone: Annotated",
-            "'limit' found, .* that differ$",
+            "expected names that differ, got two fields 'limit'$",
         ),
     ],
 )

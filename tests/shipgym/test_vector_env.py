@@ -137,15 +137,18 @@ def test_a_vector_environment_says_what_is_wrong(mariner):
     for options, message in (
         ({"num_envs": 0}, "num_envs: expected"),
         ({"sae": "calm"}, "Did you mean 'sea'"),
-        ({"autoreset_mode": "later"}, "autoreset_mode: 'later' found"),
+        ({"autoreset_mode": "later"}, "autoreset_mode: expected one of .* got 'later'"),
         ({"threads": 0}, "threads: expected"),
         (
             {"render_mode": "human"},
             "render_mode: expected one of 'rgb_array', or None, got 'human'",
         ),
-        ({"ensemble": ["container"]}, "ensemble: 'container' has other equations"),
+        (
+            {"ensemble": ["container"]},
+            "ensemble: expected models of one structure, got 'container'",
+        ),
         ({"model_uncertainty": "posterior"}, "model 'mariner': expected a covariance"),
-        ({"speed_range": 0.5}, "speed_range: 0.5 found"),
+        ({"speed_range": 0.5}, "speed_range: expected .* got 0.5"),
         ({"speed_range": (0.9, 0.5)}, "speed_range: the largest: expected"),
     ):
         with pytest.raises(InputError, match=message):
@@ -153,7 +156,7 @@ def test_a_vector_environment_says_what_is_wrong(mariner):
     env = vector(COURSE, 2)
     with pytest.raises(InputError, match="reset_mask"):
         env.reset(options={"reset_mask": np.zeros(3, dtype=np.bool_)})
-    with pytest.raises(InputError, match="seed: 3 found"):
+    with pytest.raises(InputError, match=r"seed: expected .* got 3"):
         env.reset(seed=[1, 2, 3])
     discrete = vector(COURSE, 2, action="rudder-discrete")
     discrete.reset(seed=0)
@@ -222,7 +225,7 @@ def test_workers_of_other_processes():
     [
         (
             {"reset_mask": np.zeros(3, dtype=np.bool_)},
-            "reset_mask is False in all rows",
+            "reset_mask: expected True in one row at least",
         ),
         ({"reset_mask": np.ones(2, dtype=np.bool_)}, "expected a bool array of 3"),
         ({"reset_mask": np.ones(3, dtype=np.int64)}, "expected a bool array of 3"),

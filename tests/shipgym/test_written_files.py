@@ -9,16 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from shipgym.errors import InputError
-from shipgym.files import (
+from shipgym.drafts import (
     abandoned_drafts,
     draft_folder,
     draft_name,
-    make_folder,
     remove_drafts,
-    write_json,
-    write_text,
 )
+from shipgym.errors import InputError
+from shipgym.files import make_folder, write_json, write_text
 
 WEEK = 7 * 86400
 
