@@ -50,7 +50,10 @@ def step_integrals(t: Floats, channels: Channels, terms: Terms, rule: str) -> In
 
 
 def spline_integrals(
-    t: Floats, channels: Channels, terms: Terms, rudder: Rudder
+    t: Floats,
+    channels: Channels,
+    terms: Terms,
+    rudder: Rudder,
 ) -> Integrals:
     """Integrals over each step by Gauss quadrature on splines.
 
@@ -58,14 +61,14 @@ def spline_integrals(
     """
     edges = np.union1d(t, rudder.corners)
     middle = 0.5 * (edges[1:] + edges[:-1])
-    half = 0.5 * np.diff(edges)
-    nodes = middle[:, None] + half[:, None] * NODES
-    at_nodes = {
-        name: _between(t, name, values, rudder)(nodes.ravel())
-        for name, values in channels.items()
-    }
+    half = 0.5 * np.diff(edges)[:, None]
+    nodes = middle[:, None] + half * NODES
+    at_nodes = {}
+    for name, values in channels.items():
+        curve = _between(t, name, values, rudder)
+        at_nodes[name] = curve(nodes.ravel())
 
-    weights = half[:, None] * WEIGHTS
+    weights = half * WEIGHTS
     step = np.searchsorted(t, middle, side="right") - 1
     to_end = t[step + 1][:, None] - nodes
     first_of_step = np.flatnonzero(np.diff(step, prepend=-1))
@@ -83,12 +86,17 @@ def spline_integrals(
 
 
 def _between(
-    t: Floats, name: str, values: Floats, rudder: Rudder
+    t: Floats,
+    name: str,
+    values: Floats,
+    rudder: Rudder,
 ) -> Callable[[Floats], Floats]:
-    """A channel between its samples; a shaft speed, which may jump, is taken straight."""
+    """A channel between its samples; straight for a shaft speed, which may jump."""
     if name == "n":
         return lambda times: np.interp(times, t, values)
-    return rudder if name == "delta" else broken_spline(t, values, rudder)
+    if name == "delta":
+        return rudder
+    return broken_spline(t, values, rudder)
 
 
 def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
@@ -105,37 +113,44 @@ def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
     corners: list[float] = []
     for corner, smoothness in zip(rudder.corners, rudder.smoothness, strict=True):
         multiplicity = DEGREE - 1 - int(smoothness)
-        by_distance = np.argsort(np.abs(knots - corner), kind="stable")
-        nearest = by_distance[:multiplicity]
+        distances = np.abs(knots - corner)
+        nearest = np.argsort(distances, kind="stable")[:multiplicity]
         if len(nearest) < multiplicity or _is_far(t, knots[nearest], corner):
             continue
         kept = np.delete(knots, nearest)
-        broken = [*corners, *[corner] * multiplicity]
+        broken = corners + multiplicity * [corner]
         if _is_solvable(t, _with_ends(t, kept, broken)):
             knots = kept
             corners = broken
-    return make_interp_spline(t, values, k=DEGREE, t=_with_ends(t, knots, corners))
+    every_knot = _with_ends(t, knots, corners)
+    return make_interp_spline(t, values, k=DEGREE, t=every_knot)
 
 
 def _is_far(t: Floats, knots: Floats, corner: float) -> bool:
     """Whether a knot is more than two samples away from a corner."""
-    after = np.searchsorted(t, corner)
-    return bool(np.any(np.abs(np.searchsorted(t, knots) - after) > 2))
+    at_corner = np.searchsorted(t, corner)
+    samples_away = np.abs(np.searchsorted(t, knots) - at_corner)
+    return bool(np.any(samples_away > 2))
 
 
 def _with_ends(t: Floats, knots: Floats, corners: list[float]) -> Floats:
     """Knots of the whole spline, with as many at either end as a cubic needs."""
     inner = np.sort(np.concatenate([knots, corners]))
-    ends = DEGREE + 1
-    return np.concatenate([np.repeat(t[0], ends), inner, np.repeat(t[-1], ends)])
+    first = np.repeat(t[0], DEGREE + 1)
+    last = np.repeat(t[-1], DEGREE + 1)
+    return np.concatenate([first, inner, last])
 
 
 def _is_solvable(t: Floats, knots: Floats) -> bool:
-    """Whether every basis function has a sample of its own (Schoenberg & Whitney 1953)."""
+    """Whether every basis function has a sample of its own.
+
+    Source: Schoenberg & Whitney 1953.
+    """
     inside = t[1:-1]
     begins = knots[1 : len(t) - 1]
     ends = knots[DEGREE + 2 : -1]
-    return bool(np.all((begins < inside) & (inside < ends)))
+    has_sample = (begins < inside) & (inside < ends)
+    return bool(np.all(has_sample))
 
 
 def twice_integrated(t: Floats, integrals: Floats, moments: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""What the wind does to a ship in her trials: accelerations by measured wind, or constant ones by trial."""
+"""Accelerations of a ship by the wind of her trials: measured, or constant in each."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from identification.regression.velocities import CURRENT_COLUMNS
 from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_flag, check_keys, check_text
-from shipgym.sea.wind import AIR_DENSITY, wind_curves
+from shipgym.sea.wind import AIR_DENSITY, WindCurves, wind_curves
 from shipgym.sea.wind_coefficients import WindTable
 from shipgym.ships.inertia import particulars_inertia
 from shipgym.ships.mmg import MMG
@@ -28,11 +28,14 @@ def check_wind(option: Any) -> None:
 
 
 def measured_wind(
-    trial: Trial, particulars: Particulars, option: str | Mapping[str, Any]
+    trial: Trial,
+    particulars: Particulars,
+    option: str | Mapping[str, Any],
 ) -> Trial:
-    """The trial with the accelerations by the wind of its columns; itself where it has none.
+    """The trial with the accelerations by the wind of its columns.
 
-    Velocities through the water are completed by a current in columns.
+    The trial itself where it has none. Velocities through the water are completed by a
+    current in columns.
 
     Parameters
     ----------
@@ -52,23 +55,14 @@ def measured_wind(
     if not {"wind_speed", "wind_from", "psi", "u", "v"} <= trial.channels.keys():
         return trial
 
-    named = table.get("coefficients", "auto")
-    if named == "auto":
-        named = "blendermann"
-    if isinstance(named, Mapping):
-        named = WindTable.from_dict(named, "wind coefficients")
-    curves = wind_curves(particulars, named)
-
     ahead, aside = _felt_wind(trial, relative=table.get("relative", False))
     pressure = 0.5 * AIR_DENSITY * (ahead**2 + aside**2)
     angle = np.arctan2(aside, ahead)
-    coefficients = np.array(
-        [
-            np.interp(angle, curves.angle, row, period=2.0 * np.pi)
-            for row in (curves.X, curves.Y, curves.N)
-        ]
-    )
-    forces = pressure * coefficients
+    curves = _curves(particulars, table.get("coefficients", "auto"))
+    coefficients = []
+    for row in (curves.X, curves.Y, curves.N):
+        coefficients.append(np.interp(angle, curves.angle, row, period=2.0 * np.pi))
+    forces = pressure * np.array(coefficients)
     # her resistance in still air is the model's own
     forces[0] -= 0.5 * AIR_DENSITY * curves.X[0] * trial["u"] ** 2
 
@@ -77,13 +71,25 @@ def measured_wind(
     return trial.with_channels(dict(zip(WIND.values(), accelerations, strict=True)))
 
 
+def _curves(particulars: Particulars, coefficients: Any) -> WindCurves:
+    """Wind coefficients by their name, or by a table of them."""
+    if isinstance(coefficients, Mapping):
+        given = WindTable.from_dict(coefficients, "wind coefficients")
+        return wind_curves(particulars, given)
+    if coefficients == "auto":
+        coefficients = "blendermann"
+    return wind_curves(particulars, coefficients)
+
+
 def _felt_wind(trial: Trial, relative: bool) -> tuple[Floats, Floats]:
     """Wind felt on board, from ahead and from starboard, m/s."""
-    speed, angle = trial["wind_speed"], trial["wind_from"]
+    along = trial["wind_speed"] * np.cos(trial["wind_from"])
+    across = trial["wind_speed"] * np.sin(trial["wind_from"])
     if relative:
-        return speed * np.cos(angle), speed * np.sin(angle)
+        return along, across
 
-    north, east = speed * np.cos(angle), speed * np.sin(angle)
+    north = along
+    east = across
     has_current = trial.channels.keys() >= set(CURRENT_COLUMNS)
     if has_current and not trial.over_ground:
         north = north + trial["current_north"]
@@ -93,9 +99,11 @@ def _felt_wind(trial: Trial, relative: bool) -> tuple[Floats, Floats]:
 
 
 def constant_wind(
-    trials: Sequence[Trial], samples: Samples, structure: Any
+    trials: Sequence[Trial],
+    samples: Samples,
+    structure: Any,
 ) -> dict[str, dict[str, float]]:
-    """The constant sway and yaw acceleration that the regression of each trial asks for, by its name.
+    """Constant sway and yaw acceleration that the regression asks for, by trial.
 
     A constant of the structure's own takes their mean. The MMG form has no regression:
     InputError.
@@ -125,7 +133,8 @@ def constant_wind(
 
 def _explains(features: Floats, target: Floats, rounding: float = 1e-6) -> bool:
     """Tell whether features explain a target but for rounding."""
-    left = target - features @ np.linalg.lstsq(features, target)[0]
+    solution = np.linalg.lstsq(features, target)[0]
+    left = target - features @ solution
     return bool(np.linalg.norm(left) < rounding * np.linalg.norm(target))
 
 
@@ -133,8 +142,9 @@ def with_constant_wind(
     trial: Trial, constants: Mapping[str, Mapping[str, float]]
 ) -> Trial:
     """The trial with its constants of all, by name; itself where it has none."""
-    own = {
-        name: np.full(len(trial), value)
-        for name, value in constants.get(trial.name, {}).items()
-    }
-    return trial.with_channels(own) if own else trial
+    own = constants.get(trial.name, {})
+    if not own:
+        return trial
+    return trial.with_channels(
+        {name: np.full(len(trial), value) for name, value in own.items()}
+    )

@@ -59,7 +59,8 @@ class LinearSystem:
         Those that are not finite are missing. Measurements are taken in one at a time,
         in Joseph's form, so that nothing is inverted.
         """
-        n_samples, n_states = len(measured), len(self.start)
+        n_samples = len(measured)
+        n_states = len(self.start)
         predicted = np.empty((n_samples, n_states))
         predicted_covariances = np.empty((n_samples, n_states, n_states))
         states = np.empty_like(predicted)
@@ -92,7 +93,11 @@ class LinearSystem:
             states[k] = x
             covariances[k] = P
         return Filtered(
-            predicted, predicted_covariances, states, covariances, log_likelihood
+            predicted=predicted,
+            predicted_covariances=predicted_covariances,
+            states=states,
+            covariances=covariances,
+            log_likelihood=log_likelihood,
         )
 
     def smoothed(self, measured: Floats) -> Floats:
@@ -103,7 +108,9 @@ class LinearSystem:
         found = self.filtered(measured)
         states = found.states.copy()
         for k in reversed(range(len(measured) - 1)):
-            ahead = self.transitions[k] @ found.covariances[k]
-            gain = np.linalg.solve(found.predicted_covariances[k + 1], ahead).T
-            states[k] += gain @ (states[k + 1] - found.predicted[k + 1])
+            covariance_ahead = found.predicted_covariances[k + 1]
+            moved = self.transitions[k] @ found.covariances[k]
+            gain = np.linalg.solve(covariance_ahead, moved).T
+            surprise = states[k + 1] - found.predicted[k + 1]
+            states[k] += gain @ surprise
         return states
