@@ -78,10 +78,10 @@ def without_current(
             doubtful.setdefault(doubt, []).append(PurePath(name).name)
 
         is_chance = option == "auto" and current.probability > SIGNIFICANT
-        is_taken_out = not doubt and not is_chance
-        if is_taken_out:
+        taken_out = not doubt and not is_chance
+        if taken_out:
             found[name] = through_water(found[name], *current.velocity)
-        rows[name] = _row(current, one_heading) | {"taken_out": is_taken_out}
+        rows[name] = _row(current, taken_out, one_heading)
 
     for doubt, names in doubtful.items():
         trials = ", ".join(names)
@@ -89,10 +89,15 @@ def without_current(
     return rows
 
 
-def _row(current: TrialCurrent, one_heading: bool) -> dict[str, Any]:
+def _row(current: TrialCurrent, taken_out: bool, one_heading: bool) -> dict[str, Any]:
     """A current for the provenance; how certain it is, unless from one heading."""
     north, east = current.mean.tolist()
-    row = {"north": north, "east": east, "source": current.source}
+    row = {
+        "north": north,
+        "east": east,
+        "source": current.source,
+        "taken_out": taken_out,
+    }
     if current.covariance is not None and not one_heading:
         errors = np.sqrt(np.diag(current.covariance))
         row["standard_errors"] = errors.tolist()
