@@ -132,17 +132,19 @@ class LinearSupportVectorMachine(LinearRegressor):
 
     def _set_covariance(self, scaled: Floats, scale: Floats, errors: Floats) -> None:
         """Set inverse moment and covariance, from features of unit size."""
-        moment = (scaled.T * self.weights_) @ scaled
+        weights = self.weights_
+        moment = (scaled.T * weights) @ scaled
         inverse_scaled = np.linalg.pinv(moment, hermitian=True)
         inverse = inverse_scaled / np.outer(scale, scale)
+        self.inverse_moment_ = inverse
 
         n_samples, n_features = scaled.shape
         freedom = max(n_samples - n_features, 1)
-        counted = self.weights_ * errors
+        counted = weights * errors
         variance = float(np.sum(counted**2)) / freedom
         unscaled = scaled * scale
-        self.inverse_moment_ = inverse
-        self.covariance_ = variance * inverse @ (unscaled.T @ unscaled) @ inverse
+        whole = unscaled.T @ unscaled
+        self.covariance_ = variance * inverse @ whole @ inverse
 
     def _solved(self, features: Floats, targets: Floats) -> tuple[Floats, float]:
         """Slopes and offset for features and targets of root mean square 1."""
@@ -169,4 +171,6 @@ def _huber_weights(errors: Floats) -> Floats:
     sizes = np.abs(errors)
     usual = MAD * float(np.median(sizes))
     weights = np.ones(len(errors))
-    return np.divide(usual, sizes, out=weights, where=sizes > usual)
+    is_large = sizes > usual
+    weights[is_large] = usual / sizes[is_large]
+    return weights

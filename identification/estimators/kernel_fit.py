@@ -322,5 +322,6 @@ class _Search:
 
 def _ridge(X: Floats, y: Floats, C: float) -> Floats:
     """Coefficients by ridge regression with a weight C of the squared errors."""
-    moment = X.T @ X * C + np.eye(X.shape[1])
+    penalty = np.eye(X.shape[1])
+    moment = X.T @ X * C + penalty
     return np.asarray(np.linalg.solve(moment, C * (X.T @ y)))

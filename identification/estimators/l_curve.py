@@ -75,10 +75,10 @@ def corner_rank(curve: LCurve, n_samples: int, significance: float = 0.1) -> int
     allowed = 1.0 + dropped / freedom * quantile
     # once: as array and as number a square may differ in the last bit
     squared = residual * residual
-    of_full_rank = max(squared[-1], floor**2)
-    is_adequate = squared <= allowed * of_full_rank
-    from_corner = is_adequate[corner - 1 :]
-    return corner + int(np.argmax(from_corner))
+    least = max(squared[-1], floor**2)
+    is_adequate = squared <= allowed * least
+    passed_over = np.argmax(is_adequate[corner - 1 :])
+    return corner + int(passed_over)
 
 
 def gcv_rank(curve: LCurve, n_samples: int) -> int:

@@ -121,10 +121,14 @@ def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Est
     contribution there.
     """
     window = float(np.mean(samples.duration))
-    C = 1.0 / (len(samples) * strength**2)
+    penalty = len(samples) * strength**2
     estimators: Estimators = {}
     for q, features in samples.features.items():
-        ridge = LSSVM(C=C, scale=sizes[q] * window, fit_intercept=False)
+        ridge = LSSVM(
+            C=1.0 / penalty,
+            scale=sizes[q] * window,
+            fit_intercept=False,
+        )
         estimators[q] = ridge.fit(features, samples.targets[q])
     return estimators
 

@@ -126,18 +126,22 @@ class Recursion(LinearRegressor):
         features, targets = validated(self, X, y)
         self._begin(features, targets[:, None])
 
-        gathered = min(self.start_samples * self.start_interval, len(targets))
+        n_samples = len(targets)
+        gathered = min(self.start_samples * self.start_interval, n_samples)
         picked = slice(0, gathered, self.start_interval)
         if gathered:
             self._start_from(features[picked], targets[picked])
         start = np.tile(self.coef_, (gathered, 1))
-        rest = self._run(features[gathered:, None], targets[gathered:, None])
 
-        counts = np.ones(len(targets))
-        counts[:gathered] = 0.0
+        rest = slice(gathered, None)
+        history = self._run(features[rest, None], targets[rest, None])
+        of_rest = history[:, 0]
+
+        counts = np.zeros(n_samples)
         counts[picked] = 1.0
+        counts[rest] = 1.0
         self._summarise(features, targets, counts)
-        return np.concatenate([start, rest[:, 0]])
+        return np.concatenate([start, of_rest])
 
     def update(self, phi: ArrayLike, y: ArrayLike) -> Self:
         """Take in the next sample or samples.
@@ -187,8 +191,9 @@ class Recursion(LinearRegressor):
         check_is_fitted(self, "coef_")
         if not hasattr(self, "_P"):
             return None
-        unscaled: Floats = self._P / np.outer(self.scale_, self.scale_)
-        return np.squeeze(unscaled, axis=0) if len(unscaled) == 1 else unscaled
+        unscale = np.outer(self.scale_, self.scale_)
+        unscaled: Floats = self._P / unscale
+        return unscaled.reshape(*self.coef_.shape, -1)
 
     def _begin(self, features: Floats, targets: Floats) -> None:
         """Begin with zero coefficients, in scales that the samples give."""
@@ -214,21 +219,29 @@ class Recursion(LinearRegressor):
 
         Source: LSSVR-RLS, Zhu 2018, section 7.3.
         """
-        estimator = LSSVM(C=self.start_C, scale=self.scale_, fit_intercept=False)
-        estimator.fit(features, targets)
-        self.coef_ = estimator.coef_
-        self._theta[0] = estimator.coef_ * self.scale_ / self._unit[0]
-        self._remember_start(features / self.scale_, estimator.inverse_moment_)
+        start = LSSVM(
+            C=self.start_C,
+            scale=self.scale_,
+            fit_intercept=False,
+        )
+        start.fit(features, targets)
+        self.coef_ = start.coef_
+        self._theta[0] = start.coef_ * self.scale_ / self._unit
+        self._remember_start(features / self.scale_, start.inverse_moment_)
 
     def _run(self, features: Floats, targets: Floats) -> Floats:
         """Take in samples; return the estimate after each of them.
 
         Both of shape (n_samples, n_signals, n_features).
         """
-        scaled = np.ascontiguousarray(features / self.scale_)
-        in_units = np.ascontiguousarray(targets / self._unit)
+        scaled = features / self.scale_
+        in_units = targets / self._unit
         history: Floats = np.empty(features.shape)
-        self._advance(scaled, in_units, history)
+        self._advance(
+            np.ascontiguousarray(scaled),
+            np.ascontiguousarray(in_units),
+            history,
+        )
 
         history *= self._unit[:, None] / self.scale_
         if len(history):

@@ -228,17 +228,20 @@ class _Standardised:
         scale = self._scale[self._penalised]
         found[self._penalised] = slopes * self._deviation / scale
         if self._constant is not None:
+            level = self._level + self._deviation * offset
             at_centre = self._centre @ found
-            found[self._constant] = self._level + self._deviation * offset - at_centre
+            found[self._constant] = level - at_centre
         return found
 
     def inverse_moment(self, weight: float) -> Floats:
         """Regularised inverse of X'X of the ridge regression of the same strength."""
+        X = self._X
         usual_duration = np.mean(self._duration)
-        strength = len(self._X) / weight * usual_duration**2
-        penalty = np.where(self._penalised, strength * self._scale**2, 0.0)
-        moment = self._X.T @ self._X + np.diag(penalty)
-        return np.linalg.pinv(moment, hermitian=True)
+        strength = len(X) / weight * usual_duration**2
+        penalty = strength * self._scale**2
+        penalty[~self._penalised] = 0.0
+        moment = X.T @ X + np.diag(penalty)
+        return np.asarray(np.linalg.pinv(moment, hermitian=True))
 
 
 def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:

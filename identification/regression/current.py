@@ -243,7 +243,8 @@ class _Runs:
 def _together(records: Sequence[_Record], shaft_speed: float | None) -> _Runs:
     """The records on one grid, shaft speeds by that at the start."""
     longest = max(record.t[-1] for record in records)
-    n_windows = int(longest / (STEP * STEPS))
+    window = STEP * STEPS
+    n_windows = int(longest / window)
     grid: Floats = np.arange(n_windows * STEPS + 1, dtype=np.float64) * STEP
 
     inputs, headings, seen = [], [], []
@@ -331,24 +332,27 @@ class _Problem:
         given, then follow lanes in which each of the coefficients, and u and v at the
         start, are moved by `DIFFERENCE`.
         """
-        inputs, psi = self.runs.inputs, self.runs.psi
         c = _coefficients_by_lane(x[:N_COEFFICIENTS])
-        n_lanes = len(c.X_0)
-
-        shaft = Inputs(*inputs[0]).n
-        start_u, start_v = x[self.start_columns].T
-        u = np.tile(start_u + shaft, (n_lanes, 1))
-        v = np.tile(start_v, (n_lanes, 1))
-        u[-2] += DIFFERENCE
-        v[-1] += DIFFERENCE
-
+        u, v = self._starts_by_lane(x, n_lanes=len(c.X_0))
         motion = [(u, v)]
-        for now, then in pairwise(inputs):
+        for now, then in pairwise(self.runs.inputs):
             u, v = _midpoint_step(u, v, now, then, c)
             motion.append((u, v))
+
         ahead, aside = np.array(motion).swapaxes(0, 1)
-        north, east = rotate_to_body(ahead, aside, -psi[:, None])
+        heading = self.runs.psi[:, None]
+        north, east = rotate_to_body(ahead, aside, -heading)
         return _averaged(np.stack([north, east, ahead], axis=1))
+
+    def _starts_by_lane(self, x: Floats, n_lanes: int) -> tuple[Floats, Floats]:
+        """Starting u and v, shape (n_lanes, n_trials), each moved in its own lane."""
+        at_start = Inputs(*self.runs.inputs[0])
+        u, v = x[self.start_columns].T
+        u = np.tile(u + at_start.n, (n_lanes, 1))
+        v = np.tile(v, (n_lanes, 1))
+        u[-2] += DIFFERENCE
+        v[-1] += DIFFERENCE
+        return u, v
 
     def errors(self, x: Floats) -> tuple[Floats, Floats]:
         """Measured less simulated velocities, and slopes of the latter by the unknowns.
@@ -356,16 +360,16 @@ class _Problem:
         Shapes (n_windows, 3, n_trials) and (n_windows, 3, n_trials, n_unknowns): north,
         east, and ahead through the water; 0 where nothing was measured.
         """
-        lanes = self.simulated(x)
-        predicted = lanes[:, :, 0]
-        changes = (lanes[:, :, 1:] - lanes[:, :, :1]) / DIFFERENCE
-        by_unknown = np.moveaxis(changes, 2, 3)
-        by_coefficient = by_unknown[..., :N_COEFFICIENTS]
+        lanes = np.moveaxis(self.simulated(x), 2, -1)
+        as_given = lanes[..., 0]
+        moved = lanes[..., 1:]
+        by_unknown = (moved - as_given[..., None]) / DIFFERENCE
         by_start = by_unknown[..., N_COEFFICIENTS:]
-        predicted[:, :2] += x[self.current_columns].T
 
+        predicted = as_given.copy()
+        predicted[:, :2] += x[self.current_columns].T
         slopes = np.zeros((*predicted.shape, len(x)))
-        slopes[..., :N_COEFFICIENTS] = by_coefficient
+        slopes[..., :N_COEFFICIENTS] = by_unknown[..., :N_COEFFICIENTS]
         for k in range(self.runs.n_trials):
             own_start = self.start_columns[k]
             slopes[:, :, k, own_start] = by_start[:, :, k]

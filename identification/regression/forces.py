@@ -148,15 +148,16 @@ def between_jumps(trial: Trial) -> list[slice]:
     A jump is a change from sample to sample of more than 20 usual ones, the median of
     the test; stretches of fewer than 4 samples are left out.
     """
-    jumps = np.zeros(len(trial) - 1, dtype=bool)
+    is_jump = np.zeros(len(trial) - 1, dtype=bool)
     for name in AXES:
         velocity = trial[name]
         changes = np.abs(np.diff(velocity))
+        usual = float(np.median(changes))
         rounding = 1e-9 * float(np.abs(velocity).max())
-        largest = max(JUMP * float(np.median(changes)), rounding)
-        jumps |= changes > largest + rounding
+        largest = max(JUMP * usual, rounding)
+        is_jump |= changes > largest + rounding
 
-    starts = np.flatnonzero(jumps) + 1
+    starts = np.flatnonzero(is_jump) + 1
     edges = [0, *starts.tolist(), len(trial)]
     stretches = []
     for start, stop in pairwise(edges):
@@ -261,8 +262,9 @@ def force_variances(equation: Integers, residuals: Floats, leverages: Floats) ->
     variances = []
     for i in range(len(FORCES)):
         own = equation == i
+        own_residuals = residuals[own]
+        squares = np.sum(own_residuals**2, axis=0)
         freedom = float(np.sum(1.0 - leverages[own]))
-        squares = np.sum(residuals[own] ** 2, axis=0)
         variances.append(squares / max(freedom, 1.0))
     return np.array(variances)
 

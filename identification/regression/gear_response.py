@@ -33,11 +33,13 @@ class GearResponse(NamedTuple):
         by_ramp = distance - by_lag
         ramping = np.minimum(elapsed, by_ramp / self.rate)
 
+        # the last of the way decays
+        creeping = elapsed - ramping
         decayed = 1.0
         if self.lag > 0.0:
-            creeping = elapsed - ramping
             decayed = 1.0 - np.exp(-creeping / self.lag)
-        crept = np.where(ramping < elapsed, by_lag * decayed, 0.0)
+        crept = np.where(creeping > 0.0, by_lag * decayed, 0.0)
+
         travelled = self.rate * ramping + crept
         return np.asarray(start + np.sign(move) * travelled)
 
@@ -49,12 +51,13 @@ class GearResponse(NamedTuple):
         steps = np.diff(t)
         moves = np.diff(delta)
         sizes = np.abs(moves)
-        ramps_throughout = sizes >= (1.0 - RAMP) * self.rate * steps
-
         distances = self._distances(steps, sizes)
-        reached = delta[:-1] + np.sign(moves) * distances
-        unknown = np.copysign(np.inf, moves)
-        return np.where(ramps_throughout, unknown, reached)
+        orders = delta[:-1] + np.sign(moves) * distances
+
+        # a ramp does not tell how far it goes on
+        ramps_throughout = sizes >= (1.0 - RAMP) * self.rate * steps
+        orders[ramps_throughout] = np.copysign(np.inf, moves[ramps_throughout])
+        return orders
 
     def _distances(self, steps: Floats, sizes: Floats) -> Floats:
         """Distance to the order at the start of intervals, from durations and moves."""

@@ -41,11 +41,12 @@ def step_integrals(t: Floats, channels: Channels, terms: Terms, rule: str) -> In
     steps = np.diff(t)[:, None]
     found = Integrals({}, {})
     for equation, values in terms(channels).items():
-        mean = values[:-1]
-        if rule != "euler":
-            mean = 0.5 * (values[:-1] + values[1:])
-        found.terms[equation] = mean * steps
-        found.moments[equation] = 0.5 * found.terms[equation] * steps
+        start = values[:-1]
+        end = values[1:]
+        mean = start if rule == "euler" else 0.5 * (start + end)
+        integral = mean * steps
+        found.terms[equation] = integral
+        found.moments[equation] = 0.5 * integral * steps
     return found
 
 
@@ -135,10 +136,14 @@ def _is_far(t: Floats, knots: Floats, corner: float) -> bool:
 
 def _with_ends(t: Floats, knots: Floats, corners: list[float]) -> Floats:
     """Knots of the whole spline, with as many at either end as a cubic needs."""
-    inner = np.sort(np.concatenate([knots, corners]))
-    first = np.repeat(t[0], DEGREE + 1)
-    last = np.repeat(t[-1], DEGREE + 1)
-    return np.concatenate([first, inner, last])
+    inner = np.concatenate([knots, corners])
+    inner.sort()
+    multiplicity = DEGREE + 1
+    return np.pad(
+        inner,
+        pad_width=multiplicity,
+        constant_values=(t[0], t[-1]),
+    )
 
 
 def _is_solvable(t: Floats, knots: Floats) -> bool:
@@ -146,11 +151,12 @@ def _is_solvable(t: Floats, knots: Floats) -> bool:
 
     Source: Schoenberg & Whitney 1953.
     """
-    inside = t[1:-1]
-    begins = knots[1 : len(t) - 1]
-    ends = knots[DEGREE + 2 : -1]
-    has_sample = (begins < inside) & (inside < ends)
-    return bool(np.all(has_sample))
+    n_functions = len(t)
+    begins = knots[:n_functions]
+    ends = knots[DEGREE + 1 :]
+    has_sample = (begins < t) & (t < ends)
+    # the first and the last function have the samples at the ends
+    return bool(np.all(has_sample[1:-1]))
 
 
 def twice_integrated(t: Floats, integrals: Floats, moments: Floats) -> Floats:
@@ -159,5 +165,6 @@ def twice_integrated(t: Floats, integrals: Floats, moments: Floats) -> Floats:
     `integrals` of the terms over each step and their `moments` (`Integrals`), all of
     shape (n_samples - 1, n_terms).
     """
+    steps = np.diff(t)[:, None]
     before = np.cumsum(integrals, axis=0) - integrals
-    return before * np.diff(t)[:, None] + moments
+    return before * steps + moments

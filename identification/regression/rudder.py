@@ -67,9 +67,10 @@ class Rudder:
         if not self.follows_gear:
             return np.asarray(np.interp(times, self.t, self.delta))
         following = np.searchsorted(self.t, times, side="right")
-        last = len(self.t) - 2
-        interval = np.clip(following - 1, 0, last)
-        return self.within(interval, times - self.t[interval])
+        n_intervals = len(self.t) - 1
+        interval = np.clip(following - 1, 0, n_intervals - 1)
+        elapsed = times - self.t[interval]
+        return self.within(interval, elapsed)
 
     def within(self, interval: Integers, elapsed: Floats) -> Floats:
         """Angle, rad, some time after the start of intervals."""

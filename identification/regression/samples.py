@@ -33,6 +33,7 @@ from shipgym import InputError, Particulars, SteeringGear, Trial
 from shipgym.arrays import Floats, Integers, integral
 from shipgym.checks import check_choice, check_whole
 from shipgym.ships import GreyBox, Structure
+from shipgym.trials.resampling import usual_step
 
 SAMPLE_STRUCTURES = ("euler", "integral", "spline")
 LONGEST_WINDOW = 1.0 / 3.0  # of the time to sail one ship length
@@ -294,8 +295,7 @@ def default_window(trial: Trial, particulars: Particulars) -> int:
     twentieth of the trial.
     """
     one_length = particulars["length"] / particulars["speed"]
-    usual_step = float(np.median(np.diff(trial.t)))
-    by_travel = int(LONGEST_WINDOW * one_length / usual_step)
+    by_travel = int(LONGEST_WINDOW * one_length / usual_step(trial.t))
     longest = min(by_travel, len(trial) // 20)
 
     window = 1

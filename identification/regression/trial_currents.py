@@ -236,12 +236,12 @@ def _contradict(currents: Floats, covariance: Floats, chance: float = 1e-6) -> b
     The chance is small because their covariance is an average over few blocks.
     """
     n_trials = len(currents) // 2
-    identity = np.eye(n_trials)
-    from_first = identity[1:] - identity[0]
+    first, *others = np.eye(n_trials)
+    from_first = np.array(others) - first
     apart = np.kron(from_first, np.eye(2))
     differences = apart @ currents
-    probability = wald_probability(differences, apart @ covariance @ apart.T)
-    return probability < chance
+    of_differences = apart @ covariance @ apart.T
+    return wald_probability(differences, of_differences) < chance
 
 
 def _known_current(

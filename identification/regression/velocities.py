@@ -34,12 +34,14 @@ def through_water(trial: Trial, north: Any, east: Any) -> Trial:
     Its track starts where it did; velocities over ground, but for one logged, become
     those through the water.
     """
-    north = np.full(len(trial), north, dtype=float)
-    east = np.full(len(trial), east, dtype=float)
+    t = trial.t
+    north = np.full(len(t), north, dtype=float)
+    east = np.full(len(t), east, dtype=float)
     channels = {"current_north": north, "current_east": east}
-    for name, drift in {"x": north, "y": east}.items():
-        if name in trial:
-            channels[name] = trial[name] - integral(trial.t, drift)
+    if "x" in trial:
+        channels["x"] = trial["x"] - integral(t, north)
+    if "y" in trial:
+        channels["y"] = trial["y"] - integral(t, east)
 
     if trial.over_ground and trial.channels.keys() >= {"u", "v", "psi"}:
         ahead, aside = over_ground(trial)
@@ -49,4 +51,5 @@ def through_water(trial: Trial, north: Any, east: Any) -> Trial:
             channels["u"] = ahead - drift_ahead
         if "v" in trial.derived or not one_is_logged:
             channels["v"] = aside - drift_aside
-    return trial.with_channels(channels).with_(over_ground=False)
+    still = trial.with_channels(channels)
+    return still.with_(over_ground=False)

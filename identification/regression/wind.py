@@ -55,20 +55,28 @@ def measured_wind(
     if not {"wind_speed", "wind_from", "psi", "u", "v"} <= trial.channels.keys():
         return trial
 
-    ahead, aside = _felt_wind(trial, relative=table.get("relative", False))
-    pressure = 0.5 * AIR_DENSITY * (ahead**2 + aside**2)
-    angle = np.arctan2(aside, ahead)
     curves = _curves(particulars, table.get("coefficients", "auto"))
-    coefficients = []
-    for row in (curves.X, curves.Y, curves.N):
-        coefficients.append(np.interp(angle, curves.angle, row, period=2.0 * np.pi))
-    forces = pressure * np.array(coefficients)
+    ahead, aside = _felt_wind(trial, relative=table.get("relative", False))
+    forces = _forces(curves, ahead, aside)
     # her resistance in still air is the model's own
-    forces[0] -= 0.5 * AIR_DENSITY * curves.X[0] * trial["u"] ** 2
+    still_ahead, *_ = curves.X
+    forces[0] -= 0.5 * AIR_DENSITY * still_ahead * trial["u"] ** 2
 
     inertia = particulars_inertia(particulars.completed())[:, :3]
     accelerations = np.linalg.solve(inertia, forces)
-    return trial.with_channels(dict(zip(WIND.values(), accelerations, strict=True)))
+    channels = dict(zip(WIND.values(), accelerations, strict=True))
+    return trial.with_channels(channels)
+
+
+def _forces(curves: WindCurves, ahead: Floats, aside: Floats) -> Floats:
+    """X, Y and N by a wind felt from ahead and starboard, shape (3, n_samples)."""
+    angle = np.arctan2(aside, ahead)
+    coefficients = []
+    for row in (curves.X, curves.Y, curves.N):
+        at_angle = np.interp(angle, curves.angle, row, period=2.0 * np.pi)
+        coefficients.append(at_angle)
+    pressure = 0.5 * AIR_DENSITY * (ahead**2 + aside**2)
+    return pressure * np.array(coefficients)
 
 
 def _curves(particulars: Particulars, coefficients: Any) -> WindCurves:

@@ -12,6 +12,7 @@ from identification.progress import counted
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
 from shipgym.arrays import Floats, Integers
+from shipgym.trials.resampling import usual_step
 
 DRAWS = 200
 
@@ -105,7 +106,7 @@ def rows_in(memory: float, start: Floats) -> int:
     """Rows of a regression that start within a time, s, at least one."""
     if len(start) < 2:
         return 1
-    spacing = float(np.median(np.diff(start)))
+    spacing = usual_step(start)
     if spacing <= 0.0:
         return 1
     return max(round(memory / spacing), 1)

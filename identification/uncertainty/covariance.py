@@ -6,6 +6,7 @@ from identification.estimators.estimator import Estimator, Estimators, weights
 from identification.estimators.threads import single_threaded
 from identification.regression.samples import Samples
 from shipgym.arrays import Floats
+from shipgym.trials.resampling import usual_step
 
 
 def residuals(estimators: Estimators, samples: Samples) -> dict[str, Floats]:
@@ -78,9 +79,7 @@ def _with_memory(
     for trial in np.unique(samples.trial):
         own = samples.trial == trial
         start = samples.start[own]
-        spacing = memory
-        if len(start) > 1:
-            spacing = float(np.median(np.diff(start)))
+        spacing = usual_step(start) if len(start) > 1 else memory
         lags = round(memory / spacing)
         total += newey_west(scores[own], lags)
     return 0.5 * (total + total.T)

@@ -7,6 +7,7 @@ standard errors are scaled until these errors are of size one.
 """
 
 import copy
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -25,6 +26,7 @@ from identification.validation.closed_loop import closed_loop
 from identification.validation.prediction import COMPARED, ZIGZAG, index_reader, predict
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Flags, Floats
+from shipgym.trials.resampling import usual_step
 
 FEWEST_TRIALS = 3  # to leave one out and learn something from it
 # factor for fewer: found were 2.1 to 2.6 on ships of other equations than the
@@ -310,8 +312,7 @@ def index_errors(
 
 def _timing(trial: Trial) -> float:
     """Standard deviation of a time that is known to a step, s."""
-    step = np.median(np.diff(trial.t))
-    return float(step / np.sqrt(12.0))
+    return usual_step(trial.t) / math.sqrt(12.0)
 
 
 def _reading_noise(trial: Trial, index: str, model: ShipModel) -> float:

@@ -11,6 +11,7 @@ from identification.regression.preprocess.noise import NOISY, noise_ratio
 from shipgym.arrays import Floats
 
 ORDER = 3  # of the local polynomials
+SHORTEST_WIDTH = ORDER + 2
 #: Decades of stiffness tried, of a spline on knots a unit apart.
 STIFFNESSES = tuple(float(stiffness) for stiffness in np.arange(-2.0, 8.01, 0.25))
 
@@ -40,42 +41,42 @@ def savitzky_golay(t: ArrayLike, values: ArrayLike, width: int | None = None) ->
     """
     t = np.asarray(t, dtype=float)
     values = np.asarray(values, dtype=float)
-    longest = len(t) // 5
     if width is None:
-        is_short = longest < ORDER + 2
+        is_short = len(t) < 5 * SHORTEST_WIDTH
         if is_short or noise_ratio(t, values) < NOISY:
             return values
 
     steps = np.diff(t)
     is_even = np.ptp(steps) <= 1e-3 * np.median(steps)
     if is_even:
-        return _savitzky_golay(values, width, longest)
+        return _savitzky_golay(values, width)
     grid = np.linspace(t[0], t[-1], len(t))
     on_grid = np.interp(grid, t, values)
-    filtered = _savitzky_golay(on_grid, width, longest)
+    filtered = _savitzky_golay(on_grid, width)
     return np.asarray(np.interp(t, grid, filtered))
 
 
-def _savitzky_golay(values: Floats, width: int | None, longest: int) -> Floats:
-    """The filter on even steps; without a width the best one up to the longest."""
+def _savitzky_golay(values: Floats, width: int | None) -> Floats:
+    """The filter on even steps; without a width the best one."""
     if width is None:
-        width = _best_width(values, longest)
+        width = _best_width(values)
     filtered: Floats = savgol_filter(values, width, ORDER)
     return filtered
 
 
-def _best_width(values: Floats, longest: int) -> int:
+def _best_width(values: Floats) -> int:
     """Width of least generalised cross-validation; widths grow by about a fifth."""
-    shortest = ORDER + 2
-    sizes = np.geomspace(shortest, max(longest, shortest), 24)
+    longest = len(values) // 5
+    sizes = np.geomspace(SHORTEST_WIDTH, longest, 24)
     odd = 2 * (sizes.astype(int) // 2) + 1
-    widths = np.unique(odd[odd <= len(values)])
+    widths = np.unique(odd)
 
     def criterion(width: int) -> float:
-        left_out = values - savgol_filter(values, width, ORDER)
-        own_weight = savgol_coeffs(width, ORDER)[width // 2]
-        freedom = 1.0 - float(own_weight)
-        return mean_square(left_out) / freedom**2
+        fitted = savgol_filter(values, width, ORDER)
+        weights = savgol_coeffs(width, ORDER)
+        own_weight = float(weights[width // 2])
+        left_out = mean_square(values - fitted)
+        return left_out / (1.0 - own_weight) ** 2
 
     return int(min(widths.tolist(), key=criterion))
 
@@ -123,36 +124,37 @@ class Reinsch:
         left = 1.0 / h[:-1]
         right = 1.0 / h[1:]
         middle = -left - right
+        n_inner = len(middle)
         #: the three diagonals of Q'
         self.diagonals = (left, middle, right)
 
         # upper bands, the diagonal last, as scipy.linalg.solveh_banded wants them
-        gram = np.zeros((3, len(left)))
-        gram[2] = (h[:-1] + h[1:]) / 3.0
-        gram[1, 1:] = h[1:-1] / 6.0
-        self.gram = gram
+        self.gram = np.zeros((3, n_inner))
+        _, beside, diagonal = self.gram
+        diagonal[:] = (h[:-1] + h[1:]) / 3.0
+        beside[1:] = h[1:-1] / 6.0
 
-        square = np.zeros((3, len(left)))
-        square[2] = left**2 + middle**2 + right**2
-        square[1, 1:] = middle[:-1] * left[1:] + right[:-1] * middle[1:]
-        square[0, 2:] = right[:-2] * left[2:]
-        self.square = square  # Q'Q
+        self.square = np.zeros((3, n_inner))  # Q'Q
+        two_beside, beside, diagonal = self.square
+        diagonal[:] = left**2 + middle**2 + right**2
+        beside[1:] = middle[:-1] * left[1:]
+        beside[1:] += right[:-1] * middle[1:]
+        two_beside[2:] = right[:-2] * left[2:]
 
     def smoothed(self, values: Floats, stiffness: float) -> Floats:
         """Values of the spline at the knots.
 
         Shape (n_knots,) or (n_splines, n_knots), as the values.
         """
-        left, middle, right = self.diagonals
-        differences = left * values[..., :-2]
-        differences += middle * values[..., 1:-1]
-        differences += right * values[..., 2:]
+        n_inner = self.gram.shape[1]
+        differences = np.zeros((*values.shape[:-1], n_inner))
+        for offset, diagonal in enumerate(self.diagonals):
+            differences += diagonal * values[..., offset : offset + n_inner]
 
         bands = self.gram + stiffness * self.square
         curvature = solveh_banded(bands, differences.T).T
 
         pull = np.zeros_like(values)
-        pull[..., :-2] += left * curvature
-        pull[..., 1:-1] += middle * curvature
-        pull[..., 2:] += right * curvature
+        for offset, diagonal in enumerate(self.diagonals):
+            pull[..., offset : offset + n_inner] += diagonal * curvature
         return values - stiffness * pull

@@ -108,9 +108,10 @@ class LinearSystem:
         found = self.filtered(measured)
         states = found.states.copy()
         for k in reversed(range(len(measured) - 1)):
-            covariance_ahead = found.predicted_covariances[k + 1]
+            following = k + 1
             moved = self.transitions[k] @ found.covariances[k]
-            gain = np.linalg.solve(covariance_ahead, moved).T
-            surprise = states[k + 1] - found.predicted[k + 1]
+            predicted_covariance = found.predicted_covariances[following]
+            gain = np.linalg.solve(predicted_covariance, moved).T
+            surprise = states[following] - found.predicted[following]
             states[k] += gain @ surprise
         return states

@@ -42,21 +42,21 @@ def smooth_kinematics(trial: Trial) -> Trial:
             " smooth the kinematics by, got neither; name its column, or choose"
             ' preprocessing = "spline"'
         )
+    t = trial.t
     turning = [name for name in HEADING if name in trial]
-    smoothed = {name: trial[name] for name in turning}
-    is_clean = not is_noisy(trial.t, smoothed.values())
-    if "psi" not in trial or not is_clean:
-        smoothed = _smoothed(trial, turning, heading_motion(trial.t))
+    states = {name: trial[name] for name in turning}
+    if "psi" not in trial or is_noisy(t, states.values()):
+        states = _smoothed(trial, turning, heading_motion(t))
 
     moving = [name for name in PLANE if name in trial]
     recorded = {name: trial[name] for name in moving}
     has_motion = {"u", "v"} & recorded.keys() or {"x", "y"} <= recorded.keys()
-    if has_motion and is_noisy(trial.t, recorded.values()):
-        motion = plane_motion(trial.t, smoothed["psi"])
-        smoothed |= _smoothed(trial, moving, motion)
-    return trial.with_channels(
-        {name: values for name, values in smoothed.items() if name in trial}
-    )
+    if has_motion and is_noisy(t, recorded.values()):
+        motion = plane_motion(t, states["psi"])
+        states |= _smoothed(trial, moving, motion)
+
+    smoothed = {name: states[name] for name in states if name in trial}
+    return trial.with_channels(smoothed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +183,8 @@ def _smoothed(trial: Trial, names: Sequence[str], motion: Motion) -> dict[str, F
 
 def _guessed_roughness(trial: Trial, motion: Motion) -> float:
     """Roughness as if velocity changed by its range in a twentieth of the trial."""
-    guessed_by = next(name for name in motion.guessed_by if name in trial)
+    recorded = [name for name in motion.guessed_by if name in trial]
+    guessed_by = recorded[0]
     size = float(np.ptp(trial[guessed_by])) or 1.0
     usual_time = max(trial.duration / 20.0, 1e-9)
     return size**2 / usual_time**3
