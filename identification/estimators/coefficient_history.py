@@ -99,17 +99,24 @@ def coefficient_history(
             **sampling,
         )
 
-    histories = []
-    for q in table.regressed:
-        own = clone(estimator)
-        history = own.fit_history(samples.features[q], samples.targets[q])
-        histories.append(history)
-    accelerations = np.hstack(histories)
+    accelerations = _acceleration_history(estimator, samples, table)
     matrix = table.acceleration_matrix(ship, shaft_speed)
     coefficients = np.linalg.solve(matrix, accelerations.T)
     return CoefficientHistory(
         names=table.coefficient_names,
         t=samples.start + samples.duration,
         trial=samples.trial,
-        values=coefficients.T,
+        values=np.asarray(coefficients.T),
     )
+
+
+def _acceleration_history(
+    estimator: Recursion, samples: Samples, table: Structure
+) -> Floats:
+    """Coefficients of the accelerations after each row, the equations side by side."""
+    histories = []
+    for q in table.regressed:
+        own = clone(estimator)
+        history = own.fit_history(samples.features[q], samples.targets[q])
+        histories.append(history)
+    return np.hstack(histories)

@@ -138,16 +138,7 @@ def fit_kernel(
     weights = WEIGHTS if asked.C is None else (float(asked.C),)
     kernels = _kernels(inputs, asked.centres, lengths)
     stages = {length: search.stage(kernel) for length, kernel in kernels.items()}
-
-    pairs = list(product(weights, lengths))  # the smoothest first
-    best = pairs[0]
-    errors = {}
-    if len(pairs) > 1:
-        tried = [search.error(stages[length], weight) for weight, length in pairs]
-        best = most_regularised(pairs, tried)
-        errors["kernel"] = tried[pairs.index(best)]
-    weight, length = best
-    errors["reference"] = search.error(stages[length], 0.0)
+    weight, length, errors = search.smoothest(stages, weights)
 
     kernel = kernels[length]
     fitted = search.fitted(stages[length], weight)
@@ -305,6 +296,25 @@ class _Search:
             model = stage.model.with_accelerations(coefficients)
             errors.append(heading_error(model, held, "rmse"))
         return float(np.mean(errors))
+
+    def smoothest(
+        self, stages: dict[float, KernelFit], weights: Sequence[float]
+    ) -> tuple[float, float, dict[str, float]]:
+        """Weight and length of the smoothest kernel nearly as good as the best.
+
+        The stages are by length, the smoothest first. Also returns the errors with that
+        kernel, where there is a choice, and of the reference ship alone.
+        """
+        pairs = list(product(weights, stages))  # the smoothest first
+        best = pairs[0]
+        errors = {}
+        if len(pairs) > 1:
+            tried = [self.error(stages[length], weight) for weight, length in pairs]
+            best = most_regularised(pairs, tried)
+            errors["kernel"] = tried[pairs.index(best)]
+        weight, length = best
+        errors["reference"] = self.error(stages[length], 0.0)
+        return weight, length, errors
 
     def fitted(self, stage: KernelFit, weight: float) -> KernelFit:
         """The fit to all rows."""

@@ -150,10 +150,7 @@ def estimate_current(
     runs = _together(records, _starting_shaft_speed(trials))
     problem = _Problem(runs, shared, known)
     fit = problem.fitted()
-
-    n_unknowns = len(fit.x)
-    slopes = fit.slopes.reshape(-1, n_unknowns)
-    information = slopes.T @ slopes + np.diag(problem.weights**2)
+    information = problem.information(fit.slopes)
     n_parts = 1 if shared and len(trials) > 2 else 3
     jackknife = _jackknife(fit, runs, information, n_parts)
     covariance = jackknife + np.linalg.inv(information)
@@ -249,16 +246,17 @@ def _together(records: Sequence[_Record], shaft_speed: float | None) -> _Runs:
 
     inputs, headings, seen = [], [], []
     for record in records:
-        shaft = np.ones(len(record.t))
+        t = record.t
+        shaft = np.ones(len(t))
         if shaft_speed is not None:
             shaft = record.inputs.n / shaft_speed
         moving = record.inputs._replace(n=shaft)
-        inputs.append(_on_grid(grid, record.t, moving))
-        headings.append(np.interp(grid, record.t, record.psi))
+        inputs.append(_on_grid(grid, t, moving))
+        headings.append(np.interp(grid, t, record.psi))
 
-        is_recorded = grid <= record.t[-1]
-        motion = _on_grid(grid, record.t, record.seen)
-        seen.append(np.where(is_recorded[:, None], motion, np.nan))
+        motion = _on_grid(grid, t, record.seen)
+        motion[grid > t[-1]] = np.nan
+        seen.append(motion)
     return _Runs(
         inputs=np.stack(inputs, axis=-1),
         psi=np.stack(headings, axis=-1),
@@ -429,11 +427,16 @@ class _Problem:
     ) -> Floats:
         """Damped step of Gauss & Newton from x."""
         J = slopes.reshape(-1, len(x))
-        prior = self.weights**2
-        hessian = J.T @ J + np.diag(prior)
-        downhill = J.T @ residuals.ravel() - prior * (x - self.centre)
+        from_prior = self.weights**2 * (x - self.centre)
+        downhill = J.T @ residuals.ravel() - from_prior
+        hessian = self.information(slopes)
         damped = hessian + damping * np.diag(np.diag(hessian))
         return np.asarray(np.linalg.solve(damped, downhill))
+
+    def information(self, slopes: Floats) -> Floats:
+        """Inverse covariance of the unknowns by the slopes and the prior."""
+        J = slopes.reshape(-1, len(self.weights))
+        return J.T @ J + np.diag(self.weights**2)
 
     def _cost(self, x: Floats, residuals: Floats) -> float:
         from_prior = self.weights * (x - self.centre)

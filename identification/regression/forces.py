@@ -7,13 +7,12 @@ one column; the rows of X, Y and N are stacked. Source: Xu, Hassani & Guedes Soa
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from sklearn.metrics import r2_score
 
-from identification.arrays import root_mean_square
+from identification.arrays import by_name, root_mean_square, stretches
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.estimators.threads import single_threaded
@@ -112,13 +111,7 @@ def force_regression(
     ship = particulars.completed()
     features, targets, index = [], [], []
     for i, trial in enumerate(trials):
-        missing = [name for name in NEEDED if name not in trial]
-        if missing:
-            raise InputError(
-                f"trial {trial.name!r}: expected the channels {', '.join(NEEDED)} for"
-                f" structure {structure.name!r}, got no {missing[0]!r}; give captive"
-                " tests"
-            )
+        _check_channels(trial, structure)
         for rows in between_jumps(trial):
             piece = trial.part(rows)
             motion = _prime_motion(piece, ship)
@@ -142,6 +135,15 @@ def force_regression(
     )
 
 
+def _check_channels(trial: Trial, structure: SharedStructure) -> None:
+    for name in NEEDED:
+        if name not in trial:
+            raise InputError(
+                f"trial {trial.name!r}: expected the channels {', '.join(NEEDED)} for"
+                f" structure {structure.name!r}, got no {name!r}; give captive tests"
+            )
+
+
 def between_jumps(trial: Trial) -> list[slice]:
     """Stretches of a captive test in which the velocities change smoothly.
 
@@ -157,13 +159,7 @@ def between_jumps(trial: Trial) -> list[slice]:
         largest = max(JUMP * usual, rounding)
         is_jump |= changes > largest + rounding
 
-    starts = np.flatnonzero(is_jump) + 1
-    edges = [0, *starts.tolist(), len(trial)]
-    stretches = []
-    for start, stop in pairwise(edges):
-        if stop - start >= FEWEST:
-            stretches.append(slice(start, stop))
-    return stretches
+    return stretches(is_jump, FEWEST)
 
 
 def _prime_motion(trial: Trial, ship: Particulars) -> dict[str, Floats]:
@@ -323,7 +319,6 @@ def identify_forces(
         selection=METHODS[method], rank=rank, fit_intercept=False
     )
     values, covariance = fit_forces(regression, estimator)
-    coefficients = dict(zip(regression.names, values.tolist(), strict=True))
     provenance = {
         "structure": structure,
         "method": method,
@@ -338,7 +333,7 @@ def identify_forces(
         steering=steering or SteeringGear(),
         covariance=covariance,
         provenance=provenance,
-        coefficients=coefficients,
+        coefficients=by_name(regression.names, values),
     )
 
 

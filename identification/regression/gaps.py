@@ -1,10 +1,9 @@
 """Gaps in the time of a record, across which nothing is smoothed or integrated."""
 
-from itertools import pairwise
-
 import numpy as np
 from scipy.ndimage import median_filter
 
+from identification.arrays import stretches
 from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Flags, Floats
 
@@ -31,13 +30,7 @@ def between_gaps(
         return [trial]
 
     fewest = max(fewest, FEWEST_SAMPLES)
-    starts = np.flatnonzero(is_gap) + 1
-    edges = [0, *starts.tolist(), len(trial)]
-    pieces = []
-    for start, stop in pairwise(edges):
-        if stop - start >= fewest:
-            pieces.append(trial.part(slice(start, stop)))
-
+    pieces = stretches(is_gap, fewest)
     if not pieces:
         longest = int(np.argmax(np.diff(trial.t)))
         begin, end = trial.t[longest : longest + 2]
@@ -47,7 +40,7 @@ def between_gaps(
             f" from {begin:g} to {end:g} s); export it with every"
             ' sample, or leave it out (use = "skip")'
         )
-    return pieces
+    return [trial.part(piece) for piece in pieces]
 
 
 def _gaps(t: Floats, particulars: Particulars) -> Flags:

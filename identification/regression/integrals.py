@@ -64,10 +64,7 @@ def spline_integrals(
     middle = 0.5 * (edges[1:] + edges[:-1])
     half = 0.5 * np.diff(edges)[:, None]
     nodes = middle[:, None] + half * NODES
-    at_nodes = {}
-    for name, values in channels.items():
-        curve = _between(t, name, values, rudder)
-        at_nodes[name] = curve(nodes.ravel())
+    at_nodes = _interpolated(t, channels, rudder, nodes.ravel())
 
     weights = half * WEIGHTS
     step = np.searchsorted(t, middle, side="right") - 1
@@ -86,18 +83,23 @@ def spline_integrals(
     return found
 
 
-def _between(
+def _interpolated(
     t: Floats,
-    name: str,
-    values: Floats,
+    channels: Channels,
     rudder: Rudder,
-) -> Callable[[Floats], Floats]:
-    """A channel between its samples; straight for a shaft speed, which may jump."""
-    if name == "n":
-        return lambda times: np.interp(times, t, values)
-    if name == "delta":
-        return rudder
-    return broken_spline(t, values, rudder)
+    times: Floats,
+) -> dict[str, Floats]:
+    """Channels between their samples; a shaft speed, which may jump, is straight."""
+    found = {}
+    for name, values in channels.items():
+        if name == "delta":
+            found[name] = rudder(times)
+        elif name == "n":
+            found[name] = np.interp(times, t, values)
+        else:
+            spline = broken_spline(t, values, rudder)
+            found[name] = spline(times)
+    return found
 
 
 def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:

@@ -212,31 +212,24 @@ class _Regression:
             memory = twice_integrated(t, terms.pop("q"), moments["q"])
             terms["r"] = np.hstack([terms["r"], memory])
 
-        half_window = max(window // 2, 1)
-        first = np.arange(0, len(t) - window, half_window)
-        last = first + window
+        windows = _Windows(len(t), window)
         features, targets = {}, {}
         for q, steps in terms.items():
-            features[q] = steps
-            if window > 1:
-                from_start = _from_start(steps)
-                features[q] = from_start[last] - from_start[first]
-
-            change = channels[q][last] - channels[q][first]
+            features[q] = windows.summed(steps)
+            targets[q] = windows.changes(channels[q])
             if f"wind_{q}dot" in trial:
                 by_wind = integral(t, trial[f"wind_{q}dot"])
-                change -= by_wind[last] - by_wind[first]
+                targets[q] -= windows.changes(by_wind)
             if isinstance(self.structure, GreyBox):
-                change -= features[q][:, -1]
+                targets[q] -= features[q][:, -1]
                 features[q] = features[q][:, :-1]
-            targets[q] = change
 
         rows = Samples(
             features=features,
             targets=targets,
-            start=t[first],
-            duration=t[last] - t[first],
-            trial=np.full(len(first), index),
+            start=t[windows.first],
+            duration=windows.changes(t),
+            trial=np.full(len(windows.first), index),
             window=window,
         )
         if "q" in self.structure.equations:
@@ -283,9 +276,25 @@ class _Regression:
         return terms
 
 
-def _from_start(steps: Floats) -> Floats:
-    """Integrals from the first sample to each, from those over each step."""
-    return np.pad(np.cumsum(steps, axis=0), ((1, 0), (0, 0)))
+class _Windows:
+    """Windows of some steps, each half a window after the one before."""
+
+    def __init__(self, n_samples: int, steps: int) -> None:
+        half = max(steps // 2, 1)
+        self.steps = steps
+        self.first = np.arange(0, n_samples - steps, half)
+        self.last = self.first + steps
+
+    def changes(self, values: Floats) -> Floats:
+        """Change of values, by sample, over each window."""
+        return values[self.last] - values[self.first]
+
+    def summed(self, rows: Floats) -> Floats:
+        """Sum over each window of rows, one a step."""
+        if self.steps == 1:
+            return rows
+        from_start = np.pad(np.cumsum(rows, axis=0), ((1, 0), (0, 0)))
+        return self.changes(from_start)
 
 
 def default_window(trial: Trial, particulars: Particulars) -> int:

@@ -121,22 +121,26 @@ def constant_wind(
             "wind: expected a structure that is linear in its coefficients with"
             " 'constant', or columns wind_speed and wind_from, got structure 'mmg'"
         )
-    of_trial = samples.trial[:, None] == np.arange(len(trials))
-    constants = of_trial * samples.duration[:, None]
-
     found: dict[str, dict[str, float]] = {trial.name: {} for trial in trials}
     for q in ("v", "r"):
-        if q not in samples.targets:
-            continue
-        known = samples.features[q]
-        columns = np.hstack([known, constants])
-        solution = np.linalg.lstsq(columns, samples.targets[q])[0]
-        values = solution[known.shape[1] :]
-        if _explains(known, samples.duration):
-            values = values - values.mean()
-        for trial, value in zip(trials, values.tolist(), strict=True):
-            found[trial.name][WIND[q]] = value
+        if q in samples.targets:
+            constants = _constants(samples, q, len(trials))
+            for trial, constant in zip(trials, constants.tolist(), strict=True):
+                found[trial.name][WIND[q]] = constant
     return found
+
+
+def _constants(samples: Samples, equation: str, n_trials: int) -> Floats:
+    """The constant of each trial in the regression of an equation."""
+    features = samples.features[equation]
+    is_own = samples.trial[:, None] == np.arange(n_trials)
+    of_trials = is_own * samples.duration[:, None]
+    columns = np.hstack([features, of_trials])
+    solution = np.linalg.lstsq(columns, samples.targets[equation])[0]
+    constants: Floats = solution[-n_trials:]
+    if _explains(features, samples.duration):
+        constants = constants - constants.mean()
+    return constants
 
 
 def _explains(features: Floats, target: Floats, rounding: float = 1e-6) -> bool:

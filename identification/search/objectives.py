@@ -134,14 +134,24 @@ def _errors(
             target = target - R[:, 0] * fit.mean
 
         kept = fit.numerical_rank
-        singular_values = fit.singular_values[:kept]
-        directions = fit.directions[:kept] / fit.scale
-        along = features @ directions.T
-        explained = along * fit.projections[:kept] * singular_values
         offset[k, 0] = target
-        squares[k, 0, :kept] = singular_values**2
-        gain[k, :kept] = explained.T
-    return ErrorOfC(offset, gain, squares, n_samples)
+        squares[k, 0, :kept] = fit.singular_values[:kept] ** 2
+        gain[k, :kept] = _explained(fit, features)
+    return ErrorOfC(
+        offset=offset,
+        gain=gain,
+        squares=squares,
+        n_samples=n_samples,
+    )
+
+
+def _explained(fit: Decomposition, features: Floats) -> Floats:
+    """What each direction explains of the targets, by 1 / (s^2 + 1/C)."""
+    kept = fit.numerical_rank
+    directions = fit.directions[:kept] / fit.scale
+    along = features @ directions.T
+    explained = along * fit.projections[:kept] * fit.singular_values[:kept]
+    return explained.T
 
 
 def time_blocks(

@@ -56,9 +56,12 @@ def bootstrap_covariance(
     (n_coefficients, n_coefficients).
     """
     rng = np.random.default_rng(seed)
-    trials = np.unique(samples.trial)
-    groups = [np.flatnonzero(samples.trial == trial) for trial in trials]
-    lengths = [rows_in(memory, samples.start[rows]) for rows in groups]
+    groups = []
+    lengths = []
+    for trial in np.unique(samples.trial):
+        rows = np.flatnonzero(samples.trial == trial)
+        groups.append(rows)
+        lengths.append(rows_in(memory, samples.start[rows]))
     errors = residuals(estimators, samples)
 
     refits = []

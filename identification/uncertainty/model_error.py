@@ -224,6 +224,7 @@ def motion_errors(
     names = [name for name in COMPARED if name in trial]
     levels = {name: noise_level(trial.t, trial[name]) for name in names}
     from_shifted = _from_shifted_starts(own, clean, levels)
+    timing = _timing(trial)
     found = []
     for name, level in levels.items():
         mine = predicted[name]
@@ -232,8 +233,7 @@ def motion_errors(
         if variance <= 0.0:
             continue
         by_start = [mean_square(run[name] - mine) for run in from_shifted]
-        rate = np.gradient(clean[name], trial.t)
-        by_timing = mean_square(_timing(trial) * rate)
+        by_timing = mean_square(timing * np.gradient(clean[name], clean.t))
         error = PredictionError(
             square=mean_square(mine - trial[name]),
             variance=variance,

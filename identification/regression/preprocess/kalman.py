@@ -79,17 +79,9 @@ class LinearSystem:
 
             channels = zip(self.observation, self.variances, measured[k], strict=True)
             for h, variance, y in channels:
-                if not np.isfinite(y):
-                    continue
-                Ph = P @ h
-                innovation = y - float(h @ x)
-                innovation_variance = float(h @ Ph) + variance
-                gain = Ph / innovation_variance
-                x = x + gain * innovation
-                left = np.eye(n_states) - np.outer(gain, h)
-                P = left @ P @ left.T + variance * np.outer(gain, gain)
-                misfit = innovation * innovation / innovation_variance
-                log_likelihood -= 0.5 * (np.log(innovation_variance) + misfit)
+                if np.isfinite(y):
+                    x, P, log_density = _updated(x, P, h, variance, y)
+                    log_likelihood += log_density
             states[k] = x
             covariances[k] = P
         return Filtered(
@@ -115,3 +107,25 @@ class LinearSystem:
             surprise = states[following] - found.predicted[following]
             states[k] += gain @ surprise
         return states
+
+
+def _updated(
+    x: Floats,
+    P: Floats,
+    h: Floats,
+    variance: float,
+    y: float,
+) -> tuple[Floats, Floats, float]:
+    """State, its covariance and the log density of a measurement y = h x + e."""
+    Ph = P @ h
+    innovation = y - float(h @ x)
+    innovation_variance = float(h @ Ph) + variance
+    gain = Ph / innovation_variance
+    x = x + gain * innovation
+
+    # Joseph's form keeps the matrix symmetric and positive
+    left = np.eye(len(x)) - np.outer(gain, h)
+    P = left @ P @ left.T + variance * np.outer(gain, gain)
+    misfit = innovation * innovation / innovation_variance
+    log_density = -0.5 * (np.log(innovation_variance) + misfit)
+    return x, P, float(log_density)
