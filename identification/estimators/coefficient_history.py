@@ -1,4 +1,4 @@
-"""The history of a model's coefficients over a trial, as a recursive method estimates them."""
+"""The history of a model's coefficients over a trial, by a recursive method."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -92,18 +92,31 @@ def coefficient_history(
     if not isinstance(samples, Samples):
         trials = [samples] if isinstance(samples, Trial) else list(samples)
         samples = build_samples(
-            trials, table, ship, shaft_speed=shaft_speed, **sampling
+            trials,
+            structure=table,
+            particulars=ship,
+            shaft_speed=shaft_speed,
+            **sampling,
         )
 
-    accelerations = []
-    for q in table.regressed:
-        own = clone(estimator)
-        accelerations.append(own.fit_history(samples.features[q], samples.targets[q]))
+    accelerations = _acceleration_history(estimator, samples, table)
     matrix = table.acceleration_matrix(ship, shaft_speed)
-    values = np.linalg.solve(matrix, np.hstack(accelerations).T).T
+    coefficients = np.linalg.solve(matrix, accelerations.T)
     return CoefficientHistory(
         names=table.coefficient_names,
         t=samples.start + samples.duration,
         trial=samples.trial,
-        values=values,
+        values=np.asarray(coefficients.T),
     )
+
+
+def _acceleration_history(
+    estimator: Recursion, samples: Samples, table: Structure
+) -> Floats:
+    """Coefficients of the accelerations after each row, the equations side by side."""
+    histories = []
+    for q in table.regressed:
+        own = clone(estimator)
+        history = own.fit_history(samples.features[q], samples.targets[q])
+        histories.append(history)
+    return np.hstack(histories)

@@ -7,6 +7,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from identification.arrays import root_mean_square
 from identification.estimators.decomposition import centre_and_scale
 from identification.estimators.linear import LinearRegressor, validated
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
@@ -111,29 +112,39 @@ class LinearSupportVectorMachine(LinearRegressor):
         check_whole(self.seed, "seed", at_least=0, at_most=2**32 - 1)
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
+        """Fit to samples (n_samples, n_features) and targets (n_samples,)."""
         self.check()
         features, targets = validated(self, X, y)
         centre, scale = centre_and_scale(features, True, self.fit_intercept)
         scaled = (features - centre) / scale
         mean = float(targets.mean()) if self.fit_intercept else 0.0
-        size = float(np.sqrt(np.mean((targets - mean) ** 2))) or 1.0
+        deviations = targets - mean
+        size = root_mean_square(deviations) or 1.0
 
-        slopes, offset = self._solved(scaled, (targets - mean) / size)
+        slopes, offset = self._solved(scaled, deviations / size)
         self.coef_ = slopes * size / scale
         self.intercept_ = mean + size * offset - float(centre @ self.coef_)
 
         errors = targets - features @ self.coef_ - self.intercept_
         self.weights_ = _huber_weights(errors)
-        moment = (scaled.T * self.weights_) @ scaled
-        inverse = np.linalg.pinv(moment, hermitian=True) / np.outer(scale, scale)
+        self._set_covariance(scaled, scale, errors)
+        return self
+
+    def _set_covariance(self, scaled: Floats, scale: Floats, errors: Floats) -> None:
+        """Set inverse moment and covariance, from features of unit size."""
+        weights = self.weights_
+        moment = (scaled.T * weights) @ scaled
+        inverse_scaled = np.linalg.pinv(moment, hermitian=True)
+        inverse = inverse_scaled / np.outer(scale, scale)
         self.inverse_moment_ = inverse
 
-        freedom = max(len(targets) - len(centre), 1)
-        variance = float(np.sum((self.weights_ * errors) ** 2)) / freedom
+        n_samples, n_features = scaled.shape
+        freedom = max(n_samples - n_features, 1)
+        counted = weights * errors
+        variance = float(np.sum(counted**2)) / freedom
         unscaled = scaled * scale
-        self.covariance_ = variance * inverse @ (unscaled.T @ unscaled) @ inverse
-        return self
+        whole = unscaled.T @ unscaled
+        self.covariance_ = variance * inverse @ whole @ inverse
 
     def _solved(self, features: Floats, targets: Floats) -> tuple[Floats, float]:
         """Slopes and offset for features and targets of root mean square 1."""
@@ -156,8 +167,10 @@ class LinearSupportVectorMachine(LinearRegressor):
 
 
 def _huber_weights(errors: Floats) -> Floats:
-    """Influence of samples by their errors: 1 within the robust scale, then its share of the error."""
+    """Influence of samples: 1 for errors within the robust scale, then their ratio."""
     sizes = np.abs(errors)
     usual = MAD * float(np.median(sizes))
     weights = np.ones(len(errors))
-    return np.divide(usual, sizes, out=weights, where=sizes > usual)
+    is_large = sizes > usual
+    weights[is_large] = usual / sizes[is_large]
+    return weights

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from identification.arrays import column_rms
 from identification.estimators.threads import single_threaded
 from shipgym import InputError
 from shipgym.arrays import Floats
@@ -26,7 +27,7 @@ CONSTANT = 100 * np.finfo(float).eps
 
 @dataclass(frozen=True)
 class Decomposition:
-    """Thin singular value decomposition of centred and scaled features, with the targets.
+    """Thin singular value decomposition of centred and scaled features, and targets.
 
     Attributes
     ----------
@@ -68,15 +69,17 @@ class Decomposition:
         return max(int(np.sum(self.singular_values > rounding)), 1)
 
     def filters(self, C: ArrayLike, rank: int) -> Floats:
-        """Factors s / (s^2 + 1/C) of the directions, 0 beyond `rank` and below rounding.
+        """Factors s / (s^2 + 1/C) of directions, 0 beyond `rank` and below rounding.
 
         Several C of shape (..., 1) give a row each, shape (..., n_directions).
         """
         s = self.singular_values
+        weight = np.asarray(C, dtype=float)
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            penalty = 1.0 / np.asarray(C, dtype=float)
-            filters = np.where(s > 0.0, s / (s**2 + penalty), 0.0)
+            penalty = 1.0 / weight
+            factors = s / (s**2 + penalty)
 
+        filters = np.where(s > 0.0, factors, 0.0)
         kept = min(rank, self.numerical_rank)
         filters[..., kept:] = 0.0
         return filters
@@ -88,17 +91,19 @@ class Decomposition:
 
 
 def triangle(
-    X: Floats, y: Floats, fit_intercept: bool, weights: Floats | None = None
+    X: Floats,
+    y: Floats,
+    fit_intercept: bool,
+    weights: Floats | None = None,
 ) -> Floats:
-    """Triangle of an orthogonal decomposition of [1 X y], or of [X y] without intercept.
+    """Triangle of an orthogonal decomposition of [1 X y], or [X y] without intercept.
 
     The weights, shape (n_samples,), are those of the squared errors.
     """
-    first = int(fit_intercept)
-    table = np.empty((len(y), first + X.shape[1] + 1))
-    table[:, :first] = 1.0
-    table[:, first:-1] = X
-    table[:, -1] = y
+    columns = [X, y]
+    if fit_intercept:
+        columns.insert(0, np.ones(len(y)))
+    table = np.column_stack(columns)
     if weights is not None:
         table *= np.sqrt(weights)[:, None]
     return _triangle_of(table)
@@ -126,30 +131,39 @@ def decompose(
     fit_intercept: bool,
     weights: Floats | None = None,
 ) -> Decomposition:
-    """Decompose the features of a regression (arguments as of `LSSVM` and `triangle`)."""
+    """Decompose the features of a regression; arguments as of `LSSVM`, `triangle`."""
     R = triangle(X, y, fit_intercept, weights)
-    return decompose_triangle(R, len(y), scale, fit_intercept)
+    return decompose_triangle(
+        R,
+        n_samples=len(y),
+        scale=scale,
+        fit_intercept=fit_intercept,
+    )
 
 
 def decompose_triangle(
-    R: Floats, n_samples: int, scale: bool | ArrayLike, fit_intercept: bool
+    R: Floats,
+    n_samples: int,
+    scale: bool | ArrayLike,
+    fit_intercept: bool,
 ) -> Decomposition:
     """Decompose the features of a regression of which the `triangle` is known."""
     first = int(fit_intercept)
     n_features = len(R) - 1 - first
+    uncentred = R[:, first:-1]
     centred = R[first:-1, first:-1]
     targets = R[first:-1, -1]
     out_of_reach = R[-1, -1]
 
-    size = np.sqrt(np.sum(centred**2, axis=0) / n_samples)
-    uncentred_size = np.sqrt(np.sum(R[:, first:-1] ** 2, axis=0) / n_samples)
-    size[size <= CONSTANT * uncentred_size] = 0.0
+    size = _sizes(centred, n_samples)
+    size[size <= CONSTANT * _sizes(uncentred, n_samples)] = 0.0
     scales = scales_of(size, scale)
 
     left, singular_values, directions = np.linalg.svd(centred / scales)
     projections = left.T @ targets
     kept = min(n_samples, n_features)
-    outside = out_of_reach**2 + np.sum(projections[kept:] ** 2)
+    beyond = projections[kept:]
+    outside = out_of_reach**2 + np.sum(beyond**2)
 
     means = np.zeros(n_features + 1)
     if fit_intercept:
@@ -167,6 +181,12 @@ def decompose_triangle(
     )
 
 
+def _sizes(triangle: Floats, n_samples: int) -> Floats:
+    """Root mean square of the features by the rows of their triangle."""
+    squares = np.sum(triangle**2, axis=0)
+    return np.asarray(np.sqrt(squares / n_samples))
+
+
 def keep_solution(
     estimator: Any,
     problem: Decomposition,
@@ -179,25 +199,28 @@ def keep_solution(
 
     Returns the residuals, shape (n_samples,).
     """
-    singular_values = problem.singular_values
     coefficients = problem.coefficients(filters)
     intercept = problem.mean - float(problem.centre @ coefficients)
     residuals: Floats = y - X @ coefficients - intercept
 
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inverse = np.where(filters > 0.0, filters / singular_values, 0.0)
-    unscaled = problem.directions / problem.scale
-
     # Huber's sandwich: the residuals that count are the weighted ones, the moment is
     # that of all samples
-    counted, inflation = residuals, 1.0
+    counted = residuals
+    inflation = 1.0
     if weights is not None:
         counted = residuals * weights
         inflation = len(y) / float(weights.sum())
-    freedom = problem.n_free - float(np.sum(singular_values * filters))
+
+    singular_values = problem.singular_values
+    n_effective = float(np.sum(singular_values * filters))
+    freedom = problem.n_free - n_effective
     noise_variance = np.nan
     if freedom > 0.5:
         noise_variance = float(counted @ counted) / freedom
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = np.where(filters > 0.0, filters / singular_values, 0.0)
+    unscaled = problem.directions / problem.scale
     root = (problem.directions.T * filters) / problem.scale[:, None]
 
     estimator.coef_ = coefficients
@@ -210,14 +233,16 @@ def keep_solution(
 
 
 def centre_and_scale(
-    X: Floats, scale: bool | ArrayLike, fit_intercept: bool
+    X: Floats,
+    scale: bool | ArrayLike,
+    fit_intercept: bool,
 ) -> tuple[Floats, Floats]:
-    """Means and scales of the features, shape (n_features,); zero means without intercept."""
+    """Means, zero without intercept, and scales of the features, each (n_features,)."""
     centre = np.zeros(X.shape[1])
     if fit_intercept:
         centre = X.mean(axis=0)
 
-    size = np.sqrt(np.mean((X - centre) ** 2, axis=0))
+    size = column_rms(X - centre)
     largest = np.max(np.abs(X), axis=0, initial=0.0)
     # what is constant is centred to rounding errors, which must not be blown up
     size[size <= CONSTANT * largest] = 0.0

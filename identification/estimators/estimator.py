@@ -1,4 +1,4 @@
-"""What every estimator offers that `identify` may fit to an equation, and what a method may use."""
+"""Interface of the estimators that `identify` fits, and what a method may use."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Estimator(Protocol):
     inverse_moment_: Floats
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit to features of shape (n_samples, n_features) and targets of shape (n_samples,)."""
+        """Fit to features (n_samples, n_features) and targets (n_samples,)."""
 
     def predict(self, X: ArrayLike) -> Floats:
         """Targets of features of shape (n_samples, n_features)."""

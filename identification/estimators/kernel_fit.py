@@ -1,4 +1,4 @@
-"""Fixed-size LS-SVM with an RBF kernel on what a reference ship leaves of the accelerations.
+"""Fixed-size LS-SVM with an RBF kernel on what a reference ship leaves.
 
 Source: Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares
 support vector machines, chapter 6: the kernel is approximated on a few centres, here of
@@ -8,6 +8,7 @@ principal components of the data in feature space.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -51,30 +52,38 @@ class KernelFit:
 
 
 def stabilised(model: ShipModel) -> ShipModel:
-    """The linear model beneath a black box, damped until a hard turn keeps within bounds.
+    """The linear model beneath a black box, damped so that a hard turn is bounded.
 
     Where the kernel fades the ship is linear: she must be stable, and neither drift nor
     turn beyond any ship.
     """
     c = dict(model.coefficients)
     shift = _least_damping(c, model.steering.limit)
+    c["b_v"] -= shift
+    c["c_r"] -= shift
     # surge must be damped too, in the prime system
-    surge_damping = min(c["a_du"], -0.05 - 2.0 * c["a_0"])
-    damped = {"b_v": c["b_v"] - shift, "c_r": c["c_r"] - shift, "a_du": surge_damping}
-    return replace(model, coefficients=c | damped)
+    c["a_du"] = min(c["a_du"], -0.05 - 2.0 * c["a_0"])
+    return replace(model, coefficients=c)
 
 
 def _least_damping(c: dict[str, float], rudder_limit: float) -> float:
-    """Least damping of sway and yaw, prime system, that keeps a linear ship within bounds.
+    """Least damping of sway and yaw, prime system, that keeps a linear ship bounded.
 
-    These are the eigenvalues of steering, and drift and turn with the rudder hard over.
+    The eigenvalues of steering are, and drift and turn with the rudder hard over.
     """
-    A = np.array([[c["b_v"], c["b_r"]], [c["c_v"], c["c_r"]]])
-    rudder = rudder_limit * np.array([c["b_d"], c["c_d"]])
+    A = np.array(
+        [
+            [c["b_v"], c["b_r"]],
+            [c["c_v"], c["c_r"]],
+        ]
+    )
+    by_rudder = np.array([c["b_d"], c["c_d"]])
+    hard_over = rudder_limit * by_rudder
     for step in range(2000):
         shift = 0.05 * step
         damped = A - shift * np.eye(2)
-        drift, turn = np.abs(np.linalg.solve(damped, rudder))
+        steady = np.linalg.solve(damped, hard_over)
+        drift, turn = np.abs(steady)
         slowest = np.linalg.eigvals(damped).real.max()
         if slowest < -0.2 and drift < 0.5 and turn < 1.2:
             return float(shift)
@@ -92,10 +101,11 @@ def fit_kernel(
     inputs: Floats,
     build_rows: Callable[[Structure], Samples],
 ) -> KernelFit:
-    """Fit a kernel to what the reference ship of a grey box leaves, length and weight of the errors chosen.
+    """Fit a kernel to what the reference ship of a grey box leaves.
 
-    Where not given these are the smoothest whose simulated headings of the trials held
-    out are within a tenth of the best; a fitted reference ship knows these trials.
+    Length and weight of the errors, where not given, are the smoothest whose simulated
+    headings of the trials held out are within a tenth of the best; a fitted reference
+    ship knows these trials.
 
     Parameters
     ----------
@@ -117,23 +127,21 @@ def fit_kernel(
     InputError
         For too few samples.
     """
-    search = _Search(blank, trials, box, build_rows, asked.folds)
+    search = _Search(
+        blank=blank,
+        trials=trials,
+        box=box,
+        build_rows=build_rows,
+        folds=asked.folds,
+    )
     lengths = LENGTHS if asked.length is None else (float(asked.length),)
     weights = WEIGHTS if asked.C is None else (float(asked.C),)
     kernels = _kernels(inputs, asked.centres, lengths)
     stages = {length: search.stage(kernel) for length, kernel in kernels.items()}
-
-    # the smoothest first
-    pairs = [(length, weight) for weight in weights for length in lengths]
-    length, weight = pairs[0]
-    errors = {}
-    if len(pairs) > 1:
-        tried = [search.error(stages[length], weight) for length, weight in pairs]
-        length, weight = most_regularised(pairs, tried)
-        errors["kernel"] = tried[pairs.index((length, weight))]
-    errors["reference"] = search.error(stages[length], 0.0)
+    weight, length, errors = search.smoothest(stages, weights)
 
     kernel = kernels[length]
+    fitted = search.fitted(stages[length], weight)
     report = {
         "kind": asked.kernel,
         "centres": len(kernel.centres),
@@ -141,20 +149,27 @@ def fit_kernel(
         "length": length,
         "C": weight,
         "remarks": _remarks(errors),
-        "heading_errors_held_out": {k: finite(e) for k, e in errors.items()},
+        "heading_errors_held_out": {name: finite(e) for name, e in errors.items()},
     }
-    return replace(search.fitted(stages[length], weight), report=report)
+    return replace(fitted, report=report)
 
 
 def _kernels(
-    inputs: Floats, number: int, lengths: Sequence[float]
+    inputs: Floats,
+    number: int,
+    lengths: Sequence[float],
 ) -> dict[float, Kernel]:
     """Kernels by their length, on centres among the samples."""
     offset, scale, centres = chosen_centres(inputs, number)
     basis = np.eye(len(centres))
     kernels = {}
     for length in lengths:
-        kernel = Kernel(offset, scale * length, centres / length, basis)
+        kernel = Kernel(
+            offset=offset,
+            scale=scale * length,
+            centres=centres / length,
+            basis=basis,
+        )
         kernels[length] = principal(kernel, inputs)
     return kernels
 
@@ -172,17 +187,20 @@ def _remarks(errors: dict[str, float]) -> list[str]:
 
 
 def chosen_centres(
-    x: Floats, number: int, most_samples: int = 4000
+    x: Floats,
+    number: int,
+    most_samples: int = 4000,
 ) -> tuple[Floats, Floats, Floats]:
-    """Offset and scale of inputs x, shape (n_samples, 4), and centres in these, mirrored in pairs.
+    """Offset and scale of inputs x, shape (n_samples, 4), and centres in these.
 
-    Centres are those of k-means of all samples brought to one side. Raises InputError
-    for too few samples.
+    Centres are those of k-means of all samples brought to one side, and their mirror
+    images. Raises InputError for too few samples.
     """
-    offset = np.array([0.0, 0.0, 0.0, x[:, 3].mean()])
-    size = column_rms(x - offset)
-    scale = np.maximum(size, 0.02)  # an input may hardly change
-    z = (x - offset) / scale
+    speed = x[:, 3]
+    offset = np.array([0.0, 0.0, 0.0, speed.mean()])
+    deviations = x - offset
+    scale = np.maximum(column_rms(deviations), 0.02)  # an input may hardly change
+    z = deviations / scale
     drifts_to_port = z[:, 1:2] < 0.0
     folded = z * np.where(drifts_to_port, MIRROR, 1.0)
 
@@ -193,20 +211,29 @@ def chosen_centres(
             f" of the kernel, got {len(x)} samples; add trials, or give fewer centres"
         )
     clusters = KMeans(number // 2, n_init=1, random_state=0)
-    means = clusters.fit(_thinned(folded, most_samples)).cluster_centers_
-    return offset, scale, np.concatenate([means, means * MIRROR])
+    clusters.fit(_thinned(folded, most_samples))
+    means = clusters.cluster_centers_
+    centres = np.concatenate([means, means * MIRROR])
+    return offset, scale, centres
 
 
 def principal(
-    kernel: Kernel, x: Floats, most_features: int = 40, most_samples: int = 4000
+    kernel: Kernel,
+    x: Floats,
+    most_features: int = 40,
+    most_samples: int = 4000,
 ) -> Kernel:
-    """The kernel with the leading principal components of the samples x in feature space as features.
+    """The kernel with principal components in feature space as features.
 
-    They are few, so that the covariance of their coefficients stays small.
+    The leading ones of the samples x are few, so that the covariance of their
+    coefficients stays small.
     """
-    z = _thinned((x - kernel.offset) / kernel.scale, most_samples)
-    values = gaussians(np.concatenate([z, z * MIRROR]), kernel.centres)
+    scaled = (x - kernel.offset) / kernel.scale
+    z = _thinned(scaled, most_samples)
+    both_sides = np.concatenate([z, z * MIRROR])
+    values = gaussians(both_sides, kernel.centres)
     moment = values.T @ values / len(values)
+
     among_centres = gaussians(kernel.centres, kernel.centres)
     jitter = 1e-9 * np.eye(len(among_centres))
     _, vectors = eigh(moment, among_centres + jitter)
@@ -216,7 +243,7 @@ def principal(
 
 
 def inputs_of(channels: Sequence[dict[str, Floats]], ship: Any) -> Floats:
-    """Inputs of the kernel over several trials, by their channels, shape (n_samples, 4)."""
+    """Inputs of the kernel over several trials, shape (n_samples, 4)."""
     return np.concatenate([kernel_inputs(one, ship) for one in channels])
 
 
@@ -249,34 +276,62 @@ class _Search:
         return KernelFit(blank, self.build_rows(table))
 
     def unit(self, samples: Samples) -> float:
-        """SI units, by row, of a weight of the errors by ship length in the prime system."""
+        """SI units, by row, of a weight of errors by ship length, prime system."""
         ship = self.blank.particulars
         window = np.mean(samples.duration)
         return float(1.0 / (ship["length"] * window * ship["speed"] ** 3))
 
     def error(self, stage: KernelFit, weight: float) -> float:
-        """Mean error of the simulated headings of what is held out; weight 0: of the reference ship."""
+        """Mean error of the simulated headings of what is held out.
+
+        Weight 0 gives that of the reference ship.
+        """
         C = weight * self.unit(stage.samples)
         errors = []
         for rows, held in held_out_rows(self.trials, stage.samples, self.folds):
             fitted = stage.samples.select(rows)
-            found: dict[str, Floats] = {}
+            coefficients = {}
             for q, X in fitted.features.items():
-                moment = X.T @ X * C + np.eye(X.shape[1])
-                solution = np.linalg.solve(moment, C * (X.T @ fitted.targets[q]))
-                found[q] = np.asarray(solution, dtype=float)
-            model = stage.model.with_accelerations(found)
+                coefficients[q] = _ridge(X, fitted.targets[q], C)
+            model = stage.model.with_accelerations(coefficients)
             errors.append(heading_error(model, held, "rmse"))
         return float(np.mean(errors))
+
+    def smoothest(
+        self, stages: dict[float, KernelFit], weights: Sequence[float]
+    ) -> tuple[float, float, dict[str, float]]:
+        """Weight and length of the smoothest kernel nearly as good as the best.
+
+        The stages are by length, the smoothest first. Also returns the errors with that
+        kernel, where there is a choice, and of the reference ship alone.
+        """
+        pairs = list(product(weights, stages))  # the smoothest first
+        best = pairs[0]
+        errors = {}
+        if len(pairs) > 1:
+            tried = [self.error(stages[length], weight) for weight, length in pairs]
+            best = most_regularised(pairs, tried)
+            errors["kernel"] = tried[pairs.index(best)]
+        weight, length = best
+        errors["reference"] = self.error(stages[length], 0.0)
+        return weight, length, errors
 
     def fitted(self, stage: KernelFit, weight: float) -> KernelFit:
         """The fit to all rows."""
         samples = stage.samples
         C = weight * self.unit(samples)
         estimators: Estimators = {}
+        coefficients = {}
         for q, X in samples.features.items():
             estimator = LSSVM(C=C, scale=False, fit_intercept=False)
             estimators[q] = estimator.fit(X, samples.targets[q])
-        coefficients = {q: one.coef_ for q, one in estimators.items()}
+            coefficients[q] = estimator.coef_
         model = stage.model.with_accelerations(coefficients)
         return KernelFit(model, samples, estimators)
+
+
+def _ridge(X: Floats, y: Floats, C: float) -> Floats:
+    """Coefficients by ridge regression with a weight C of the squared errors."""
+    penalty = np.eye(X.shape[1])
+    moment = X.T @ X * C + penalty
+    return np.asarray(np.linalg.solve(moment, C * (X.T @ y)))

@@ -9,7 +9,7 @@ from shipgym.ships.kernel_boxes import RBF, SIZES
 
 @dataclass(frozen=True)
 class KernelResidual:
-    """A kernel on what a reference ship leaves of the accelerations (fixed-size LS-SVM).
+    """Fixed-size LS-SVM with a kernel on what a reference ship leaves.
 
     The reference ship is that of `grey-box`, the fitted model of the structure named,
     or, for a black box, a linear model.

@@ -1,4 +1,4 @@
-"""How many singular directions to keep: the L-curve and generalised cross-validation."""
+"""Rank of a truncated decomposition: L-curve and generalised cross-validation."""
 
 from dataclasses import dataclass
 
@@ -17,17 +17,25 @@ class LCurve:
 
 
 def l_curve(
-    singular_values: Floats, projections: Floats, filters: Floats, outside: float
+    singular_values: Floats,
+    projections: Floats,
+    filters: Floats,
+    outside: float,
 ) -> LCurve:
-    """Norms for every rank from the directions of a `Decomposition`, shape (n_ranks,)."""
+    """Norms for every rank from the directions of a `Decomposition`."""
     whole = projections**2
     beyond_rank = whole.sum() - np.cumsum(whole)
     shrinkage = 1.0 - singular_values * filters
-    within_rank = np.cumsum((projections * shrinkage) ** 2)
-
+    left = projections * shrinkage
+    within_rank = np.cumsum(left**2)
     residual = beyond_rank + within_rank + max(outside, 0.0)
-    solution = np.cumsum((filters * projections) ** 2)
-    return LCurve(np.sqrt(np.maximum(residual, 0.0)), np.sqrt(solution))
+
+    coefficients = filters * projections
+    solution = np.cumsum(coefficients**2)
+    return LCurve(
+        residual_norm=np.sqrt(np.maximum(residual, 0.0)),
+        solution_norm=np.sqrt(solution),
+    )
 
 
 def corner_rank(curve: LCurve, n_samples: int, significance: float = 0.1) -> int:
@@ -50,13 +58,14 @@ def corner_rank(curve: LCurve, n_samples: int, significance: float = 0.1) -> int
     significance : float
         Level of the F test.
     """
-    residual, solution = curve.residual_norm, curve.solution_norm
-    full = len(residual)
-    tiny = np.finfo(float).tiny
-    floor = max(np.finfo(float).eps * float(residual[0]), tiny)
-    height = np.log(np.maximum(residual, floor)) + np.log(np.maximum(solution, tiny))
-    corner = int(np.argmin(height)) + 1
+    residual = curve.residual_norm
+    machine = np.finfo(float)
+    floor = max(machine.eps * float(residual[0]), machine.tiny)
+    along = np.log(np.maximum(residual, floor))
+    upward = np.log(np.maximum(curve.solution_norm, machine.tiny))
+    corner = int(np.argmin(along + upward)) + 1
 
+    full = len(residual)
     freedom = n_samples - full
     if freedom < 1:
         return corner
@@ -66,15 +75,18 @@ def corner_rank(curve: LCurve, n_samples: int, significance: float = 0.1) -> int
     allowed = 1.0 + dropped / freedom * quantile
     # once: as array and as number a square may differ in the last bit
     squared = residual * residual
-    adequate = squared <= allowed * max(squared[-1], floor**2)
-    return int(np.flatnonzero(adequate[corner - 1 :])[0]) + corner
+    least = max(squared[-1], floor**2)
+    is_adequate = squared <= allowed * least
+    passed_over = np.argmax(is_adequate[corner - 1 :])
+    return corner + int(passed_over)
 
 
 def gcv_rank(curve: LCurve, n_samples: int) -> int:
     """Rank that minimises generalised cross-validation (Golub, Heath & Wahba 1979)."""
-    ranks = np.arange(1, len(curve.residual_norm) + 1)
-    freedom = n_samples - ranks
-    score = curve.residual_norm**2 / np.maximum(freedom, 1) ** 2
+    n_ranks = len(curve.residual_norm)
+    freedom = n_samples - np.arange(1, n_ranks + 1)
+    divisor = np.maximum(freedom, 1) ** 2
+    score = curve.residual_norm**2 / divisor
     score[freedom <= 0] = np.inf
     return int(np.argmin(score)) + 1
 

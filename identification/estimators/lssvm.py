@@ -1,4 +1,4 @@
-"""Least-squares support vector machines for regression, the linear kernel in primal form.
+"""Least-squares support vector machines, the linear kernel in primal form.
 
 With a linear kernel this is ridge regression with a free intercept. One singular value
 decomposition of the centred and scaled features, X = U S V', gives the coefficients for
@@ -119,12 +119,14 @@ class LSSVM(LinearRegressor):
         check_flag(self.robust, "robust")
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
+        """Fit to samples (n_samples, n_features) and targets (n_samples,)."""
         self.check()
         features, targets = validated(self, X, y)
         fit_once = self._fit_primal if self.kernel == "linear" else self._fit_dual
         self.weights_ = fit_weighted(
-            lambda weights: fit_once(features, targets, weights), targets, self.robust
+            lambda weights: fit_once(features, targets, weights),
+            y=targets,
+            robust=self.robust,
         )
         return self
 
@@ -133,7 +135,13 @@ class LSSVM(LinearRegressor):
         return self.C
 
     def _fit_primal(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
-        problem = decompose(X, y, self.scale, self.fit_intercept, weights)
+        problem = decompose(
+            X,
+            y=y,
+            scale=self.scale,
+            fit_intercept=self.fit_intercept,
+            weights=weights,
+        )
         n_directions = len(problem.singular_values)
         filters = problem.filters(self.error_weight(), n_directions)
         return keep_solution(self, problem, filters, X, y, weights)
@@ -161,8 +169,10 @@ class LSSVM(LinearRegressor):
         if self.fit_intercept:
             self.intercept_ = float(of_targets.sum() / of_ones.sum())
         self.dual_coef_ = of_targets - self.intercept_ * of_ones
+
         self.ridge_.dual_coef_ = self.dual_coef_
-        return np.asarray(y - self.ridge_.predict(self.support_) - self.intercept_)
+        fitted = self.ridge_.predict(self.support_)
+        return np.asarray(y - fitted - self.intercept_)
 
     def predict(self, X: ArrayLike) -> Floats:
         """Targets, shape (n_samples,), of samples of shape (n_samples, n_features)."""
@@ -176,10 +186,11 @@ class LSSVM(LinearRegressor):
 
 @dataclass(eq=False, repr=False)
 class TruncatedLSSVM(LinearRegressor):
-    """Truncated least-squares support vector machine, linear kernel (Xu 2020, section 3.2).
+    """Truncated least-squares support vector machine with a linear kernel.
 
-    Keeps the `rank_` largest singular values of the centred and scaled features. That
-    equals truncating the dual system of the paper, at a cost of O(n m^2).
+    Source: Xu 2020, section 3.2. Keeps the `rank_` largest singular values of the
+    centred and scaled features. That equals truncating the dual system of the paper, at
+    a cost of O(n m^2).
 
     Parameters
     ----------
@@ -247,25 +258,33 @@ class TruncatedLSSVM(LinearRegressor):
         check_flag(self.robust, "robust")
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
+        """Fit to samples (n_samples, n_features) and targets (n_samples,)."""
         self.check()
         features, targets = validated(self, X, y)
         self.weights_ = fit_weighted(
-            lambda weights: self._fit(features, targets, weights), targets, self.robust
+            lambda weights: self._fit(features, targets, weights),
+            y=targets,
+            robust=self.robust,
         )
         return self
 
     def _fit(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
-        problem = decompose(X, y, self.scale, self.fit_intercept, weights)
+        problem = decompose(
+            X,
+            y=y,
+            scale=self.scale,
+            fit_intercept=self.fit_intercept,
+            weights=weights,
+        )
         distinct = problem.numerical_rank
         filters = problem.filters(self.C, distinct)
 
-        lost = float(np.sum(problem.projections[distinct:] ** 2))
+        lost = problem.projections[distinct:]
         self.l_curve_ = l_curve(
             problem.singular_values[:distinct],
-            problem.projections[:distinct],
-            filters[:distinct],
-            problem.outside + lost,
+            projections=problem.projections[:distinct],
+            filters=filters[:distinct],
+            outside=problem.outside + float(np.sum(lost**2)),
         )
         self.rank_ = self._chosen_rank(problem, distinct)
         filters[self.rank_ :] = 0.0
@@ -281,9 +300,10 @@ class TruncatedLSSVM(LinearRegressor):
         check_is_fitted(self)
         names = [f"x{i}" for i in range(self.n_features_in_)]
         names = getattr(self, "feature_names_in_", names)
-        return tuple(
-            tuple(str(names[i]) for i in group) for group in self.collinear_groups_
-        )
+        groups = []
+        for group in self.collinear_groups_:
+            groups.append(tuple(str(names[i]) for i in group))
+        return tuple(groups)
 
     def _chosen_rank(self, problem: Decomposition, distinct: int) -> int:
         if self.rank is not None:
@@ -301,4 +321,6 @@ class TruncatedLSSVM(LinearRegressor):
 def _main_features(direction: Floats, least_share: float = 0.1) -> tuple[int, ...]:
     """Features of at least a tenth of the largest share in a direction."""
     sizes = np.abs(direction)
-    return tuple(np.flatnonzero(sizes / sizes.max() >= least_share).tolist())
+    shares = sizes / sizes.max()
+    main = np.flatnonzero(shares >= least_share)
+    return tuple(main.tolist())

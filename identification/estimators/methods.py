@@ -1,4 +1,4 @@
-"""Methods of identification: which estimator is fitted to the regression of each equation."""
+"""Methods of identification: which estimator is fitted to each equation."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -77,16 +77,20 @@ class Method:
 
 
 def get_method(method: str | Any) -> Method:
-    """A method by name, or that of an estimator object, of which each equation has a copy.
+    """A method by name, or that of an estimator object.
 
-    Without a constant term: the equations of motion have none but that of the
-    structure.
+    Each equation has a copy of that, without a constant term: the equations of motion
+    have none but that of the structure.
     """
     if isinstance(method, str):
         method = make_method(check_choice(method, METHODS, "method"))
     if isinstance(method, Refinement):
         start = get_method(method.start)
-        return Method(Refinement.name, start.make, refinement=method)
+        return Method(
+            name=Refinement.name,
+            make=start.make,
+            refinement=method,
+        )
     if not hasattr(method, "fit"):
         raise InputError(
             f"method: expected one of {quoted(METHODS)}, or an estimator with"
@@ -100,7 +104,11 @@ def get_method(method: str | Any) -> Method:
         )
     make = partial(without_constant, method)
     if isinstance(method, LinearRegressor):
-        return Method(method.method_name, make, method.regularised)
+        return Method(
+            name=method.method_name,
+            make=make,
+            regularised=method.regularised,
+        )
     return Method(type(method).__name__, make, regularised=False)
 
 
@@ -108,21 +116,25 @@ def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Est
     """Estimators whose terms are held back by what they do in a hard turn.
 
     Ridge regression in which each feature is scaled by its size in a hard turn
-    (`hard_turn.hard_turn_features`) over a window: the penalty falls on what is invisible
-    in the data and large in the turn. Its strength is relative to the terms'
+    (`hard_turn.hard_turn_features`) over a window: the penalty falls on what is
+    invisible in the data and large in the turn. Its strength is relative to the terms'
     contribution there.
     """
     window = float(np.mean(samples.duration))
-    C = 1.0 / (len(samples) * strength**2)
+    penalty = len(samples) * strength**2
     estimators: Estimators = {}
     for q, features in samples.features.items():
-        ridge = LSSVM(C=C, scale=sizes[q] * window, fit_intercept=False)
+        ridge = LSSVM(
+            C=1.0 / penalty,
+            scale=sizes[q] * window,
+            fit_intercept=False,
+        )
         estimators[q] = ridge.fit(features, samples.targets[q])
     return estimators
 
 
 class Adapted(LinearRegressor):
-    """An estimator with scikit-learn's interface, and the moment and covariance that it lacks.
+    """An estimator with scikit-learn's interface, given moment and covariance.
 
     These are those of least squares on the features whose coefficients are not 0: an
     approximation for an estimator that shrinks its coefficients. `inner` has a `fit(X,
@@ -133,31 +145,35 @@ class Adapted(LinearRegressor):
         self.inner = inner
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit; InputError for an estimator that sets no `coef_` of a finite number for each feature."""
+        """Fit; InputError unless that sets a finite `coef_` for each feature."""
         features, targets = validated(self, X, y)
         n_features = features.shape[1]
         self.inner.fit(features, targets)
-        found = np.asarray(getattr(self.inner, "coef_", np.nan), dtype=float).ravel()
-        if found.shape != (n_features,) or not np.isfinite(found).all():
+        coefficients = getattr(self.inner, "coef_", np.nan)
+        self.coef_ = np.asarray(coefficients, dtype=float).ravel()
+        if self.coef_.shape != (n_features,) or not np.isfinite(self.coef_).all():
             raise InputError(
                 "method: expected a linear estimator whose fit sets coef_, a finite"
                 f" coefficient for each of the {n_features} terms, got {self.inner!r}"
             )
 
-        used = np.flatnonzero(found)
-        moment = features[:, used].T @ features[:, used]
+        is_used = self.coef_ != 0.0
+        used = features[:, is_used]
         inverse = np.zeros((n_features, n_features))
-        inverse[np.ix_(used, used)] = np.linalg.pinv(moment, hermitian=True)
-        residual = targets - features @ found
-        freedom = max(len(targets) - len(used), 1)
-        self.coef_ = found
+        inverse[np.ix_(is_used, is_used)] = np.linalg.pinv(
+            used.T @ used, hermitian=True
+        )
+
+        residuals = targets - features @ self.coef_
+        freedom = max(len(targets) - used.shape[1], 1)
+        variance = float(residuals @ residuals) / freedom
         self.inverse_moment_ = inverse
-        self.covariance_ = float(residual @ residual) / freedom * inverse
+        self.covariance_ = variance * inverse
         return self
 
 
 def without_constant(estimator: Any) -> Estimator:
-    """An unfitted copy of an estimator object, with its `fit_intercept`, if it has one, set to False."""
+    """An unfitted copy of an estimator object, without intercept if it can."""
     copied = clone(estimator, safe=False)
     settings = {}
     if hasattr(copied, "get_params"):
@@ -165,9 +181,12 @@ def without_constant(estimator: Any) -> Estimator:
     if "fit_intercept" in settings:
         copied.set_params(fit_intercept=False)
 
-    # our own estimators know their moment; that of others is estimated
-    known = type(copied).__module__.partition(".")[0] == "identification"
-    return copied if known else Adapted(copied)
+    package, *_ = type(copied).__module__.split(".")
+    if package != "identification":
+        # others than our own do not know their moment
+        copied = Adapted(copied)
+    estimator_copy: Estimator = copied
+    return estimator_copy
 
 
 def method_options(name: str) -> tuple[str, ...]:
@@ -188,15 +207,22 @@ def make_method(name: str, settings: Mapping[str, Any] | None = None) -> Any:
     known = method_options(name) if name in METHODS else ()
     for setting in settings:
         if setting not in known:
+            choices = ", ".join(known) or "it has none"
             raise InputError(
-                f"{setting}: expected a setting of method {name!r}"
-                f" ({', '.join(known) or 'it has none'}), got one that it does not know;"
-                " leave it out, or choose the method that it is for"
+                f"{setting}: expected a setting of method {name!r} ({choices}), got one"
+                " that it does not know; leave it out, or choose the method that it is"
+                " for"
             )
-    kind, own = METHODS[name]
+    kind, usual = METHODS[name]
     if kind != "Refinement":
-        return getattr(identification, kind)(**(own | dict(settings)))
+        estimator = getattr(identification, kind)
+        return estimator(**{**usual, **settings})
 
-    own = {k: v for k, v in settings.items() if k in Refinement.options}
-    of_start = {k: v for k, v in settings.items() if k not in own}
+    own = {}
+    of_start = {}
+    for setting, value in settings.items():
+        if setting in Refinement.options:
+            own[setting] = value
+        else:
+            of_start[setting] = value
     return Refinement(**own, start=TruncatedLSSVM(**of_start))

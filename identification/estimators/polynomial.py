@@ -38,25 +38,29 @@ def polynomial_coefficients(estimator: LSSVM) -> dict[tuple[int, ...], float]:
     check_is_fitted(estimator)
     degree = int(estimator.degree)
     n_features = estimator.n_features_in_
-    gamma = 1.0 / n_features if estimator.gamma is None else estimator.gamma
+    gamma = estimator.gamma
+    if gamma is None:
+        gamma = 1.0 / n_features
     slope = gamma * estimator.support_ / estimator.scale_  # of features as given
     constant = estimator.coef0 - slope @ estimator.centre_
 
     found = {}
+    features = range(n_features)
     for total in range(degree + 1):
-        for chosen in combinations_with_replacement(range(n_features), total):
-            powers = tuple(chosen.count(j) for j in range(n_features))
+        for chosen in combinations_with_replacement(features, total):
+            powers = tuple(chosen.count(j) for j in features)
             products = np.prod(slope ** np.array(powers), axis=1)
             by_sample = products * constant ** (degree - total)
             sum_over_samples = float(estimator.dual_coef_ @ by_sample)
             found[powers] = _multinomial(degree, powers) * sum_over_samples
 
-    found[(0,) * n_features] += estimator.intercept_
+    no_power = (0,) * n_features
+    found[no_power] += estimator.intercept_
     return found
 
 
 def _multinomial(degree: int, powers: tuple[int, ...]) -> float:
-    """Number of ways in which a product of these powers arises from that of `degree` sums."""
+    """Number of times these powers occur in a multiplied-out power of a sum."""
     ways = factorial(degree) / factorial(degree - sum(powers))
     for power in powers:
         ways /= factorial(power)

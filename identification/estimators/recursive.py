@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
+from identification.arrays import column_rms
 from identification.estimators.decomposition import check_scale, scales_of
 from identification.estimators.linear import LinearRegressor, validated
 from identification.estimators.lssvm import LSSVM
@@ -42,7 +43,9 @@ OPTIONS = (
 
 @dataclass(eq=False, repr=False)
 class Recursion(LinearRegressor):
-    """What the recursive methods share; samples are taken in time order, without intercept.
+    """Base of the recursive methods, which take samples in time order.
+
+    There is no intercept.
 
     Parameters
     ----------
@@ -91,7 +94,7 @@ class Recursion(LinearRegressor):
     inverse_free = True
 
     def __sklearn_tags__(self) -> Any:
-        """A recursion has no intercept, which some of scikit-learn's test data would need."""
+        """Tell scikit-learn that its test data, which need an intercept, fit badly."""
         tags = super().__sklearn_tags__()
         tags.regressor_tags.poor_score = True
         return tags
@@ -109,12 +112,12 @@ class Recursion(LinearRegressor):
         check_flag(self.inverse_free, "inverse_free")
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Run over samples of shape (n_samples, n_features), in time order, from the beginning."""
+        """Run over samples of shape (n_samples, n_features), from the beginning."""
         self.fit_history(X, y)
         return self
 
     def fit_history(self, X: ArrayLike, y: ArrayLike) -> Floats:
-        """Fit, and return the estimate after each sample, shape (n_samples, n_features).
+        """Fit, and return the estimates after each sample, (n_samples, n_features).
 
         While LS-SVR gathers its samples these are the coefficients that it will find
         from them.
@@ -123,18 +126,22 @@ class Recursion(LinearRegressor):
         features, targets = validated(self, X, y)
         self._begin(features, targets[:, None])
 
-        gathered = min(self.start_samples * self.start_interval, len(targets))
+        n_samples = len(targets)
+        gathered = min(self.start_samples * self.start_interval, n_samples)
         picked = slice(0, gathered, self.start_interval)
         if gathered:
             self._start_from(features[picked], targets[picked])
         start = np.tile(self.coef_, (gathered, 1))
-        rest = self._run(features[gathered:, None], targets[gathered:, None])
 
-        multiplicity = np.zeros(len(targets))
-        multiplicity[picked] = 1.0
-        multiplicity[gathered:] = 1.0
-        self._summarise(features, targets, multiplicity)
-        return np.concatenate([start, rest[:, 0]])
+        rest = slice(gathered, None)
+        history = self._run(features[rest, None], targets[rest, None])
+        of_rest = history[:, 0]
+
+        counts = np.zeros(n_samples)
+        counts[picked] = 1.0
+        counts[rest] = 1.0
+        self._summarise(features, targets, counts)
+        return np.concatenate([start, of_rest])
 
     def update(self, phi: ArrayLike, y: ArrayLike) -> Self:
         """Take in the next sample or samples.
@@ -170,78 +177,109 @@ class Recursion(LinearRegressor):
 
     @property
     def theta(self) -> Floats:
-        """Estimate after the last sample, shape (n_features,) or (n_signals, n_features)."""
+        """Estimate after the last sample, as `coef_`."""
         check_is_fitted(self, "coef_")
         return self.coef_
 
     @property
     def covariance(self) -> Floats | None:
-        """Covariance of `theta` by variance of the errors; None for the stochastic gradient.
+        """Covariance of `theta` by variance of the errors.
 
-        Shape (n_features, n_features) or (n_signals, n_features, n_features).
+        Shape (n_features, n_features) or (n_signals, n_features, n_features); None for
+        the stochastic gradient.
         """
         check_is_fitted(self, "coef_")
         if not hasattr(self, "_P"):
             return None
-        unscaled: Floats = self._P / np.multiply.outer(self.scale_, self.scale_)
-        return unscaled[0] if len(unscaled) == 1 else unscaled
+        unscale = np.outer(self.scale_, self.scale_)
+        unscaled: Floats = self._P / unscale
+        return unscaled.reshape(*self.coef_.shape, -1)
 
     def _begin(self, features: Floats, targets: Floats) -> None:
-        """Begin with zero coefficients of covariance C, in scales that the samples give."""
+        """Begin with zero coefficients, in scales that the samples give."""
         n_signals = targets.shape[1]
         n_features = features.shape[-1]
         every_row = features.reshape(-1, n_features)
-        self.scale_ = scales_of(np.sqrt(np.mean(every_row**2, axis=0)), self.scale)
-        unit = np.sqrt(np.mean(targets**2, axis=0))
+        self.scale_ = scales_of(column_rms(every_row), self.scale)
+        unit = column_rms(targets)
         self._unit = np.where(unit > 0.0, unit, 1.0)
 
         self._theta = np.zeros((n_signals, n_features))
-        self.coef_ = np.zeros(n_features) if n_signals == 1 else self._theta.copy()
+        self._keep(self._theta)
         self._begin_memory()
 
+    def _keep(self, estimates: Floats) -> None:
+        """Set `coef_`, of one signal without the axis of the signals."""
+        self.coef_ = estimates.copy()
+        if len(estimates) == 1:
+            self.coef_ = estimates[0].copy()
+
     def _start_from(self, features: Floats, targets: Floats) -> None:
-        """Take LS-SVR's estimate on the first samples, and its certainty (LSSVR-RLS, Zhu 2018, 7.3)."""
-        estimator = LSSVM(C=self.start_C, scale=self.scale_, fit_intercept=False)
-        estimator.fit(features, targets)
-        self.coef_ = estimator.coef_
-        self._theta[0] = estimator.coef_ * self.scale_ / self._unit[0]
-        self._remember_start(features / self.scale_, estimator.inverse_moment_)
+        """Take LS-SVR's estimate on the first samples, and its certainty.
+
+        Source: LSSVR-RLS, Zhu 2018, section 7.3.
+        """
+        start = LSSVM(
+            C=self.start_C,
+            scale=self.scale_,
+            fit_intercept=False,
+        )
+        start.fit(features, targets)
+        self.coef_ = start.coef_
+        self._theta[0] = start.coef_ * self.scale_ / self._unit
+        self._remember_start(features / self.scale_, start.inverse_moment_)
 
     def _run(self, features: Floats, targets: Floats) -> Floats:
-        """Take in samples of shape (n_samples, n_signals, n_features); estimate after each of them."""
-        scaled = np.ascontiguousarray(features / self.scale_)
-        in_units = np.ascontiguousarray(targets / self._unit)
+        """Take in samples; return the estimate after each of them.
+
+        Both of shape (n_samples, n_signals, n_features).
+        """
+        scaled = features / self.scale_
+        in_units = targets / self._unit
         history: Floats = np.empty(features.shape)
-        self._advance(scaled, in_units, history)
+        self._advance(
+            np.ascontiguousarray(scaled),
+            np.ascontiguousarray(in_units),
+            history,
+        )
 
         history *= self._unit[:, None] / self.scale_
         if len(history):
-            last = history[-1]
-            self.coef_ = (last[0] if len(last) == 1 else last).copy()
+            self._keep(history[-1])
         return history
 
     def _summarise(
-        self, features: Floats, targets: Floats, multiplicity: Floats
+        self,
+        features: Floats,
+        targets: Floats,
+        counts: Floats,
     ) -> None:
-        """Set weights and covariance of the estimate that the recursion tends to."""
+        """Set weights and covariance of the estimate that the recursion tends to.
+
+        `counts` are 1 for samples that are used, else 0.
+        """
         # a sample is seen again while it is among the last
         age = np.arange(len(targets) - 1.0, -1.0, -1.0)
         times_seen = np.minimum(self.innovations, age + 1.0)
-        self.weights_ = multiplicity * times_seen * self.forgetting**age
+        weights = counts * times_seen * self.forgetting**age
 
         scaled = features / self.scale_
         start = np.eye(scaled.shape[1]) / self.C
-        moment = (scaled.T * self.weights_) @ scaled + start
+        moment = (scaled.T * weights) @ scaled + start
         inverse = np.linalg.inv(moment)
-        unscale = np.outer(self.scale_, self.scale_)
-        self.inverse_moment_ = inverse / unscale
 
-        error = targets - features @ self.coef_
+        errors = targets - features @ self.coef_
         n_effective = float(np.sum(inverse * (moment - start)))
-        freedom = max(self.weights_.sum() - n_effective, 1.0)
-        self.noise_variance_ = float(self.weights_ @ error**2) / freedom
-        middle = (scaled.T * self.weights_**2) @ scaled
-        self.covariance_ = self.noise_variance_ * (inverse @ middle @ inverse) / unscale
+        freedom = max(weights.sum() - n_effective, 1.0)
+        variance = float(weights @ errors**2) / freedom
+        middle = (scaled.T * weights**2) @ scaled
+        covariance = variance * (inverse @ middle @ inverse)
+
+        unscale = np.outer(self.scale_, self.scale_)
+        self.weights_ = weights
+        self.inverse_moment_ = inverse / unscale
+        self.noise_variance_ = variance
+        self.covariance_ = covariance / unscale
 
     @abstractmethod
     def _begin_memory(self) -> None:
@@ -258,7 +296,7 @@ class Recursion(LinearRegressor):
 
 @dataclass(eq=False, repr=False)
 class RecursiveLeastSquares(Recursion):
-    """Recursive least squares with forgetting, started from zero or from LS-SVR (Zhu 2018, section 7.3).
+    """Recursive least squares with forgetting (Zhu 2018, section 7.3).
 
     Its parameters are those of `Recursion`.
     """
@@ -268,8 +306,9 @@ class RecursiveLeastSquares(Recursion):
 
     def _begin_memory(self) -> None:
         n_signals, n_features = self._theta.shape
-        self._P = np.tile(self.C * np.eye(n_features), (n_signals, 1, 1))
-        self._ceiling = np.full((n_signals, n_features), float(self.C))
+        start = self.C * np.eye(n_features)
+        self._P = np.tile(start, (n_signals, 1, 1))
+        self._ceiling = np.full(self._theta.shape, float(self.C))
         self._past_phi = np.empty((0, n_signals, n_features))
         self._past_y = np.empty((0, n_signals))
 
@@ -301,9 +340,10 @@ class RecursiveLeastSquares(Recursion):
 
 @dataclass(eq=False, repr=False)
 class MultiInnovationLeastSquares(RecursiveLeastSquares):
-    """Multi-innovation least squares: each step corrects by the last few innovations together.
+    """Multi-innovation least squares.
 
-    It has the parameters of `Recursion` too.
+    Each step corrects by the last few innovations together. It has the parameters of
+    `Recursion` too.
 
     Parameters
     ----------
@@ -379,7 +419,7 @@ class StochasticGradient(Recursion):
 
 
 def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
-    """Samples of shape (n_samples, n_signals, n_features) and (n_samples, n_signals)."""
+    """Samples (n_samples, n_signals, n_features) and targets (n_samples, n_signals)."""
     features = np.asarray(phi, dtype=float)
     targets = np.atleast_1d(np.asarray(y, dtype=float))
     if features.ndim == 1:  # a single sample

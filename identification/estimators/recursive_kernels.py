@@ -1,4 +1,4 @@
-"""Recursions: one pass over samples in time order, for any number of signals side by side.
+"""Recursions: one pass over samples in time order, for any number of signals.
 
 Arrays are `phi`, regressors of shape (n_samples, n_signals, n_features), `y`, targets
 of shape (n_samples, n_signals), `theta`, estimates of shape (n_signals, n_features),
@@ -19,15 +19,20 @@ VECTOR, TABLE, CUBE = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
 
 
 def innovation(error: float, omega: float) -> float:
-    """The error, or its bounded odd function of slope 1 at 0 (Song 2020, equation 3-7, over omega)."""
-    return tanh(omega * error) / omega if omega > 0.0 else error
+    """The error, or its bounded odd function of slope 1 at 0.
+
+    Source: Song 2020, equation 3-7, over omega.
+    """
+    if omega > 0.0:
+        return tanh(omega * error) / omega
+    return error
 
 
 def forget(P: Any, forgetting: float, ceiling: Any, stretch: Any) -> None:
-    """Divide a covariance by the forgetting factor, but let no coefficient forget beyond its start.
+    """Divide a covariance by the forgetting factor, at most to the start's variances.
 
     Rows and columns are stretched by the same factors, so that the matrix stays
-    positive; `stretch` is scratch.
+    positive; `ceiling` holds the variances, `stretch` is scratch.
     """
     full = 1.0 / np.sqrt(forgetting)
     for i in range(ceiling.size):
@@ -79,7 +84,10 @@ def scalar_updates(
     history: Any,
     scratch: Any,
 ) -> None:
-    """Least squares by rank-one updates over the last samples (TMILS, Song 2020, 4-12); RLS with one."""
+    """Least squares by rank-one updates over the last samples; RLS with one.
+
+    Source: TMILS, Song 2020, equation 4-12.
+    """
     n_signals, n_features = theta.shape
     for t in range(first, phi.shape[0]):
         oldest = max(t - innovations + 1, 0)
@@ -105,7 +113,10 @@ def matrix_updates(
     history: Any,
     scratch: Any,
 ) -> None:
-    """Multi-innovation least squares with its matrix of innovations solved (MILS, Song 2020, 4-11)."""
+    """Multi-innovation least squares with its matrix of innovations solved.
+
+    Source: MILS, Song 2020, equation 4-11.
+    """
     n_signals = theta.shape[0]
     for t in range(first, phi.shape[0]):
         oldest = max(t - innovations + 1, 0)
@@ -127,9 +138,18 @@ def matrix_updates(
 
 
 def gradient_updates(
-    phi: Any, y: Any, theta: Any, r: Any, forgetting: float, omega: float, history: Any
+    phi: Any,
+    y: Any,
+    theta: Any,
+    r: Any,
+    forgetting: float,
+    omega: float,
+    history: Any,
 ) -> None:
-    """Stochastic gradient, theta += phi e / r, r += |phi|^2 (Song 2020, equations 3-3 to 3-8)."""
+    """Stochastic gradient: theta += phi e / r, r += |phi|^2.
+
+    Source: Song 2020, equations 3-3 to 3-8.
+    """
     n_signals, n_features = theta.shape
     for t in range(phi.shape[0]):
         for s in range(n_signals):

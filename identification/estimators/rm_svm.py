@@ -1,4 +1,4 @@
-"""RM-SVM: a linear support vector regression of what a reference ship leaves of the accelerations.
+"""RM-SVM: a linear support vector regression of what a reference ship leaves.
 
 Source: Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via
 adaptive RM-SVM with minor rudder. The Lagrangian printed there (9) is that of LS-SVM,
@@ -13,10 +13,12 @@ from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
+from sklearn.base import clone
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Ridge
 from sklearn.svm import SVR, LinearSVR
 
+from identification.arrays import column_rms, mean_square, root_mean_square
 from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, validated
 from identification.search.pattern_search import pattern_search
@@ -41,7 +43,7 @@ Choice = TypeVar("Choice")
 
 @dataclass(eq=False, repr=False)
 class RMSVM(LinearRegressor):
-    """The linear correction of one equation: epsilon-SVR with standardised features and targets.
+    """The linear correction of one equation, by epsilon-SVR.
 
     Minimises w.w / 2 + C mean(max(|e| - epsilon, 0)) with the w of the standardised
     features and e in standard deviations of the target.
@@ -117,25 +119,23 @@ class RMSVM(LinearRegressor):
             check_number(self.epsilon, "epsilon", at_least=0.0, hint=hint)
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
+        """Fit to samples (n_samples, n_features) and targets (n_samples,)."""
         self.check()
         features, targets = validated(self, X, y)
+        rows = _Standardised(features, targets, self.constant)
         weight = 1.0 if self.C is None else float(self.C)
         if weight == NO_CORRECTION:
-            # its uncertainty is that of the weakest correction
-            self._fit(features, targets, WEAKEST)
             self.coef_ = np.zeros(features.shape[1])
+            # its uncertainty is that of the weakest correction
+            self.inverse_moment_ = rows.inverse_moment(WEAKEST)
         else:
-            self._fit(features, targets, weight)
+            slopes, offset = self._solve(rows, weight)
+            self.coef_ = rows.coefficients(slopes, offset)
+            self.inverse_moment_ = rows.inverse_moment(weight)
 
         residuals = targets - features @ self.coef_
-        self.covariance_ = float(np.mean(residuals**2)) * self.inverse_moment_
+        self.covariance_ = mean_square(residuals) * self.inverse_moment_
         return self
-
-    def _fit(self, X: Floats, y: Floats, weight: float) -> None:
-        rows = _Standardised(X, y, self.constant)
-        self.coef_ = rows.coefficients(*self._solve(rows, weight))
-        self.inverse_moment_ = rows.inverse_moment(weight)
 
     def _solve(self, rows: "_Standardised", weight: float) -> tuple[Floats, float]:
         """Slopes and offset for standardised features and targets."""
@@ -176,9 +176,9 @@ class RMSVM(LinearRegressor):
         bands, search = tuner.bands(weight)
 
         found: Estimators = {}
-        for k, (q, band) in enumerate(zip(task.samples.features, bands, strict=True)):
-            estimator = tuner.fitted(q, weight, band, tuner.everything)
-            estimator.chosen_ = {"C": weight, "epsilon": band}
+        for k, q in enumerate(task.samples.features):
+            estimator = tuner.fitted(q, weight, bands[k], tuner.everything)
+            estimator.chosen_ = {"C": weight, "epsilon": bands[k]}
             if search is not None:
                 estimator.search_ = search.of(k, BAND)
             found[q] = estimator
@@ -186,7 +186,7 @@ class RMSVM(LinearRegressor):
 
 
 class _Standardised:
-    """Features and targets of zero mean, where there is a free constant, and of unit size.
+    """Features and targets of unit size, and of zero mean where a constant is free.
 
     Attributes
     ----------
@@ -197,28 +197,30 @@ class _Standardised:
     """
 
     def __init__(self, X: Floats, y: Floats, constant: int | None) -> None:
+        n_samples, n_features = X.shape
         self._X = X
         self._constant = constant
-        self._penalised = np.arange(X.shape[1]) != constant
-        self._duration = np.ones(len(y)) if constant is None else X[:, constant]
+        self._penalised = np.arange(n_features) != constant
+        self._duration = np.ones(n_samples)
+        if constant is not None:
+            self._duration = X[:, constant]
         rows = X / self._duration[:, None]
         targets = y / self._duration
 
-        self._centre = np.zeros(X.shape[1])
+        self._centre = np.zeros(n_features)
         self._level = 0.0
         if constant is not None:
             self._centre = np.where(self._penalised, rows.mean(axis=0), 0.0)
             self._level = float(targets.mean())
-
-        size = np.sqrt(np.mean((rows - self._centre) ** 2, axis=0))
+        deviations = rows - self._centre
+        size = column_rms(deviations)
         has_size = (size > 0.0) & self._penalised
         self._scale = np.where(has_size, size, 1.0)
-        deviations = targets - self._level
-        self._deviation = float(np.sqrt(np.mean(deviations**2))) or 1.0
+        self.features = (deviations / self._scale)[:, self._penalised]
 
-        scaled = (rows - self._centre) / self._scale
-        self.features = scaled[:, self._penalised]
-        self.targets = deviations / self._deviation
+        target_deviations = targets - self._level
+        self._deviation = root_mean_square(target_deviations) or 1.0
+        self.targets = target_deviations / self._deviation
 
     def coefficients(self, slopes: Floats, offset: float) -> Floats:
         """Coefficients of the features as given, shape (n_features,)."""
@@ -226,16 +228,20 @@ class _Standardised:
         scale = self._scale[self._penalised]
         found[self._penalised] = slopes * self._deviation / scale
         if self._constant is not None:
+            level = self._level + self._deviation * offset
             at_centre = self._centre @ found
-            found[self._constant] = self._level + self._deviation * offset - at_centre
+            found[self._constant] = level - at_centre
         return found
 
     def inverse_moment(self, weight: float) -> Floats:
         """Regularised inverse of X'X of the ridge regression of the same strength."""
-        strength = len(self._X) / weight * np.mean(self._duration) ** 2
-        penalty = np.where(self._penalised, strength * self._scale**2, 0.0)
-        moment = self._X.T @ self._X + np.diag(penalty)
-        return np.linalg.pinv(moment, hermitian=True)
+        X = self._X
+        usual_duration = np.mean(self._duration)
+        strength = len(X) / weight * usual_duration**2
+        penalty = strength * self._scale**2
+        penalty[~self._penalised] = 0.0
+        moment = X.T @ X + np.diag(penalty)
+        return np.asarray(np.linalg.pinv(moment, hermitian=True))
 
 
 def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
@@ -284,15 +290,14 @@ class _Tuner:
         """The estimator of one equation for some of the rows."""
         key = (equation, weight, band, rows.tobytes())
         if key not in self._known:
-            chosen = {
-                "C": weight,
-                "epsilon": band,
-                "constant": self._free_constant(equation),
-            }
+            estimator = clone(self.asked).set_params(
+                C=weight,
+                epsilon=band,
+                constant=self._free_constant(equation),
+            )
             used = np.flatnonzero(rows)[:: self.every]
             X = self.samples.features[equation][used]
             y = self.samples.targets[equation][used]
-            estimator = RMSVM(**self.asked.get_params() | chosen)
             self._known[key] = estimator.fit(X, y)
         return self._known[key]
 
@@ -307,11 +312,12 @@ class _Tuner:
         """The grey box with the corrections fitted to some of the rows."""
         coefficients = {}
         for q, band in zip(self.samples.features, bands, strict=True):
-            coefficients[q] = self.fitted(q, weight, band, rows).coef_
+            estimator = self.fitted(q, weight, band, rows)
+            coefficients[q] = estimator.coef_
         return self.blank.with_accelerations(coefficients)
 
     def weight(self) -> float:
-        """The least weight of the errors nearly as good as the best on what is held out.
+        """The least weight of the errors nearly as good as the best, on data held out.
 
         Simulated headings are compared, not accelerations: collinear terms hardly
         change these. Where it makes no difference the reference ship is to be believed,
@@ -326,28 +332,41 @@ class _Tuner:
                 errors.append(heading_error(model, held, "rmse"))
             return float(np.mean(errors))
 
-        return float(most_regularised(WEIGHTS, [error(weight) for weight in WEIGHTS]))
+        errors = [error(weight) for weight in WEIGHTS]
+        return float(most_regularised(WEIGHTS, errors))
 
     def bands(self, weight: float) -> tuple[list[float], SearchResult | None]:
-        """The insensitive bands, by a pattern search on the simulated heading of the trials."""
-        first, asked = self.first_bands, self.asked
+        """The insensitive bands, by a pattern search on simulated headings."""
+        first = self.first_bands
+        asked = self.asked
         has_no_band = weight == NO_CORRECTION or asked.regression == "ls-svm"
         if asked.epsilon is not None or has_no_band:
             return first, None
 
         def error(bands: Floats) -> float:
             model = self.model(weight, bands.tolist(), self.everything)
-            errors = [heading_error(model, t, asked.objective) for t in self.trials]
+            errors = []
+            for trial in self.trials:
+                errors.append(heading_error(model, trial, asked.objective))
             return float(np.mean(errors))
 
-        search = pattern_search(error, first, np.zeros(len(first)), np.ones(len(first)))
+        search = pattern_search(
+            error,
+            start=first,
+            low=np.zeros(len(first)),
+            high=np.ones(len(first)),
+        )
         return search.x.tolist(), search
 
 
 def most_regularised(
-    choices: Sequence[Choice], errors: Sequence[float], tolerance: float = 1.1
+    choices: Sequence[Choice],
+    errors: Sequence[float],
+    tolerance: float = 1.1,
 ) -> Choice:
-    """The first choice whose error is nearly the least; the first of all if none is finite.
+    """The first choice whose error is nearly the least.
+
+    The first of all if none is finite.
 
     Parameters
     ----------
@@ -366,17 +385,18 @@ def most_regularised(
 
 
 def heading_error(model: ShipModel, trial: Trial, objective: str) -> float:
-    """Error of the simulated heading of a trial, open loop; infinite where the model runs away.
+    """Error of the simulated heading of a trial, open loop.
 
     Root mean square, rad ("rmse"), or 1 less Pearson's correlation with the measured
-    one ("correlation").
+    one ("correlation"). Infinite where the model runs away.
     """
     prediction = predict(model, trial)
     if prediction is None:
         return np.inf
-    predicted, measured = prediction["psi"], trial["psi"]
+    predicted = prediction["psi"]
+    measured = trial["psi"]
     if objective == "rmse":
-        return float(np.sqrt(np.mean((predicted - measured) ** 2)))
+        return root_mean_square(predicted - measured)
     if np.ptp(predicted) == 0.0 or np.ptp(measured) == 0.0:
         return 1.0
     return 1.0 - float(np.corrcoef(predicted, measured)[0, 1])

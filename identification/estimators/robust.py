@@ -8,20 +8,22 @@ from shipgym.arrays import Floats
 
 #: Standard deviation by median absolute deviation, of a normal distribution.
 MAD = 1.4826
-#: Residuals, by their scale, of full weight up to the first and of least from the second.
+#: Residuals, by their scale, of full weight up to the first, of least from the second.
 INNER, OUTER = 2.5, 3.0
 LEAST_WEIGHT = 1e-4
 
 
 def hampel_weights(residuals: Floats, largest: float) -> Floats:
-    """Weights of samples by their residuals (Suykens et al. 2002, Neurocomputing 48, eq. 14).
+    """Weights of samples by their residuals.
 
-    The scale is estimated by the median absolute deviation; residuals of the rounding
-    of the `largest` target all have the weight 1.
+    Source: Suykens et al. 2002, Neurocomputing 48, equation 14. The scale is estimated
+    by the median absolute deviation; residuals of the rounding of the `largest` target
+    all have the weight 1.
     """
-    rounding = 64 * np.finfo(float).eps * largest
-    deviation = np.abs(residuals - np.median(residuals))
-    scale = MAD * float(np.median(deviation))
+    machine = np.finfo(float)
+    rounding = 64 * machine.eps * largest
+    deviations = np.abs(residuals - np.median(residuals))
+    scale = MAD * float(np.median(deviations))
     if scale <= rounding:
         return np.ones(len(residuals))
 
@@ -37,7 +39,7 @@ def fit_weighted(
     most_rounds: int = 50,
     settled: float = 1e-3,
 ) -> Floats:
-    """Fit; if robust weight the samples by their residuals and fit again until they settle.
+    """Fit; if robust, weight samples by their residuals and fit again until settled.
 
     Parameters
     ----------

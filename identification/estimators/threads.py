@@ -1,4 +1,4 @@
-"""One thread for linear algebra on tall, narrow matrices: sharing them costs more than it saves."""
+"""One thread for linear algebra on tall, narrow matrices, which gain by no more."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import clone
 
+from identification.arrays import mean_square
 from identification.estimators.decomposition import check_scale, decompose
 from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, check_weight, validated
@@ -39,7 +40,9 @@ RAN_AWAY = 1e3  # error, relative to the motion, of a ship that ran away
 
 @dataclass(eq=False, repr=False)
 class TunedLSSVM(LinearRegressor):
-    """LS-SVM with a linear kernel and C found by a search over its logarithm (Zhu 2018, section 5.3).
+    """LS-SVM with a linear kernel and C found by a search over its logarithm.
+
+    Source: Zhu 2018, section 5.3.
 
     Parameters
     ----------
@@ -115,10 +118,11 @@ class TunedLSSVM(LinearRegressor):
         check_flag(self.robust, "robust")
 
     def fit(self, X: ArrayLike, y: ArrayLike, groups: ArrayLike | None = None) -> Self:
-        """Search for C and fit to samples of shape (n_samples, n_features), in the order of time.
+        """Search for C and fit.
 
-        Targets have the shape (n_samples,), as have `groups`: the trial of each sample,
-        for folds="trials".
+        Samples of shape (n_samples, n_features) are in the order of time. Targets have
+        the shape (n_samples,), as have `groups`: the trial of each sample, for
+        folds="trials".
         """
         self.check()
         if self.objective == "free-running":
@@ -127,9 +131,11 @@ class TunedLSSVM(LinearRegressor):
                 " samples alone cannot be simulated; give the estimator to identify"
             )
         features, targets = validated(self, X, y)
-        objective = self._objective(features, targets, groups)
-        search = get_optimiser(self.optimiser).minimise(
-            objective, [self.log_bounds()], self.seed
+        optimiser = get_optimiser(self.optimiser)
+        search = optimiser.minimise(
+            self._objective(features, targets, groups),
+            bounds=[self.log_bounds()],
+            seed=self.seed,
         )
         return self.fit_with(features, targets, search)
 
@@ -170,7 +176,10 @@ class TunedLSSVM(LinearRegressor):
 
     def _estimator(self, C: float) -> LSSVM:
         return LSSVM(
-            C=C, scale=self.scale, fit_intercept=self.fit_intercept, robust=self.robust
+            C=C,
+            scale=self.scale,
+            fit_intercept=self.fit_intercept,
+            robust=self.robust,
         )
 
     def _objective(self, X: Floats, y: Floats, groups: ArrayLike | None) -> ErrorOfC:
@@ -179,16 +188,29 @@ class TunedLSSVM(LinearRegressor):
             _, largest = self.log_bounds()
             weights = self._estimator(10.0**largest).fit(X, y).weights_
         if self.objective == "training":
-            return training_error(X, y, self.scale, self.fit_intercept, weights)
+            return training_error(
+                X,
+                y=y,
+                scale=self.scale,
+                fit_intercept=self.fit_intercept,
+                weights=weights,
+            )
 
         folds = self.folds
         if isinstance(folds, int):
             folds = min(folds, len(y))
         blocks = time_blocks(len(y), folds, groups)
-        return held_out_error(X, y, self.scale, self.fit_intercept, blocks, weights)
+        return held_out_error(
+            X,
+            y=y,
+            scale=self.scale,
+            fit_intercept=self.fit_intercept,
+            blocks=blocks,
+            weights=weights,
+        )
 
     def fit_equations(self, task: FitTask) -> Estimators:
-        """Copies fitted to all equations, which may use the trials as blocks or simulate them."""
+        """Copies fitted to all equations; trials may be blocks, or be simulated."""
         if self.objective == "free-running":
             return _fit_free_running(self, task)
         samples = task.samples
@@ -200,38 +222,47 @@ class TunedLSSVM(LinearRegressor):
 
 
 def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:
-    """Mean squared error of open-loop predictions, each channel relative to its variance in the trial.
+    """Mean squared error of open-loop predictions, by the variance of each channel.
 
     0 for a perfect model, 1 for one that predicts the mean; 1e3 for each trial that ran
     away.
     """
     errors = []
     for trial in trials:
+        error = RAN_AWAY
         predicted = predict(model, trial)
-        if predicted is None:
-            errors.append(RAN_AWAY)
-            continue
-        ratios = []
-        for channel in ("u", "v", "r"):
-            measured = trial[channel]
-            if np.ptp(measured) > 0.0:
-                square = np.mean((predicted[channel] - measured) ** 2)
-                ratios.append(square / np.var(measured))
-        errors.append(min(float(np.mean(ratios)), RAN_AWAY))
+        if predicted is not None:
+            error = min(_relative_error(predicted, trial), RAN_AWAY)
+        errors.append(error)
     return float(np.mean(errors))
 
 
+def _relative_error(predicted: Trial, trial: Trial) -> float:
+    """Mean squared error of the velocities by their variance, where they vary."""
+    ratios = []
+    for channel in ("u", "v", "r"):
+        measured = trial[channel]
+        if np.ptp(measured) > 0.0:
+            square = mean_square(predicted[channel] - measured)
+            ratios.append(square / np.var(measured))
+    return float(np.mean(ratios))
+
+
 def _fit_free_running(settings: TunedLSSVM, task: FitTask) -> Estimators:
-    """Estimators of all equations, their C chosen together by the error of simulated trials.
+    """Estimators of all equations, their C chosen by the error of simulated trials.
 
     The variables of their common search are log10 C in the order of the equations.
     """
     settings.check()
     samples = task.samples
-    decomposed = {
-        q: decompose(X, samples.targets[q], settings.scale, settings.fit_intercept)
-        for q, X in samples.features.items()
-    }
+    decomposed = {}
+    for q, X in samples.features.items():
+        decomposed[q] = decompose(
+            X,
+            y=samples.targets[q],
+            scale=settings.scale,
+            fit_intercept=settings.fit_intercept,
+        )
 
     def error(log_c: Floats) -> float:
         accelerations = {}

@@ -13,6 +13,7 @@ All quantities of the simulation are in units of the ship's length and service s
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +30,7 @@ DIFFERENCE = 1e-4  # of finite differences
 
 
 class CurrentEstimate(NamedTuple):
-    """The currents of some trials, north and east after each other, and how certain they are."""
+    """Currents of some trials, each north and east, and their covariance."""
 
     mean: Floats  # m/s, shape (2 n_trials,); the same pair repeated where shared
     covariance: Floats  # (m/s)^2, shape (2 n_trials, 2 n_trials)
@@ -128,7 +129,7 @@ def estimate_current(
     shared: bool,
     known: Floats | None = None,
 ) -> CurrentEstimate:
-    """The current of each trial, or of all, from psi, r, delta and velocities over ground.
+    """Estimate the current of each trial, or of all, from velocities over ground.
 
     n, accelerations by wind and a speed u through the water are used where they are
     there.
@@ -144,31 +145,48 @@ def estimate_current(
     known : array of shape (18,), optional
         Coefficients of another estimate, which are then not fitted.
     """
-    records = [_record(trial, length / speed, speed) for trial in trials]
-    problem = _Problem(_together(records, trials), shared, known)
+    travel_time = length / speed
+    records = [_record(trial, travel_time, speed) for trial in trials]
+    runs = _together(records, _starting_shaft_speed(trials))
+    problem = _Problem(runs, shared, known)
     fit = problem.fitted()
-    x, slopes, residuals = fit.x, fit.slopes, fit.residuals
-    every_slope = slopes.reshape(-1, len(x))
-    information = every_slope.T @ every_slope + np.diag(problem.weights**2)
-
-    changes = []  # of the estimate, where a part of the record is left out
+    information = problem.information(fit.slopes)
     n_parts = 1 if shared and len(trials) > 2 else 3
-    for k in range(len(trials)):
-        measured = np.flatnonzero(np.isfinite(problem.runs.seen[:, 0, k]))
-        for rows in np.array_split(measured, n_parts):
-            own = slopes[rows, :, k].reshape(-1, len(x))
-            score = own.T @ residuals[rows, :, k].ravel()
-            changes.append(np.linalg.solve(information - own.T @ own, score))
+    jackknife = _jackknife(fit, runs, information, n_parts)
+    covariance = jackknife + np.linalg.inv(information)
 
-    inflation = (len(changes) - 1) ** 2 / len(changes)
-    jackknife = np.cov(np.transpose(changes)) * inflation
     columns = problem.current_columns.ravel()
-    covariance = (jackknife + np.linalg.inv(information))[np.ix_(columns, columns)]
     return CurrentEstimate(
-        mean=speed * x[columns],
-        covariance=speed**2 * covariance,
-        coefficients=x[:N_COEFFICIENTS],
+        mean=speed * fit.x[columns],
+        covariance=speed**2 * covariance[np.ix_(columns, columns)],
+        coefficients=fit.x[:N_COEFFICIENTS],
     )
+
+
+def _jackknife(
+    fit: "_Fit",
+    runs: "_Runs",
+    information: Floats,
+    n_parts: int,
+) -> Floats:
+    """Covariance by estimates with each part of each trial left out.
+
+    Each is one step of Gauss & Newton away from the estimate by all.
+    """
+    changes = []
+    for k in range(runs.n_trials):
+        is_measured = np.isfinite(runs.seen[:, 0, k])
+        windows = np.flatnonzero(is_measured)
+        for part in np.array_split(windows, n_parts):
+            slopes = fit.slopes[part, :, k].reshape(-1, len(fit.x))
+            residuals = fit.residuals[part, :, k].ravel()
+            score = slopes.T @ residuals
+            information_left = information - slopes.T @ slopes
+            changes.append(np.linalg.solve(information_left, score))
+
+    n_changes = len(changes)
+    inflation = (n_changes - 1) ** 2 / n_changes
+    return np.asarray(np.cov(np.transpose(changes)) * inflation)
 
 
 class _Record(NamedTuple):
@@ -190,11 +208,17 @@ def _record(trial: Trial, travel_time: float, speed: float) -> _Record:
     logged = np.full(len(trial), np.nan)
     if "v" in trial.derived and "u" not in trial.derived:
         logged = trial["u"]
+
+    inputs = Inputs(
+        r=trial["r"] * travel_time,
+        delta=trial["delta"],
+        n=shaft,
+        ahead=wind[:, 0],
+        aside=wind[:, 1],
+    )
     return _Record(
         t=(trial.t - trial.t[0]) / travel_time,
-        inputs=Inputs(
-            trial["r"] * travel_time, trial["delta"], shaft, wind[:, 0], wind[:, 1]
-        ),
+        inputs=inputs,
         psi=trial["psi"],
         seen=(north / speed, east / speed, logged / speed),
     )
@@ -202,7 +226,7 @@ def _record(trial: Trial, travel_time: float, speed: float) -> _Record:
 
 @dataclass(frozen=True, eq=False)
 class _Runs:
-    """Trials on one grid of time; trials shorter than the longest stay at their last sample."""
+    """Trials on one grid of time; a shorter one stays at its last sample."""
 
     inputs: Floats  # as of `Inputs`, shape (n_times, 5, n_trials)
     psi: Floats  # shape (n_times, n_trials)
@@ -213,31 +237,40 @@ class _Runs:
         return len(self.psi[0])
 
 
-def _together(records: Sequence[_Record], trials: Sequence[Trial]) -> _Runs:
+def _together(records: Sequence[_Record], shaft_speed: float | None) -> _Runs:
+    """The records on one grid, shaft speeds by that at the start."""
     longest = max(record.t[-1] for record in records)
-    n_windows = int(longest / (STEP * STEPS))
-    grid = np.arange(n_windows * STEPS + 1) * STEP
-    shaft_speed = _starting_shaft_speed(trials)
+    window = STEP * STEPS
+    n_windows = int(longest / window)
+    grid: Floats = np.arange(n_windows * STEPS + 1, dtype=np.float64) * STEP
 
-    inputs = np.empty((len(grid), len(Inputs._fields), len(records)))
-    psi = np.empty((len(grid), len(records)))
-    seen = np.full((len(grid), 3, len(records)), np.nan)
-    for k, record in enumerate(records):
-        shaft = np.ones(len(record.t))
+    inputs, headings, seen = [], [], []
+    for record in records:
+        t = record.t
+        shaft = np.ones(len(t))
         if shaft_speed is not None:
             shaft = record.inputs.n / shaft_speed
-        for i, row in enumerate(record.inputs._replace(n=shaft)):
-            inputs[:, i, k] = np.interp(grid, record.t, row)
-        psi[:, k] = np.interp(grid, record.t, record.psi)
-        is_recorded = grid <= record.t[-1]
-        for i, row in enumerate(record.seen):
-            on_grid = np.interp(grid, record.t, row)
-            seen[:, i, k] = np.where(is_recorded, on_grid, np.nan)
-    return _Runs(inputs, psi, _averaged(seen))
+        moving = record.inputs._replace(n=shaft)
+        inputs.append(_on_grid(grid, t, moving))
+        headings.append(np.interp(grid, t, record.psi))
+
+        motion = _on_grid(grid, t, record.seen)
+        motion[grid > t[-1]] = np.nan
+        seen.append(motion)
+    return _Runs(
+        inputs=np.stack(inputs, axis=-1),
+        psi=np.stack(headings, axis=-1),
+        seen=_averaged(np.stack(seen, axis=-1)),
+    )
+
+
+def _on_grid(grid: Floats, t: Floats, rows: Sequence[Floats]) -> Floats:
+    """Rows of samples at the times of the grid, shape (n_times, n_rows)."""
+    return np.column_stack([np.interp(grid, t, row) for row in rows])
 
 
 def _starting_shaft_speed(trials: Sequence[Trial]) -> float | None:
-    """Median of the shaft speeds at which trials start, 1/s; None where not all turn ahead."""
+    """Median shaft speed at the start, 1/s; None where not all trials turn ahead."""
     starts = []
     for trial in trials:
         if "n" not in trial or not trial["n"][0] > 0.0:
@@ -253,7 +286,10 @@ def _averaged(values: Floats) -> Floats:
 
 
 class _Fit(NamedTuple):
-    """The most probable unknowns, and slopes and residuals there by their standard deviation."""
+    """The most probable unknowns, and slopes and residuals there.
+
+    Both are divided by the standard deviation of the residuals.
+    """
 
     x: Floats
     slopes: Floats  # shape (n_windows, 3, n_trials, n_unknowns)
@@ -277,13 +313,10 @@ class _Problem:
             self.current_columns = np.tile(self.current_columns[0], (len(pairs), 1))
             n_currents = 1
 
-        deviations = np.concatenate(
-            [
-                np.ones(N_COEFFICIENTS),
-                np.tile([0.3, 0.15], runs.n_trials),  # of u and v at the start
-                np.full(2 * n_currents, 0.5),
-            ]
-        )
+        of_coefficients = np.ones(N_COEFFICIENTS)
+        of_starts = np.tile([0.3, 0.15], runs.n_trials)  # u and v
+        of_currents = np.full(2 * n_currents, 0.5)
+        deviations = np.concatenate([of_coefficients, of_starts, of_currents])
         self.centre = np.zeros(len(deviations))
         if known is not None:
             deviations[:N_COEFFICIENTS] = 1e-4
@@ -291,101 +324,152 @@ class _Problem:
         self.weights = 1.0 / deviations
 
     def simulated(self, x: Floats) -> Floats:
-        """Velocities without current, means over windows, shape (n_windows, 3, n_lanes, n_trials).
+        """Mean velocities over windows, without current: north, east and ahead.
 
-        These are north, east and ahead. The first lane has the unknowns as given, then
-        follow lanes in which each of the coefficients, and u and v at the start, are
-        moved by `DIFFERENCE`.
+        Shape (n_windows, 3, n_lanes, n_trials). The first lane has the unknowns as
+        given, then follow lanes in which each of the coefficients, and u and v at the
+        start, are moved by `DIFFERENCE`.
         """
-        runs = self.runs
-        n_lanes = 1 + N_COEFFICIENTS + 2
-        values = np.tile(MEAN + x[:N_COEFFICIENTS] * DEVIATION, (n_lanes, 1))
-        moved = np.arange(N_COEFFICIENTS)
-        values[1 + moved, moved] += DIFFERENCE * DEVIATION
-        c = Coefficients(*values.T[:, :, None])
+        c = _coefficients_by_lane(x[:N_COEFFICIENTS])
+        u, v = self._starts_by_lane(x, n_lanes=len(c.X_0))
+        motion = [(u, v)]
+        for now, then in pairwise(self.runs.inputs):
+            u, v = _midpoint_step(u, v, now, then, c)
+            motion.append((u, v))
 
-        start = x[self.start_columns]
-        u = np.tile(start[:, 0] + runs.inputs[0, 2], (n_lanes, 1))
-        v = np.tile(start[:, 1], (n_lanes, 1))
-        u[-2] += DIFFERENCE
-        v[-1] += DIFFERENCE
-
-        motion = np.empty((len(runs.psi), 2, n_lanes, runs.n_trials))
-        motion[0] = u, v
-        for k in range(len(runs.psi) - 1):
-            u, v = _midpoint_step(u, v, runs.inputs[k], runs.inputs[k + 1], c)
-            motion[k + 1] = u, v
-
-        ahead, aside = motion[:, 0], motion[:, 1]
-        north, east = rotate_to_body(ahead, aside, -runs.psi[:, None])
+        ahead, aside = np.array(motion).swapaxes(0, 1)
+        heading = self.runs.psi[:, None]
+        north, east = rotate_to_body(ahead, aside, -heading)
         return _averaged(np.stack([north, east, ahead], axis=1))
 
+    def _starts_by_lane(self, x: Floats, n_lanes: int) -> tuple[Floats, Floats]:
+        """Starting u and v, shape (n_lanes, n_trials), each moved in its own lane."""
+        at_start = Inputs(*self.runs.inputs[0])
+        u, v = x[self.start_columns].T
+        u = np.tile(u + at_start.n, (n_lanes, 1))
+        v = np.tile(v, (n_lanes, 1))
+        u[-2] += DIFFERENCE
+        v[-1] += DIFFERENCE
+        return u, v
+
     def errors(self, x: Floats) -> tuple[Floats, Floats]:
-        """What is measured less what is simulated, and the slopes of the latter by the unknowns.
+        """Measured less simulated velocities, and slopes of the latter by the unknowns.
 
         Shapes (n_windows, 3, n_trials) and (n_windows, 3, n_trials, n_unknowns): north,
         east, and ahead through the water; 0 where nothing was measured.
         """
-        simulated = self.simulated(x)
-        predicted = simulated[:, :, 0]
-        changes = (simulated[:, :, 1:] - simulated[:, :, :1]) / DIFFERENCE
-        by_lane = np.moveaxis(changes, 2, 3)
-        predicted[:, :2] += x[self.current_columns].T
+        lanes = np.moveaxis(self.simulated(x), 2, -1)
+        as_given = lanes[..., 0]
+        moved = lanes[..., 1:]
+        by_unknown = (moved - as_given[..., None]) / DIFFERENCE
+        by_start = by_unknown[..., N_COEFFICIENTS:]
 
+        predicted = as_given.copy()
+        predicted[:, :2] += x[self.current_columns].T
         slopes = np.zeros((*predicted.shape, len(x)))
-        slopes[..., :N_COEFFICIENTS] = by_lane[..., :N_COEFFICIENTS]
+        slopes[..., :N_COEFFICIENTS] = by_unknown[..., :N_COEFFICIENTS]
         for k in range(self.runs.n_trials):
+            own_start = self.start_columns[k]
+            slopes[:, :, k, own_start] = by_start[:, :, k]
             north, east = self.current_columns[k]
-            slopes[:, :, k, self.start_columns[k]] = by_lane[:, :, k, N_COEFFICIENTS:]
             slopes[:, 0, k, north] = 1.0
             slopes[:, 1, k, east] = 1.0
 
-        missing = ~np.isfinite(self.runs.seen)
-        slopes[missing] = 0.0
-        return np.where(missing, 0.0, self.runs.seen - predicted), slopes
+        measured = self.runs.seen
+        is_missing = np.isnan(measured)
+        slopes[is_missing] = 0.0
+        errors = np.where(is_missing, 0.0, measured - predicted)
+        return errors, slopes
 
     def fitted(self, most_rounds: int = 20, enough: float = 1e-3) -> _Fit:
-        """Fit by Levenberg & Marquardt, the scale of the residuals renewed from round to round."""
-        x = self.centre
-        damping, scale = 1e-2, 0.1
-        errors, slopes = self.errors(x)
+        """Fit by Levenberg & Marquardt; each round renews the residuals' scale."""
+        rounding = 0.003  # of the sensors
         n_measured = int(np.isfinite(self.runs.seen).sum())
-        freedom = max(n_measured - len(x), 1)
-        for _ in range(most_rounds):
-            before = self._cost(errors / scale, x)
-            J = slopes.reshape(-1, len(x)) / scale
-            e = errors.ravel() / scale
-            hessian = J.T @ J + np.diag(self.weights**2)
-            downhill = J.T @ e - self.weights**2 * (x - self.centre)
-            damped = hessian + damping * np.diag(np.diag(hessian))
-            moved = x + np.linalg.solve(damped, downhill)
+        freedom = max(n_measured - len(self.centre), 1)
 
+        x = self.centre
+        damping = 1e-2
+        scale = 0.1
+        errors, slopes = self.errors(x)
+        for _ in range(most_rounds):
+            before = self._cost(x, errors / scale)
+            moved = x + self._step(
+                x,
+                residuals=errors / scale,
+                slopes=slopes / scale,
+                damping=damping,
+            )
             new_errors, new_slopes = self.errors(moved)
-            after = self._cost(new_errors / scale, moved)
+            after = self._cost(moved, new_errors / scale)
             if after < before:
+                x = moved
+                errors = new_errors
+                slopes = new_slopes
                 damping = max(0.1 * damping, 1e-9)
-                x, errors, slopes = moved, new_errors, new_slopes
-                # residuals below that are rounding of the sensors
-                scale = max(float(np.sqrt(np.sum(errors**2) / freedom)), 0.003)
+                deviation = np.sqrt(np.sum(errors**2) / freedom)
+                scale = max(float(deviation), rounding)
             else:
                 damping *= 10.0
             if abs(before - after) < enough * before:
                 break
-        return _Fit(x, slopes / scale, errors / scale)
+        return _Fit(
+            x=x,
+            slopes=slopes / scale,
+            residuals=errors / scale,
+        )
 
-    def _cost(self, residuals: Floats, x: Floats) -> float:
+    def _step(
+        self,
+        x: Floats,
+        residuals: Floats,
+        slopes: Floats,
+        damping: float,
+    ) -> Floats:
+        """Damped step of Gauss & Newton from x."""
+        J = slopes.reshape(-1, len(x))
+        from_prior = self.weights**2 * (x - self.centre)
+        downhill = J.T @ residuals.ravel() - from_prior
+        hessian = self.information(slopes)
+        damped = hessian + damping * np.diag(np.diag(hessian))
+        return np.asarray(np.linalg.solve(damped, downhill))
+
+    def information(self, slopes: Floats) -> Floats:
+        """Inverse covariance of the unknowns by the slopes and the prior."""
+        J = slopes.reshape(-1, len(self.weights))
+        return J.T @ J + np.diag(self.weights**2)
+
+    def _cost(self, x: Floats, residuals: Floats) -> float:
         from_prior = self.weights * (x - self.centre)
         return float(np.sum(residuals**2) + np.sum(from_prior**2))
 
 
+def _coefficients_by_lane(deviations: Floats) -> Coefficients:
+    """Coefficients of the lanes of `_Problem.simulated`, each of shape (n_lanes, 1).
+
+    From deviations of the prior, shape (18,).
+    """
+    n_lanes = 1 + N_COEFFICIENTS + 2  # those given; each one moved; two starts moved
+    mean = MEAN + deviations * DEVIATION
+    values = np.tile(mean, (n_lanes, 1))
+    moved = np.arange(N_COEFFICIENTS)
+    values[1 + moved, moved] += DIFFERENCE * DEVIATION
+    columns = values.T[:, :, None]
+    return Coefficients(*columns)
+
+
 def _midpoint_step(
-    u: Floats, v: Floats, now: Floats, then: Floats, c: Coefficients
+    u: Floats,
+    v: Floats,
+    now: Floats,
+    then: Floats,
+    c: Coefficients,
 ) -> tuple[Floats, Floats]:
     """One step of the midpoint rule, kept within what a ship does."""
     surge, sway = accelerations(u, v, Inputs(*now), c)
     u_half = u + 0.5 * STEP * surge
     v_half = v + 0.5 * STEP * sway
-    surge, sway = accelerations(u_half, v_half, Inputs(*(0.5 * (now + then))), c)
+    halfway = 0.5 * (now + then)
+    surge, sway = accelerations(u_half, v_half, Inputs(*halfway), c)
     u = np.clip(u + STEP * surge, -2.0, 3.0)
     v = np.clip(v + STEP * sway, -2.0, 2.0)
     return u, v

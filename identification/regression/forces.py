@@ -7,13 +7,12 @@ one column; the rows of X, Y and N are stacked. Source: Xu, Hassani & Guedes Soa
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from sklearn.metrics import r2_score
 
-from identification.arrays import root_mean_square
+from identification.arrays import by_name, root_mean_square, stretches
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.estimators.threads import single_threaded
@@ -63,11 +62,11 @@ class ForceRegression:
 
     def scales(self) -> Floats:
         """Root mean square of each row's force over all tests, shape (n_rows,)."""
-        sizes = [
-            root_mean_square(self.targets[self.equation == i])
-            for i in range(len(FORCES))
-        ]
-        return np.array([size or 1.0 for size in sizes])[self.equation]
+        sizes = []
+        for i in range(len(FORCES)):
+            own = self.targets[self.equation == i]
+            sizes.append(root_mean_square(own) or 1.0)
+        return np.array(sizes)[self.equation]
 
     def r_squared(self, coefficients: Floats) -> dict[str, float]:
         """Share of the variance of X, Y and N that is explained (equation 22)."""
@@ -112,13 +111,7 @@ def force_regression(
     ship = particulars.completed()
     features, targets, index = [], [], []
     for i, trial in enumerate(trials):
-        missing = [name for name in NEEDED if name not in trial]
-        if missing:
-            raise InputError(
-                f"trial {trial.name!r}: expected the channels {', '.join(NEEDED)} for"
-                f" structure {structure.name!r}, got no {missing[0]!r}; give captive"
-                " tests"
-            )
+        _check_channels(trial, structure)
         for rows in between_jumps(trial):
             piece = trial.part(rows)
             motion = _prime_motion(piece, ship)
@@ -142,21 +135,31 @@ def force_regression(
     )
 
 
+def _check_channels(trial: Trial, structure: SharedStructure) -> None:
+    for name in NEEDED:
+        if name not in trial:
+            raise InputError(
+                f"trial {trial.name!r}: expected the channels {', '.join(NEEDED)} for"
+                f" structure {structure.name!r}, got no {name!r}; give captive tests"
+            )
+
+
 def between_jumps(trial: Trial) -> list[slice]:
     """Stretches of a captive test in which the velocities change smoothly.
 
     A jump is a change from sample to sample of more than 20 usual ones, the median of
     the test; stretches of fewer than 4 samples are left out.
     """
-    jumps = np.zeros(len(trial) - 1, dtype=bool)
-    for name in "uvr":
-        change = np.abs(np.diff(trial[name]))
-        rounding = 1e-9 * float(np.abs(trial[name]).max())
-        largest = max(JUMP * float(np.median(change)), rounding)
-        jumps |= change > largest + rounding
-    starts = np.flatnonzero(jumps) + 1
-    edges = [0, *starts.tolist(), len(trial)]
-    return [slice(i, j) for i, j in pairwise(edges) if j - i >= FEWEST]
+    is_jump = np.zeros(len(trial) - 1, dtype=bool)
+    for name in AXES:
+        velocity = trial[name]
+        changes = np.abs(np.diff(velocity))
+        usual = float(np.median(changes))
+        rounding = 1e-9 * float(np.abs(velocity).max())
+        largest = max(JUMP * usual, rounding)
+        is_jump |= changes > largest + rounding
+
+    return stretches(is_jump, FEWEST)
 
 
 def _prime_motion(trial: Trial, ship: Particulars) -> dict[str, Floats]:
@@ -171,25 +174,36 @@ def _prime_motion(trial: Trial, ship: Particulars) -> dict[str, Floats]:
     motion = {}
     scales = {"u": 1.0, "v": 1.0, "r": length}
     for name, scale in scales.items():
-        rate = CubicSpline(trial.t, trial[name])(trial.t, 1)
-        motion[name] = trial[name] * scale / speed
+        velocity = trial[name]
+        spline = CubicSpline(trial.t, velocity)
+        rate = spline(trial.t, 1)
+        motion[name] = velocity * scale / speed
         motion[f"|{name}|"] = np.abs(motion[name])
         motion[f"{name}dot"] = rate * length / speed**2 * scale
     return motion
 
 
 def _prime_forces(
-    trial: Trial, motion: dict[str, Floats], ship: Particulars, model_inertia: bool
+    trial: Trial,
+    motion: dict[str, Floats],
+    ship: Particulars,
+    model_inertia: bool,
 ) -> Floats:
     """Hydrodynamic X, Y and N, prime system, shape (3, n_samples)."""
     length = ship.length
     speed = np.hypot(trial["u"], trial["v"])
-    unit = 0.5 * ship.require("water_density") * length**2 * speed**2
+    density = ship.require("water_density")
+    unit = 0.5 * density * length**2 * speed**2
     forces = np.array(
-        [trial["X"] / unit, trial["Y"] / unit, trial["N"] / unit / length]
+        [
+            trial["X"] / unit,
+            trial["Y"] / unit,
+            trial["N"] / unit / length,
+        ]
     )
     if not model_inertia:
         return forces
+
     mass = ship.mass_prime
     velocities = [motion[name] for name in AXES]
     accelerations = [motion[name] for name in ACCELERATIONS]
@@ -200,11 +214,13 @@ def _prime_forces(
 def _shares(motion: dict[str, Floats], structure: SharedStructure) -> Floats:
     """Share of each coefficient in X, Y and N, shape (3, n_samples, n_coefficients)."""
     names = structure.coefficient_names
-    found = np.zeros((len(AXES), len(motion["u"]), len(names)))
+    n_samples = len(motion["u"])
+    found = np.zeros((len(AXES), n_samples, len(names)))
     for i, axis in enumerate(AXES):
         for share in structure.shares[axis]:
-            powers = share.term.powers
-            factors = [motion[symbol] ** float(power) for symbol, power in powers]
+            factors = []
+            for symbol, power in share.term.powers:
+                factors.append(motion[symbol] ** float(power))
             column = names.index(share.coefficient)
             found[i, :, column] += share.sign * np.prod(factors, axis=0)
     return found
@@ -215,19 +231,20 @@ def fit_forces(
 ) -> tuple[Floats, Floats]:
     """Coefficients and their covariance.
 
-    X, Y and N count alike, each by its root mean square. `estimator` has no intercept. The covariance is for white errors of the size of each
-    force's residuals.
+    X, Y and N count alike, each by its root mean square. `estimator` has no intercept.
+    The covariance is for white errors of the size of each force's residuals.
     """
     scales = regression.scales()
     features = regression.features / scales[:, None]
     targets = regression.targets / scales
     estimator.fit(features, targets)
 
-    half = features @ estimator.inverse_moment_
     residuals = targets - estimator.predict(features)
+    half = features @ estimator.inverse_moment_
     leverages = np.sum(half * features, axis=1)
-    variances = force_variances(regression.equation, residuals, leverages)
-    covariance = (half.T * variances[regression.equation]) @ half
+    by_force = force_variances(regression.equation, residuals, leverages)
+    variances = by_force[regression.equation]
+    covariance = (half.T * variances) @ half
     return estimator.coef_, 0.5 * (covariance + covariance.T)
 
 
@@ -241,8 +258,10 @@ def force_variances(equation: Integers, residuals: Floats, leverages: Floats) ->
     variances = []
     for i in range(len(FORCES)):
         own = equation == i
-        freedom = max(float(np.sum(1.0 - leverages[own])), 1.0)
-        variances.append(np.sum(residuals[own] ** 2, axis=0) / freedom)
+        own_residuals = residuals[own]
+        squares = np.sum(own_residuals**2, axis=0)
+        freedom = float(np.sum(1.0 - leverages[own]))
+        variances.append(squares / max(freedom, 1.0))
     return np.array(variances)
 
 
@@ -290,12 +309,16 @@ def identify_forces(
             " None"
         )
     table = _captive_structure(structure)
-    regression = force_regression(trials, table, particulars, model_inertia)
+    regression = force_regression(
+        trials,
+        structure=table,
+        particulars=particulars,
+        model_inertia=model_inertia,
+    )
     estimator = TruncatedLSSVM(
         selection=METHODS[method], rank=rank, fit_intercept=False
     )
     values, covariance = fit_forces(regression, estimator)
-    coefficients = dict(zip(regression.names, values.tolist(), strict=True))
     provenance = {
         "structure": structure,
         "method": method,
@@ -310,7 +333,7 @@ def identify_forces(
         steering=steering or SteeringGear(),
         covariance=covariance,
         provenance=provenance,
-        coefficients=coefficients,
+        coefficients=by_name(regression.names, values),
     )
 
 

@@ -1,11 +1,11 @@
 """Gaps in the time of a record, across which nothing is smoothed or integrated."""
 
-from itertools import pairwise
-
 import numpy as np
 from scipy.ndimage import median_filter
 
+from identification.arrays import stretches
 from shipgym import InputError, Particulars, Trial
+from shipgym.arrays import Flags, Floats
 
 LARGEST_STEPS = 5.0  # of the usual time step; a longer one is a gap,
 #: unless it is shorter than this part of the time to sail one ship length
@@ -15,7 +15,9 @@ FEWEST_SAMPLES = 10  # between gaps; fewer are left out
 
 
 def between_gaps(
-    trial: Trial, particulars: Particulars, fewest: int = FEWEST_SAMPLES
+    trial: Trial,
+    particulars: Particulars,
+    fewest: int = FEWEST_SAMPLES,
 ) -> list[Trial]:
     """Cut a trial where samples are missing; the trial itself if it has no gap.
 
@@ -23,25 +25,31 @@ def between_gaps(
     around, and more than 0.15 of the time to sail one ship length. Pieces shorter than
     `fewest`, or 10, samples are left out; InputError where no piece is left.
     """
-    steps = np.diff(trial.t)
-    around = median_filter(steps, NEIGHBOURS, mode="mirror")
-    usual = np.maximum(np.median(steps), around)
-    shortest = SHORTEST_GAP * particulars["length"] / particulars["speed"]
-    longest = np.maximum(LARGEST_STEPS * usual, shortest)
-    is_gap = steps > (1.0 + 1e-6) * longest
+    is_gap = _gaps(trial.t, particulars)
     if not is_gap.any():
         return [trial]
 
     fewest = max(fewest, FEWEST_SAMPLES)
-    starts = np.flatnonzero(is_gap) + 1
-    edges = [0, *starts.tolist(), len(trial)]
-    pieces = [slice(i, j) for i, j in pairwise(edges) if j - i >= fewest]
+    pieces = stretches(is_gap, fewest)
     if not pieces:
-        k = int(np.argmax(steps))
+        longest = int(np.argmax(np.diff(trial.t)))
+        begin, end = trial.t[longest : longest + 2]
         raise InputError(
             f"trial {trial.name!r}: expected {fewest} samples somewhere without a gap"
             f" in time, got {is_gap.sum()} gaps with fewer between them (the longest"
-            f" from {trial.t[k]:g} to {trial.t[k + 1]:g} s); export it with every"
+            f" from {begin:g} to {end:g} s); export it with every"
             ' sample, or leave it out (use = "skip")'
         )
     return [trial.part(piece) for piece in pieces]
+
+
+def _gaps(t: Floats, particulars: Particulars) -> Flags:
+    """Whether each step between samples is a gap, shape (n_samples - 1,)."""
+    steps = np.diff(t)
+    around = median_filter(steps, NEIGHBOURS, mode="mirror")
+    usual = np.maximum(np.median(steps), around)
+
+    one_length = particulars["length"] / particulars["speed"]
+    longest = np.maximum(LARGEST_STEPS * usual, SHORTEST_GAP * one_length)
+    is_gap: Flags = steps > (1.0 + 1e-6) * longest
+    return is_gap

@@ -23,42 +23,58 @@ class GearResponse(NamedTuple):
     lag: float  # time constant, s; 0 for a gear of constant rate
 
     def angle(self, start: Any, order: Any, elapsed: Any) -> Floats:
-        """Rudder a time after `start` under one order, rad (infinite: still ramping)."""
-        distance = np.abs(order - start)
-        side = np.sign(order - start)
-        by_lag = np.minimum(distance, self.rate * self.lag)
-        ramping = np.minimum(elapsed, (distance - by_lag) / self.rate)
+        """Rudder some time after `start` under one order, rad.
 
+        Under an infinite order it ramps on.
+        """
+        move = order - start
+        distance = np.abs(move)
+        by_lag = np.minimum(distance, self.rate * self.lag)
+        by_ramp = distance - by_lag
+        ramping = np.minimum(elapsed, by_ramp / self.rate)
+
+        # the last of the way decays
+        creeping = elapsed - ramping
         decayed = 1.0
         if self.lag > 0.0:
-            decayed = 1.0 - np.exp(-(elapsed - ramping) / self.lag)
-        crept = np.where(ramping < elapsed, by_lag * decayed, 0.0)
-        return np.asarray(start + side * (self.rate * ramping + crept))
+            decayed = 1.0 - np.exp(-creeping / self.lag)
+        crept = np.where(creeping > 0.0, by_lag * decayed, 0.0)
+
+        travelled = self.rate * ramping + crept
+        return np.asarray(start + np.sign(move) * travelled)
 
     def orders(self, t: Floats, delta: Floats) -> Floats:
         """The single order that explains each interval between samples, rad.
 
         Infinite where the rudder ramps all the way. Shape (n_samples - 1,).
         """
-        steps, moves = np.diff(t), np.diff(delta)
+        steps = np.diff(t)
+        moves = np.diff(delta)
         sizes = np.abs(moves)
-        ramps_throughout = sizes >= (1.0 - RAMP) * self.rate * steps
         distances = self._distances(steps, sizes)
-        finite = delta[:-1] + np.sign(moves) * distances
-        return np.where(ramps_throughout, np.copysign(np.inf, moves), finite)
+        orders = delta[:-1] + np.sign(moves) * distances
+
+        # a ramp does not tell how far it goes on
+        ramps_throughout = sizes >= (1.0 - RAMP) * self.rate * steps
+        orders[ramps_throughout] = np.copysign(np.inf, moves[ramps_throughout])
+        return orders
 
     def _distances(self, steps: Floats, sizes: Floats) -> Floats:
-        """Distance to the order at the start of intervals, from their lengths and moves."""
+        """Distance to the order at the start of intervals, from durations and moves."""
         if self.lag == 0.0:
             return sizes
-        distances = sizes / -np.expm1(-steps / self.lag)
+        decayed = -np.expm1(-steps / self.lag)
+        distances = sizes / decayed
         far = distances > self.rate * self.lag
-        if np.any(far):
-            # the ramp lasts x s, of x - lag exp((x - step) / lag) = size / rate - lag
-            short = sizes[far] / self.rate - self.lag
-            exponent = np.minimum((short - steps[far]) / self.lag, -1.0)
-            ramping = short - self.lag * lambertw(-np.exp(exponent), 0).real
-            distances[far] = self.rate * (ramping + self.lag)
+        if not np.any(far):
+            return distances
+
+        # the ramp lasts x s, of x - lag exp((x - step) / lag) = size / rate - lag
+        short = sizes[far] / self.rate - self.lag
+        exponent = np.minimum((short - steps[far]) / self.lag, -1.0)
+        root = lambertw(-np.exp(exponent), 0).real
+        ramping = short - self.lag * root
+        distances[far] = self.rate * (ramping + self.lag)
         return distances
 
     def explained_share(self, t: Floats, delta: Floats) -> float:
@@ -73,16 +89,21 @@ def goes_on(orders: Floats, delta: Floats) -> Flags:
 
     Shape (n_samples - 2,), of orders of shape (n_samples - 1,).
     """
-    before, now = orders[:-1], orders[1:]
-    angle = delta[1:-1]  # where the intervals meet
-    was_ramping, is_ramping = np.isinf(before), np.isinf(now)
+    before = orders[:-1]
+    now = orders[1:]
+    was_ramping = np.isinf(before)
+    is_ramping = np.isinf(now)
+    same_ramp = is_ramping & (now == before)
+
+    # a ramp arrives at an order that lies ahead of where the intervals meet
+    to_go = now - delta[1:-1]
+    is_ahead = np.sign(to_go) * np.sign(before) >= 0.0
+    arrives = was_ramping & ~is_ramping & is_ahead
+
     with np.errstate(invalid="ignore"):  # between two ramps
         is_near = np.abs(now - before) <= TOLERANCE * np.ptp(delta)
-
-    same_ramp = is_ramping & (now == before)
-    ahead = np.sign(now - angle) * np.sign(before) >= 0.0
-    arrives = was_ramping & ~is_ramping & ahead
     same_order = ~was_ramping & ~is_ramping & is_near
+
     continues: Flags = same_ramp | arrives | same_order
     return continues
 
@@ -98,26 +119,31 @@ def estimate_gear(t: Floats, delta: Floats) -> GearResponse:
     fastest = float(rates.max())
     if fastest == 0.0:
         return GearResponse(0.0, 0.0)
-    rate = float(np.median(rates[rates >= (1.0 - RAMP) * fastest]))
 
+    is_ramp = rates >= (1.0 - RAMP) * fastest
+    rate = float(np.median(rates[is_ramp]))
     largest_jump = 10.0 * TOLERANCE * np.ptp(delta)
 
     def unsteadiness(lag: float) -> float:
-        orders = GearResponse(rate, lag).orders(t, delta)
+        gear = GearResponse(rate, lag)
+        orders = gear.orders(t, delta)
         with np.errstate(invalid="ignore"):  # between two ramps
             jumps = np.abs(np.diff(orders))
-        jumps = np.where(np.isfinite(jumps), jumps, 0.0)
+        jumps[~np.isfinite(jumps)] = 0.0
         return float(np.minimum(jumps, largest_jump).sum())
 
     usual_step = float(np.median(steps))
     lags = np.geomspace(0.1, 20.0, 48) * usual_step
-    best = int(np.argmin([unsteadiness(lag) for lag in lags]))
-    low, high = lags[max(best - 1, 0)], lags[min(best + 1, len(lags) - 1)]
+    costs = [unsteadiness(lag) for lag in lags]
+    best = int(np.argmin(costs))
+    low = lags[max(best - 1, 0)]
+    high = lags[min(best + 1, len(lags) - 1)]
     refined = minimize_scalar(
         unsteadiness,
         bounds=(low, high),
         method="bounded",
         options={"xatol": 1e-10 * high},
     )
-    needs_no_lag = unsteadiness(0.0) <= 1.01 * refined.fun
-    return GearResponse(rate, 0.0 if needs_no_lag else float(refined.x))
+    if unsteadiness(0.0) <= 1.01 * refined.fun:
+        return GearResponse(rate, 0.0)
+    return GearResponse(rate, float(refined.x))

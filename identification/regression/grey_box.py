@@ -1,4 +1,7 @@
-"""Grey boxes: their reference ship, how well she alone predicts, and the regression of a model on itself."""
+"""Grey boxes: their reference ship, and how well she alone predicts.
+
+And the regression of a model on its own accelerations.
+"""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -22,7 +25,7 @@ from shipgym.ships import GreyBox, grey_box
 
 
 class _OwnAccelerations:
-    """A table of one term an equation: the acceleration of a grey box's reference ship."""
+    """A table whose one term an equation is the reference ship's acceleration."""
 
     def __init__(self, box: GreyBox) -> None:
         self._box = box
@@ -31,7 +34,11 @@ class _OwnAccelerations:
         return getattr(self._box, name)
 
     def features(
-        self, equation: str, channels: Any, particulars: Particulars, shaft_speed: float
+        self,
+        equation: str,
+        channels: Any,
+        particulars: Particulars,
+        shaft_speed: float,
     ) -> Floats:
         """Shape (n_samples, 1)."""
         accelerations = self._box.converted_accelerations(
@@ -41,9 +48,13 @@ class _OwnAccelerations:
 
 
 def chosen_box(
-    reference: str | ShipModel | None, particulars: Particulars, trials: Sequence[Trial]
+    reference: str | ShipModel | None,
+    particulars: Particulars,
+    trials: Sequence[Trial],
 ) -> tuple[GreyBox, dict[str, float]]:
-    """The grey box of a reference ship, and the correlations of the candidates where she was not named.
+    """The grey box of a reference ship.
+
+    Also returns the correlations of the candidates where she was not named.
 
     Parameters
     ----------
@@ -76,17 +87,20 @@ def chosen_box(
 
 
 def explained_samples(
-    trials: Sequence[Trial], model: ShipModel, **sampling: Any
+    trials: Sequence[Trial],
+    model: ShipModel,
+    **sampling: Any,
 ) -> tuple[Samples, dict[str, Estimator]]:
-    """The regression on a model's own accelerations, one term an equation, and estimators of coefficient 1.
+    """The regression on a model's own accelerations, and estimators of coefficient 1.
 
-    For models that were not fitted by regression; `sampling` as in `build_samples`.
+    Each equation has one term. For models that were not fitted by regression;
+    `sampling` as in `build_samples`.
     """
     table: Any = _OwnAccelerations(grey_box(model, shaft=True))
     samples = build_samples(
         trials,
-        table,
-        model.particulars,
+        structure=table,
+        particulars=model.particulars,
         shaft_speed=model.service_shaft_speed,
         **sampling,
     )
@@ -97,11 +111,15 @@ def explained_samples(
 
 
 def bare_metrics(model: ShipModel, trials: Sequence[Trial]) -> dict[str, Any]:
-    """Name of the reference ship of a grey box, and how well she alone predicts trials (`trial_metrics`)."""
+    """How well the reference ship of a grey box alone predicts trials.
+
+    Returns her name and the `trial_metrics` by trial.
+    """
     assert isinstance(model.table, GreyBox)
     no_correction = dict.fromkeys(model.coefficients, 0.0)
     bare = replace(model, coefficients=no_correction, covariance=None)
     metrics = {}
     for trial in trials:
-        metrics[trial.name] = trial_metrics(bare, trial, predict(bare, trial))
+        predicted = predict(bare, trial)
+        metrics[trial.name] = trial_metrics(bare, trial, predicted)
     return {"name": model.table.ship.name, "trials": metrics}

@@ -41,16 +41,20 @@ def step_integrals(t: Floats, channels: Channels, terms: Terms, rule: str) -> In
     steps = np.diff(t)[:, None]
     found = Integrals({}, {})
     for equation, values in terms(channels).items():
-        mean = values[:-1]
-        if rule != "euler":
-            mean = 0.5 * (values[:-1] + values[1:])
-        found.terms[equation] = mean * steps
-        found.moments[equation] = 0.5 * found.terms[equation] * steps
+        start = values[:-1]
+        end = values[1:]
+        mean = start if rule == "euler" else 0.5 * (start + end)
+        integral = mean * steps
+        found.terms[equation] = integral
+        found.moments[equation] = 0.5 * integral * steps
     return found
 
 
 def spline_integrals(
-    t: Floats, channels: Channels, terms: Terms, rudder: Rudder
+    t: Floats,
+    channels: Channels,
+    terms: Terms,
+    rudder: Rudder,
 ) -> Integrals:
     """Integrals over each step by Gauss quadrature on splines.
 
@@ -58,14 +62,11 @@ def spline_integrals(
     """
     edges = np.union1d(t, rudder.corners)
     middle = 0.5 * (edges[1:] + edges[:-1])
-    half = 0.5 * np.diff(edges)
-    nodes = middle[:, None] + half[:, None] * NODES
-    at_nodes = {
-        name: _between(t, name, values, rudder)(nodes.ravel())
-        for name, values in channels.items()
-    }
+    half = 0.5 * np.diff(edges)[:, None]
+    nodes = middle[:, None] + half * NODES
+    at_nodes = _interpolated(t, channels, rudder, nodes.ravel())
 
-    weights = half[:, None] * WEIGHTS
+    weights = half * WEIGHTS
     step = np.searchsorted(t, middle, side="right") - 1
     to_end = t[step + 1][:, None] - nodes
     first_of_step = np.flatnonzero(np.diff(step, prepend=-1))
@@ -82,13 +83,23 @@ def spline_integrals(
     return found
 
 
-def _between(
-    t: Floats, name: str, values: Floats, rudder: Rudder
-) -> Callable[[Floats], Floats]:
-    """A channel between its samples; a shaft speed, which may jump, is taken straight."""
-    if name == "n":
-        return lambda times: np.interp(times, t, values)
-    return rudder if name == "delta" else broken_spline(t, values, rudder)
+def _interpolated(
+    t: Floats,
+    channels: Channels,
+    rudder: Rudder,
+    times: Floats,
+) -> dict[str, Floats]:
+    """Channels between their samples; a shaft speed, which may jump, is straight."""
+    found = {}
+    for name, values in channels.items():
+        if name == "delta":
+            found[name] = rudder(times)
+        elif name == "n":
+            found[name] = np.interp(times, t, values)
+        else:
+            spline = broken_spline(t, values, rudder)
+            found[name] = spline(times)
+    return found
 
 
 def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
@@ -105,37 +116,49 @@ def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
     corners: list[float] = []
     for corner, smoothness in zip(rudder.corners, rudder.smoothness, strict=True):
         multiplicity = DEGREE - 1 - int(smoothness)
-        by_distance = np.argsort(np.abs(knots - corner), kind="stable")
-        nearest = by_distance[:multiplicity]
+        distances = np.abs(knots - corner)
+        nearest = np.argsort(distances, kind="stable")[:multiplicity]
         if len(nearest) < multiplicity or _is_far(t, knots[nearest], corner):
             continue
         kept = np.delete(knots, nearest)
-        broken = [*corners, *[corner] * multiplicity]
+        broken = corners + multiplicity * [corner]
         if _is_solvable(t, _with_ends(t, kept, broken)):
             knots = kept
             corners = broken
-    return make_interp_spline(t, values, k=DEGREE, t=_with_ends(t, knots, corners))
+    every_knot = _with_ends(t, knots, corners)
+    return make_interp_spline(t, values, k=DEGREE, t=every_knot)
 
 
 def _is_far(t: Floats, knots: Floats, corner: float) -> bool:
     """Whether a knot is more than two samples away from a corner."""
-    after = np.searchsorted(t, corner)
-    return bool(np.any(np.abs(np.searchsorted(t, knots) - after) > 2))
+    at_corner = np.searchsorted(t, corner)
+    samples_away = np.abs(np.searchsorted(t, knots) - at_corner)
+    return bool(np.any(samples_away > 2))
 
 
 def _with_ends(t: Floats, knots: Floats, corners: list[float]) -> Floats:
     """Knots of the whole spline, with as many at either end as a cubic needs."""
-    inner = np.sort(np.concatenate([knots, corners]))
-    ends = DEGREE + 1
-    return np.concatenate([np.repeat(t[0], ends), inner, np.repeat(t[-1], ends)])
+    inner = np.concatenate([knots, corners])
+    inner.sort()
+    multiplicity = DEGREE + 1
+    return np.pad(
+        inner,
+        pad_width=multiplicity,
+        constant_values=(t[0], t[-1]),
+    )
 
 
 def _is_solvable(t: Floats, knots: Floats) -> bool:
-    """Whether every basis function has a sample of its own (Schoenberg & Whitney 1953)."""
-    inside = t[1:-1]
-    begins = knots[1 : len(t) - 1]
-    ends = knots[DEGREE + 2 : -1]
-    return bool(np.all((begins < inside) & (inside < ends)))
+    """Whether every basis function has a sample of its own.
+
+    Source: Schoenberg & Whitney 1953.
+    """
+    n_functions = len(t)
+    begins = knots[:n_functions]
+    ends = knots[DEGREE + 1 :]
+    has_sample = (begins < t) & (t < ends)
+    # the first and the last function have the samples at the ends
+    return bool(np.all(has_sample[1:-1]))
 
 
 def twice_integrated(t: Floats, integrals: Floats, moments: Floats) -> Floats:
@@ -144,5 +167,6 @@ def twice_integrated(t: Floats, integrals: Floats, moments: Floats) -> Floats:
     `integrals` of the terms over each step and their `moments` (`Integrals`), all of
     shape (n_samples - 1, n_terms).
     """
+    steps = np.diff(t)[:, None]
     before = np.cumsum(integrals, axis=0) - integrals
-    return before * np.diff(t)[:, None] + moments
+    return before * steps + moments

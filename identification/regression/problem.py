@@ -1,4 +1,4 @@
-"""The problem to be identified: the trials used, the structure, the ship, and the regression they make."""
+"""The problem to be identified: trials, structure, ship, and their regression."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -50,33 +50,36 @@ class Problem:
         """The regression of the same trials with another structure, of a ship."""
         return build_samples(
             self.used,
-            table,
-            ship.particulars,
+            structure=table,
+            particulars=ship.particulars,
             shaft_speed=ship.service_shaft_speed,
             **self.sampling,
         )
 
 
 def pose(trials: Sequence[Trial], options: Options) -> Problem:
-    """Check the trials and options, and make the regression; errors as in `identify`."""
+    """Check trials and options, and make the regression; errors as in `identify`."""
+    particulars = options.particulars
     everything, sea = in_still_water(
         held_out(trials, options.hold_out),
-        options.particulars,
-        options.current,
-        options.wind,
+        particulars=particulars,
+        current=options.current,
+        wind=options.wind,
     )
     used = [trial for trial in everything if trial.use == "fit"]
     if options.preprocessing.repair:
         used = [repaired(trial) for trial in used]
 
     table, similarity = _table(options, used)
-    if _is_yaw_alone(table):
-        used = [_at_service_speed(trial, options.particulars) for trial in used]
-        everything = [_at_service_speed(t, options.particulars) for t in everything]
+    is_yaw_alone = set(table.symbols) <= {"r", "delta"}
+    if is_yaw_alone:
+        used = [_at_service_speed(trial, particulars) for trial in used]
+        everything = [_at_service_speed(trial, particulars) for trial in everything]
     check_trials(used, table)
-    ship = _ship(options.particulars, used, table)
+    ship = _ship(particulars, used, table)
     for trial in used:
         check_scale(trial, ship, f"trial {trial.name!r}")
+
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
     sampling: dict[str, Any] = {
         "samples": options.samples.rule,
@@ -84,13 +87,24 @@ def pose(trials: Sequence[Trial], options: Options) -> Problem:
         "smoothing": options.preprocessing.smoothing,
         "gear": options.steering,
     }
-    samples = build_samples(used, table, ship, shaft_speed=shaft, **sampling)
-
+    samples = build_samples(
+        used,
+        structure=table,
+        particulars=ship,
+        shaft_speed=shaft,
+        **sampling,
+    )
     if options.wind == "constant":
         constants = constant_wind(used, samples, options.structure)
         used = [with_constant_wind(trial, constants) for trial in used]
         everything = [with_constant_wind(trial, constants) for trial in everything]
-        samples = build_samples(used, table, ship, shaft_speed=shaft, **sampling)
+        samples = build_samples(
+            used,
+            structure=table,
+            particulars=ship,
+            shaft_speed=shaft,
+            **sampling,
+        )
         sea["wind"] = {"option": "constant", "accelerations": constants}
     check_samples(samples, used, table)
 
@@ -106,17 +120,17 @@ def pose(trials: Sequence[Trial], options: Options) -> Problem:
     )
 
 
-def _is_yaw_alone(table: Structure) -> bool:
-    return set(table.symbols) <= {"r", "delta"}
-
-
 def _at_service_speed(trial: Trial, particulars: Given) -> Trial:
     """A trial of heading and rudder alone, as if sailed at the service speed."""
-    speed = (particulars or {}).get("speed")
-    if speed is None or {"u", "v"} & trial.channels.keys():
+    if particulars is None or {"u", "v"} & trial.channels.keys():
         return trial
-    ahead = np.full(len(trial), float(speed))
-    return trial.with_channels({"u": ahead, "v": np.zeros(len(trial))})
+    speed = particulars.get("speed")
+    if speed is None:
+        return trial
+
+    n_samples = len(trial)
+    ahead = np.full(n_samples, float(speed))
+    return trial.with_channels({"u": ahead, "v": np.zeros(n_samples)})
 
 
 def _blank(
@@ -132,10 +146,10 @@ def _blank(
         gear = estimated_gear(used) if table.has_rudder else SteeringGear()
 
     dynamics = get_dynamics(MMG) if table is MMG_CHANNELS else table
-    samples = [
-        np.concatenate([trial[channel] for trial in used])
-        for channel in ("u", "v", "r", "delta")
-    ]
+    samples = []
+    for channel in ("u", "v", "r", "delta"):
+        of_trials = [trial[channel] for trial in used]
+        samples.append(np.concatenate(of_trials))
     return ShipModel(
         name=options.name or ship["name"],
         structure=table.name,
@@ -174,16 +188,19 @@ def held_out(trials: Any, names: str | Sequence[str]) -> Sequence[Trial]:
     wanted = [names] if isinstance(names, str) else list(names)
     for name in wanted:
         check_choice(name, known, "hold_out")
-    return [
-        trial.with_(use="validate") if trial.name in wanted else trial
-        for trial in candidates
-    ]
+
+    marked = []
+    for trial in candidates:
+        if trial.name in wanted:
+            trial = trial.with_(use="validate")
+        marked.append(trial)
+    return marked
 
 
 def _table(
     options: Options, used: Sequence[Trial]
 ) -> tuple[Structure, dict[str, float]]:
-    """The structure; a grey box with its reference ship, and the similarity of the candidates."""
+    """The structure; for a grey box also the similarity of the candidates."""
     structure, reference = options.structure, options.reference_model
     if structure == MMG:
         return MMG_CHANNELS, {}
@@ -205,7 +222,10 @@ def _table(
 
 
 def _ship(particulars: Given, trials: Sequence[Trial], table: Structure) -> Particulars:
-    """Particulars with speed, and for forces inertia and added mass, estimated where absent."""
+    """Particulars with those that are needed estimated where absent.
+
+    Needed are the speed, and for structures of forces inertia and added mass.
+    """
     if particulars is None:
         raise InputError(
             "particulars: expected those of the ship, at least its length and its mass"
@@ -218,20 +238,28 @@ def _ship(particulars: Given, trials: Sequence[Trial], table: Structure) -> Part
     if not isinstance(ship, Particulars):
         ship = Particulars.from_mapping(ship)
     if ship.speed is None:
-        starts = [np.hypot(trial["u"][0], trial["v"][0]) for trial in trials]
-        speed = float(np.median(starts))
-        if speed <= 0.0:
-            raise InputError(
-                f"trial {trials[0].name!r}: expected way on the ship at the start, got"
-                " a ship at rest; give the service speed in the particulars (speed,"
-                " m/s)"
-            )
+        speed = _speed_at_start(trials)
         ship = replace(ship, speed=speed, estimated=ship.estimated | {"speed"})
     return ship.completed() if table.quantity == "force" else ship
 
 
+def _speed_at_start(trials: Sequence[Trial]) -> float:
+    """Median of the speeds at which the trials start, m/s."""
+    starts = [np.hypot(trial["u"][0], trial["v"][0]) for trial in trials]
+    speed = float(np.median(starts))
+    if speed <= 0.0:
+        raise InputError(
+            f"trial {trials[0].name!r}: expected way on the ship at the start, got"
+            " a ship at rest; give the service speed in the particulars (speed,"
+            " m/s)"
+        )
+    return speed
+
+
 def _shaft_speed(
-    given: float | None, trials: Sequence[Trial], table: Structure
+    given: float | None,
+    trials: Sequence[Trial],
+    table: Structure,
 ) -> float:
     """Shaft speed at service speed, 1/s; 0 for a structure that knows no shaft."""
     if "n" not in table.command_names:

@@ -67,15 +67,25 @@ class Rudder:
         if not self.follows_gear:
             return np.asarray(np.interp(times, self.t, self.delta))
         following = np.searchsorted(self.t, times, side="right")
-        interval = np.clip(following - 1, 0, len(self.t) - 2)
-        return self.within(interval, times - self.t[interval])
+        n_intervals = len(self.t) - 1
+        interval = np.clip(following - 1, 0, n_intervals - 1)
+        elapsed = times - self.t[interval]
+        return self.within(interval, elapsed)
 
     def within(self, interval: Integers, elapsed: Floats) -> Floats:
         """Angle, rad, some time after the start of intervals."""
         gear = GearResponse(self.rate, self.time_constant)
         first_part = np.minimum(elapsed, self.switch[interval])
-        at_switch = gear.angle(self.delta[interval], self.before[interval], first_part)
-        return gear.angle(at_switch, self.after[interval], elapsed - first_part)
+        at_switch = gear.angle(
+            start=self.delta[interval],
+            order=self.before[interval],
+            elapsed=first_part,
+        )
+        return gear.angle(
+            start=at_switch,
+            order=self.after[interval],
+            elapsed=elapsed - first_part,
+        )
 
 
 def rebuild(t: ArrayLike, delta: ArrayLike, gear: SteeringGear | None = None) -> Rudder:
@@ -86,20 +96,26 @@ def rebuild(t: ArrayLike, delta: ArrayLike, gear: SteeringGear | None = None) ->
     samples, and leave eight samples for each change of its order: with fewer it
     explains noise.
     """
-    t, delta = np.asarray(t, dtype=float), np.asarray(delta, dtype=float)
-    candidates = [estimate_gear(t, delta)]
+    t = np.asarray(t, dtype=float)
+    delta = np.asarray(delta, dtype=float)
+    response = estimate_gear(t, delta)
+    share = response.explained_share(t, delta)
     if gear is not None:
-        candidates.insert(0, GearResponse(gear.rate, gear.time_constant))
-    shares = [candidate.explained_share(t, delta) for candidate in candidates]
-    best = int(np.argmax(shares))
-    if shares[best] < 0.85:
+        given = GearResponse(gear.rate, gear.time_constant)
+        given_share = given.explained_share(t, delta)
+        if given_share >= share:
+            response = given
+            share = given_share
+    if share < 0.85:
         return straight(t, delta)
 
-    rudder = _with_gear(t, delta, candidates[best])
-    ends = rudder.within(np.arange(len(t) - 1), np.diff(t))
-    missed = np.abs(ends - delta[1:]).max()
+    rudder = _with_gear(t, delta, response)
+    intervals = np.arange(len(t) - 1)
+    ends = rudder.within(intervals, np.diff(t))
+    largest_miss = np.abs(ends - delta[1:]).max()
+    reproduces = largest_miss <= TOLERANCE * np.ptp(delta)
     n_changes = int(np.sum(rudder.smoothness == 0))
-    if missed > TOLERANCE * np.ptp(delta) or 8 * n_changes > len(t):
+    if not reproduces or 8 * n_changes > len(t):
         return straight(t, delta)
     return rudder
 
@@ -133,24 +149,36 @@ def _with_gear(t: Floats, delta: Floats, gear: GearResponse) -> Rudder:
     orders = gear.orders(t, delta)
     continues = goes_on(orders, delta).tolist()
     follows = [True, *continues, True]  # each interval the one before it
-    before, after = orders.copy(), orders.copy()
+    before = orders.copy()
+    after = orders.copy()
     switch = np.diff(t)
     corners: list[_Corner] = []
     for k, is_continued in enumerate(follows[:-1]):
         if is_continued:
             continue
+        time = float(t[k])
         if follows[k + 1] and not np.isinf(orders[k]):
-            corners.append(_Corner(float(t[k]), 0))  # the order changed on the sample
+            corners.append(_Corner(time, 0))  # the order changed on the sample
             continue
         if k > 1 and not follows[k - 1]:
             continue  # the end of a change inside the interval before
 
-        following = orders[min(k + 1, len(orders) - 1)]
-        time = _switch_time(gear, delta[k : k + 2], orders[k - 1], following, switch[k])
-        if time is not None:
-            before[k], after[k] = orders[k - 1], following
-            switch[k] = time
-        corners.append(_Corner(float(t[k] + (time or 0.0)), 0))
+        first = orders[k - 1]
+        second = orders[min(k + 1, len(orders) - 1)]
+        elapsed = _switch_time(
+            gear,
+            start=delta[k],
+            end=delta[k + 1],
+            first=first,
+            second=second,
+            step=switch[k],
+        )
+        if elapsed is not None:
+            before[k] = first
+            after[k] = second
+            switch[k] = elapsed
+            time = float(t[k] + elapsed)
+        corners.append(_Corner(time, 0))
 
     corners += _ramp_ends(gear, t, delta, before, after, switch)
     inside = [corner for corner in sorted(corners) if t[0] < corner.time < t[-1]]
@@ -169,14 +197,22 @@ def _with_gear(t: Floats, delta: Floats, gear: GearResponse) -> Rudder:
 
 
 def _switch_time(
-    gear: GearResponse, ends: Floats, first: float, second: float, step: float
+    gear: GearResponse,
+    start: float,
+    end: float,
+    first: float,
+    second: float,
+    step: float,
 ) -> float | None:
-    """Time at which one order has to follow another to go from end to end; None if never."""
-    start, end = ends
+    """Time at which a second order has to follow the first to reach the end in a step.
 
-    def miss(time: float) -> float:
-        at_switch = gear.angle(start, first, time)
-        return float(gear.angle(at_switch, second, step - time) - end)
+    None if it never does.
+    """
+
+    def miss(elapsed: float) -> float:
+        at_switch = gear.angle(start, first, elapsed)
+        reached = gear.angle(at_switch, second, step - elapsed)
+        return float(reached - end)
 
     if miss(0.0) * miss(step) > 0.0:
         return None
@@ -192,22 +228,40 @@ def _ramp_ends(
     switch: Floats,
 ) -> list[_Corner]:
     """Times at which a ramp ends inside an interval."""
-    at_switch = gear.angle(delta[:-1], before, switch)
-    rest = np.diff(t) - switch
-    first = _ends_of_ramps(gear, t[:-1], delta[:-1], before, switch)
-    second = _ends_of_ramps(gear, t[:-1] + switch, at_switch, after, rest)
+    begins = t[:-1]
+    starts = delta[:-1]
+    first = _ends_of_ramps(
+        gear,
+        begin=begins,
+        start=starts,
+        order=before,
+        length=switch,
+    )
+    second = _ends_of_ramps(
+        gear,
+        begin=begins + switch,
+        start=gear.angle(starts, before, switch),
+        order=after,
+        length=np.diff(t) - switch,
+    )
     smoothness = int(gear.lag > 0.0)
     return [_Corner(float(time), smoothness) for time in (*first, *second)]
 
 
 def _ends_of_ramps(
-    gear: GearResponse, begin: Floats, start: Floats, order: Floats, length: Floats
+    gear: GearResponse,
+    begin: Floats,
+    start: Floats,
+    order: Floats,
+    length: Floats,
 ) -> Floats:
     """Times at which ramps end, of those that end within their part of an interval."""
-    by_ramp = np.abs(order - start) - gear.rate * gear.lag
+    distance = np.abs(order - start)
+    by_ramp = distance - gear.rate * gear.lag
     ramp = by_ramp / gear.rate
     inside = (ramp > 1e-9) & (ramp < length)
-    return (begin + ramp)[inside]
+    ends = begin + ramp
+    return ends[inside]
 
 
 def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
@@ -217,26 +271,36 @@ def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
     explain records without noise exactly; records with noise give the median rate of
     the fast moves, and no lag.
     """
-    largest = max(float(np.abs(trial["delta"]).max()) for trial in trials)
-    limit_deg = min(max(35.0, float(np.degrees(largest))), 90.0)
+    largest = max(np.abs(trial["delta"]).max() for trial in trials)
+    largest_deg = float(np.degrees(largest))
+    limit_deg = min(max(35.0, largest_deg), 90.0)
 
     exact = []
     for trial in trials:
-        if not is_noisy(trial.t, [trial[name] for name in ("u", "v", "r")]):
-            rudder = rebuild(trial.t, trial["delta"])
-            if rudder.follows_gear:
-                exact.append((rudder.rate, rudder.time_constant))
+        velocities = [trial[name] for name in ("u", "v", "r")]
+        if is_noisy(trial.t, velocities):
+            continue
+        rudder = rebuild(trial.t, trial["delta"])
+        if rudder.follows_gear:
+            exact.append((rudder.rate, rudder.time_constant))
+
     if exact:
         rate, lag = np.median(exact, axis=0).tolist()
     else:
-        rate, lag = _usual_rate(trials), 0.0
+        rate = _usual_rate(trials)
+        lag = 0.0
     return SteeringGear(limit_deg, float(np.degrees(rate)), lag)
 
 
 def _usual_rate(trials: Sequence[Trial]) -> float:
     """Median of the rates at which rudders of records with noise move fast, rad/s."""
-    rates = np.concatenate(
-        [np.abs(np.diff(trial["delta"])) / np.diff(trial.t) for trial in trials]
-    )
-    fastest = float(np.quantile(rates[rates > 0.0], 0.995))
-    return float(np.median(rates[rates >= 0.5 * fastest]))
+    by_trial = []
+    for trial in trials:
+        moves = np.diff(trial["delta"])
+        by_trial.append(np.abs(moves) / np.diff(trial.t))
+    rates = np.concatenate(by_trial)
+
+    moving = rates[rates > 0.0]
+    fastest = float(np.quantile(moving, 0.995))
+    is_fast = rates >= 0.5 * fastest
+    return float(np.median(rates[is_fast]))

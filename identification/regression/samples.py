@@ -1,4 +1,4 @@
-"""From sampled trials to a regression: the Euler, integral and spline sample structures.
+"""From sampled trials to a regression: Euler, integral and spline sample structures.
 
 For accelerations that are linear in unknown parameters, xdot = P(x, rudder) theta, each
 row says x(t_k+w) - x(t_k) = (integral of P over the window) theta. Euler takes P at the
@@ -33,6 +33,7 @@ from shipgym import InputError, Particulars, SteeringGear, Trial
 from shipgym.arrays import Floats, Integers, integral
 from shipgym.checks import check_choice, check_whole
 from shipgym.ships import GreyBox, Structure
+from shipgym.trials.resampling import usual_step
 
 SAMPLE_STRUCTURES = ("euler", "integral", "spline")
 LONGEST_WINDOW = 1.0 / 3.0  # of the time to sail one ship length
@@ -142,18 +143,26 @@ def build_samples(
     shaft_speed : float
         At service speed, 1/s, for terms that refer to it.
     """
-    sampling = Sampling(samples, window)
     regression = _Regression(
-        structure, particulars, sampling, gear, smoothing, shaft_speed
+        structure=structure,
+        particulars=particulars,
+        sampling=Sampling(samples, window),
+        gear=gear,
+        smoothing=smoothing,
+        shaft_speed=shaft_speed,
     )
     parts = []
     for index, trial in enumerate(trials):
         parts += regression.of_trial(trial, index)
 
-    equations = structure.regressed
+    features = {}
+    targets = {}
+    for q in structure.regressed:
+        features[q] = np.concatenate([part.features[q] for part in parts])
+        targets[q] = np.concatenate([part.targets[q] for part in parts])
     return Samples(
-        features={q: np.concatenate([p.features[q] for p in parts]) for q in equations},
-        targets={q: np.concatenate([p.targets[q] for p in parts]) for q in equations},
+        features=features,
+        targets=targets,
         start=np.concatenate([part.start for part in parts]),
         duration=np.concatenate([part.duration for part in parts]),
         trial=np.concatenate([part.trial for part in parts]),
@@ -185,7 +194,8 @@ class _Regression:
                 )
         pieces = between_gaps(trial, self.particulars, fewest)
         if window is None:
-            window = default_window(max(pieces, key=len), self.particulars)
+            longest = max(pieces, key=len)
+            window = default_window(longest, self.particulars)
         return [
             self._of_piece(piece, index, window)
             for piece in pieces
@@ -195,27 +205,21 @@ class _Regression:
     def _of_piece(self, trial: Trial, index: int, window: int) -> Samples:
         """The rows of a trial without gaps."""
         t = trial.t
-        channels = smoothed_channels(
-            trial, self.structure.required_channels, self.smoothing
-        )
-        steps = self._integrals(trial, channels)
-        if "q" in steps.terms:
-            moments = steps.moments["q"]
-            memory = twice_integrated(t, steps.terms.pop("q"), moments)
-            steps.terms["r"] = np.hstack([steps.terms["r"], memory])
+        names = self.structure.required_channels
+        channels = smoothed_channels(trial, names, self.smoothing)
+        terms, moments = self._integrals(trial, channels)
+        if "q" in terms:
+            memory = twice_integrated(t, terms.pop("q"), moments["q"])
+            terms["r"] = np.hstack([terms["r"], memory])
 
-        first = np.arange(0, len(t) - window, max(window // 2, 1))
-        last = first + window
+        windows = _Windows(len(t), window)
         features, targets = {}, {}
-        for q, terms in steps.terms.items():
-            features[q] = terms
-            if window > 1:
-                summed = np.pad(np.cumsum(terms, axis=0), ((1, 0), (0, 0)))
-                features[q] = summed[last] - summed[first]
-            targets[q] = channels[q][last] - channels[q][first]
+        for q, steps in terms.items():
+            features[q] = windows.summed(steps)
+            targets[q] = windows.changes(channels[q])
             if f"wind_{q}dot" in trial:
                 by_wind = integral(t, trial[f"wind_{q}dot"])
-                targets[q] -= by_wind[last] - by_wind[first]
+                targets[q] -= windows.changes(by_wind)
             if isinstance(self.structure, GreyBox):
                 targets[q] -= features[q][:, -1]
                 features[q] = features[q][:, :-1]
@@ -223,35 +227,74 @@ class _Regression:
         rows = Samples(
             features=features,
             targets=targets,
-            start=t[first],
-            duration=t[last] - t[first],
-            trial=np.full(len(first), index),
+            start=t[windows.first],
+            duration=windows.changes(t),
+            trial=np.full(len(windows.first), index),
             window=window,
         )
-        return without_memory(rows) if "q" in self.structure.equations else rows
+        if "q" in self.structure.equations:
+            return without_memory(rows)
+        return rows
 
     def _integrals(self, trial: Trial, channels: Channels) -> Integrals:
         """Integrals of the terms over each step."""
         t = trial.t
-        if self.sampling.rule != "spline":
-            return step_integrals(t, channels, self._terms, self.sampling.rule)
+        rule = self.sampling.rule
+        if rule != "spline":
+            return step_integrals(
+                t,
+                channels=channels,
+                terms=self._terms,
+                rule=rule,
+            )
+
+        delta = trial["delta"]
         recorded = [trial[name] for name in channels if name != "delta"]
         if is_noisy(t, recorded):
-            rudder = straight(t, trial["delta"])
+            rudder = straight(t, delta)
         else:
-            rudder = rebuild(t, trial["delta"], self.gear)
-        return spline_integrals(t, channels, self._terms, rudder)
+            rudder = rebuild(t, delta, self.gear)
+        return spline_integrals(
+            t,
+            channels=channels,
+            terms=self._terms,
+            rudder=rudder,
+        )
 
     def _terms(self, channels: Channels) -> dict[str, Floats]:
-        """The terms by equation, of a grey box followed by the reference's acceleration."""
-        given = channels, self.particulars, self.shaft_speed
-        terms = {
-            q: self.structure.features(q, *given) for q in self.structure.equations
-        }
-        if isinstance(self.structure, GreyBox):
-            known = self.structure.converted_accelerations(*given)
-            terms = {q: np.column_stack([terms[q], known[q]]) for q in terms}
+        """The terms by equation; last, of a grey box, the reference's acceleration."""
+        structure = self.structure
+        motion = (channels, self.particulars, self.shaft_speed)
+        terms = {}
+        for q in structure.equations:
+            terms[q] = structure.features(q, *motion)
+
+        if isinstance(structure, GreyBox):
+            known = structure.converted_accelerations(*motion)
+            for q, own in terms.items():
+                terms[q] = np.column_stack([own, known[q]])
         return terms
+
+
+class _Windows:
+    """Windows of some steps, each half a window after the one before."""
+
+    def __init__(self, n_samples: int, steps: int) -> None:
+        half = max(steps // 2, 1)
+        self.steps = steps
+        self.first = np.arange(0, n_samples - steps, half)
+        self.last = self.first + steps
+
+    def changes(self, values: Floats) -> Floats:
+        """Change of values, by sample, over each window."""
+        return values[self.last] - values[self.first]
+
+    def summed(self, rows: Floats) -> Floats:
+        """Sum over each window of rows, one a step."""
+        if self.steps == 1:
+            return rows
+        from_start = np.pad(np.cumsum(rows, axis=0), ((1, 0), (0, 0)))
+        return self.changes(from_start)
 
 
 def default_window(trial: Trial, particulars: Particulars) -> int:
@@ -261,8 +304,9 @@ def default_window(trial: Trial, particulars: Particulars) -> int:
     twentieth of the trial.
     """
     one_length = particulars["length"] / particulars["speed"]
-    usual_step = float(np.median(np.diff(trial.t)))
-    longest = min(int(LONGEST_WINDOW * one_length / usual_step), len(trial) // 20)
+    by_travel = int(LONGEST_WINDOW * one_length / usual_step(trial.t))
+    longest = min(by_travel, len(trial) // 20)
+
     window = 1
     for channel in "uvr":
         ratio = noise_ratio(trial.t, trial[channel])
@@ -290,15 +334,18 @@ def without_memory(rows: Samples) -> Samples:
     if not first.size:
         raise InputError(
             "window: expected at least two windows after each other in every trial for"
-            f" a structure with a memory of yaw, got {len(rows)}; give a smaller window,"
-            " or longer trials"
+            f" a structure with a memory of yaw, got {len(rows)}; give a smaller"
+            " window, or longer trials"
         )
+
     second = next_window[first]
-    both = 0.5 * (rows.duration[first] + rows.duration[second])
-    features = rows.features["r"] / rows.duration[:, None]
-    features = (features[second] - features[first]) * both[:, None]
-    targets = rows.targets["r"] / rows.duration
-    targets = (targets[second] - targets[first]) * both
+    duration = rows.duration
+    both = 0.5 * (duration[first] + duration[second])
+    mean_features = rows.features["r"] / duration[:, None]
+    features = (mean_features[second] - mean_features[first]) * both[:, None]
+    mean_targets = rows.targets["r"] / duration
+    targets = (mean_targets[second] - mean_targets[first]) * both
+
     chosen = rows.select(first)
     return replace(
         chosen,

@@ -29,7 +29,7 @@ def in_still_water(
     current: str | Mapping[str, float] = "auto",
     wind: str | Mapping[str, Any] = "auto",
 ) -> tuple[list[Trial], dict[str, Any]]:
-    """The trials without current and with the accelerations by wind; a report on both.
+    """Trials without current and with the accelerations by wind; a report on both.
 
     Trials that are skipped keep both; of those whose velocities are through the water a
     current in columns is taken out of the track. `current` and `wind` are those of
@@ -40,23 +40,24 @@ def in_still_water(
     in_still = is_usual_wind and not any(_feels_sea(trial) for trial in trials)
     if particulars is None or in_still:
         return list(trials), {}
+
     ship = particulars
     if isinstance(ship, Mapping):
         ship = Particulars.from_mapping(ship)
-
+    remarks: list[str] = []
+    report: dict[str, Any] = {}
     free_running = {
         trial.name: trial
         for trial in trials
         if trial.use != "skip" and trial.kind != "captive"
     }
-    remarks: list[str] = []
-    report: dict[str, Any] = {}
-    found = _with_wind(free_running, ship, wind, remarks)
-    wind_speeds = {
-        name: float(trial["wind_speed"].mean())
-        for name, trial in found.items()
-        if "wind_udot" in trial
-    }
+    found = _with_wind(
+        free_running,
+        ship=ship,
+        option=wind,
+        remarks=remarks,
+    )
+    wind_speeds = _mean_wind_speeds(found)
     if wind_speeds:
         report["wind"] = {"option": wind, "mean_speeds": wind_speeds}
 
@@ -77,8 +78,17 @@ def _feels_sea(trial: Trial) -> bool:
     return trial.over_ground or bool(columns & trial.channels.keys())
 
 
+def _mean_wind_speeds(trials: Mapping[str, Trial]) -> dict[str, float]:
+    """Mean wind speed of those trials with accelerations by it, m/s."""
+    speeds = {}
+    for name, trial in trials.items():
+        if "wind_udot" in trial:
+            speeds[name] = float(trial["wind_speed"].mean())
+    return speeds
+
+
 def _starting_speed(trials: Iterable[Trial]) -> float:
-    """Median of the speeds over ground at which trials start, m/s; 0 where none is known."""
+    """Median speed over ground at the start of trials, m/s; 0 where none is known."""
     starts = []
     for trial in trials:
         if {"u", "v"} <= trial.channels.keys():
@@ -88,15 +98,18 @@ def _starting_speed(trials: Iterable[Trial]) -> float:
 
 
 def _with_wind(
-    trials: Mapping[str, Trial], ship: Particulars, option: Any, remarks: list[str]
+    trials: Mapping[str, Trial],
+    ship: Particulars,
+    option: Any,
+    remarks: list[str],
 ) -> dict[str, Trial]:
     """The trials by name, with the accelerations by their wind."""
     if option in ("none", "constant"):
         return dict(trials)
+    found = {}
     try:
-        found = {
-            name: measured_wind(trial, ship, option) for name, trial in trials.items()
-        }
+        for name, trial in trials.items():
+            found[name] = measured_wind(trial, ship, option)
     except InputError as error:
         if option != "auto":
             raise

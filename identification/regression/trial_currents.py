@@ -49,7 +49,7 @@ class TrialCurrent:
 
     @property
     def probability(self) -> float:
-        """Probability of a current as far from zero by chance; 0 for one that is known."""
+        """Probability of a current as far from zero by chance; 0 for a known one."""
         if self.covariance is None:
             return 0.0
         return wald_probability(self.mean, self.covariance)
@@ -71,11 +71,6 @@ def without_current(
     rows: dict[str, Any] = {}
     doubtful: dict[str, list[str]] = {}
     for name, current in currents.items():
-        row = _row(current)
-        if current.covariance is not None and not one_heading:
-            errors = np.sqrt(np.diag(current.covariance))
-            row["standard_errors"] = errors.tolist()
-            row["probability"] = current.probability
         doubt = _doubt(current, speed, one_heading)
         if doubt and (option != "auto" or current.covariance is None):
             _refuse(name, doubt, current)
@@ -83,20 +78,31 @@ def without_current(
             doubtful.setdefault(doubt, []).append(PurePath(name).name)
 
         is_chance = option == "auto" and current.probability > SIGNIFICANT
-        row["taken_out"] = not doubt and not is_chance
-        if row["taken_out"]:
+        taken_out = not doubt and not is_chance
+        if taken_out:
             found[name] = through_water(found[name], *current.velocity)
-        rows[name] = row
+        rows[name] = _row(current, taken_out, one_heading)
 
     for doubt, names in doubtful.items():
-        remarks.append(f"{', '.join(names)}: no current is removed: {doubt}; {REMEDY}")
+        trials = ", ".join(names)
+        remarks.append(f"{trials}: no current is removed: {doubt}; {REMEDY}")
     return rows
 
 
-def _row(current: TrialCurrent) -> dict[str, Any]:
-    """A current for the provenance."""
+def _row(current: TrialCurrent, taken_out: bool, one_heading: bool) -> dict[str, Any]:
+    """A current for the provenance; how certain it is, unless from one heading."""
     north, east = current.mean.tolist()
-    return {"north": north, "east": east, "source": current.source, "taken_out": True}
+    row = {
+        "north": north,
+        "east": east,
+        "source": current.source,
+        "taken_out": taken_out,
+    }
+    if current.covariance is not None and not one_heading:
+        errors = np.sqrt(np.diag(current.covariance))
+        row["standard_errors"] = errors.tolist()
+        row["probability"] = current.probability
+    return row
 
 
 def _refuse(name: str, doubt: str, current: TrialCurrent) -> None:
@@ -123,22 +129,27 @@ def _doubt(current: TrialCurrent, speed: float, one_heading: bool) -> str:
 
 
 def _keep_to_one_heading(trials: Iterable[Trial]) -> bool:
-    """Whether trials over ground keep so near to one heading that speed hides the current."""
-    headings = [
-        trial["psi"]
-        for trial in trials
-        if trial.over_ground and trial.use == "fit" and "psi" in trial
-    ]
+    """Whether trials keep so near to one heading that speed hides the current.
+
+    Only trials to fit whose velocities are over ground count.
+    """
+    headings = []
+    for trial in trials:
+        if trial.over_ground and trial.use == "fit" and "psi" in trial:
+            headings.append(trial["psi"])
     if not headings:
         return False
-    mean_direction = np.exp(1j * np.concatenate(headings)).mean()
-    return bool(abs(mean_direction) > 0.85)
+    directions = np.exp(1j * np.concatenate(headings))
+    return bool(abs(directions.mean()) > 0.85)
 
 
 def currents_of(
-    trials: Sequence[Trial], length: float, speed: float, option: Any
+    trials: Sequence[Trial],
+    length: float,
+    speed: float,
+    option: Any,
 ) -> dict[str, TrialCurrent]:
-    """The current of each trial, by name, whose current is known or can be estimated.
+    """Currents by trial, of those whose current is known or can be estimated.
 
     The trials to fit have one current unless they contradict it or are asked one by
     one. That of a trial held out is theirs, or is found by their coefficients. A
@@ -160,7 +171,11 @@ def currents_of(
         known = _known_current(trial, option)
         if known is not None:
             source = "columns" if CURRENT_COLUMNS[0] in trial else "given"
-            found[trial.name] = TrialCurrent(known, None, source)
+            found[trial.name] = TrialCurrent(
+                velocity=known,
+                covariance=None,
+                source=source,
+            )
         elif _shows_current(trial) and trial.duration > shortest:
             unknown.append(trial)
     return found | _estimated_currents(unknown, length, speed, option)
@@ -172,7 +187,10 @@ def _shows_current(trial: Trial) -> bool:
 
 
 def _estimated_currents(
-    trials: Sequence[Trial], length: float, speed: float, option: Any
+    trials: Sequence[Trial],
+    length: float,
+    speed: float,
+    option: Any,
 ) -> dict[str, TrialCurrent]:
     fitted = [trial for trial in trials if trial.use == "fit"]
     if not fitted:
@@ -180,38 +198,61 @@ def _estimated_currents(
     shared = option != "trial"
     estimate = estimate_current(fitted, length, speed, shared)
     if option == "auto" and len(fitted) > 1:
-        each = estimate_current(fitted, length, speed, False)
+        each = estimate_current(
+            fitted,
+            length=length,
+            speed=speed,
+            shared=False,
+        )
         if _contradict(each.mean, each.covariance):
             estimate, shared = each, False
 
     found: dict[str, TrialCurrent] = {}
     for trial in trials:
-        own, k = estimate, 0
+        own = estimate
+        place = 0
         if not shared and trial.use == "fit":
-            k = fitted.index(trial)
+            place = fitted.index(trial)
         elif not shared:
-            own = estimate_current([trial], length, speed, True, estimate.coefficients)
-        part = slice(2 * k, 2 * k + 2)
-        source = "all trials" if shared else "trial"
+            own = estimate_current(
+                [trial],
+                length=length,
+                speed=speed,
+                shared=True,
+                known=estimate.coefficients,
+            )
+        pair = slice(2 * place, 2 * place + 2)
         found[trial.name] = TrialCurrent(
-            own.mean[part], own.covariance[part, part], source
+            velocity=own.mean[pair],
+            covariance=own.covariance[pair, pair],
+            source="all trials" if shared else "trial",
         )
     return found
 
 
 def _contradict(currents: Floats, covariance: Floats, chance: float = 1e-6) -> bool:
-    """Whether the currents of trials differ by more than chance; their covariance is of few blocks."""
+    """Whether the currents of trials differ by more than chance.
+
+    The chance is small because their covariance is an average over few blocks.
+    """
     n_trials = len(currents) // 2
-    from_first = np.eye(n_trials)[1:] - np.eye(n_trials)[0]
+    first, *others = np.eye(n_trials)
+    from_first = np.array(others) - first
     apart = np.kron(from_first, np.eye(2))
-    probability = wald_probability(apart @ currents, apart @ covariance @ apart.T)
-    return probability < chance
+    differences = apart @ currents
+    of_differences = apart @ covariance @ apart.T
+    return wald_probability(differences, of_differences) < chance
 
 
 def _known_current(
-    trial: Trial, option: Any, contradiction: float = 0.1
+    trial: Trial,
+    option: Any,
+    contradiction: float = 0.1,
 ) -> Floats | None:
-    """North and east of a current in columns or given, shape (2,) or (2, n_samples); None where unknown."""
+    """North and east of a current in columns or given; None where unknown.
+
+    Shape (2,) or (2, n_samples).
+    """
     given = None
     if isinstance(option, Mapping):
         given = np.array([option["north"], option["east"]], dtype=float)
@@ -222,7 +263,8 @@ def _known_current(
     if given is None:
         return columns
     north, east = columns.mean(axis=1)
-    if np.hypot(north - given[0], east - given[1]) > contradiction:
+    contradicts = np.hypot(north - given[0], east - given[1]) > contradiction
+    if contradicts:
         raise InputError(
             f"trial {trial.name!r}: expected columns current_north and current_east to"
             f" agree with current = {{ north = {given[0]:g}, east = {given[1]:g} }},"

@@ -34,19 +34,22 @@ def through_water(trial: Trial, north: Any, east: Any) -> Trial:
     Its track starts where it did; velocities over ground, but for one logged, become
     those through the water.
     """
-    north = np.broadcast_to(np.asarray(north, dtype=float), trial.t.shape)
-    east = np.broadcast_to(np.asarray(east, dtype=float), trial.t.shape)
-    channels = dict(zip(CURRENT_COLUMNS, (north, east), strict=True))
-    for name, speed in (("x", north), ("y", east)):
-        if name in trial:
-            channels[name] = trial[name] - integral(trial.t, speed)
+    t = trial.t
+    north = np.full(len(t), north, dtype=float)
+    east = np.full(len(t), east, dtype=float)
+    channels = {"current_north": north, "current_east": east}
+    if "x" in trial:
+        channels["x"] = trial["x"] - integral(t, north)
+    if "y" in trial:
+        channels["y"] = trial["y"] - integral(t, east)
 
     if trial.over_ground and trial.channels.keys() >= {"u", "v", "psi"}:
-        any_derived = bool(trial.derived & {"u", "v"})
-        ground = over_ground(trial)
-        drift = rotate_to_body(north, east, trial["psi"])
-        for axis, name in enumerate(("u", "v")):
-            is_logged = any_derived and name not in trial.derived
-            if not is_logged:
-                channels[name] = ground[axis] - drift[axis]
-    return trial.with_channels(channels).with_(over_ground=False)
+        ahead, aside = over_ground(trial)
+        drift_ahead, drift_aside = rotate_to_body(north, east, trial["psi"])
+        one_is_logged = bool(trial.derived & {"u", "v"})
+        if "u" in trial.derived or not one_is_logged:
+            channels["u"] = ahead - drift_ahead
+        if "v" in trial.derived or not one_is_logged:
+            channels["v"] = aside - drift_aside
+    still = trial.with_channels(channels)
+    return still.with_(over_ground=False)

@@ -1,4 +1,4 @@
-"""What the wind does to a ship in her trials: accelerations by measured wind, or constant ones by trial."""
+"""Accelerations of a ship by the wind of her trials: measured, or constant in each."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from identification.regression.velocities import CURRENT_COLUMNS
 from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_flag, check_keys, check_text
-from shipgym.sea.wind import AIR_DENSITY, wind_curves
+from shipgym.sea.wind import AIR_DENSITY, WindCurves, wind_curves
 from shipgym.sea.wind_coefficients import WindTable
 from shipgym.ships.inertia import particulars_inertia
 from shipgym.ships.mmg import MMG
@@ -28,11 +28,14 @@ def check_wind(option: Any) -> None:
 
 
 def measured_wind(
-    trial: Trial, particulars: Particulars, option: str | Mapping[str, Any]
+    trial: Trial,
+    particulars: Particulars,
+    option: str | Mapping[str, Any],
 ) -> Trial:
-    """The trial with the accelerations by the wind of its columns; itself where it has none.
+    """The trial with the accelerations by the wind of its columns.
 
-    Velocities through the water are completed by a current in columns.
+    The trial itself where it has none. Velocities through the water are completed by a
+    current in columns.
 
     Parameters
     ----------
@@ -52,38 +55,49 @@ def measured_wind(
     if not {"wind_speed", "wind_from", "psi", "u", "v"} <= trial.channels.keys():
         return trial
 
-    named = table.get("coefficients", "auto")
-    if named == "auto":
-        named = "blendermann"
-    if isinstance(named, Mapping):
-        named = WindTable.from_dict(named, "wind coefficients")
-    curves = wind_curves(particulars, named)
-
+    curves = _curves(particulars, table.get("coefficients", "auto"))
     ahead, aside = _felt_wind(trial, relative=table.get("relative", False))
-    pressure = 0.5 * AIR_DENSITY * (ahead**2 + aside**2)
-    angle = np.arctan2(aside, ahead)
-    coefficients = np.array(
-        [
-            np.interp(angle, curves.angle, row, period=2.0 * np.pi)
-            for row in (curves.X, curves.Y, curves.N)
-        ]
-    )
-    forces = pressure * coefficients
+    forces = _forces(curves, ahead, aside)
     # her resistance in still air is the model's own
-    forces[0] -= 0.5 * AIR_DENSITY * curves.X[0] * trial["u"] ** 2
+    still_ahead, *_ = curves.X
+    forces[0] -= 0.5 * AIR_DENSITY * still_ahead * trial["u"] ** 2
 
     inertia = particulars_inertia(particulars.completed())[:, :3]
     accelerations = np.linalg.solve(inertia, forces)
-    return trial.with_channels(dict(zip(WIND.values(), accelerations, strict=True)))
+    channels = dict(zip(WIND.values(), accelerations, strict=True))
+    return trial.with_channels(channels)
+
+
+def _forces(curves: WindCurves, ahead: Floats, aside: Floats) -> Floats:
+    """X, Y and N by a wind felt from ahead and starboard, shape (3, n_samples)."""
+    angle = np.arctan2(aside, ahead)
+    coefficients = []
+    for row in (curves.X, curves.Y, curves.N):
+        at_angle = np.interp(angle, curves.angle, row, period=2.0 * np.pi)
+        coefficients.append(at_angle)
+    pressure = 0.5 * AIR_DENSITY * (ahead**2 + aside**2)
+    return pressure * np.array(coefficients)
+
+
+def _curves(particulars: Particulars, coefficients: Any) -> WindCurves:
+    """Wind coefficients by their name, or by a table of them."""
+    if isinstance(coefficients, Mapping):
+        given = WindTable.from_dict(coefficients, "wind coefficients")
+        return wind_curves(particulars, given)
+    if coefficients == "auto":
+        coefficients = "blendermann"
+    return wind_curves(particulars, coefficients)
 
 
 def _felt_wind(trial: Trial, relative: bool) -> tuple[Floats, Floats]:
     """Wind felt on board, from ahead and from starboard, m/s."""
-    speed, angle = trial["wind_speed"], trial["wind_from"]
+    along = trial["wind_speed"] * np.cos(trial["wind_from"])
+    across = trial["wind_speed"] * np.sin(trial["wind_from"])
     if relative:
-        return speed * np.cos(angle), speed * np.sin(angle)
+        return along, across
 
-    north, east = speed * np.cos(angle), speed * np.sin(angle)
+    north = along
+    east = across
     has_current = trial.channels.keys() >= set(CURRENT_COLUMNS)
     if has_current and not trial.over_ground:
         north = north + trial["current_north"]
@@ -93,9 +107,11 @@ def _felt_wind(trial: Trial, relative: bool) -> tuple[Floats, Floats]:
 
 
 def constant_wind(
-    trials: Sequence[Trial], samples: Samples, structure: Any
+    trials: Sequence[Trial],
+    samples: Samples,
+    structure: Any,
 ) -> dict[str, dict[str, float]]:
-    """The constant sway and yaw acceleration that the regression of each trial asks for, by its name.
+    """Constant sway and yaw acceleration that the regression asks for, by trial.
 
     A constant of the structure's own takes their mean. The MMG form has no regression:
     InputError.
@@ -105,27 +121,32 @@ def constant_wind(
             "wind: expected a structure that is linear in its coefficients with"
             " 'constant', or columns wind_speed and wind_from, got structure 'mmg'"
         )
-    of_trial = samples.trial[:, None] == np.arange(len(trials))
-    constants = of_trial * samples.duration[:, None]
-
     found: dict[str, dict[str, float]] = {trial.name: {} for trial in trials}
     for q in ("v", "r"):
-        if q not in samples.targets:
-            continue
-        known = samples.features[q]
-        columns = np.hstack([known, constants])
-        solution = np.linalg.lstsq(columns, samples.targets[q])[0]
-        values = solution[known.shape[1] :]
-        if _explains(known, samples.duration):
-            values = values - values.mean()
-        for trial, value in zip(trials, values.tolist(), strict=True):
-            found[trial.name][WIND[q]] = value
+        if q in samples.targets:
+            constants = _constants(samples, q, len(trials))
+            for trial, constant in zip(trials, constants.tolist(), strict=True):
+                found[trial.name][WIND[q]] = constant
     return found
+
+
+def _constants(samples: Samples, equation: str, n_trials: int) -> Floats:
+    """The constant of each trial in the regression of an equation."""
+    features = samples.features[equation]
+    is_own = samples.trial[:, None] == np.arange(n_trials)
+    of_trials = is_own * samples.duration[:, None]
+    columns = np.hstack([features, of_trials])
+    solution = np.linalg.lstsq(columns, samples.targets[equation])[0]
+    constants: Floats = solution[-n_trials:]
+    if _explains(features, samples.duration):
+        constants = constants - constants.mean()
+    return constants
 
 
 def _explains(features: Floats, target: Floats, rounding: float = 1e-6) -> bool:
     """Tell whether features explain a target but for rounding."""
-    left = target - features @ np.linalg.lstsq(features, target)[0]
+    solution = np.linalg.lstsq(features, target)[0]
+    left = target - features @ solution
     return bool(np.linalg.norm(left) < rounding * np.linalg.norm(target))
 
 
@@ -133,8 +154,9 @@ def with_constant_wind(
     trial: Trial, constants: Mapping[str, Mapping[str, float]]
 ) -> Trial:
     """The trial with its constants of all, by name; itself where it has none."""
-    own = {
-        name: np.full(len(trial), value)
-        for name, value in constants.get(trial.name, {}).items()
-    }
-    return trial.with_channels(own) if own else trial
+    own = constants.get(trial.name, {})
+    if not own:
+        return trial
+    return trial.with_channels(
+        {name: np.full(len(trial), value) for name, value in own.items()}
+    )

@@ -24,7 +24,7 @@ OPTIMISERS: dict[str, type[Optimiser]] = {
 
 
 def get_optimiser(optimiser: str | Mapping[str, Any] | Optimiser) -> Optimiser:
-    """An optimiser as given, by name, or by a table with settings, `{"name": "abc", "rounds": 60}`."""
+    """An optimiser as given, by name, or by a table `{"name": "abc", "rounds": 60}`."""
     if hasattr(optimiser, "minimise"):
         return cast(Optimiser, optimiser)
     table = optimiser if isinstance(optimiser, Mapping) else {"name": optimiser}

@@ -1,4 +1,7 @@
-"""Objectives of a search for C: the samples are read once, and a candidate costs the same for any number."""
+"""Objectives of a search for C: a candidate costs the same for any number of samples.
+
+The samples are read once.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +22,7 @@ from shipgym.arrays import Floats, Integers
 
 @dataclass(frozen=True, eq=False)
 class ErrorOfC:
-    """Mean squared error of the fits for each C, on the samples they were fitted to or on others.
+    """Mean squared error of the fits for each C, on any samples.
 
     Attributes
     ----------
@@ -39,10 +42,11 @@ class ErrorOfC:
     n_samples: int
 
     def __call__(self, log_c: Floats) -> Floats:
-        """Mean squared errors, shape (n_candidates,), of log10 C of shape (n_candidates, 1)."""
-        shrinkage = 1.0 / (self.squares + 10.0**-log_c)
-        error = self.offset - shrinkage @ self.gain
-        sums = np.einsum("kij,kij->i", error, error)
+        """Mean squared errors, shape (n_candidates,), of log10 C (n_candidates, 1)."""
+        penalty = 10.0**-log_c
+        shrinkage = 1.0 / (self.squares + penalty)
+        errors = self.offset - shrinkage @ self.gain
+        sums = np.einsum("kij,kij->i", errors, errors)
         return np.asarray(sums / self.n_samples)
 
 
@@ -53,13 +57,24 @@ def training_error(
     fit_intercept: bool,
     weights: Floats | None = None,
 ) -> ErrorOfC:
-    """Error on the samples fitted (Zhu 2018, eq. 5.14), which falls monotonically with C.
+    """Error on the samples fitted, which falls monotonically with C.
 
-    Its minimum is the upper bound of C: use it to reproduce the paper, not to choose.
+    Source: Zhu 2018, equation 5.14. Its minimum is the upper bound of C: use it to
+    reproduce the paper, not to choose.
     """
     whole = triangle(X, y, fit_intercept, weights)
-    fit = decompose_triangle(whole, len(y), scale, fit_intercept)
-    return _errors([fit], [whole], len(y), fit_intercept)
+    fit = decompose_triangle(
+        whole,
+        n_samples=len(y),
+        scale=scale,
+        fit_intercept=fit_intercept,
+    )
+    return _errors(
+        [fit],
+        triangles=[whole],
+        n_samples=len(y),
+        fit_intercept=fit_intercept,
+    )
 
 
 def held_out_error(
@@ -70,7 +85,7 @@ def held_out_error(
     blocks: Integers,
     weights: Floats | None = None,
 ) -> ErrorOfC:
-    """Error on each block of samples, by their indices from 0, of the fit to all others."""
+    """Error on each block of samples, by its index from 0, of a fit to the others."""
     n_blocks = int(blocks.max()) + 1
     parts = []
     for k in range(n_blocks):
@@ -81,9 +96,19 @@ def held_out_error(
     fits = []
     for k in range(n_blocks):
         others = parts[:k] + parts[k + 1 :]
-        n_others = int(np.sum(blocks != k))
-        fits.append(decompose_triangle(stacked(others), n_others, scale, fit_intercept))
-    return _errors(fits, parts, len(y), fit_intercept)
+        fit = decompose_triangle(
+            stacked(others),
+            n_samples=int(np.sum(blocks != k)),
+            scale=scale,
+            fit_intercept=fit_intercept,
+        )
+        fits.append(fit)
+    return _errors(
+        fits,
+        triangles=parts,
+        n_samples=len(y),
+        fit_intercept=fit_intercept,
+    )
 
 
 def _errors(
@@ -94,30 +119,47 @@ def _errors(
 ) -> ErrorOfC:
     """Errors of fits on the samples of which the triangles are given."""
     first = int(fit_intercept)
-    n_folds, n_rows = len(fits), len(triangles[0])
+    n_folds = len(fits)
+    n_rows = len(triangles[0])
     n_features = n_rows - 1 - first
     offset = np.empty((n_folds, 1, n_rows))
     gain = np.zeros((n_folds, n_features, n_rows))
     squares = np.zeros((n_folds, 1, n_features))
 
     for k, (fit, R) in enumerate(zip(fits, triangles, strict=True)):
-        features, target = R[:, first:-1], R[:, -1]
+        features = R[:, first:-1]
+        target = R[:, -1]
         if fit_intercept:
             features = features - R[:, :1] * fit.centre
             target = target - R[:, 0] * fit.mean
+
         kept = fit.numerical_rank
-        singular_values = fit.singular_values[:kept]
-        explained = features @ (fit.directions[:kept] / fit.scale).T
         offset[k, 0] = target
-        squares[k, 0, :kept] = singular_values**2
-        gain[k, :kept] = (explained * fit.projections[:kept] * singular_values).T
-    return ErrorOfC(offset, gain, squares, n_samples)
+        squares[k, 0, :kept] = fit.singular_values[:kept] ** 2
+        gain[k, :kept] = _explained(fit, features)
+    return ErrorOfC(
+        offset=offset,
+        gain=gain,
+        squares=squares,
+        n_samples=n_samples,
+    )
+
+
+def _explained(fit: Decomposition, features: Floats) -> Floats:
+    """What each direction explains of the targets, by 1 / (s^2 + 1/C)."""
+    kept = fit.numerical_rank
+    directions = fit.directions[:kept] / fit.scale
+    along = features @ directions.T
+    explained = along * fit.projections[:kept] * fit.singular_values[:kept]
+    return explained.T
 
 
 def time_blocks(
-    n_samples: int, folds: int | str = 5, groups: ArrayLike | None = None
+    n_samples: int,
+    folds: int | str = 5,
+    groups: ArrayLike | None = None,
 ) -> Integers:
-    """Index of each sample's block; blocks follow each other, for neighbours in time are similar.
+    """Index of each sample's block of neighbours in time, which are similar.
 
     Parameters
     ----------

@@ -31,7 +31,11 @@ class GridSearch(Optimiser):
     refinements: int = 1
 
     def _search(
-        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+        self,
+        record: Recorder,
+        low: Floats,
+        high: Floats,
+        rng: np.random.Generator,
     ) -> None:
         points = check_whole(self.points, "points", at_least=3, at_most=MOST)
         check_whole(self.refinements, "refinements", at_least=0, at_most=MOST)
@@ -49,7 +53,9 @@ class GridSearch(Optimiser):
 
 @dataclass(frozen=True)
 class ParticleSwarm(Optimiser):
-    """Particle swarm optimisation with inertia (Shi & Eberhart 1998; Zhu 2018, section 5.3.2).
+    """Particle swarm optimisation with inertia.
+
+    Source: Shi & Eberhart 1998; Zhu 2018, section 5.3.2.
 
     Parameters
     ----------
@@ -71,11 +77,21 @@ class ParticleSwarm(Optimiser):
     common: float = 1.49618
 
     def _search(
-        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+        self,
+        record: Recorder,
+        low: Floats,
+        high: Floats,
+        rng: np.random.Generator,
     ) -> None:
         n = check_whole(self.particles, "particles", at_least=1, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
-        place, values = _start(record, n, low, high, rng)
+        place, values = _start(
+            record,
+            count=n,
+            low=low,
+            high=high,
+            rng=rng,
+        )
         shape = place.shape
         velocity = np.zeros(shape)
         best = place.copy()
@@ -113,7 +129,11 @@ class DifferentialEvolution(Optimiser):
     rounds: int = 60
 
     def _search(
-        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+        self,
+        record: Recorder,
+        low: Floats,
+        high: Floats,
+        rng: np.random.Generator,
     ) -> None:
         from scipy.optimize import Bounds, differential_evolution
 
@@ -165,13 +185,27 @@ class ArtificialBeeColony(Optimiser):
     limit: int = 20
 
     def _search(
-        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+        self,
+        record: Recorder,
+        low: Floats,
+        high: Floats,
+        rng: np.random.Generator,
     ) -> None:
         n = check_whole(self.sources, "sources", at_least=2, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
         check_whole(self.limit, "limit", at_least=1, at_most=MOST)
-        places, values = _start(record, n, low, high, rng)
-        colony = Colony(places, values, np.zeros(n, dtype=np.int64))
+        places, values = _start(
+            record,
+            count=n,
+            low=low,
+            high=high,
+            rng=rng,
+        )
+        colony = Colony(
+            places=places,
+            values=values,
+            idle=np.zeros(n, dtype=np.int64),
+        )
         for _ in range(self.rounds):
             colony.send_bees(np.arange(n), record, low, high, rng)
             onlookers = colony.chances().searchsorted(rng.random(n), "right")
@@ -194,13 +228,14 @@ class Colony:
     idle: Integers  # moves since the last improvement, shape (n_sources,)
 
     def chances(self) -> Floats:
-        """Cumulative chance of each source to be chosen, by its fitness, shape (n_sources,)."""
-        n_sources = len(self.values)
-        small = 1.0 / (1.0 + np.maximum(self.values, 0.0))
-        fitness = np.where(self.values >= 0.0, small, 1.0 - self.values)
+        """Cumulative chance of each source, by its fitness, shape (n_sources,)."""
+        values = self.values
+        of_positive = 1.0 / (1.0 + np.maximum(values, 0.0))
+        of_negative = 1.0 - values
+        fitness = np.where(values >= 0.0, of_positive, of_negative)
+        if not 0.0 < fitness.sum() < np.inf:
+            fitness = np.ones(len(values))
         cumulative = fitness.cumsum()
-        if not 0.0 < cumulative[-1] < np.inf:
-            cumulative = np.arange(1.0, n_sources + 1.0)
         return np.asarray(cumulative / cumulative[-1])
 
     def send_bees(
@@ -225,17 +260,21 @@ class Colony:
         self.idle[improved] = 0
 
     def _moved(self, chosen: Integers, rng: np.random.Generator) -> Floats:
-        """Sources moved in one dimension each: x + a (x - x of another), a in [-1, 1]."""
+        """Sources moved in one dimension each, towards or away from another.
+
+        That is x + a (x - x of the other), with a in [-1, 1].
+        """
         n_sources, n_dimensions = self.places.shape
-        draws = rng.random((3, len(chosen)))
-        distance = (draws[0] * (n_sources - 1)).astype(np.int64)
+        n_bees = len(chosen)
+        by_distance, by_axis, by_stride = rng.random((3, n_bees))
+        distance = (by_distance * (n_sources - 1)).astype(np.int64)
         other = (chosen + 1 + distance) % n_sources
-        axis = (draws[1] * n_dimensions).astype(np.int64)
-        stride = 2.0 * draws[2] - 1.0
+        axis = (by_axis * n_dimensions).astype(np.int64)
+        stride = 2.0 * by_stride - 1.0
 
         moved = self.places[chosen]
         away = self.places[chosen, axis] - self.places[other, axis]
-        moved[np.arange(len(chosen)), axis] += stride * away
+        moved[np.arange(n_bees), axis] += stride * away
         return moved
 
 
@@ -245,7 +284,11 @@ def _drawn(count: int, low: Floats, high: Floats, rng: np.random.Generator) -> F
 
 
 def _start(
-    record: Recorder, count: int, low: Floats, high: Floats, rng: np.random.Generator
+    record: Recorder,
+    count: int,
+    low: Floats,
+    high: Floats,
+    rng: np.random.Generator,
 ) -> tuple[Floats, Floats]:
     """The first round: candidates drawn in the box, and their values."""
     drawn = _drawn(count, low, high, rng)

@@ -24,7 +24,7 @@ def pattern_search(
     finest: float = 1.0 / 64.0,
     most_evaluations: int = 200,
 ) -> SearchResult:
-    """Minimise a function of few variables without derivatives, from a start within bounds.
+    """Minimise a function of few variables without derivatives, within bounds.
 
     Each round polls the 2n neighbours on the mesh and moves to the best of them if it
     is better; else the mesh is halved until it is finer than `finest`. No point is
@@ -57,10 +57,12 @@ def pattern_search(
     record.end_round()
 
     axes = np.eye(len(lowest))
-    directions = (highest - lowest) * np.vstack([axes, -axes])
+    both_ways = np.vstack([axes, -axes])
+    directions = (highest - lowest) * both_ways
     while mesh >= finest and value_at.cache_info().currsize < most_evaluations:
         before = record.value
-        record(np.clip(record.x + mesh * directions, lowest, highest))
+        neighbours = record.x + mesh * directions
+        record(np.clip(neighbours, lowest, highest))
         if not record.value < before:
             mesh *= 0.5
         record.end_round()

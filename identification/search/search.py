@@ -93,30 +93,48 @@ class Recorder:
         """The search up to now."""
         history = np.array(self._history)
         course = np.array(self._course)
-        return SearchResult(self.x, self.value, history, course, self.evaluations)
+        return SearchResult(
+            x=self.x,
+            value=self.value,
+            history=history,
+            course=course,
+            evaluations=self.evaluations,
+        )
 
 
 class Optimiser(ABC):
     """Minimises an objective within a box."""
 
     def minimise(
-        self, objective: Objective, bounds: ArrayLike, seed: int = 0
+        self,
+        objective: Objective,
+        bounds: ArrayLike,
+        seed: int = 0,
     ) -> SearchResult:
-        """Minimise an objective; arguments and errors are those of `identification.minimise`.
+        """Minimise an objective; arguments and errors as of `identification.minimise`.
 
         The objective gives values, shape (n_candidates,), of candidates of shape
         (n_candidates, n_dimensions); the bounds have shape (n_dimensions, 2).
         """
         record = Recorder(objective)
         low, high = check_bounds(bounds)
-        self._search(record, low, high, np.random.default_rng(seed))
+        self._search(
+            record,
+            low=low,
+            high=high,
+            rng=np.random.default_rng(seed),
+        )
         return record.result()
 
     @abstractmethod
     def _search(
-        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+        self,
+        record: Recorder,
+        low: Floats,
+        high: Floats,
+        rng: np.random.Generator,
     ) -> None:
-        """Evaluate candidates by `record`, and call its `end_round` after each round."""
+        """Evaluate candidates by `record`, and end each round by its `end_round`."""
 
 
 def check_bounds(bounds: ArrayLike) -> tuple[Floats, Floats]:

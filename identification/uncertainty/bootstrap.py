@@ -1,7 +1,6 @@
-"""Covariance of coefficients by refits to blocks of the record drawn with replacement."""
+"""Covariance of coefficients by refits to blocks of the record (bootstrap)."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from sklearn.base import clone
@@ -13,14 +12,17 @@ from identification.progress import counted
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
 from shipgym.arrays import Floats, Integers
+from shipgym.trials.resampling import usual_step
 
 DRAWS = 200
 
 
 def moving_blocks(
-    groups: Sequence[Integers], lengths: Sequence[int], rng: np.random.Generator
+    groups: Sequence[Integers],
+    lengths: Sequence[int],
+    rng: np.random.Generator,
 ) -> Integers:
-    """Rows drawn in blocks with replacement, as many as there are, each group by itself.
+    """Rows drawn in blocks with replacement, as many as there are, by group.
 
     Künsch 1989, Annals of Statistics 17(3): every stretch of the block's length is as
     likely. A group are rows that follow one another in time, such as those of one
@@ -54,26 +56,33 @@ def bootstrap_covariance(
     (n_coefficients, n_coefficients).
     """
     rng = np.random.default_rng(seed)
-    trials = np.unique(samples.trial)
-    groups = [np.flatnonzero(samples.trial == trial) for trial in trials]
-    lengths = [rows_in(memory, samples.start[rows]) for rows in groups]
+    groups = []
+    lengths = []
+    for trial in np.unique(samples.trial):
+        rows = np.flatnonzero(samples.trial == trial)
+        groups.append(rows)
+        lengths.append(rows_in(memory, samples.start[rows]))
     errors = residuals(estimators, samples)
 
     refits = []
     for _ in counted("bootstrap", range(draws)):
         rows = moving_blocks(groups, lengths, rng)
-        coefficients = [
-            _refitted(estimator, samples, q, rows, errors[q])
-            for q, estimator in estimators.items()
-        ]
+        coefficients = []
+        for q, estimator in estimators.items():
+            X = samples.features[q][rows]
+            y = samples.targets[q][rows]
+            coefficients.append(_refitted(estimator, X, y, errors[q][rows]))
         refits.append(np.concatenate(coefficients))
-    return np.asarray(np.cov(np.array(refits).T))
+    return np.asarray(np.cov(np.transpose(refits)))
 
 
 def influence_covariance(
-    influences: Sequence[Floats], block: int, draws: int = DRAWS, seed: int = 0
+    influences: Sequence[Floats],
+    block: int,
+    draws: int = DRAWS,
+    seed: int = 0,
 ) -> Floats:
-    """Covariance of coefficients by a block bootstrap of what each stretch of time adds to them.
+    """Covariance of coefficients by a block bootstrap of what stretches add to them.
 
     One Newton step instead of a refit (Davidson & MacKinnon 1999, International
     Economic Review 40(2)). Influences by trial, in the order of time, of shape
@@ -81,39 +90,37 @@ def influence_covariance(
     """
     rng = np.random.default_rng(seed)
     stacked = np.concatenate(influences)
-    counts = [len(stretches) for stretches in influences]
-    edges = np.cumsum([0, *counts]).tolist()
-    groups = [np.arange(first, end) for first, end in pairwise(edges)]
+    groups = []
+    first = 0
+    for stretches in influences:
+        end = first + len(stretches)
+        groups.append(np.arange(first, end))
+        first = end
     lengths = [block] * len(groups)
 
     totals = []
     for _ in range(draws):
         rows = moving_blocks(groups, lengths, rng)
         totals.append(stacked[rows].sum(axis=0))
-    return np.asarray(np.cov(np.array(totals).T))
+    return np.asarray(np.cov(np.transpose(totals)))
 
 
 def rows_in(memory: float, start: Floats) -> int:
     """Rows of a regression that start within a time, s, at least one."""
     if len(start) < 2:
         return 1
-    spacing = float(np.median(np.diff(start)))
-    return max(round(memory / spacing), 1) if spacing > 0.0 else 1
+    spacing = usual_step(start)
+    if spacing <= 0.0:
+        return 1
+    return max(round(memory / spacing), 1)
 
 
-def _refitted(
-    estimator: Estimator,
-    samples: Samples,
-    equation: str,
-    rows: Integers,
-    errors: Floats,
-) -> Floats:
-    """Coefficients from the drawn rows."""
-    X, y = samples.features[equation][rows], samples.targets[equation][rows]
+def _refitted(estimator: Estimator, X: Floats, y: Floats, errors: Floats) -> Floats:
+    """Coefficients from the drawn rows, whose errors by the estimator are given."""
     if isinstance(estimator, TruncatedLSSVM | LSSVM):
         refit = clone(estimator)
         if isinstance(estimator, TruncatedLSSVM):
             refit.set_params(rank=estimator.rank_)
         return np.asarray(refit.fit(X, y).coef_)
-    step = estimator.inverse_moment_ @ (X.T @ errors[rows])
+    step = estimator.inverse_moment_ @ (X.T @ errors)
     return np.asarray(estimator.coef_ + step)

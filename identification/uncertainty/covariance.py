@@ -1,4 +1,4 @@
-"""How certain the coefficients are, together: one covariance over all equations of motion."""
+"""Covariance of the coefficients of all equations of motion together."""
 
 import numpy as np
 
@@ -6,21 +6,25 @@ from identification.estimators.estimator import Estimator, Estimators, weights
 from identification.estimators.threads import single_threaded
 from identification.regression.samples import Samples
 from shipgym.arrays import Floats
+from shipgym.trials.resampling import usual_step
 
 
 def residuals(estimators: Estimators, samples: Samples) -> dict[str, Floats]:
     """Target less prediction of each equation, arrays of shape (n_rows,)."""
     errors = {}
     for q, estimator in estimators.items():
-        errors[q] = samples.targets[q] - estimator.predict(samples.features[q])
+        predicted = estimator.predict(samples.features[q])
+        errors[q] = samples.targets[q] - predicted
     return errors
 
 
 @single_threaded()
 def joint_covariance(
-    estimators: Estimators, samples: Samples, memory: float = 0.0
+    estimators: Estimators,
+    samples: Samples,
+    memory: float = 0.0,
 ) -> Floats:
-    """Covariance of the coefficients of all equations, residuals correlated across equations and in time.
+    """Covariance of the coefficients of all equations.
 
     With the coefficients of each equation a linear map of its targets, the covariance
     follows from that of the residuals. Without memory they are independent in time
@@ -48,7 +52,7 @@ def joint_covariance(
 
 
 def _without_memory(maps: list[Floats], errors: list[Floats]) -> Floats:
-    """Covariance for errors that are independent in time, and correlated between equations."""
+    """Covariance for errors that are independent in time."""
     rows = []
     for own_map, own_errors in zip(maps, errors, strict=True):
         blocks = []
@@ -60,21 +64,24 @@ def _without_memory(maps: list[Floats], errors: list[Floats]) -> Floats:
 
 
 def _with_memory(
-    maps: list[Floats], errors: list[Floats], samples: Samples, memory: float
+    maps: list[Floats],
+    errors: list[Floats],
+    samples: Samples,
+    memory: float,
 ) -> Floats:
     """Covariance for errors that last, each trial by itself."""
-    columns = [
-        own_map * own_errors[:, None]
-        for own_map, own_errors in zip(maps, errors, strict=True)
-    ]
-    scores = np.hstack(columns)
+    by_equation = []
+    for own_map, own_errors in zip(maps, errors, strict=True):
+        by_equation.append(own_map * own_errors[:, None])
+    scores = np.hstack(by_equation)
     n_coefficients = scores.shape[1]
     total = np.zeros((n_coefficients, n_coefficients))
     for trial in np.unique(samples.trial):
-        rows = samples.trial == trial
-        start = samples.start[rows]
-        spacing = float(np.median(np.diff(start))) if len(start) > 1 else memory
-        total += newey_west(scores[rows], round(memory / spacing))
+        own = samples.trial == trial
+        start = samples.start[own]
+        spacing = usual_step(start) if len(start) > 1 else memory
+        lags = round(memory / spacing)
+        total += newey_west(scores[own], lags)
     return 0.5 * (total + total.T)
 
 
@@ -90,10 +97,10 @@ def effective_freedom(estimator: Estimator, features: Floats) -> float:
 def coefficient_covariance(
     acceleration_covariance: Floats, acceleration_matrix: Floats
 ) -> Floats:
-    """Covariance of the hydrodynamic derivatives from that of the coefficients of the accelerations.
+    """Covariance of the hydrodynamic derivatives from that of the accelerations.
 
-    Both have the shape (n, n), as the matrix, which maps derivatives to those
-    coefficients (`Structure.acceleration_matrix`).
+    Of the coefficients of these, that is. Both have the shape (n, n), as the matrix,
+    which maps derivatives to those coefficients (`Structure.acceleration_matrix`).
     """
     half = np.linalg.solve(acceleration_matrix, acceleration_covariance)
     covariance: Floats = np.linalg.solve(acceleration_matrix, half.T)
@@ -105,10 +112,12 @@ def newey_west(scores: Floats, lags: int) -> Floats:
 
     By Newey & West 1987, with Bartlett's weights 1 - lag / (lags + 1).
     """
-    lags = min(lags, len(scores) - 1)
+    most = min(lags, len(scores) - 1)
     total: Floats = scores.T @ scores
-    for lag in range(1, lags + 1):
-        shifted = scores[lag:].T @ scores[:-lag]
-        weight = 1.0 - lag / (lags + 1.0)
-        total += weight * (shifted + shifted.T)
+    for lag in range(1, most + 1):
+        later = scores[lag:]
+        earlier = scores[:-lag]
+        moment = later.T @ earlier
+        weight = 1.0 - lag / (most + 1.0)
+        total += weight * (moment + moment.T)
     return total

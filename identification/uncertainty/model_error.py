@@ -1,4 +1,4 @@
-"""How much worse trials left out are predicted than the covariance says, because of the structure.
+"""Error of the structure: how much worse trials are predicted than noise explains.
 
 The covariance of a regression says what noise does to the coefficients, not what the
 equations cannot do. So each trial is left out in turn and predicted, motion and indices
@@ -7,6 +7,7 @@ standard errors are scaled until these errors are of size one.
 """
 
 import copy
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -15,7 +16,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import t as student
 
-from identification.arrays import mean_square
+from identification.arrays import mean_square, root_mean_square
 from identification.estimators.estimator import Estimator, Estimators, weights
 from identification.regression.preprocess import smoothed_channels
 from identification.regression.preprocess.noise import noise_level
@@ -25,6 +26,7 @@ from identification.validation.closed_loop import closed_loop
 from identification.validation.prediction import COMPARED, ZIGZAG, index_reader, predict
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Flags, Floats
+from shipgym.trials.resampling import usual_step
 
 FEWEST_TRIALS = 3  # to leave one out and learn something from it
 # factor for fewer: found were 2.1 to 2.6 on ships of other equations than the
@@ -56,7 +58,9 @@ class ErrorSizes(NamedTuple):
 
 
 def without_trial(
-    estimators: Estimators, samples: Samples, trial: int
+    estimators: Estimators,
+    samples: Samples,
+    trial: int,
 ) -> tuple[Estimators, Samples]:
     """Estimators as if fitted without a trial, and the rows of the others.
 
@@ -65,46 +69,55 @@ def without_trial(
     """
     errors = residuals(estimators, samples)
     out = samples.trial == trial
-    found = {
-        q: _without_rows(estimator, samples.features[q], errors[q], out)
-        for q, estimator in estimators.items()
-    }
+    found = {}
+    for q, estimator in estimators.items():
+        found[q] = _without_rows(
+            estimator,
+            features=samples.features[q],
+            errors=errors[q],
+            out=out,
+        )
     return found, samples.select(~out)
 
 
 def _without_rows(
-    estimator: Estimator, features: Floats, errors: Floats, out: Flags
+    estimator: Estimator,
+    features: Floats,
+    errors: Floats,
+    out: Flags,
 ) -> Estimator:
     """An estimator less the rows of its normal equations that are `out`.
 
     With M the inverse moment of all, that of the others is (1 - M X'W X)^-1 M, with the
     features X and weights W of the rows left out.
     """
-    weight = weights(estimator, features)
+    counts = weights(estimator, features)
     M = estimator.inverse_moment_
     X = features[out]
-    left = X.T * weight[out]
-    change = np.linalg.pinv(np.eye(len(M)) - M @ left @ X)
+    XW = X.T * counts[out]
+    change = np.linalg.pinv(np.eye(len(M)) - M @ XW @ X)
 
     found = copy.copy(estimator)
-    found.coef_ = estimator.coef_ - change @ M @ (left @ errors[out])
+    found.coef_ = estimator.coef_ - change @ M @ (XW @ errors[out])
     found.inverse_moment_ = change @ M
     if hasattr(estimator, "weights_"):
-        found.weights_ = weight[~out]  # type: ignore[attr-defined]
+        found.weights_ = counts[~out]  # type: ignore[attr-defined]
     return found
 
 
 def model_error(
-    own: ShipModel, left_out: Sequence[ShipModel], trials: Sequence[Trial]
+    own: ShipModel,
+    left_out: Sequence[ShipModel],
+    trials: Sequence[Trial],
 ) -> dict[str, Any]:
-    """The factor on the standard errors at which errors of prediction are of size one, never below 1.
+    """Factor on the standard errors at which errors of prediction are of size one.
 
-    `own`: the model of all trials; `left_out`: each identified without the trial of the
-    same place; all with covariance. Trials left out ask for a factor, and so do, where
-    it is larger, the errors of the own model on the trials that it was fitted to: a
-    trial left out is known from its mirror image, and the covariance shrinks with each
-    trial while the error of the equations does not. Returns `factor`, `how` it was
-    found, and what it is made of, for the provenance.
+    It is never below 1. `own`: the model of all trials; `left_out`: each identified
+    without the trial of the same place; all with covariance. Trials left out ask for a
+    factor, and so do, where it is larger, the errors of the own model on the trials
+    that it was fitted to: a trial left out is known from its mirror image, and the
+    covariance shrinks with each trial while the error of the equations does not.
+    Returns `factor`, `how` it was found, and what it is made of, for the provenance.
     """
     fitted = error_sizes([own] * len(trials), trials)
     error = _generalisation(left_out, trials)
@@ -117,10 +130,11 @@ def model_error(
 def _generalisation(
     left_out: Sequence[ShipModel], trials: Sequence[Trial]
 ) -> dict[str, Any]:
-    """The factor of trials left out, times Student's t with as many degrees of freedom over the normal's.
+    """Factor by trials left out, widened for few trials.
 
-    Of few trials the scatter itself is uncertain. `DEFAULT` where fewer than three can
-    be predicted.
+    Of few trials the scatter itself is uncertain, hence the quantile of Student's t
+    over that of the normal distribution. `DEFAULT` where fewer than three can be
+    predicted.
     """
     if len(trials) < FEWEST_TRIALS:
         return _assumed(f"too few trials to leave one out ({len(trials)})")
@@ -146,8 +160,9 @@ def _assumed(why: str) -> dict[str, Any]:
 
 
 def error_sizes(models: Sequence[ShipModel], trials: Sequence[Trial]) -> ErrorSizes:
-    """How large the errors of models, with covariance, are on the trials of the same places."""
-    motion, indices = list[PredictionError](), list[PredictionError]()
+    """Sizes of the errors of models, with covariance, each on its trial."""
+    motion: list[PredictionError] = []
+    indices: list[PredictionError] = []
     predicted = 0
     for model, trial in zip(models, trials, strict=True):
         names = [name for name in COMPARED if name in trial]
@@ -162,19 +177,23 @@ def error_sizes(models: Sequence[ShipModel], trials: Sequence[Trial]) -> ErrorSi
             motion += errors
             indices += index_errors(own, drawn, trial, clean)
 
-    by_kind = dict[str, float]()
+    by_kind: dict[str, float] = {}
     if motion:
         by_kind["motion"] = scale_of(motion)
     if indices:
         by_kind["indices"] = scale_of(indices)
-    squares = [size**2 for size in by_kind.values()]
-    return ErrorSizes(float(np.sqrt(np.mean(squares or 0.0))), by_kind, predicted)
+    factor = 0.0
+    if by_kind:
+        sizes = np.array(list(by_kind.values()))
+        factor = root_mean_square(sizes)
+    return ErrorSizes(factor, by_kind, predicted)
 
 
 def scale_of(errors: Sequence[PredictionError]) -> float:
-    """The factor k at which errors are of size one: the mean of error^2 / (k^2 variance + noise^2) is 1.
+    """Factor k at which errors are of size one.
 
-    Between a thousandth and a thousand.
+    There the mean of error^2 / (k^2 variance + noise^2) is 1. It is between a
+    thousandth and a thousand.
     """
     square, variance, noise = np.array(errors).T
 
@@ -182,68 +201,88 @@ def scale_of(errors: Sequence[PredictionError]) -> float:
         expected = np.exp(2.0 * log_factor) * variance + noise
         return float(np.mean(square / expected)) - 1.0
 
-    smallest, largest = np.log(1e-3), -np.log(1e-3)
-    if excess(smallest) <= 0.0:
+    largest = -np.log(1e-3)
+    if excess(-largest) <= 0.0:
         return 1e-3
     if excess(largest) >= 0.0:
         return 1e3
-    return float(np.exp(brentq(excess, smallest, largest)))
+    return float(np.exp(brentq(excess, -largest, largest)))
 
 
 def motion_errors(
-    own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, clean: Trial
+    own: ShipModel,
+    drawn: Sequence[ShipModel],
+    trial: Trial,
+    clean: Trial,
 ) -> list[PredictionError]:
-    """Mean square error of each channel; none where the model or most draws run away."""
+    """Mean square error of each channel; none where the model or most draws fail."""
     predicted = predict(own, clean)
-    runs = list[Trial]()
-    for draw in drawn:
-        run = predict(draw, clean)
-        if run is not None:
-            runs.append(run)
+    runs = _runs([(draw, clean) for draw in drawn])
     if predicted is None or len(runs) < DRAWS / 2:
         return []
 
-    levels = {
-        name: noise_level(trial.t, trial[name]) for name in COMPARED if name in trial
-    }
-    shifted = _shifted_starts(own, clean, levels)
+    names = [name for name in COMPARED if name in trial]
+    levels = {name: noise_level(trial.t, trial[name]) for name in names}
+    from_shifted = _from_shifted_starts(own, clean, levels)
+    timing = _timing(trial)
     found = []
     for name, level in levels.items():
-        scatter = np.array([run[name] for run in runs]) - predicted[name]
+        mine = predicted[name]
+        scatter = np.array([run[name] for run in runs]) - mine
         variance = float(np.mean(_robust_variance(scatter)))
         if variance <= 0.0:
             continue
-        by_start = [mean_square(run[name] - predicted[name]) for run in shifted]
-        by_timing = mean_square(_timing(trial) * np.gradient(clean[name], trial.t))
-        noise = level**2 + by_timing + sum(by_start)
-        square = mean_square(predicted[name] - trial[name])
-        found.append(PredictionError(square, variance, noise))
+        by_start = [mean_square(run[name] - mine) for run in from_shifted]
+        by_timing = mean_square(timing * np.gradient(clean[name], clean.t))
+        error = PredictionError(
+            square=mean_square(mine - trial[name]),
+            variance=variance,
+            noise=level**2 + by_timing + sum(by_start),
+        )
+        found.append(error)
     return found
 
 
-def _shifted_starts(
-    own: ShipModel, clean: Trial, levels: dict[str, float]
-) -> list[Trial]:
-    """Predictions from starts off by half the noise of a channel, to which smoothing leaves it known."""
+def _runs(cases: Sequence[tuple[ShipModel, Trial]]) -> list[Trial]:
+    """Predictions of trials by models, of those that do not run away."""
     runs = []
-    for name, level in levels.items():
-        if level:
-            shifted = clean.with_channels({name: clean[name] + 0.5 * level})
-            run = predict(own, shifted)
-            if run is not None:
-                runs.append(run)
+    for model, trial in cases:
+        run = predict(model, trial)
+        if run is not None:
+            runs.append(run)
     return runs
 
 
+def _from_shifted_starts(
+    own: ShipModel,
+    clean: Trial,
+    levels: dict[str, float],
+) -> list[Trial]:
+    """Predictions from starts off by half the noise of a channel.
+
+    Smoothing leaves the start known to that.
+    """
+    cases = []
+    for name, level in levels.items():
+        if level:
+            shifted = clean.with_channels({name: clean[name] + 0.5 * level})
+            cases.append((own, shifted))
+    return _runs(cases)
+
+
 def _robust_variance(scatter: Floats) -> Floats:
-    """Variance along the first axis from the median of the squares, which of a normal number is 0.455."""
-    return np.asarray(np.median(scatter**2, axis=0) / 0.455)
+    """Variance along the first axis from the median of the squares."""
+    of_normal = 0.455  # median of the square of a standard normal number
+    return np.asarray(np.median(scatter**2, axis=0) / of_normal)
 
 
 def index_errors(
-    own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, clean: Trial
+    own: ShipModel,
+    drawn: Sequence[ShipModel],
+    trial: Trial,
+    clean: Trial,
 ) -> list[PredictionError]:
-    """Error of each index of a zigzag or a turning circle; a time read from samples is known to a step."""
+    """Error of each index of a zigzag or a turning circle."""
     read = index_reader(own, clean)
     if read is None:
         return []
@@ -262,24 +301,28 @@ def index_errors(
             continue
         variance = float(_robust_variance(known - mine))
         if variance > 0.0:
-            noise = _reading_noise(trial, name, own)
-            found.append(PredictionError((truth - mine) ** 2, variance, noise))
+            error = PredictionError(
+                square=(truth - mine) ** 2,
+                variance=variance,
+                noise=_reading_noise(trial, name, own),
+            )
+            found.append(error)
     return found
 
 
 def _timing(trial: Trial) -> float:
-    """Standard deviation of a time that is known to a step, such as that of a rudder's corner, s."""
-    return float(np.median(np.diff(trial.t)) / np.sqrt(12.0))
+    """Standard deviation of a time that is known to a step, s."""
+    return usual_step(trial.t) / math.sqrt(12.0)
 
 
 def _reading_noise(trial: Trial, index: str, model: ShipModel) -> float:
-    """Variance of an index as it is read from samples: noise, and a time that is known to a step."""
+    """Variance of an index as it is read from samples, by noise and timing."""
     timing = _timing(trial)
     if index.endswith("_deg"):
         noise = noise_level(trial.t, trial["psi"])
-        rate = float(np.abs(trial["r"]).max())
-        error_deg = np.degrees(np.hypot(noise, timing * rate))
-        return float(error_deg) ** 2
+        fastest = float(np.abs(trial["r"]).max())
+        error = np.hypot(noise, timing * fastest)
+        return float(np.degrees(error)) ** 2
 
     noise = 0.0
     if "x" in trial and trial.kind != "zigzag":

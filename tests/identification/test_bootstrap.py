@@ -19,7 +19,7 @@ from shipgym import InputError, ShipModel, Trial
 
 
 def regression(rng: np.random.Generator, lasting: int = 1, n: int = 400) -> Samples:
-    """One equation with two terms of coefficients 1 and -2, and errors that last over some rows."""
+    """One equation with terms of coefficients 1 and -2; errors last over some rows."""
     smooth = [
         np.convolve(rng.standard_normal(n + 9), np.ones(10), "valid") for _ in range(2)
     ]

@@ -13,7 +13,7 @@ def test_the_filter_finds_a_linear_equation_and_depends_on_its_start_for_a_cubic
 
 
 def test_a_network_steps_the_record_that_it_learned():
-    """Heading and yaw rate of a zigzag from its first sample and its rudder, to a twentieth of their span."""
+    """Heading and yaw rate of a zigzag are predicted to a twentieth of their span."""
     trial = first_samples(song2020.trial("nomoto"), 400)
     found = comparators.trained([trial], ("psi", "r"), 0).run(trial, ("psi", "r"))
     for name, values in found.items():

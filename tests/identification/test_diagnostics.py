@@ -137,7 +137,7 @@ def test_times_that_nearly_coincide_are_refused(
 
 
 def test_each_equation_tells_its_numbers() -> None:
-    """Two orthogonal features (0.01 and 100), one explained but for alternating errors of 0.5."""
+    """Two orthogonal features (0.01, 100); alternating errors of 0.5 in one of them."""
     rows = np.arange(400)
     a = np.where(rows % 2 == 0, 0.01, -0.01)
     b = np.where(rows // 2 % 2 == 0, 100.0, -100.0)

@@ -1,4 +1,4 @@
-"""Captive tests: the vectorial PMM models, coefficients shared between equations, added mass among them."""
+"""Captive tests: the vectorial PMM models, with coefficients shared by equations."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def tank_tests(noise: float = 0.0, model_inertia: bool = True) -> tuple[Trial, .
 
 
 def test_the_models_have_the_coefficients_of_the_paper() -> None:
-    """38 in equations 19 to 21 (10, 14, 14), 18 in 39 to 41 (5, 6, 7); the reduced ones among the full."""
+    """Equations 19 to 21 have 38 (10, 14, 14), equations 39 to 41 have 18 (5, 6, 7)."""
     assert len(PMM38.coefficient_names) == 38
     assert set(PMM18.coefficient_names) == TABLE_11.keys()
     assert TABLE_11.keys() < set(PMM38.coefficient_names)
@@ -94,7 +94,7 @@ def test_each_term_stands_once_and_before_those_of_the_mass() -> None:
 
 
 def test_a_kept_acceleration_feels_mass_and_added_mass() -> None:
-    """Equation 40 with v only: (m' - Y_vdot) vdot' + (m'xG' - Y_rdot) rdot' = Y_uuv + Y_v|v| v'|v'|."""
+    """Equation 40 with v only: (m' - Y_vdot) vdot' + ... = Y_uuv + Y_v|v| v'|v'|."""
     m = 417e3 / PRIME_MASS
     drift, L, U = 0.1, 28.9, 5.0
     u, v = np.cos(drift), -np.sin(drift)
@@ -115,7 +115,7 @@ def test_a_kept_acceleration_feels_mass_and_added_mass() -> None:
 
 @pytest.mark.parametrize("model_inertia", [True, False])
 def test_table_11_is_recovered_from_the_virtual_tank(model_inertia: bool) -> None:
-    """Added mass, and coefficients that stand in three equations, from all tests at once."""
+    """Added mass, and coefficients of three equations, from all tests at once."""
     model = identify_forces(
         tank_tests(model_inertia=model_inertia),
         "pmm18",
@@ -160,7 +160,7 @@ def test_each_force_has_the_noise_of_its_own_residuals() -> None:
 
 
 def test_the_full_model_explains_the_tests_but_not_all_its_coefficients() -> None:
-    """With u' = 1 in pure yaw, ur and uur are one: rank below 38, as Tables 3, 6 and 8 of the paper show."""
+    """With u' = 1 in pure yaw ur and uur are one: rank below 38 (tables 3, 6, 8)."""
     model = identify_forces(tank_tests(), "pmm38", PARTICULARS)
     assert model.provenance is not None
     assert model.provenance["rank"] < 38
@@ -246,7 +246,7 @@ def test_tests_that_tell_nothing_are_refused() -> None:
         identify_forces([run], "pmm18", None)
 
 
-def test_the_variance_of_a_force_is_that_of_its_own_residuals_with_one_degree_of_freedom_at_least():
+def test_the_variance_of_a_force_is_by_its_own_residuals_and_freedom():
     equation = np.array([0, 0, 0, 1, 1, 2])
     residuals = np.array(
         [[1.0, 2.0], [1.0, 2.0], [2.0, 0.0], [3.0, 1.0], [4.0, 1.0], [5.0, 6.0]]
@@ -271,9 +271,7 @@ def test_a_static_test_is_cut_where_a_velocity_jumps_by_twenty_usual_changes() -
     assert between_jumps(held) == [slice(0, 5), slice(8, 12), slice(12, 20)]
 
 
-def test_each_force_is_scaled_by_its_root_mean_square_and_one_that_is_zero_not_at_all() -> (
-    None
-):
+def test_each_force_is_scaled_by_its_root_mean_square_unless_it_is_zero() -> None:
     regression = ForceRegression(
         np.ones((6, 1)),
         np.array([0.0, 0.0, 3.0, 4.0, 5.0, -5.0]),
@@ -309,7 +307,7 @@ def test_a_test_of_jumps_alone_is_refused_and_rounding_is_none() -> None:
 
 
 def test_forces_are_those_of_the_prime_system_less_the_inertia_of_the_ship() -> None:
-    """X by rho L^2 U^2 / 2 and N by another L; at constant velocities m' r' is what turns with her axes."""
+    """X by rho L^2 U^2 / 2, N by another L; at constant velocities m' r' is left."""
     length, density, U, n = 28.9, 1025.0, 2.0, 8
     still = np.ones(n)
     motion = {"u": 1.6 * still, "v": 1.2 * still, "r": 0.05 * still}

@@ -1,4 +1,4 @@
-"""Kernel ships: LS-SVM with an RBF kernel on what a named or fitted reference ship leaves."""
+"""Kernel ships: LS-SVM with an RBF kernel on what a reference ship leaves."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def errors(result: IdentificationResult, use: str, of: str = "model") -> float:
 def accelerations(
     model: ShipModel, trial: Trial, scale: float = 1.0, sign: float = 1.0
 ) -> np.ndarray:
-    """Prime accelerations at the states of a trial, drift, turn and rudder times a factor."""
+    """Prime accelerations at states of a trial; drift, turn, rudder times a factor."""
     states = np.stack(
         [np.zeros(len(trial))] * 3 + [trial[n] for n in ("u", "v", "r", "delta")],
         axis=-1,
@@ -361,10 +361,8 @@ SIDES = np.array(
 )  # of drift, turn, rudder and speed seen from the other side
 
 
-def test_centres_are_those_of_samples_brought_to_one_side_and_the_same_of_the_other() -> (
-    None
-):
-    """Two groups of samples beside each other, a third of both from the other side: their means are found."""
+def test_centres_are_those_of_samples_brought_to_one_side_and_their_mirror() -> None:
+    """Two groups, a third of both from the other side: their means are found."""
     random = np.random.default_rng(0)
     groups = np.repeat([[0.1, 0.4, -0.3, 1.0], [-0.2, 0.8, 0.5, 1.1]], 300, axis=0)
     around = groups + 1e-3 * random.standard_normal((600, 4))
@@ -434,7 +432,7 @@ def test_the_linear_ship_beneath_a_kernel_is_damped_as_little_as_steadies_her() 
 
 
 def worst_of(ship: ShipModel, damping: float) -> float:
-    """Most of what a linear ship may do by it: roots at -0.2, a drift of 0.5, a turn of 1.2."""
+    """Bounds of the linear ship: roots at -0.2, a drift of 0.5, a turn of 1.2."""
     c = ship.coefficients
     A = np.array([[c["b_v"], c["b_r"]], [c["c_v"], c["c_r"]]]) - damping * np.eye(2)
     drift, turn = np.linalg.inv(A) @ [c["b_d"], c["c_d"]] * GEAR.limit

@@ -1,4 +1,4 @@
-"""The identified models in the box: made again from the trials that ship with the project."""
+"""The identified models that ship with the project, made again from their trials."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def off_in_standard_errors(model, shipped):
 
 
 def test_mariner_tls_svm_is_what_its_trials_give():
-    """As `scripts/build_models.py` does; coefficients to the last digits of the linear algebra.
+    """As `scripts/build_models.py` does; to the last digits of the linear algebra.
 
     The file, which the agents' files name by its hash, has a model error of before
     measured rudders were traced back to the angle that was held. The trials are those
@@ -51,7 +51,7 @@ def test_mariner_tls_svm_is_what_its_trials_give():
 
 @pytest.mark.parametrize("angle", [10, 15, 20, 30])
 def test_mariner_tls_svm_sails_like_the_ship_behind_its_trials(angle):
-    """Overshoots within 0.1 deg and 3 per cent of the simulated ship's, from noisy trials."""
+    """Overshoots within 0.1 deg and 3 per cent of the ship's, from noisy trials."""
     found, truth = (
         manoeuvres.zigzag_indices(
             manoeuvres.zigzag(shipgym.load_model(name), angle, angle)
@@ -95,7 +95,7 @@ def test_every_environment_has_an_identified_model_by_default():
 def test_models_sail_like_the_ships_behind_their_trials_where_these_did_not_reach(
     name, turn, overshoot
 ):
-    """Turning circles at 35 deg and zigzags 15/15 and 25/25 are in no model's trials."""
+    """Turning circles at 35 deg and zigzags 15/15, 25/25 are in no model's trials."""
     model = shipgym.load_model(name)
     turns, held_out, _ = build_models.errors(model, *build_models.COMPARED_DEG)
     assert turns < 100.0 * turn
@@ -176,7 +176,7 @@ def kvlcc2_overshoots(model):
 
 
 def test_kvlcc2_rm_svm_turns_like_the_ship_behind_its_zigzags():
-    """Within 1 per cent at 35 deg, from 20 deg at most; its reference ship by itself is 3 per cent wide."""
+    """Within 1 per cent at 35 deg, from 20 deg at most; the reference is 3 wide."""
     ship, model = (shipgym.load_model(name) for name in ("kvlcc2", "kvlcc2-rm-svm"))
     bare = shipgym.ships.converted_model(
         "kvlcc2-l7", ship.particulars, ship.steering, ship.service_shaft_speed
@@ -211,7 +211,7 @@ def test_kvlcc2_nomoto_overshoots_like_the_ship_within_its_form():
     ],
 )
 def test_a_ship_is_steered_by_controllers_designed_on_its_models(name, design):
-    """The true ship keeps its course: no model of KVLCC2, on the verge of stability, misleads the design."""
+    """The true ship keeps its course: no model of KVLCC2 misleads the design."""
     env = gymnasium.make("shipgym/CourseKeeping-v0", model=name.split("-")[0])
     controller = design.from_model(shipgym.load_model(name))
     observation, _ = env.reset(seed=0)

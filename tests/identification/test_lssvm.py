@@ -39,7 +39,7 @@ Floats = np.ndarray[Any, np.dtype[np.float64]]
 def regression(
     n: int = 300, m: int = 7, noise: float = 0.1, seed: int = 0
 ) -> tuple[Floats, Floats, Floats]:
-    """Features like those of manoeuvres: correlated, of very different size, with an offset."""
+    """Features like those of manoeuvres: correlated, of different size, with offset."""
     rng = np.random.default_rng(seed)
     X = (
         rng.standard_normal((n, m)) @ rng.standard_normal((m, m)) + 1.0
@@ -122,7 +122,7 @@ def test_without_penalty_it_is_least_squares() -> None:
 
 @pytest.mark.parametrize("n", [60, 9])
 def test_gcv_keeps_the_rank_of_least_generalised_cross_validation(n: int) -> None:
-    """Targets in two of eight directions, and noise: the score of each rank is worked out from its fit."""
+    """Targets in two of eight directions, and noise: scores follow from the fits."""
     rng = np.random.default_rng(4)
     X = np.linalg.qr(rng.standard_normal((n, 8)))[0] * np.geomspace(1.0, 1e-3, 8)
     y = 5.0 * X[:, 0] - 40.0 * X[:, 1] + 0.05 * rng.standard_normal(n)
@@ -335,10 +335,8 @@ def test_robust_kernel_fit_is_not_moved_by_outliers() -> None:
     assert error[True] < 0.03 < 0.2 < error[False]
 
 
-def test_hampel_s_weights_fall_from_one_to_nearly_none_between_2_5_and_3_deviations() -> (
-    None
-):
-    """1.4826 times the median absolute deviation, here of 1, is the standard deviation."""
+def test_hampel_s_weights_fall_from_one_to_none_between_2_5_and_3_deviations() -> None:
+    """1.4826 times the median absolute deviation, here 1, is the deviation."""
     sizes = np.array(
         [
             0.5,
@@ -368,9 +366,7 @@ def test_robust_fit_of_clean_data_is_the_plain_one() -> None:
     np.testing.assert_array_equal(robust.weights_, 1.0)
 
 
-def test_intervals_of_the_robust_fit_cover_the_truth_in_95_per_cent_in_spite_of_outliers() -> (
-    None
-):
+def test_intervals_of_the_robust_fit_cover_the_truth_in_spite_of_outliers() -> None:
     covered = []
     for seed in range(150):
         X, y, coefficients = with_outliers(seed)
@@ -450,7 +446,7 @@ def test_variance_is_held_by_squares_of_singular_values() -> None:
 
 
 def test_weights_are_renewed_until_they_settle_for_fifty_rounds_at_most() -> None:
-    """The third fit of residuals that no longer change is none; those that never settle stop."""
+    """Fits end with weights that no longer change, or after the last round."""
     y, given = np.array([0.1, -0.1, 0.2, -0.2, 0.3, 2.7]), []
 
     def fit(weights: Floats | None) -> Floats:

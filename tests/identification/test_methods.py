@@ -274,7 +274,7 @@ def test_methods_have_the_settings_of_their_estimators() -> None:
 def test_an_estimator_object_is_a_method(
     noisy_trials: list[Trial], mariner: ShipModel
 ) -> None:
-    """Scikit-learn's ridge regression, whose constant the equations do not have, and our own estimator."""
+    """Scikit-learn's ridge regression has a constant, which the equations do not."""
     ship = {"particulars": mariner.particulars, "steering": mariner.steering}
     named = identify(noisy_trials, method=RidgeRegression(alpha=1e-9), **ship)
     own = identify(noisy_trials, method=Ridge(alpha=1e-9, solver="svd"), **ship)
@@ -310,7 +310,7 @@ def test_the_free_running_error_is_relative_to_the_motion_of_each_trial(
 def test_the_rank_of_few_samples_is_the_corner_and_of_many_what_they_determine() -> (
     None
 ):
-    """The corner has the smallest product of both norms; a drop by more than chance goes beyond it."""
+    """The corner has the smallest product of norms, unless a rank fits better."""
     curve = LCurve(np.array([10.0, 1.0, 0.8, 0.79]), np.array([1.0, 2.0, 9.0, 90.0]))
     assert [corner_rank(curve, n) for n in (4, 5, 100, 400)] == [2, 2, 3, 4]
     flat = LCurve(np.array([10.0, 1.0, 1.0, 1.0]), np.array([1.0, 2.0, 9.0, 90.0]))
@@ -323,10 +323,8 @@ def test_the_rank_of_few_samples_is_the_corner_and_of_many_what_they_determine()
     assert gcv_rank(curve, 4) == 2  # never as many as samples
 
 
-def test_an_estimator_of_others_is_copied_without_its_constant_and_given_a_covariance() -> (
-    None
-):
-    """That of least squares on the features whose coefficients are not zero, by n less their number."""
+def test_an_estimator_of_others_is_copied_without_constant_with_a_covariance() -> None:
+    """That of least squares on the features whose coefficients are not zero."""
     theirs = Ridge(alpha=0.5)
     adapted: Any = without_constant(theirs)
     assert (theirs.fit_intercept, adapted.inner.fit_intercept) == (True, False)

@@ -77,7 +77,7 @@ def test_the_factor_is_that_at_which_errors_with_their_noise_are_of_size_one() -
 
 
 def test_intervals_hold_the_truth_of_a_ship_of_other_equations() -> None:
-    """An MMG ship by Abkowitz' structure: noise alone explains half of the error (scripts/certainty.py)."""
+    """An MMG ship by Abkowitz' structure: noise alone explains half of the error."""
     row = case("kcs", "abkowitz", "zigzags and turn", seed=0, draws=25)
     assert np.mean(list(row["all"].values())) >= 0.85
     assert np.mean(list(row["noise"].values())) <= 0.7
@@ -112,7 +112,7 @@ def test_too_few_trials_have_the_documented_factor(
 def test_closed_loop_overshoots_do_not_depend_on_the_neutral_helm(
     mariner: ShipModel,
 ) -> None:
-    """Three tenths of a degree of helm hardly move overshoots where the rudder is reversed at headings."""
+    """Three tenths of a degree of helm hardly move overshoots."""
     run = zigzag(mariner, 10, 10, duration=500, dt=0.5)
     moved = run["delta"] + np.radians(0.3)
     kept = {name: run[name] for name in ("x", "y", "psi", "u", "v", "r")}
@@ -130,7 +130,7 @@ def test_closed_loop_overshoots_do_not_depend_on_the_neutral_helm(
 def test_a_ship_that_was_steered_on_the_approach_predicts_her_own_zigzag(
     mariner: ShipModel,
 ) -> None:
-    """A minute of helm to and fro, 1.2 degrees, before the order: her model has the overshoots measured."""
+    """A minute of helm to and fro before the order leaves the overshoots measured."""
     helm = np.radians(1.2) * np.sin(np.arange(60.0) / 6.0)
     ordered = np.r_[
         helm, zigzag(mariner, 10, 10, duration=500, dt=1.0)["delta_command"][:-1]
@@ -186,7 +186,7 @@ def wide(noisy_fit: IdentificationResult) -> ShipModel:
 def test_the_factor_is_the_mean_of_motion_and_indices_and_larger_for_few_trials(
     noisy_fit: IdentificationResult, noisy_trials: list[Trial]
 ) -> None:
-    """Student's t with three degrees of freedom is 3.182 where the normal distribution has 1.96."""
+    """Student's t with three degrees of freedom is 3.182, the normal's is 1.96."""
     model, trials = noisy_fit.model, noisy_trials[:3]
     sure = replace(model, covariance=1e-2 * model.covariance)
     sizes = error_sizes([sure] * 3, trials)

@@ -184,7 +184,7 @@ def test_preprocessing_that_does_not_exist_is_refused(
 
 
 def test_noise_is_told_by_the_change_over_a_window() -> None:
-    """White noise of 0.1 on a ramp of 0.5 a sample: sqrt(2) 0.1 by the root mean square of the change."""
+    """White noise of 0.1 on a ramp of 0.5 a sample: sqrt(2) 0.1 by its change."""
     t = np.arange(20_000.0)
     values = 0.5 * t + 0.1 * np.random.default_rng(0).standard_normal(len(t))
     for window in (1, 10):
@@ -220,7 +220,7 @@ def test_steps_of_one_and_a_half_to_ten_and_a_half_usual_ones_are_filled(
 
 
 def chequered(t: np.ndarray, noise: float) -> np.ndarray:
-    """A record whose `noise_level` is known: alternating values, of the cubic's weights."""
+    """A record of known `noise_level`: alternating values, of the cubic's weights."""
     gain = np.sqrt(1.0 + 2.0 * (4.0 / 6.0) ** 2 + 2.0 * (1.0 / 6.0) ** 2)
     size = noise * 0.6745 * gain / (1.0 + 8.0 / 6.0 + 2.0 / 6.0)
     return size * (-1.0) ** np.arange(len(t))
@@ -324,9 +324,7 @@ def test_rounding_is_no_outlier_on_a_channel_without_noise() -> None:
         assert np.flatnonzero(outliers(t, values)).tolist() == found
 
 
-def test_a_sample_may_be_away_by_what_the_channel_moves_in_half_the_median_s_width() -> (
-    None
-):
+def test_a_sample_may_be_off_by_what_the_channel_moves_in_half_the_width() -> None:
     """On a clean ramp of one a sample: three and a half from the median of seven."""
     t = np.arange(60.0)
     for off, found in ((4.45, []), (4.55, [30]), (-4.45, []), (-4.55, [30])):
@@ -339,7 +337,7 @@ def test_a_sample_may_be_away_by_what_the_channel_moves_in_half_the_median_s_wid
 def test_an_end_is_an_outlier_beyond_seven_times_the_largest_step_inside(
     end: int,
 ) -> None:
-    """Where the step in time to it is longer, so much more; where it is shorter, not less."""
+    """Where the step in time to it is longer, so much more; never less."""
     for wait, size, found in (
         (1.0, 0.68, False),
         (1.0, 0.72, True),
@@ -367,7 +365,7 @@ def test_ends_are_compared_in_records_of_21_samples() -> None:
 
 
 def test_five_samples_tell_noise_and_four_do_not() -> None:
-    """One of the five off by 1: 1 / sqrt(70 / 36) of its own and the cubic's spread, by a median."""
+    """One of the five off by 1: 1 / sqrt(70 / 36) of the spread, by a median."""
     spike = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
     assert noise_level(np.arange(5.0), spike) == pytest.approx(
         6.0 / np.sqrt(70.0) / 0.6745

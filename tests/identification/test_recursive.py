@@ -1,4 +1,4 @@
-"""Recursive methods: equal to the batch where theory says so, and true to a ship whose numbers are known."""
+"""Recursive methods: equal to the batch in theory, and true to a known ship."""
 
 from __future__ import annotations
 
@@ -332,7 +332,7 @@ def test_what_has_seen_no_sample_has_no_estimate() -> None:
 
 
 def test_one_sample_of_one_regressor_by_hand() -> None:
-    """Of y = 6 at phi = 2, both by their size: P 1 / (1 / C + 1), theta the same share of 6 / 2."""
+    """y = 6 at phi = 2, both by their size: theta is a share 1 / (1 / C + 1) of 3."""
     for C in (1.0, 4.0):
         found = RecursiveLeastSquares(C=C).update([[2.0]], [6.0])
         share = 1.0 / (1.0 / C + 1.0)
@@ -366,7 +366,7 @@ def test_an_innovation_is_bounded_by_one_over_omega_and_odd() -> None:
 def test_a_covariance_forgets_up_to_where_it_began(
     variances: list[float], expected: list[float]
 ) -> None:
-    """By 0.9, from ceilings of 1; rows and columns alike, so that the correlation stays."""
+    """By 0.9, from ceilings of 1; rows and columns alike: the correlation stays."""
     cross = 0.5 * np.sqrt(np.prod(variances))
     P = np.array([[variances[0], cross], [cross, variances[1]]])
     kernels.forget(P, 0.9, np.ones(2), np.empty(2))
@@ -388,7 +388,7 @@ def test_a_history_ends_with_the_estimate_and_knows_its_coefficients() -> None:
 
 
 def test_samples_count_by_how_often_and_how_long_ago_they_were_used() -> None:
-    """With three innovations the last sample once, the one before twice; forgetting 0.5 a step."""
+    """With three innovations the last sample once, the one before twice."""
     X, y = regression(6)
     found = MultiInnovationLeastSquares(forgetting=0.5, innovations=3).fit(X, y)
     np.testing.assert_allclose(

@@ -227,7 +227,7 @@ def signs(count: int) -> Floats:
 def test_by_default_a_term_that_explains_less_than_a_thousandth_is_left_out(
     share: float, terms: tuple[str, ...]
 ) -> None:
-    """Of what is held out; in an elimination only where it is uncertain, here by more than 20 per cent."""
+    """An elimination counts it only where it is uncertain, here by over 20 per cent."""
     X = signs(3)
     y = X[:, 0] + np.sqrt(share) * X[:, 1]
     assert forward_selection(X[:, :2], y, ["a", "b"]).terms == terms
@@ -256,7 +256,7 @@ def test_by_default_a_term_is_uncertain_beyond_a_tenth_of_its_size(
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
 def test_terms_are_selected_whatever_the_unit_of_the_targets(unit: float) -> None:
-    """Also beside one that says the same as another, which adds nothing and is left out."""
+    """Also beside one that says the same as another, which adds nothing."""
     X, y = orthogonal()
     found = forward_selection(
         np.column_stack([X, 2.0 * X[:, 2]]), unit * y, (*NAMES, "copy")
@@ -284,7 +284,7 @@ def test_one_term_stays_and_is_enough_for_ten_samples() -> None:
         forward_selection(few[:9], few[:9, 0], ["a"])
 
 
-def test_a_coefficient_with_which_the_ship_runs_away_has_no_bound_and_stands_first() -> (
+def test_a_coefficient_with_which_the_ship_runs_away_has_no_bound_and_is_first() -> (
     None
 ):
     ship = virtual_ship()

@@ -144,9 +144,7 @@ def test_an_order_goes_on_where_the_rudder_moves_as_before(
     assert found.tolist()[0] is expected
 
 
-def test_an_order_changes_within_an_interval_when_the_rudder_ends_where_it_was_seen() -> (
-    None
-):
+def test_an_order_changes_within_an_interval_when_the_rudder_ends_as_seen() -> None:
     """At rest for 29.7 s, then moving at 0.1 rad/s, seen every 2 s."""
     t = 2.0 * np.arange(31.0)
     fine = np.linspace(0.0, 60.0, 601)
@@ -158,7 +156,7 @@ def test_an_order_changes_within_an_interval_when_the_rudder_ends_where_it_was_s
 
 
 def test_a_gear_of_rate_and_lag_ramps_and_then_creeps() -> None:
-    """0.1 rad/s and 2 s: from 0 to an order of 0.5 it ramps to 0.3, what is left falls by exp(-t / 2)."""
+    """0.1 rad/s and 2 s: to an order of 0.5 it ramps to 0.3, then exp(-t / 2)."""
     gear = GearResponse(0.1, 2.0)
     angles = gear.angle(0.0, 0.5, np.array([1.0, 3.0, 5.0]))
     np.testing.assert_allclose(angles, [0.1, 0.3, 0.5 - 0.2 * np.exp(-1.0)])

@@ -21,7 +21,7 @@ from shipgym.ships.simulate import open_loop
 
 
 def mismatch(model: ShipModel, samples: Samples) -> float:
-    """Largest violation of the regression by the true coefficients, relative to the largest change."""
+    """Largest violation of the regression by the truth, by the largest change."""
     table = model.table
     theta = table.acceleration_matrix(model.particulars) @ np.array(
         list(model.coefficients.values())
@@ -193,7 +193,7 @@ def test_a_record_of_nothing_but_gaps_is_refused(
 
 
 def test_a_gap_is_a_step_of_more_than_five_usual_ones() -> None:
-    """And of more than 0.15 of the time to sail a ship length, here 1.5 s of 10 s; pieces have 10 samples."""
+    """And of more than 0.15 of a ship length, here 1.5 s; pieces have 10 samples."""
     ship = Particulars(length=50.0, speed=5.0)
 
     def pieces(step: float, pause: float, first: int = 30) -> list[int]:
@@ -212,7 +212,7 @@ def test_a_gap_is_a_step_of_more_than_five_usual_ones() -> None:
 
 
 def test_six_long_steps_on_end_are_another_rate_and_five_are_gaps() -> None:
-    """The usual step is the median of the eleven around, where that is longer than the trial's."""
+    """The usual step is the median of the eleven around, where that is longer."""
     ship = Particulars(length=50.0, speed=5.0)
 
     def pieces(*long: int) -> list[int]:
@@ -232,7 +232,7 @@ def test_six_long_steps_on_end_are_another_rate_and_five_are_gaps() -> None:
 
 
 def test_euler_takes_the_start_of_each_step_and_the_trapezoid_rule_its_mean() -> None:
-    """Steps of 1 and 3 s; a moment is the integral times half the step that is left on average."""
+    """Steps of 1 and 3 s; a moment is the integral times half the step."""
     t, channels = np.array([0.0, 1.0, 4.0]), {"u": np.array([2.0, 4.0, 10.0])}
     for rule, expected in (("euler", [2.0, 12.0]), ("integral", [3.0, 21.0])):
         found = step_integrals(t, channels, lambda c: {"u": c["u"][:, None]}, rule)
@@ -305,7 +305,7 @@ def test_the_memory_of_a_trial_falls_out_of_one_window_less_the_next() -> None:
     ("corner", "smoothness"), [(5.3, 0), (5.3, 1), (9.8, 0), (1.4, 0), (7.0, 0)]
 )
 def test_a_spline_breaks_where_the_rudder_does(corner: float, smoothness: int) -> None:
-    """Beyond a jump of the rudder's rate a square grows, of its acceleration a cube: both are met exactly."""
+    """Beyond a jump of the rudder's rate a square grows, of its acceleration a cube."""
     t, fine = np.arange(13.0), np.linspace(0.0, 12.0, 241)
 
     def motion(times: np.ndarray) -> np.ndarray:
@@ -327,7 +327,7 @@ def test_a_spline_breaks_where_the_rudder_does(corner: float, smoothness: int) -
 
 
 def test_corners_that_leave_too_few_samples_for_a_spline_are_passed_over() -> None:
-    """Beside an end, or the third within a step; the spline goes through all samples still."""
+    """Beside an end, or the third in a step; the spline meets all samples still."""
     t, values = np.arange(9.0), np.random.default_rng(0).standard_normal(9)
     for corners in ([0.02], [7.98], [4.1, 4.3, 4.6], [4.1, 4.3, 4.6, 4.8]):
         rudder = replace(

@@ -1,4 +1,4 @@
-"""Where no structure is named, that is taken which predicts the trials to fit best, each held out."""
+"""Where no structure is named, the one that predicts held-out trials best is used."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from shipgym.manoeuvres import turning_circle, zigzag
 
 
 def as_derived(run, spoiled, drop=()):
-    """The run as a log with positions and heading only has it: the first velocities wrong."""
+    """The run as a log of positions and heading has it: first velocities wrong."""
     channels = {
         name: values for name, values in run.channels.items() if name not in drop
     }

@@ -1,4 +1,4 @@
-"""Currents are told from velocities over ground and taken out, wind by the ship's coefficients."""
+"""Currents are found from velocities over ground, wind from ship and columns."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ CURRENT = Weather(Current(0.5, np.degrees(np.arctan2(EAST, NORTH))))
 
 
 def log(run: Trial, seed: int = 0) -> Trial:
-    """GNSS positions, gyro and rudder of a run at 1 Hz; u, v and r are derived from them."""
+    """GNSS positions, gyro and rudder at 1 Hz; u, v and r are derived from them."""
     rng, every = np.random.default_rng(seed), slice(None, None, 2)
     noise = {"x": 0.3, "y": 0.3, "psi": np.radians(0.1), "delta": np.radians(0.1)}
     channels = {
@@ -71,7 +71,7 @@ def logs(mariner: ShipModel) -> list[Trial]:
 def test_a_current_is_found_and_taken_out(
     mariner: ShipModel, logs: list[Trial]
 ) -> None:
-    """To centimetres per second, of the trial held out too; velocities and track follow."""
+    """To centimetres per second, also of a held-out trial; the track follows."""
     found, report = in_still_water(logs, mariner.particulars)
     row = report["currents"]["held out"]
     errors = np.array([row["north"] - NORTH, row["east"] - EAST])
@@ -107,7 +107,7 @@ def test_a_current_is_found_and_taken_out(
 def test_each_trial_may_have_a_current_of_its_own(
     mariner: ShipModel, logs: list[Trial]
 ) -> None:
-    """Trials that contradict one current have two; that of a trial held out follows from these."""
+    """Trials that contradict one current have two, a held-out trial one by these."""
     other = turning_circle(
         mariner, -35.0, 700.0, 0.5, weather=Weather(Current(0.8, 90.0))
     )
@@ -123,7 +123,7 @@ def test_each_trial_may_have_a_current_of_its_own(
 
 
 def test_still_water_stays_still(mariner: ShipModel) -> None:
-    """A current that does not differ from zero is reported and left in, so that the velocities stay."""
+    """A current that does not differ from zero is reported and left in."""
     calm = log(turning_circle(mariner, 35.0, 700.0, 0.5))
     (found,), report = in_still_water([calm], mariner.particulars)
     assert found is calm
@@ -133,7 +133,7 @@ def test_still_water_stays_still(mariner: ShipModel) -> None:
 
 
 def test_velocities_through_the_water_keep_theirs(mariner: ShipModel) -> None:
-    """A logged speed is through the water: a known current is taken out of the track alone."""
+    """A logged speed is through the water: only the track changes."""
     run = zigzag(mariner, 20, 20, duration=300.0, dt=1.0, weather=CURRENT)
     (found,), report = in_still_water([run], mariner.particulars)
     assert report["currents"][run.name]["source"] == "columns"
@@ -143,7 +143,7 @@ def test_velocities_through_the_water_keep_theirs(mariner: ShipModel) -> None:
 
 
 def test_a_given_current_and_a_logged_speed(mariner: ShipModel) -> None:
-    """Of a trial with a speed log and positions only the sway that was derived changes."""
+    """With a speed log and positions only the sway that was derived changes."""
     run = zigzag(mariner, 20, 20, duration=300.0, dt=0.5, weather=CURRENT)
     channels = {name: run[name] for name in ("x", "y", "psi", "r", "delta", "u")}
     recorded = Log(run.t, channels, "log", [])
@@ -156,7 +156,7 @@ def test_a_given_current_and_a_logged_speed(mariner: ShipModel) -> None:
 
 
 def straight(psi_deg: float) -> Trial:
-    """A trial of 100 s over ground, half of it on one heading and half on its mirror image."""
+    """A trial of 100 s over ground, its second half the mirror image of the first."""
     psi = np.radians(np.repeat([psi_deg, -psi_deg], 50))
     channels = {
         "u": np.full(100, 2.0),
@@ -189,9 +189,7 @@ def test_a_current_is_known_by_several_headings(
     assert keeps == one_heading
 
 
-def test_a_current_in_columns_and_one_that_is_given_agree_to_a_decimetre_per_second() -> (
-    None
-):
+def test_a_current_in_columns_and_one_given_agree_to_a_decimetre_per_second() -> None:
     logged = straight(40.0).with_channels(
         {"current_north": np.full(100, 0.2), "current_east": np.zeros(100)}
     )
@@ -255,7 +253,7 @@ def test_one_heading_is_left_as_it_is_with_a_word(
 
 
 def test_measured_wind_is_taken_out(mariner: ShipModel) -> None:
-    """The run in wind is the run of her equations with that force: predicted with it, not without."""
+    """The run in wind is that of her equations with the force, not without."""
     run = zigzag(
         mariner,
         10,
@@ -347,7 +345,7 @@ def test_wind_without_what_it_needs(mariner: ShipModel) -> None:
 def test_the_wind_that_a_ship_feels_is_that_of_her_way_over_ground(
     mariner: ShipModel,
 ) -> None:
-    """In sway and yaw alike for velocities over ground and for those through a current in columns."""
+    """In sway and yaw alike, over ground or through a current in columns."""
     t = np.arange(0.0, 40.0, 0.5)
     psi, north, east = 0.05 * t, 0.8, -0.5
     own = {
@@ -433,7 +431,7 @@ def test_captive_trials_and_those_of_unknown_speed_keep_their_current(
 
 
 def test_what_a_ship_of_the_prior_does_is_the_same_to_both_sides() -> None:
-    """Her own neutral helm apart: sway changes its sign with drift, turn, rudder and wind; surge does not."""
+    """Sway changes sign with drift, turn, rudder and wind; surge does not."""
     c = Coefficients(*np.random.default_rng(0).normal(size=len(MEAN)))._replace(Y_0=0.0)
     at = Inputs(r=0.4, delta=0.3, n=1.1, ahead=0.02, aside=0.05)
     mirrored = at._replace(r=-0.4, delta=-0.3, aside=-0.05)
@@ -487,7 +485,7 @@ def test_what_a_ship_of_the_prior_does_is_the_same_to_both_sides() -> None:
     ],
 )
 def test_a_current_is_told_with_set_and_drift_and_what_became_of_it(row, said):
-    """A knot is 0.514444 m/s; the water sets to the north-west, 53 degrees from north."""
+    """A knot is 0.514444 m/s; the water sets to the north-west, 53 deg from north."""
     told = current_text({"north": NORTH, "east": EAST, **row})
     assert told == f"current of 0.50 m/s (0.97 knots) towards 307 deg, {said}"
 

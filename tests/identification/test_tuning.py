@@ -163,9 +163,7 @@ def test_held_out_error_is_that_of_fits_one_by_one(
         assert error(np.log10([[C]]))[0] == pytest.approx(np.mean(squares), rel=1e-9)
 
 
-def test_training_error_falls_with_the_weight_so_that_its_optimum_is_the_upper_bound() -> (
-    None
-):
+def test_training_error_falls_with_the_weight_up_to_the_upper_bound() -> None:
     X, y = regression(noise=0.01)
     error = training_error(X, y, True, True)(np.linspace(-2.0, 4.0, 40)[:, None])
     assert np.all(np.diff(error) < 0.0)
@@ -238,7 +236,7 @@ def test_robust_search_is_not_moved_by_outliers() -> None:
 
 
 def test_pattern_search_goes_downhill_on_a_mesh_that_it_halves() -> None:
-    """From the corner of a box of 4 x 8 to (1, 2): no point twice, none off the finest mesh."""
+    """From the corner of a box of 4 x 8 to (1, 2): no point twice or off the mesh."""
     seen: list[tuple[float, ...]] = []
 
     def bowl(x: Floats) -> float:
@@ -308,7 +306,7 @@ def colony(values: list[float]) -> Colony:
 
 
 def test_bees_choose_good_sources_more_often() -> None:
-    """Fitness 1 / (1 + f), or 1 - f below zero (Karaboga 2005); of infinite costs all have the same chance."""
+    """Fitness 1 / (1 + f), or 1 - f below zero (Karaboga 2005); infinite: all alike."""
     expected = np.array([1.0, 1.5, 1.75, 3.75]) / 3.75
     np.testing.assert_allclose(colony([0.0, 1.0, 3.0, -1.0]).chances(), expected)
     np.testing.assert_allclose(colony([np.inf] * 4).chances(), [0.25, 0.5, 0.75, 1.0])
@@ -349,7 +347,7 @@ def test_an_optimiser_is_a_name_a_table_or_an_object() -> None:
 
 
 def test_a_particle_is_constricted_as_clerc_and_kennedy_say() -> None:
-    """With pulls of 2.05 each the factor is 2 / (phi - 2 + root(phi^2 - 4 phi)) of phi = 4.1."""
+    """With pulls of 2.05 the factor is 2 / (phi - 2 + root(phi^2 - 4 phi)), phi 4.1."""
     swarm, phi = ParticleSwarm(), 4.1
     factor = 2.0 / (phi - 2.0 + np.sqrt(phi**2 - 4.0 * phi))
     assert swarm.inertia == pytest.approx(factor, abs=5e-5)
@@ -361,7 +359,7 @@ def test_a_particle_is_constricted_as_clerc_and_kennedy_say() -> None:
     [("grid", 58, 2), ("pso", 1220, 61), ("de", 1220, 60)],
 )
 def test_a_search_costs_what_it_says(name: str, candidates: int, rounds: int) -> None:
-    """Two grids of 29 points; 20 particles or members in each dimension, 60 times after the first draw."""
+    """Two grids of 29 points; 20 members a dimension, 60 rounds after the first."""
     found = minimise(lambda x: 1.0 + 1e-9 * x[:, 0], [(-1.0, 1.0)], optimiser=name)
     assert (found.evaluations, len(found.history)) == (candidates, rounds)
 

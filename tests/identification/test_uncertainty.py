@@ -29,7 +29,7 @@ def draw(
     rng: np.random.Generator,
     memory: int = 1,
 ) -> Samples:
-    """The regression with exact features and errors correlated between equations and over `memory` rows."""
+    """The regression, with errors correlated across equations and `memory` rows."""
     white = rng.standard_normal((len(exact) + memory - 1, 3))
     summed = np.cumsum(np.vstack([np.zeros((1, 3)), white]), axis=0)
     errors = (summed[memory:] - summed[:-memory]) @ mixing.T
@@ -119,7 +119,7 @@ def test_covariance_of_a_real_fit_is_positive_and_of_all_coefficients(
 
 @pytest.mark.parametrize("lags", [0, 2, 7, 30])
 def test_bartletts_weights_fall_linearly_to_zero_beyond_the_last_lag(lags: int) -> None:
-    """Every pair of rows by 1 - |i - j| / (L + 1), Newey & West 1987; of eight rows at most seven lags."""
+    """Pairs of rows by 1 - |i - j| / (L + 1), Newey & West 1987; at most seven lags."""
     scores = np.random.default_rng(0).standard_normal((8, 3))
     apart = np.abs(np.subtract.outer(np.arange(8), np.arange(8)))
     weight = np.maximum(1.0 - apart / (min(lags, 7) + 1.0), 0.0)
@@ -129,7 +129,7 @@ def test_bartletts_weights_fall_linearly_to_zero_beyond_the_last_lag(lags: int) 
 
 
 def test_without_memory_the_covariance_is_that_of_the_textbook() -> None:
-    """s2 (X'X)^-1 with n - p degrees of freedom; a step of memory of no length changes its factor alone."""
+    """s2 (X'X)^-1 with n - p degrees of freedom; memory changes its factor alone."""
     rng = np.random.default_rng(1)
     X = rng.standard_normal((40, 3))
     y = X @ [1.0, 2.0, 3.0] + rng.standard_normal(40)
@@ -156,10 +156,8 @@ def test_without_memory_the_covariance_is_that_of_the_textbook() -> None:
     )
 
 
-def test_memory_of_each_trial_is_counted_in_its_own_steps_and_a_short_one_is_no_memory_at_all() -> (
-    None
-):
-    """Three trials in steps of 1 s, 1 s and 5 s, and one of a single row, correlated over 2 s."""
+def test_memory_counts_in_the_steps_of_each_trial_and_a_short_one_is_none() -> None:
+    """Trials in steps of 1 s, 1 s and 5 s, and one of a single row, over 2 s."""
     rng = np.random.default_rng(2)
     X, y = rng.standard_normal((41, 2)), rng.standard_normal(41)
     time = np.concatenate([np.arange(30.0), np.arange(8.0), [0.0, 5.0], [0.0]])

@@ -50,7 +50,9 @@ class Preprocessing:
 
 
 def smoothed_channels(
-    trial: Trial, names: Sequence[str], smoothing: str = "spline"
+    trial: Trial,
+    names: Sequence[str],
+    smoothing: str = "spline",
 ) -> dict[str, Floats]:
     """Some channels of a trial, smoothed (`Preprocessing`).
 
@@ -66,11 +68,14 @@ def smoothed_channels(
 
         trial = kinematics.smooth_kinematics(trial)
         kept |= {*kinematics.HEADING, *kinematics.PLANE}
-    one_channel = FILTERS.get(smoothing, smooth)
-    return {
-        name: trial[name] if name in kept else one_channel(trial.t, trial[name])
-        for name in names
-    }
+
+    filtered = FILTERS.get(smoothing, smooth)
+    channels = {}
+    for name in names:
+        channels[name] = trial[name]
+        if name not in kept:
+            channels[name] = filtered(trial.t, trial[name])
+    return channels
 
 
 __all__ = [

@@ -6,23 +6,29 @@ from scipy.linalg import solveh_banded
 from scipy.ndimage import median_filter
 from scipy.signal import savgol_coeffs, savgol_filter
 
+from identification.arrays import mean_square
 from identification.regression.preprocess.noise import NOISY, noise_ratio
 from shipgym.arrays import Floats
 
 ORDER = 3  # of the local polynomials
+SHORTEST_WIDTH = ORDER + 2
 #: Decades of stiffness tried, of a spline on knots a unit apart.
 STIFFNESSES = tuple(float(stiffness) for stiffness in np.arange(-2.0, 8.01, 0.25))
 
 
 def median(t: ArrayLike, values: ArrayLike, width: int = 5) -> Floats:
-    """Running median of `width` samples, odd; takes away spikes of up to half its width and keeps steps."""
+    """Running median of `width` samples, odd.
+
+    It takes away spikes of up to half its width and keeps steps.
+    """
     return median_filter(np.asarray(values, dtype=float), width, mode="nearest")
 
 
 def savitzky_golay(t: ArrayLike, values: ArrayLike, width: int | None = None) -> Floats:
-    """Local cubic polynomials by least squares (Savitzky & Golay 1964, Analytical Chemistry 36(8)).
+    """Local cubic polynomials by least squares.
 
-    Records with uneven steps are filtered on an even grid with as many samples.
+    Source: Savitzky & Golay 1964, Analytical Chemistry 36(8). Records with uneven steps
+    are filtered on an even grid with as many samples.
 
     Parameters
     ----------
@@ -33,53 +39,66 @@ def savitzky_golay(t: ArrayLike, values: ArrayLike, width: int | None = None) ->
         picks, of at most a fifth of the record. Without a width, values that are free
         of noise (`noise.NOISY`) or fewer than 25 are returned as they are.
     """
-    t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
-    longest = len(t) // 5
+    t = np.asarray(t, dtype=float)
+    values = np.asarray(values, dtype=float)
     if width is None:
-        is_short = longest < ORDER + 2
+        is_short = len(t) < 5 * SHORTEST_WIDTH
         if is_short or noise_ratio(t, values) < NOISY:
             return values
 
     steps = np.diff(t)
     is_even = np.ptp(steps) <= 1e-3 * np.median(steps)
+    if is_even:
+        return _savitzky_golay(values, width)
     grid = np.linspace(t[0], t[-1], len(t))
-    sampled: Floats = values if is_even else np.interp(grid, t, values)
+    on_grid = np.interp(grid, t, values)
+    filtered = _savitzky_golay(on_grid, width)
+    return np.asarray(np.interp(t, grid, filtered))
+
+
+def _savitzky_golay(values: Floats, width: int | None) -> Floats:
+    """The filter on even steps; without a width the best one."""
     if width is None:
-        width = _best_width(sampled, longest)
-    filtered: Floats = savgol_filter(sampled, width, ORDER)
-    return filtered if is_even else np.interp(t, grid, filtered)
+        width = _best_width(values)
+    filtered: Floats = savgol_filter(values, width, ORDER)
+    return filtered
 
 
-def _best_width(values: Floats, longest: int) -> int:
+def _best_width(values: Floats) -> int:
     """Width of least generalised cross-validation; widths grow by about a fifth."""
-    shortest = ORDER + 2
-    sizes = np.geomspace(shortest, max(longest, shortest), 24)
-    widths = np.unique(2 * (sizes.astype(int) // 2) + 1)
+    longest = len(values) // 5
+    sizes = np.geomspace(SHORTEST_WIDTH, longest, 24)
+    odd = 2 * (sizes.astype(int) // 2) + 1
+    widths = np.unique(odd)
 
     def criterion(width: int) -> float:
-        left_out = values - savgol_filter(values, width, ORDER)
-        own_share = savgol_coeffs(width, ORDER)[width // 2]
-        freedom = 1.0 - float(own_share)
-        return float(np.mean(left_out**2)) / freedom**2
+        fitted = savgol_filter(values, width, ORDER)
+        weights = savgol_coeffs(width, ORDER)
+        own_weight = float(weights[width // 2])
+        left_out = mean_square(values - fitted)
+        return left_out / (1.0 - own_weight) ** 2
 
-    return int(min(widths[widths <= len(values)].tolist(), key=criterion))
+    return int(min(widths.tolist(), key=criterion))
 
 
 def smooth(t: ArrayLike, values: ArrayLike) -> Floats:
-    """Smooth a channel by a cubic spline whose stiffness generalised cross-validation picks.
+    """Smooth a channel by a cubic spline of a stiffness by cross-validation.
 
     The natural smoothing spline of Reinsch 1967 (Numerische Mathematik 10); the trace
-    in the criterion of Craven & Wahba 1979 (Numerische Mathematik 31) is estimated by
-    random signs (Girard 1989), always the same ones. Times in s, of shape (n_samples,)
-    as the values, which are returned as they are where they are free of noise (`NOISY`)
-    or fewer than five.
+    in the generalised criterion of Craven & Wahba 1979 (Numerische Mathematik 31) is
+    estimated by random signs (Girard 1989), always the same ones. Times in s, of shape
+    (n_samples,) as the values, which are returned as they are where they are free of
+    noise (`NOISY`) or fewer than five.
     """
-    t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
+    t = np.asarray(t, dtype=float)
+    values = np.asarray(values, dtype=float)
     if len(t) < 5 or noise_ratio(t, values) < NOISY:
         return values
+
     usual_step = np.median(np.diff(t))
     spline = Reinsch(t / usual_step)
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], len(t))
+    rng = np.random.default_rng(0)
+    signs = rng.choice([-1.0, 1.0], len(t))
     both = np.stack([values, signs])
 
     def criterion(stiffness: float) -> float:
@@ -92,42 +111,50 @@ def smooth(t: ArrayLike, values: ArrayLike) -> Floats:
 
 
 class Reinsch:
-    """Natural cubic smoothing splines on given knots, by banded matrices (Reinsch 1967).
+    """Natural cubic smoothing splines on given knots, by banded matrices.
 
-    With Q' the second divided differences of the values y at the knots, T the Gram
-    matrix of the spline's second derivative, and a stiffness s, the second derivatives
-    at the inner knots are (T + s Q'Q)^-1 Q'y, and the smoothed values y - s Q of these.
+    Source: Reinsch 1967. With Q' the second divided differences of the values y at the
+    knots, T the Gram matrix of the spline's second derivative, and a stiffness s, the
+    second derivatives at the inner knots are (T + s Q'Q)^-1 Q'y, and the smoothed
+    values y - s Q of these.
     """
 
     def __init__(self, t: Floats) -> None:
         h = np.diff(t)
-        # the three diagonals of Q'
-        self.left = 1.0 / h[:-1]
-        self.right = 1.0 / h[1:]
-        self.middle = -self.left - self.right
+        left = 1.0 / h[:-1]
+        right = 1.0 / h[1:]
+        middle = -left - right
+        n_inner = len(middle)
+        #: the three diagonals of Q'
+        self.diagonals = (left, middle, right)
 
         # upper bands, the diagonal last, as scipy.linalg.solveh_banded wants them
-        n_inner = len(h) - 1
         self.gram = np.zeros((3, n_inner))
-        self.gram[2] = (h[:-1] + h[1:]) / 3.0
-        self.gram[1, 1:] = h[1:-1] / 6.0
+        _, beside, diagonal = self.gram
+        diagonal[:] = (h[:-1] + h[1:]) / 3.0
+        beside[1:] = h[1:-1] / 6.0
+
         self.square = np.zeros((3, n_inner))  # Q'Q
-        self.square[2] = self.left**2 + self.middle**2 + self.right**2
-        next_left = self.middle[:-1] * self.left[1:]
-        next_middle = self.right[:-1] * self.middle[1:]
-        self.square[1, 1:] = next_left + next_middle
-        self.square[0, 2:] = self.right[:-2] * self.left[2:]
+        two_beside, beside, diagonal = self.square
+        diagonal[:] = left**2 + middle**2 + right**2
+        beside[1:] = middle[:-1] * left[1:]
+        beside[1:] += right[:-1] * middle[1:]
+        two_beside[2:] = right[:-2] * left[2:]
 
     def smoothed(self, values: Floats, stiffness: float) -> Floats:
-        """Values of the spline at the knots, shape (n_knots,) or (n_splines, n_knots)."""
-        differences = self.left * values[..., :-2]
-        differences += self.middle * values[..., 1:-1]
-        differences += self.right * values[..., 2:]
+        """Values of the spline at the knots.
+
+        Shape (n_knots,) or (n_splines, n_knots), as the values.
+        """
+        n_inner = self.gram.shape[1]
+        differences = np.zeros((*values.shape[:-1], n_inner))
+        for offset, diagonal in enumerate(self.diagonals):
+            differences += diagonal * values[..., offset : offset + n_inner]
+
         bands = self.gram + stiffness * self.square
         curvature = solveh_banded(bands, differences.T).T
 
         pull = np.zeros_like(values)
-        pull[..., :-2] += self.left * curvature
-        pull[..., 1:-1] += self.middle * curvature
-        pull[..., 2:] += self.right * curvature
+        for offset, diagonal in enumerate(self.diagonals):
+            pull[..., offset : offset + n_inner] += diagonal * curvature
         return values - stiffness * pull

@@ -59,7 +59,8 @@ class LinearSystem:
         Those that are not finite are missing. Measurements are taken in one at a time,
         in Joseph's form, so that nothing is inverted.
         """
-        n_samples, n_states = len(measured), len(self.start)
+        n_samples = len(measured)
+        n_states = len(self.start)
         predicted = np.empty((n_samples, n_states))
         predicted_covariances = np.empty((n_samples, n_states, n_states))
         states = np.empty_like(predicted)
@@ -78,21 +79,17 @@ class LinearSystem:
 
             channels = zip(self.observation, self.variances, measured[k], strict=True)
             for h, variance, y in channels:
-                if not np.isfinite(y):
-                    continue
-                Ph = P @ h
-                innovation = y - float(h @ x)
-                innovation_variance = float(h @ Ph) + variance
-                gain = Ph / innovation_variance
-                x = x + gain * innovation
-                left = np.eye(n_states) - np.outer(gain, h)
-                P = left @ P @ left.T + variance * np.outer(gain, gain)
-                misfit = innovation * innovation / innovation_variance
-                log_likelihood -= 0.5 * (np.log(innovation_variance) + misfit)
+                if np.isfinite(y):
+                    x, P, log_density = _updated(x, P, h, variance, y)
+                    log_likelihood += log_density
             states[k] = x
             covariances[k] = P
         return Filtered(
-            predicted, predicted_covariances, states, covariances, log_likelihood
+            predicted=predicted,
+            predicted_covariances=predicted_covariances,
+            states=states,
+            covariances=covariances,
+            log_likelihood=log_likelihood,
         )
 
     def smoothed(self, measured: Floats) -> Floats:
@@ -103,7 +100,32 @@ class LinearSystem:
         found = self.filtered(measured)
         states = found.states.copy()
         for k in reversed(range(len(measured) - 1)):
-            ahead = self.transitions[k] @ found.covariances[k]
-            gain = np.linalg.solve(found.predicted_covariances[k + 1], ahead).T
-            states[k] += gain @ (states[k + 1] - found.predicted[k + 1])
+            following = k + 1
+            moved = self.transitions[k] @ found.covariances[k]
+            predicted_covariance = found.predicted_covariances[following]
+            gain = np.linalg.solve(predicted_covariance, moved).T
+            surprise = states[following] - found.predicted[following]
+            states[k] += gain @ surprise
         return states
+
+
+def _updated(
+    x: Floats,
+    P: Floats,
+    h: Floats,
+    variance: float,
+    y: float,
+) -> tuple[Floats, Floats, float]:
+    """State, its covariance and the log density of a measurement y = h x + e."""
+    Ph = P @ h
+    innovation = y - float(h @ x)
+    innovation_variance = float(h @ Ph) + variance
+    gain = Ph / innovation_variance
+    x = x + gain * innovation
+
+    # Joseph's form keeps the matrix symmetric and positive
+    left = np.eye(len(x)) - np.outer(gain, h)
+    P = left @ P @ left.T + variance * np.outer(gain, gain)
+    misfit = innovation * innovation / innovation_variance
+    log_density = -0.5 * (np.log(innovation_variance) + misfit)
+    return x, P, float(log_density)

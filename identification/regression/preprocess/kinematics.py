@@ -15,6 +15,16 @@ HEADING = ("psi", "r")
 PLANE = ("x", "y", "u", "v")
 LONGEST_SEARCH = 500  # samples, from which the roughness of the motion is found
 DECADES = 4.0  # to either side of the first guess of the roughness
+#: Covariance of position, velocity and acceleration after a step h of a twice
+#: integrated random walk: factors times powers of h.
+WALK_FACTORS = np.array(
+    [
+        [1 / 20, 1 / 8, 1 / 6],
+        [1 / 8, 1 / 3, 1 / 2],
+        [1 / 6, 1 / 2, 1.0],
+    ]
+)
+WALK_POWERS = np.array([[5, 4, 3], [4, 3, 2], [3, 2, 1]])
 LEAST_NOISE = 1e-4  # of the range of a channel: resolution, and channels without noise
 
 
@@ -32,21 +42,21 @@ def smooth_kinematics(trial: Trial) -> Trial:
             " smooth the kinematics by, got neither; name its column, or choose"
             ' preprocessing = "spline"'
         )
+    t = trial.t
     turning = [name for name in HEADING if name in trial]
-    smoothed = {name: trial[name] for name in turning}
-    is_clean = not is_noisy(trial.t, smoothed.values())
-    if "psi" not in trial or not is_clean:
-        smoothed = _smoothed(trial, turning, heading_motion(trial.t))
+    states = {name: trial[name] for name in turning}
+    if "psi" not in trial or is_noisy(t, states.values()):
+        states = _smoothed(trial, turning, heading_motion(t))
 
     moving = [name for name in PLANE if name in trial]
     recorded = {name: trial[name] for name in moving}
     has_motion = {"u", "v"} & recorded.keys() or {"x", "y"} <= recorded.keys()
-    if has_motion and is_noisy(trial.t, recorded.values()):
-        motion = plane_motion(trial.t, smoothed["psi"])
-        smoothed |= _smoothed(trial, moving, motion)
-    return trial.with_channels(
-        {name: values for name, values in smoothed.items() if name in trial}
-    )
+    if has_motion and is_noisy(t, recorded.values()):
+        motion = plane_motion(t, states["psi"])
+        states |= _smoothed(trial, moving, motion)
+
+    smoothed = {name: states[name] for name in states if name in trial}
+    return trial.with_channels(smoothed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,41 +85,32 @@ class Motion:
 
 
 def heading_motion(t: Floats) -> Motion:
-    """Heading and yaw rate, whose yaw acceleration is a random walk.
-
-    The covariance is that of a twice integrated random walk over each step.
-    """
+    """Heading and yaw rate, whose yaw acceleration is a random walk."""
     h = np.diff(t)
+    psi, r, rdot = range(3)
     transitions = np.tile(np.eye(3), (len(h), 1, 1))
-    transitions[:, 0, 1] = h
-    transitions[:, 1, 2] = h
-    transitions[:, 0, 2] = 0.5 * h**2
-
-    powers = np.array([[5, 4, 3], [4, 3, 2], [3, 2, 1]])
-    factors = np.array(
-        [
-            [1 / 20, 1 / 8, 1 / 6],
-            [1 / 8, 1 / 3, 1 / 2],
-            [1 / 6, 1 / 2, 1.0],
-        ]
-    )
-    process = factors * h[:, None, None] ** powers
-    start_variances = np.array([1.0, 1e-2, 1.0])
+    transitions[:, psi, r] = h
+    transitions[:, r, rdot] = h
+    transitions[:, psi, rdot] = 0.5 * h**2
     return Motion(
-        (*HEADING, "rdot"), ("r", "psi"), transitions, process, start_variances
+        states=(*HEADING, "rdot"),
+        guessed_by=("r", "psi"),
+        transitions=transitions,
+        process=WALK_FACTORS * h[:, None, None] ** WALK_POWERS,
+        start_variances=np.array([1.0, 1e-2, 1.0]),
     )
 
 
 def plane_motion(t: Floats, psi: Floats) -> Motion:
-    """Position, surge and sway at a known heading; their accelerations are random walks.
+    """Position, surge and sway at a known heading, whose accelerations random-walk.
 
     The mean of the heading's cosine and sine holds over each step. The random walk acts
     on velocities and accelerations as on those of `heading_motion`.
     """
     h = np.diff(t)
     x, y, u, v, udot, vdot = range(6)
-    cosine = 0.5 * (np.cos(psi[1:]) + np.cos(psi[:-1]))
-    sine = 0.5 * (np.sin(psi[1:]) + np.sin(psi[:-1]))
+    cosine = _midpoints(np.cos(psi))
+    sine = _midpoints(np.sin(psi))
     transitions = np.tile(np.eye(6), (len(h), 1, 1))
     parts = [
         (x, u, udot, cosine),
@@ -127,51 +128,66 @@ def plane_motion(t: Floats, psi: Floats) -> Motion:
     walk = heading_motion(t).process[:, 1:, 1:]
     for axis in ([u, udot], [v, vdot]):
         process[:, np.array(axis)[:, None], axis] = walk
-    start_variances = np.array([1e4, 1e4, 1e2, 1e2, 1.0, 1.0])
     return Motion(
-        (*PLANE, "udot", "vdot"), ("u", "x", "v"), transitions, process, start_variances
+        states=(*PLANE, "udot", "vdot"),
+        guessed_by=("u", "x", "v"),
+        transitions=transitions,
+        process=process,
+        start_variances=np.array([1e4, 1e4, 1e2, 1e2, 1.0, 1.0]),
     )
 
 
-def _smoothed(trial: Trial, names: Sequence[str], motion: Motion) -> dict[str, Floats]:
-    """States of the motion by the recorded channels, at the roughness of greatest likelihood.
+def _midpoints(values: Floats) -> Floats:
+    """Means of each value and the next."""
+    return 0.5 * (values[1:] + values[:-1])
 
-    That is found on the first samples.
+
+def _smoothed(trial: Trial, names: Sequence[str], motion: Motion) -> dict[str, Floats]:
+    """States of the motion by the recorded channels.
+
+    The roughness is that of greatest likelihood on the first samples.
     """
     measured = np.column_stack([trial[name] for name in names])
     recorded = [motion.states.index(name) for name in names]
-    observation = np.eye(len(motion.states))[recorded]
-    variances = np.array([_least_noise(trial, name) for name in names]) ** 2
-    start = np.zeros(len(motion.states))
+    n_states = len(motion.states)
+    start = np.zeros(n_states)
     start[recorded] = measured[0]
-
-    guessed_by = next(name for name in motion.guessed_by if name in trial)
-    size = float(np.ptp(trial[guessed_by])) or 1.0
-    usual_time = max(trial.duration / 20.0, 1e-9)
-    guess = size**2 / usual_time**3  # as if velocity changed by all that in this time
+    noise = np.array([_least_noise(trial, name) for name in names])
+    guess = _guessed_roughness(trial, motion)
 
     def system(decade: float, n_samples: int) -> LinearSystem:
         steps = slice(n_samples - 1)
         roughness = guess * 10.0**decade
         return LinearSystem(
-            motion.transitions[steps],
-            roughness * motion.process[steps],
-            observation,
-            variances,
-            start,
-            motion.start_variances,
+            transitions=motion.transitions[steps],
+            process=roughness * motion.process[steps],
+            observation=np.eye(n_states)[recorded],
+            variances=noise**2,
+            start=start,
+            start_variances=motion.start_variances,
         )
 
-    n_searched = min(len(trial), LONGEST_SEARCH)
-    first = measured[:n_searched]
+    def unlikelihood(decade: float) -> float:
+        first = measured[:LONGEST_SEARCH]
+        return -system(decade, len(first)).filtered(first).log_likelihood
+
     best = minimize_scalar(
-        lambda decade: -system(decade, n_searched).filtered(first).log_likelihood,
+        unlikelihood,
         bounds=(-DECADES, DECADES),
         method="bounded",
         options={"xatol": 0.1},
     )
     states = system(float(best.x), len(trial)).smoothed(measured)
     return dict(zip(motion.states, states.T, strict=True))
+
+
+def _guessed_roughness(trial: Trial, motion: Motion) -> float:
+    """Roughness as if velocity changed by its range in a twentieth of the trial."""
+    recorded = [name for name in motion.guessed_by if name in trial]
+    guessed_by = recorded[0]
+    size = float(np.ptp(trial[guessed_by])) or 1.0
+    usual_time = max(trial.duration / 20.0, 1e-9)
+    return size**2 / usual_time**3
 
 
 def _least_noise(trial: Trial, name: str) -> float:

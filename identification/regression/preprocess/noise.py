@@ -19,7 +19,8 @@ def noise_level(t: ArrayLike, values: ArrayLike) -> float:
     the median of the differences is not moved by corners of the signal. 0 with fewer
     than five samples.
     """
-    t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
+    t = np.asarray(t, dtype=float)
+    values = np.asarray(values, dtype=float)
     n_compared = len(t) - 4
     if n_compared < 1:
         return 0.0
@@ -44,17 +45,20 @@ def noise_level(t: ArrayLike, values: ArrayLike) -> float:
 
 
 def noise_ratio(t: ArrayLike, values: ArrayLike, window: int = 1) -> float:
-    """Noise of the change over a window of steps relative to the change itself (root mean squares)."""
+    """Noise of the change over a window of steps relative to the change itself.
+
+    Both are root mean squares.
+    """
     values = np.asarray(values, dtype=float)
     change = values[window:] - values[:-window]
-    size = root_mean_square(change) if len(change) else 0.0
-    if size == 0.0:
+    if not np.any(change):
         return 0.0
+    size = root_mean_square(change)
     noise_of_change = np.sqrt(2.0) * noise_level(t, values)
     ratio: float = noise_of_change / size
     return ratio
 
 
 def is_noisy(t: ArrayLike, channels: Iterable[ArrayLike]) -> bool:
-    """Whether any of some channels, each of shape (n_samples,), has noise beyond `NOISY`."""
+    """Whether any of some channels, each (n_samples,), has noise beyond `NOISY`."""
     return any(noise_ratio(t, values) > NOISY for values in channels)

@@ -1,4 +1,6 @@
-"""Outliers and dropouts of a record: found, filled from their neighbours, and counted."""
+"""Outliers and dropouts of a record: found, filled from neighbours, and counted."""
+
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,12 +19,16 @@ STEPPING = ("delta", "n")  # without the inertia of a ship
 
 
 def outliers(
-    t: ArrayLike, values: ArrayLike, threshold: float = OUTLYING, may_step: bool = True
+    t: ArrayLike,
+    values: ArrayLike,
+    threshold: float = OUTLYING,
+    may_step: bool = True,
 ) -> Flags:
-    """Samples away from the running median by several times the noise (Hampel 1974, JASA 69), as flags.
+    """Flags of samples away from the running median by several times the noise.
 
-    What the signal itself moves from sample to sample is allowed for by the running
-    median's own steps, so that corners of a clean signal are no outliers.
+    Source: Hampel 1974, JASA 69. What the signal itself moves from sample to sample is
+    allowed for by the running median's own steps, so that corners of a clean signal are
+    no outliers.
 
     Parameters
     ----------
@@ -34,11 +40,14 @@ def outliers(
         Whether the signal may have just moved at its ends, as a rudder does; if not,
         the first and the last sample are compared with the next one.
     """
-    t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
+    t = np.asarray(t, dtype=float)
+    values = np.asarray(values, dtype=float)
     if len(values) < WIDTH:
         return np.zeros(len(values), dtype=bool)
+
     middle = median_filter(values, WIDTH, mode="nearest")
-    least = threshold * noise_level(t, values) + 1e-9 * np.ptp(middle)
+    rounding = 1e-9 * np.ptp(middle)
+    least = threshold * noise_level(t, values) + rounding
     allowed = least + 0.5 * WIDTH * _usual_steps(middle)
     found: Flags = np.abs(values - middle) > allowed
 
@@ -51,17 +60,24 @@ def outliers(
 
 
 def _usual_steps(middle: Floats) -> Floats:
-    """Largest of the running median's steps to either side, in the median around each sample."""
+    """Larger of the running median's steps to either side, smoothed by a median."""
     forward = np.abs(np.diff(middle, append=middle[-1]))
     backward = np.roll(forward, 1)
     return median_filter(np.maximum(forward, backward), WIDTH, mode="nearest")
 
 
 def _ends_that_jump(
-    t: Floats, values: Floats, middle: Floats, least: float
+    t: Floats,
+    values: Floats,
+    middle: Floats,
+    least: float,
 ) -> tuple[bool, bool]:
-    """Whether first and last sample are further from the next one than the signal moves inside."""
-    inside = middle[WIDTH // 2 : -(WIDTH // 2)]
+    """Whether the first and the last sample jump to the next one.
+
+    That is further than the signal moves anywhere inside.
+    """
+    half = WIDTH // 2
+    inside = middle[half:-half]
     largest_move = np.abs(np.diff(inside)).max()
     steps = np.diff(t)
     jumps = np.abs(np.diff(values))
@@ -75,7 +91,7 @@ def _ends_that_jump(
 
 
 def repaired(trial: Trial, threshold: float = OUTLYING) -> Trial:
-    """Replace outliers and fill short dropouts of a trial from their neighbours, by PCHIP.
+    """Replace outliers and fill short dropouts of a trial by PCHIP interpolation.
 
     A dropout is a step in time of more than 1.5 usual ones; those of up to 10 are
     filled, at the usual step; longer ones stay, and no method smooths or integrates
@@ -111,7 +127,12 @@ def _outliers_of(trial: Trial, name: str, threshold: float) -> Flags:
     if name not in MEASURED:
         return np.zeros(len(trial), dtype=bool)
     may_step = name in STEPPING
-    wrong = outliers(trial.t, trial[name], threshold, may_step)
+    wrong = outliers(
+        trial.t,
+        values=trial[name],
+        threshold=threshold,
+        may_step=may_step,
+    )
     if wrong.mean() > 0.1:
         raise InputError(
             f"trial {trial.name!r}: expected at most a tenth of {name} to be outliers,"
@@ -125,10 +146,11 @@ def _filled_times(t: Floats) -> Floats:
     """The times with those that are missing in short dropouts."""
     steps = np.diff(t)
     usual = float(np.median(steps))
-    is_dropout = (steps > 1.5 * usual) & (steps <= 10.5 * usual)
     times = [t]
-    for k in np.flatnonzero(is_dropout):
-        n_steps = round(steps[k] / usual)
-        filled = np.linspace(t[k], t[k + 1], n_steps + 1)
-        times.append(filled[1:-1])
+    for start, end in pairwise(t):
+        step = end - start
+        if 1.5 * usual < step <= 10.5 * usual:
+            n_steps = round(step / usual)
+            filled = np.linspace(start, end, n_steps + 1)
+            times.append(filled[1:-1])
     return np.unique(np.concatenate(times))
