@@ -1,4 +1,4 @@
-"""A bridge's instruments: first-order motion in waves, noise, and a filter against the waves.
+"""Instruments of a bridge: motion in waves, noise, and a filter against the waves.
 
 The notch filter (s^2 + 2 a w s + w^2) / (s^2 + 2 b w s + w^2) around the frequency of
 encounter: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control,
@@ -34,7 +34,7 @@ class Settings(NamedTuple):
 
 
 class Notch(NamedTuple):
-    """Memory of the filter: the last two signals, and the last two that were taken away."""
+    """Memory of the notch filter: the last two signals and what was taken from them."""
 
     signal_1: float
     signal_2: float
@@ -64,7 +64,10 @@ def measure(
     settings: Settings,
     random: Random,
 ) -> Memory:
-    """First-order motion, noise, and what the filter takes away (see `shipgym.instruments.perfect`)."""
+    """Add first-order motion and noise; take away what the filter finds of the waves.
+
+    See `shipgym.instruments.perfect` for the arguments.
+    """
     psi = sea.psi_wave
     r = sea.r_wave
     x, y, u, v = 0.0, 0.0, 0.0, 0.0
@@ -90,7 +93,9 @@ def measure(
 
 
 def notched(signal: float, turn: float, first: bool, memory: Notch) -> Notch:
-    """Memory of a notch filter after a sample, around `turn` rad a sample; `taken_1` is taken away.
+    """Memory of a notch filter after a sample, around `turn` rad a sample.
+
+    `taken_1` is what it takes away.
 
     The notch is 1 less a band-pass, discretised bilinearly with its frequency kept. In
     the episode's first sample nothing is taken away.

@@ -1,4 +1,4 @@
-"""Rudder and shaft sequences that excite a ship for identification, each replayed by its seed.
+"""Rudder and shaft sequences that excite a ship for identification, drawn by a seed.
 
 Signals: Ljung 1999, System Identification, 13.3 (pseudo-random binary and multi-sine
 signals).
@@ -28,7 +28,9 @@ def prbs_rudder(
 ) -> Trial:
     """Simulate a pseudo-random binary rudder.
 
-    It is put from one side to the other at multiples of a clock period. Raises InputError for an amplitude beyond the rudder's limit, or a time that is not
+    It is put from one side to the other at multiples of a clock period.
+
+    Raises InputError for an amplitude beyond the rudder's limit, or a time that is not
     above 0. Raises UnstableModelError if the ship runs away.
 
     Parameters
@@ -173,7 +175,8 @@ def shaft_speed_steps(
 ) -> Trial:
     """Simulate steps of the ordered shaft speed, of random speed and length.
 
-    Both are evenly distributed: orders are `lowest_ratio` to `highest_ratio` of the shaft speed at service speed,
+    Both are evenly distributed: orders are `lowest_ratio` to `highest_ratio` of the
+    shaft speed at service speed,
     ahead and at most 1.5, each held for `shortest_s` to `longest_s`, s, by default 5 to
     15 times the time to travel one ship length; the rudder is held at `rudder_deg`
     meanwhile, degrees. The seed is that of the steps; otherwise as `prbs_rudder`.

@@ -1,4 +1,4 @@
-"""When a manoeuvre was executed, found from the rudder, ordered or measured; and other things all share."""
+"""When a manoeuvre was executed, by the ordered or measured rudder; shared helpers."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -40,7 +40,7 @@ def is_ordered(trial: Trial) -> bool:
 
 
 def usual_rudder(trial: Trial) -> float:
-    """The angle that a rudder has in a manoeuvre, whatever it has on the approach, rad."""
+    """Rudder angle that shows in a manoeuvre, whatever it is on the approach, rad."""
     return float(np.percentile(np.abs(rudder(trial)), 75))
 
 
@@ -92,7 +92,7 @@ def reversals(trial: Trial) -> Reversals:
 
 
 def _holds(t: Floats, delta: Floats, start: float, least: float) -> list[Floats]:
-    """Samples from the start on at which the rudder is held beyond an angle, side after side."""
+    """Samples where the rudder starts to be held beyond an angle, side after side."""
     beyond = np.abs(delta) > least
     held = np.flatnonzero(beyond & (t >= start))
     turned = np.diff(np.sign(delta[held])) != 0.0
@@ -134,12 +134,12 @@ def departure(t: Floats, move: Floats, reach: float, fastest: float) -> float:
 
 
 def distance_sailed(trial: Trial) -> Floats:
-    """Distance from the start, m, from the speed by the trapezoid rule, shape (n_samples,)."""
+    """Distance from the start, m, by the trapezoid rule, shape (n_samples,)."""
     return integral(trial.t, np.hypot(trial["u"], trial["v"]))
 
 
 def reached(values: Floats, threshold: float, other: Floats) -> float | None:
-    """Another quantity when values first reach a threshold, by straight lines; None if they never do."""
+    """Another quantity when values first reach a threshold; None if they never do."""
     past = np.flatnonzero(values >= threshold)
     if len(past) == 0:
         return None
@@ -149,7 +149,7 @@ def reached(values: Floats, threshold: float, other: Floats) -> float | None:
 
 
 def turning_rudder(rudder_deg: float, limit: float, hint: str = "") -> float:
-    """A rudder angle that turns the ship, from degrees, rad; InputError for 0 or one beyond the limit."""
+    """Rudder angle from degrees, rad; InputError for 0 or one beyond the limit."""
     angle = check_number(
         rudder_deg, "rudder_deg", at_least=-limit, at_most=limit, hint=hint
     )

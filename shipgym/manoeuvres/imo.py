@@ -26,7 +26,9 @@ DRAWS = 100  # of an identified ship
 def imo_assessment(
     model: ShipModel, n_draws: int | None = None, seed: int | np.random.Generator = 0
 ) -> dict[str, Criterion]:
-    """Assess a ship by MSC.137(76): turning, initial turning, yaw checking, course keeping and stopping.
+    """Assess a ship by the criteria of MSC.137(76).
+
+    They are turning, initial turning, yaw checking, course keeping and stopping.
 
     Simulated from service speed in deep water: turning circles with 35 degrees of
     rudder, or the rudder's limit where that is less, and zigzags 10/10 and 20/20, each
@@ -58,7 +60,7 @@ def assess_draws(model: ShipModel, draws: Sequence[ShipModel]) -> dict[str, Crit
 def imo_criteria(
     model: ShipModel, found: Mapping[str, Mapping[str, IndexInterval]]
 ) -> dict[str, Criterion]:
-    """The criteria of a ship from the indices of her standard manoeuvres, by their names.
+    """Criteria of a ship by name, from the indices of her standard manoeuvres.
 
     A manoeuvre that never got so far fails its criteria. Of an identified ship a
     criterion is decided only where the manoeuvre is within the envelope of her trials
@@ -82,7 +84,7 @@ def imo_criteria(
 def stopping_criterion(
     model: ShipModel, stop: Mapping[str, IndexInterval] | None
 ) -> Criterion:
-    """The full astern stopping test; without verdict for a ship that cannot be ordered astern."""
+    """Full astern stopping test; no verdict for a ship that cannot go astern."""
     if stop is not None:
         note = (
             "where large displacement makes 15 lengths impracticable, the"

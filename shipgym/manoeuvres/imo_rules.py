@@ -1,4 +1,4 @@
-"""The manoeuvring criteria of the International Maritime Organization: resolution MSC.137(76), 2002."""
+"""Criteria of the IMO (International Maritime Organization): MSC.137(76)."""
 
 from dataclasses import dataclass, replace
 
@@ -66,14 +66,14 @@ def ship_rules(model: ShipModel) -> dict[str, Rule]:
 
 
 def overshoot_limits_deg(seconds_per_length: float) -> tuple[float, float]:
-    """Limits of the first and second overshoot in the 10/10 zigzag, degrees, for L/V in s."""
+    """Limits of the two overshoots of the 10/10 zigzag, degrees, for L/V in s."""
     first = np.clip(5.0 + 0.5 * seconds_per_length, 10.0, 20.0)
     second = np.clip(17.5 + 0.75 * seconds_per_length, 25.0, 40.0)
     return float(first), float(second)
 
 
 def trial_in_words(model: ShipModel, manoeuvre: str) -> str:
-    """A trial of a standard manoeuvre, of a turn with the rudder's limit where that is less than 35 deg."""
+    """Trial of a standard manoeuvre; turns are with 35 deg or the rudder's limit."""
     if manoeuvre == "turning circle":
         return f"{full_rudder_deg(model):g} deg turn"
     return f"{manoeuvre.removeprefix('zigzag ')} zigzag"

@@ -1,4 +1,4 @@
-"""How certain the indices of an identified ship are: manoeuvres of models drawn from its covariance."""
+"""How certain the indices of an identified ship are, by models of its covariance."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -33,7 +33,7 @@ class IndexInterval:
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """The 95 % interval: quantiles of 2.5 and 97.5 per cent of the draws that have a value.
+        """The 95 % interval: quantiles of 2.5 and 97.5 per cent of the draws.
 
         It says nothing of those that ran away or never got so far: see their counts.
         None without any.
@@ -78,7 +78,7 @@ class IndexInterval:
 
     @property
     def lost_in_words(self) -> str:
-        """How many draws have no value, which are not in the interval; empty where all have one."""
+        """Say how many draws have no value, and so no part in the interval."""
         draws = len(self.values)
         lost = []
         if self.n_ran_away:
@@ -94,7 +94,7 @@ def index_intervals(
     n_draws: int = 200,
     seed: int | np.random.Generator = 0,
 ) -> dict[str, IndexInterval]:
-    """Indices of a manoeuvre with their 95 % intervals over the estimated covariance of a model.
+    """Indices of a manoeuvre with their 95 % intervals over a model's covariance.
 
     Returns an IndexInterval by the name of each index, with its unit in the name. Draws
     that run away or never get so far are counted. Raises InputError for a model without
@@ -117,7 +117,8 @@ def index_intervals(
     Examples
     --------
     >>> from shipgym import load_model, manoeuvres
-    >>> found = manoeuvres.index_intervals(load_model("mariner-tls-svm"), n_draws=50, seed=1)
+    >>> ship = load_model("mariner-tls-svm")
+    >>> found = manoeuvres.index_intervals(ship, n_draws=50, seed=1)
     >>> low, high = found["overshoot_1_deg"].interval
     >>> low < found["overshoot_1_deg"].value < high
     True
@@ -138,7 +139,7 @@ def index_intervals(
 def own_indices(
     model: ShipModel, needed: Mapping[str, Manoeuvre]
 ) -> dict[str, dict[str, float | None]]:
-    """Indices of a model in some manoeuvres; all None in one that it cannot complete."""
+    """Indices of a model in some manoeuvres; None for one that it cannot complete."""
     own = {}
     for name, manoeuvre in needed.items():
         indices, _ = attempt(manoeuvre.evaluate, model)
@@ -185,7 +186,7 @@ def _without_draws(
 def attempt(
     evaluate: Evaluation, model: ShipModel
 ) -> tuple[dict[str, float | None], bool]:
-    """Indices of a manoeuvre, none where it never got so far, and whether the ship ran away.
+    """Indices of a manoeuvre as far as it got, and whether the ship ran away.
 
     A spiral of a draw that turns to one side only, or whose rudder has the wrong sign,
     has no indices either: there the error lies in the draw and not in what the user

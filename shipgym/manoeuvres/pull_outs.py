@@ -40,7 +40,7 @@ def pull_out(
     weather: Weather | str | None = None,
     seed: Seed = 0,
 ) -> Trial:
-    """Simulate a pull-out: a steady turn, then the rudder amidships until the motion is steady again.
+    """Simulate a pull-out: a steady turn, then the rudder amidships until steady again.
 
     The ship is at service speed and the matching shaft speed, the rudder of the turn in
     degrees, negative to port; `dt`, the time between samples, s, is by default a
@@ -57,7 +57,7 @@ def pull_out(
 
 
 def pull_out_indices(trial: Trial) -> PullOutIndices:
-    """Yaw rate of the turn and the yaw rate left at the end of a measured or simulated pull-out.
+    """Yaw rate of the turn and the yaw rate left at the end of a pull-out.
 
     Means over the last tenth of the turn and of the time amidships. The trial has r and
     delta (or delta_command): the same rudder in a turn, then amidships to the end.

@@ -1,4 +1,4 @@
-"""Intervals of 95 %: their quantiles, of values drawn and of the normal distribution."""
+"""Ends of 95 % intervals, of drawn values and of the normal distribution."""
 
 import numpy as np
 
@@ -24,6 +24,6 @@ def upper_95(values: Floats) -> float:
 
 
 def band_95(values: Floats) -> tuple[Floats, Floats]:
-    """Both ends of the interval over the first axis, each of the shape of the others."""
+    """Both ends of the interval over the first axis, in the shape of the others."""
     low, high = np.quantile(values, LEVELS_95, axis=0)
     return low, high

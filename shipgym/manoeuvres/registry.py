@@ -1,4 +1,4 @@
-"""The manoeuvres known by name: those of this package, and those that a user registers."""
+"""Manoeuvres known by name: those of this package, and those that a user registers."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Manoeuvre:
         return dict.fromkeys(field.name for field in fields(self.outcome))
 
     def evaluate(self, model: ShipModel) -> Any:
-        """The indices of a ship in this manoeuvre; UnstableModelError where she does what no ship can."""
+        """Indices of a ship; UnstableModelError where she does what no ship can."""
         sailed = self.sail(model)
         if isinstance(sailed, Trial):
             check_physical(model, sailed)
@@ -51,7 +51,7 @@ class Manoeuvre:
 
 
 def check_physical(model: ShipModel, trial: Trial) -> None:
-    """Refuse a run beyond every speed and yaw rate of a ship at service power, short of overflow."""
+    """Refuse a run beyond every speed and yaw rate of a ship at service power."""
     speed, length = model.particulars["speed"], model.particulars["length"]
     largest = {
         "u": FASTEST * speed,
@@ -80,7 +80,7 @@ Variants = Callable[[ShipModel, float], Mapping[str, Manoeuvre]]
 
 @dataclass(frozen=True)
 class Family:
-    """Manoeuvres of one kind, which share a section of the page that `shipgym trials` writes."""
+    """Manoeuvres of one kind, a section of the page that `shipgym trials` writes."""
 
     title: str
     variants: Variants
@@ -93,7 +93,9 @@ FAMILIES: dict[str, Family] = {}
 def register_manoeuvre(
     name: str, variants: Variants, title: str = "", kind: str | None = None
 ) -> None:
-    """Make a family of manoeuvres known to `standard_manoeuvres`, `index_intervals` and `shipgym trials`.
+    """Register a family of manoeuvres.
+
+    `standard_manoeuvres`, `index_intervals` and `shipgym trials` then know it.
 
     Raises InputError if a family of that name is registered already.
 
@@ -123,7 +125,7 @@ def register_manoeuvre(
 def families_of(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, dict[str, Manoeuvre]]:
-    """The manoeuvres that suit a ship, by family and name; arguments and errors of `standard_manoeuvres`."""
+    """Manoeuvres that suit a ship, by family and name; see `standard_manoeuvres`."""
     model.check_depth(water_depth)
     return {
         name: dict(family.variants(model, water_depth))
@@ -134,7 +136,7 @@ def families_of(
 def standard_manoeuvres(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, Manoeuvre]:
-    """The registered manoeuvres that suit a ship, from service speed, in deep water by default.
+    """Registered manoeuvres that suit a ship, from service speed.
 
     Raises InputError for water that is too shallow, or for shallow water with a
     deep-water model.

@@ -31,7 +31,7 @@ class SteadyMotion(NamedTuple):
 
 
 class Voyage:
-    """A manoeuvre in the making: one leg after the other, from service speed or a given state.
+    """Manoeuvre in the making: leg by leg, from service speed or a given state.
 
     Samples are dt apart, s; by default a fortieth of the time to travel one ship
     length. In weather the motion is never steady: legs that wait for it last their
@@ -62,7 +62,7 @@ class Voyage:
         return np.asarray(self._states[-1][-1])
 
     def go(self, sail: Sail, n_steps: int) -> tuple[Floats, Floats]:
-        """Sail some steps; states of shape (n_steps, n_columns) and commands of shape (n_steps, 2)."""
+        """Sail some steps; states (n_steps, n_columns) and commands (n_steps, 2)."""
         states = self.passage.states(self.state, n_steps)
         commands = np.empty((n_steps, 2))
         sail(states, commands)
@@ -84,7 +84,7 @@ class Voyage:
         return sail
 
     def rate_helmsman(self) -> Callable[[float], Sail]:
-        """From a yaw rate, rad/s, to the leg in which a proportional-integral helmsman holds it.
+        """Map a yaw rate, rad/s, to the leg in which a helmsman holds it by PI control.
 
         The helmsman is designed from the rudder's effect at service speed, for a
         bandwidth of 2 U0 / L and a reset time of 4 L / U0; the integral part carries

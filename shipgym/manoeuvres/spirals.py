@@ -1,4 +1,4 @@
-"""Spirals: the manoeuvres that show whether, and how far, a ship is unstable on a straight course.
+"""Spirals, which show whether, and how far, a ship is unstable on a straight course.
 
 Direct spiral of Dieudonne and reverse spiral of Bech as described in IMO MSC/Circ.1053
 and ITTC 7.5-04-02-01.
@@ -77,7 +77,7 @@ class SpiralIndices:
 
 
 class _Curve(NamedTuple):
-    """Yaw rate over rudder angle of the way there or back, in the order of the angles."""
+    """Yaw rate over rudder angle of the way there or back, by rising angle."""
 
     angles: Floats  # deg
     rates: Floats  # deg/s
@@ -91,7 +91,9 @@ def direct_spiral(
     weather: Weather | str | None = None,
     seed: Seed = 0,
 ) -> Spiral:
-    """Simulate a direct spiral (Dieudonne): rudder angles there and back, each held until the turn is steady.
+    """Simulate a direct spiral (Dieudonne).
+
+    Rudder angles there and back, each held until the turn is steady.
 
     The angles, degrees, go from one side to the other; they are sailed in this order
     and then back to the first. The loop is known to within their steps. Other arguments
@@ -118,7 +120,9 @@ def reverse_spiral(
     weather: Weather | str | None = None,
     seed: Seed = 0,
 ) -> Spiral:
-    """Simulate a reverse spiral (Bech): a helmsman keeps a sequence of yaw rates, each until it is steady.
+    """Simulate a reverse spiral (Bech).
+
+    A helmsman keeps a sequence of yaw rates, each until it is steady.
 
     It also finds the turns at which an unstable ship would not stay by itself. The
     helmsman is a proportional-integral controller, designed from the rudder's effect on
@@ -228,7 +232,7 @@ def _near(angle: float, wanted: Sequence[float], tolerance: float) -> bool:
 
 
 def spiral_indices(spiral: Spiral) -> SpiralIndices:
-    """Width and height of the loop of a spiral, simulated or measured (`spiral_from_trial`).
+    """Width and height of the loop of a spiral, simulated or from a trial.
 
     Raises InputError if the yaw rate never changes its side, or a direct spiral does
     not come back.
@@ -247,7 +251,7 @@ def spiral_indices(spiral: Spiral) -> SpiralIndices:
 
 
 def turning_point(angles: Floats) -> int:
-    """Number of the point at which a direct spiral turns back: the later of its extreme rudder angles."""
+    """Index at which a direct spiral turns back: the later of its extreme angles."""
     return int(max(np.argmin(angles), np.argmax(angles)))
 
 
@@ -319,7 +323,7 @@ def _reverse_loop(angles: Floats, rates: Floats) -> SpiralIndices:
 def standard_spirals(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, Manoeuvre]:
-    """A direct spiral, and a reverse one where the ship is unstable on a straight course."""
+    """A direct spiral, and a reverse one where the ship is unstable going straight."""
     limit = model.steering.rudder_limit_deg
     angles = [angle for angle in DIRECT_RUDDER_DEG if abs(angle) <= limit]
     spirals = {

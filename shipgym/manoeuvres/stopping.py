@@ -1,4 +1,4 @@
-"""Straight-line acceleration and stopping, and their indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
+"""Straight-line acceleration and stopping (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -54,7 +54,7 @@ def stopping(
     weather: Weather | str | None = None,
     seed: Seed = 0,
 ) -> Trial:
-    """Simulate a stop from service speed, the rudder amidships, until the ship is slow enough.
+    """Simulate a stop from service speed, rudder amidships, until the ship is slow.
 
     A shaft ordered astern needs equations that hold there: of the reference ships only
     those of `tanker` do. The propellers of `container` and `kvlcc2` are open-water
@@ -130,7 +130,7 @@ def goes_astern(model: ShipModel) -> bool:
 
 
 def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
-    """The full astern stopping test: the shaft ordered astern as fast as ahead, until dead in the water.
+    """Full astern stopping test: the shaft astern as fast as ahead, until at rest.
 
     InputError for a ship whose equations do not hold astern; `water_depth` as in
     `zigzag`.
@@ -141,7 +141,7 @@ def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
 def stopping_indices(
     trial: Trial, speed_ratio: float | None = None, length: float | None = None
 ) -> StoppingIndices:
-    """Stopping distance of a measured or simulated stop, from the first sample, that of the order, on.
+    """Stopping distance of a stop, from the first sample, that of the order, on.
 
     The trial has u, v, x, y and psi. She counts as stopped at `speed_ratio` of the
     surge speed at the start, by default at the end of the trial; `length`, between
@@ -179,7 +179,7 @@ def acceleration(
     weather: Weather | str | None = None,
     seed: Seed = 0,
 ) -> Trial:
-    """Simulate a straight-line acceleration: from a slow speed with the shaft ordered to service speed.
+    """Simulate an acceleration from a slow speed, the shaft ordered as in service.
 
     A helmsman keeps the yaw rate at zero, so that an unstable ship stays straight.
 
@@ -236,7 +236,7 @@ def acceleration_indices(
 
 
 def _when(trial: Trial, values: Floats, threshold: float) -> float:
-    """Time at which values first reach a threshold, between samples by straight lines, s."""
+    """Time at which values first reach a threshold, by straight lines, s."""
     time = reached(values, threshold, trial.t)
     if time is None:
         raise ManoeuvreError(
@@ -250,7 +250,7 @@ def _when(trial: Trial, values: Floats, threshold: float) -> float:
 def standard_stops(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, Manoeuvre]:
-    """Inertia stop and acceleration of a ship with a shaft; a crash stop where she can go astern."""
+    """Inertia stop, acceleration and, if the shaft reverses, crash stop."""
     if "n" not in model.command_names:
         return {}
     found = {

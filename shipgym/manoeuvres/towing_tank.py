@@ -1,6 +1,7 @@
 """A virtual towing tank: captive tests of any ship model.
 
-The motion is prescribed and the forces are measured: each test returns a Trial with the motion and the forces X, Y (N) and N (N m); a number
+The motion is prescribed and the forces are measured: each test returns a Trial with
+the motion and the forces X, Y (N) and N (N m); a number
 out of range is an InputError. The tests are those of the planar motion mechanism
 (Gertler 1967, The DTMB planar-motion-mechanism system; ITTC 7.5-02-06-02).
 """
@@ -280,7 +281,8 @@ def rigid_body_forces(
 ) -> Floats:
     """Forces X, Y and moment N that accelerate a ship without water, about midship.
 
-    Fossen 2011, 3.3. All in SI units, or all in the prime system: `rigid` is mass, its static moment and
+    Fossen 2011, 3.3. All in SI units or all in the prime system: `rigid` is mass, its
+    static moment and
     the yaw inertia; forces, and velocity and acceleration in surge, sway and yaw, have
     the shape (3, n_samples).
     """

@@ -47,7 +47,7 @@ class TurningIndices:
 
 
 class TrackFromOrder(NamedTuple):
-    """A track from the position and along the heading at which the rudder was ordered."""
+    """Track from the position and along the heading at which the rudder was ordered."""
 
     ahead: Floats  # ship lengths, shape (n_samples,)
     aside: Floats  # to starboard, ship lengths
@@ -69,7 +69,7 @@ def turning_circle(
     weather: Weather | str | None = None,
     seed: Seed = 0,
 ) -> Trial:
-    """Simulate a turning circle from straight ahead at service speed, without an approach run.
+    """Simulate a turning circle from straight ahead at service speed, with no approach.
 
     The rudder is ordered at the start, degrees, negative to port; `duration` and `dt`,
     the time between samples, are in s; the rest as in `zigzag`. Raises InputError for a
@@ -83,7 +83,7 @@ def turning_circle(
 
 
 def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices:
-    """Advance, transfer, diameters and the steady turn of a measured or simulated turning circle.
+    """Advance, transfer, diameters and the steady turn of a turning circle.
 
     The trial has x, y, psi, u, v, r and delta (or delta_command); `length` is that
     between perpendiculars, m, by default the trial's own. Raises InputError if a
@@ -128,7 +128,7 @@ def track_from_order(trial: Trial, length: float) -> TrackFromOrder:
 def _steady_turn(
     trial: Trial, after: Flags, turned: Floats, side: float, length: float
 ) -> _SteadyTurn:
-    """The turn over its last quarter; `turned` to the `side` of the turn, from the order on."""
+    """Steady turn in its last quarter; `turned` to its `side`, from the order on."""
     u, v, r = (trial[name][after] for name in ("u", "v", "r"))
     speed = np.hypot(u, v)
     drift = np.arctan2(-v, u)
@@ -144,7 +144,7 @@ def _steady_turn(
 
 
 def full_rudder_deg(model: ShipModel) -> float:
-    """Rudder of the standard circle, degrees: 35, or the rudder's limit where that is less."""
+    """Rudder of the standard circle, degrees: 35, or the rudder's limit if less."""
     return min(35.0, model.steering.rudder_limit_deg)
 
 

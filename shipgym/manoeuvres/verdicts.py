@@ -1,4 +1,4 @@
-"""Verdicts on criteria: by a model and the models drawn from it, and by measured trials."""
+"""Verdicts on criteria by a model, the models drawn from it, and measured trials."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -54,14 +54,14 @@ class Criterion:
 
     @property
     def share_passed(self) -> float | None:
-        """Share of the draws that pass; those that run away or never get so far do not."""
+        """Share of the draws that pass; runaways and incomplete runs do not."""
         if self.drawn is None or not len(self.drawn.values):
             return None
         return float(np.mean(self.drawn.values <= self.limit))  # NaN is not
 
     @property
     def probability(self) -> float | None:
-        """Of passing: 1 or 0 where it was measured, the share of the draws otherwise; None if not decided."""
+        """Probability to pass: 1 or 0 if measured; None if undecided."""
         if not self.decided:
             return None
         if self.measured is not None:
@@ -99,7 +99,7 @@ class Criterion:
 def criterion_of(
     rule: Rule, runs: Sequence[Mapping[str, IndexInterval]], note: str = ""
 ) -> Criterion:
-    """The worst value of some runs against its limit; a run that never got so far fails it."""
+    """The worst value of some runs against its limit; an incomplete run fails it."""
     drawn = worst([run[rule.index] for run in runs])
     passed = drawn.value is not None and drawn.value <= rule.limit
     return Criterion(
@@ -108,7 +108,9 @@ def criterion_of(
 
 
 def decided_by_model(criterion: Criterion, manoeuvre: str, outside: bool) -> Criterion:
-    """The criterion without verdict where a model does not decide it, and the trial that would.
+    """The criterion without verdict where a model does not decide it.
+
+    It names the trial that would decide it.
 
     `manoeuvre`: the trial in words; `outside`: whether it is outside the envelope of
     the trials that the model was identified from.
@@ -125,7 +127,7 @@ def decided_by_model(criterion: Criterion, manoeuvre: str, outside: bool) -> Cri
 
 
 def _on_both_sides(criterion: Criterion) -> bool:
-    """Whether too few draws lie on one side of the limit; those that run away lie on none."""
+    """Whether too few draws lie on one side of the limit; runaways lie on none."""
     drawn = criterion.drawn
     if drawn is None or not len(drawn.values):
         return False
@@ -135,7 +137,7 @@ def _on_both_sides(criterion: Criterion) -> bool:
 
 
 def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:
-    """Whether a manoeuvre leaves the envelope of the trials, in a turn up to 180 degrees of heading.
+    """Whether a manoeuvre leaves the trials' envelope, in a turn up to 180 degrees.
 
     By more than 0.15 of its size.
     """
@@ -157,7 +159,7 @@ def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:
 def with_measured(
     criteria: Mapping[str, Criterion], model: ShipModel, trials: Sequence[Trial]
 ) -> dict[str, Criterion]:
-    """The criteria of a ship, decided by her trials where one of them is the manoeuvre; the worst counts.
+    """Criteria of a ship, by her trials where they measure them; the worst counts.
 
     `trials`: as recorded; those of another rudder angle, heading or approach speed
     count for nothing.
@@ -178,7 +180,7 @@ def with_measured(
 
 
 def measured_indices(model: ShipModel, trial: Trial) -> dict[str, float]:
-    """The criteria that a trial measures, by name; none where it is not one of the manoeuvres."""
+    """Criteria that a trial measures, by name; none for another manoeuvre."""
     if trial.kind not in ("zigzag", "turning-circle") or not _at_speed(model, trial):
         return {}
     length = model.particulars["length"]
@@ -212,7 +214,7 @@ def _at_speed(model: ShipModel, trial: Trial) -> bool:
 
 
 def _manoeuvre_of(model: ShipModel, trial: Trial) -> str | None:
-    """The manoeuvre of the rules that a trial is, its rudder and heading to a degree; None for another."""
+    """Manoeuvre of the rules that a trial is, to a degree; None for another."""
     rudder_deg = float(np.degrees(usual_rudder(trial)))
     if trial.kind == "turning-circle":
         off = abs(rudder_deg - full_rudder_deg(model))

@@ -1,4 +1,4 @@
-"""The zigzag manoeuvre (Kempf 1932) and its indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
+"""Zigzags (Kempf 1932) and their indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -148,7 +148,7 @@ def zigzag_indices(
 def _initial_turning(
     trial: Trial, start: float, threshold_deg: float | None, length: float
 ) -> float | None:
-    """Lengths sailed from the first order until the heading has changed by the threshold, if it has."""
+    """Lengths sailed from the first order to the heading threshold, if reached."""
     if not threshold_deg:
         return None
     times = trial.t[trial.t >= start]
@@ -161,7 +161,7 @@ def _initial_turning(
 
 
 def switch_heading_deg(trial: Trial) -> float | None:
-    """Heading change at which the rudder of a zigzag was to be reversed, degrees; None without reversal.
+    """Heading change at which the rudder was to be reversed, degrees; None if never.
 
     Orders are given in whole degrees, in trials nearly always 1 or a multiple of 5, and
     carried out after a delay in which the heading moves on. So it is the largest such
@@ -204,7 +204,7 @@ def _heading_change(
 def _overshoot_deg(
     trial: Trial, start: float, turn: float, end: float, switch: float | None
 ) -> float | None:
-    """Heading beyond that of the switch after the reversal at time `turn`; None if still growing at `end`."""
+    """Heading beyond that of the reversal at time `turn`; None if growing at `end`."""
     times = trial.t[(trial.t >= turn) & (trial.t <= end)]
     if switch is None or len(times) < 3:
         return None

@@ -1,4 +1,4 @@
-"""The page of recorded trials, as they were read: facts, remarks, track and channels of each."""
+"""Page of recorded trials as they were read: facts, remarks, track and channels."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Numbers as a page shows them: a true minus, no needless digits, a dash where there is none."""
+"""Numbers as a page shows them: a true minus, no needless digits, a dash for none."""
 
 import math
 

@@ -28,7 +28,7 @@ from shipgym.trials.trial import Trial
 
 
 def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
-    """A zigzag in the usual form: heading change and rudder over time, with the switch headings.
+    """Plot a zigzag: heading change and rudder over time, with the switch headings.
 
     Of a trial with psi and delta; height in pixels.
     """
@@ -53,7 +53,7 @@ def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
 def turning_figure(
     trial: Trial, length: float | None = None, height: int = 480
 ) -> Figure:
-    """A turning circle seen from above, with advance, transfer and tactical diameter marked.
+    """Plot a turning circle, with advance, transfer and tactical diameter marked.
 
     In ship lengths, from the position and along the heading at which the rudder was
     ordered. The trial has x, y, psi, u, v, r and delta (or delta_command); `length` is
@@ -95,7 +95,7 @@ def _dimension(x: list[float], y: list[float], name: str, colour: str) -> Any:
 
 
 def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
-    """Yaw rate over rudder angle of a spiral, with the width of its loop; a direct one in two lines."""
+    """Plot yaw rate over rudder angle of a spiral; a direct one in two lines."""
     angles, rates = spiral.rudder_deg, spiral.yaw_rate_deg_s
     is_direct = spiral.method == "direct"
     parts = {"reverse spiral": (slice(None), MODEL)}
@@ -141,7 +141,9 @@ def _loop(spiral: Spiral) -> _Loop:
 
 
 def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
-    """Yaw rate of pull-outs over the time since the rudder was put amidships; those of a stable ship meet.
+    """Plot yaw rates of pull-outs since the rudder went amidships.
+
+    Those of a stable ship meet.
 
     The trials, usually one from each side, by the label of their line. InputError if
     one has no pull-out.
@@ -172,7 +174,7 @@ def _release(trial: Trial) -> float:
 def speed_figure(
     trial: Trial, length: float | None = None, height: int = 380
 ) -> Figure:
-    """A stop or an acceleration: surge speed and shaft over time, and speed over the distance sailed.
+    """Plot a stop or an acceleration: speed and shaft, and speed over distance.
 
     The trial has u and v, and n where the ship has a shaft; `length` as in
     `turning_figure`.
@@ -202,7 +204,7 @@ def speed_figure(
 
 
 def excitation_figure(trial: Trial) -> Figure:
-    """A manoeuvre for identification, such as `prbs_rudder`: orders above the ship's response."""
+    """Plot a manoeuvre for identification: orders above the ship's response."""
     shown = []
     for name in ("delta_command", "delta", "n_command", "n"):
         if name in trial and np.ptp(trial[name]) > 0.0:
@@ -214,7 +216,7 @@ def excitation_figure(trial: Trial) -> Figure:
 
 
 def manoeuvre_figure(sailed: Trial | Spiral) -> Figure:
-    """The figure that suits a measured or simulated manoeuvre by its kind; else time histories.
+    """Plot a manoeuvre in the form of its kind; else time histories.
 
     Raises InputError if a channel or the ship's length is missing.
     """

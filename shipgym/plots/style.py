@@ -1,4 +1,4 @@
-"""The style that all figures share, and plotly itself, imported when it is first used."""
+"""Style that all figures share; plotly itself is imported when first used."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def _axis(told: Axis) -> dict[str, Any]:
 
 
 def _placed_traces(shown: Sequence[Panel]) -> list[dict[str, Any]]:
-    """Lines and points on the axes of their panels, the first of each name in the legend."""
+    """Traces on the axes of their panels, the first of each name in the legend."""
     traces = []
     names = set[str]()
     for k, panel in enumerate(shown):
@@ -149,7 +149,7 @@ def layout(
 
 
 def axis(title: str = "", zero: bool = False, **changes: Any) -> dict[str, Any]:
-    """An axis in the shared style, with its title (quantity and unit) and perhaps a line at zero."""
+    """Axis in the shared style, with a title and perhaps a line at zero."""
     shared = {
         "title": {"text": title, "font": {"size": 12, "color": MUTED}, "standoff": 8},
         "gridcolor": GRID,
@@ -171,7 +171,7 @@ def compact(values: ArrayLike) -> NDArray[np.float32]:
 
 
 def line_styles(labels: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Line of each label: measurements thin and dark, the others by the palette in their order."""
+    """Line of each label: measurements thin and dark, others by the palette."""
     styles: dict[str, dict[str, Any]] = {}
     coloured = 0
     for label in labels:

@@ -47,7 +47,7 @@ MOST_SAMPLES = 1500
 
 
 def quantity(trial: Trial, name: str) -> Floats | None:
-    """A channel of a trial, or speed (m/s) or drift angle (rad) from u and v; None without them.
+    """Channel of a trial, or speed (m/s) or drift angle (rad); None without them.
 
     The drift angle is positive where the ship moves to port of her heading.
     """
@@ -73,7 +73,7 @@ def history_figure(
     trials: Mapping[str, Trial],
     channels: Sequence[str] = ("psi", "r", "u", "v", "delta"),
 ) -> Figure:
-    """Time histories: a panel for each channel, "speed" or "drift", a line for each trial by its label.
+    """Plot time histories: a panel a channel, a line for each trial by its label.
 
     The trial called "measured" is drawn dark; channels that no trial has are left out;
     InputError if all are.
@@ -106,7 +106,7 @@ def _history(trials: Mapping[str, Trial], channel: str) -> Panel:
 
 
 def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
-    """Paths seen from above, north up, both axes to one scale, by the label of their line.
+    """Plot paths seen from above, north up, to one scale, by the label of their line.
 
     Trials without x and y are left out; InputError if no trial has a position. Height
     in pixels.

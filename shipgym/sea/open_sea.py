@@ -335,7 +335,7 @@ def sea_functions(windy: bool) -> dict[str, Any]:
 
 
 def sea_hooks(windy: bool, lanes: int = LANES) -> dict[str, Any]:
-    """Return `sea_functions`, and those that load state and parameters, a vector for all.
+    """Return `sea_functions`, and those that load state and parameters of all ships.
 
     `lanes` are those of a tile of states, 64, or 1 where they are vectors.
     """

@@ -48,7 +48,7 @@ def model_of(
     )
 
 
-# ---- reference ships -------------------------------------------------------------------
+# ---- reference ships -----------------------------------------------------------------
 
 
 def mariner() -> ShipModel:
@@ -73,7 +73,7 @@ def tanker(rudder_limit_deg: float = 35.0) -> ShipModel:
 
 
 def kvlcc2(form: Form = "published") -> ShipModel:
-    """KVLCC2 at full scale, 320 m: the MMG standard method, or shipmmg 0.0.11's variant."""
+    """KVLCC2 at full scale, 320 m: MMG standard method, or shipmmg 0.0.11's variant."""
     from shipgym.ships import kvlcc2 as file
 
     model = kvlcc2_l7(form)
@@ -105,7 +105,7 @@ REFERENCE_SHIPS: dict[str, Callable[[], ShipModel]] = {
 }
 
 
-# ---- by name or file -------------------------------------------------------------------
+# ---- by name or file -----------------------------------------------------------------
 
 
 def list_models() -> list[str]:
@@ -193,7 +193,7 @@ def truth_of(model: str | Path | ShipModel) -> ShipModel:
     )
 
 
-# ---- grey boxes ------------------------------------------------------------------------
+# ---- grey boxes ----------------------------------------------------------------------
 
 
 def grey_box(
@@ -227,7 +227,7 @@ def grey_box(
 
 
 def fitted_box(ship: ShipModel) -> GreyBox:
-    """Grey box on a model of the same ship, whose covariance and provenance it keeps."""
+    """Grey box on a model of the same ship, with its covariance and provenance."""
     reference = replace(ship, name=f"{ship.name}, {ship.structure}", envelope=None)
     return replace(grey_box(ship), reference=reference)
 

@@ -131,8 +131,8 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
         if not worst < agreement:
             yield (
                 "derivatives: expected compiled accelerations within"
-                f" {agreement:g} of those of the table, got {worst:.1e}; empty the cache"
-                " of compiled ships"
+                f" {agreement:g} of those of the table, got {worst:.1e}; empty the"
+                " cache of compiled ships"
             )
 
 

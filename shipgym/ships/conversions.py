@@ -223,7 +223,7 @@ def prime_matrices(
 def si_matrices(
     A: ArrayLike, B: ArrayLike, length: float, speed: float
 ) -> tuple[Floats, Floats]:
-    """Steering dynamics of the prime system in SI units, inverse of `prime_matrices`."""
+    """Steering dynamics of the prime system in SI, inverse of `prime_matrices`."""
     a, b = _checked(A, B)
     unit_a, unit_b = _units(length, speed)
     return a * unit_a, b * unit_b

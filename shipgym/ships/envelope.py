@@ -52,7 +52,7 @@ class Envelope:
     def distance(
         self, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike
     ) -> Floats:
-        """Distance of states, SI units, from the centre: 1 on the ellipsoid, 2 at twice its size."""
+        """Distance of states, SI, from the centre; 1 on the ellipsoid."""
         states = np.stack(np.broadcast_arrays(u, v, r, delta), axis=-1)
         offsets = states - self.centre
         distance: Floats = np.linalg.norm(offsets @ self.shape.T, axis=-1)

@@ -112,7 +112,7 @@ class ShipEquations:
             check_number(values[name], f"{where}: coefficient {name!r}")
 
     def _try(self) -> None:
-        """Compute the accelerations of one state in plain Python, for its clear messages."""
+        """Accelerations of one state in plain Python, for its clear messages."""
         L, U = self.particulars["length"], self.particulars["speed"]
         n = self.service_shaft_speed
         gear = self.steering
@@ -149,7 +149,7 @@ class ShipEquations:
     def fault(
         self, state: Mapping[str, float], coefficients: Mapping[str, float], ship: Ship
     ) -> str:
-        """Place where plain Python fails at a state, and why; else that of the accelerations."""
+        """Place where plain Python fails at a state, and why."""
         motion = Motion(*[state.get(name, 0.0) for name in Motion._fields])
         c = self.coefficients_record(**coefficients)
         try:
@@ -159,7 +159,7 @@ class ShipEquations:
         return place_of(self.accelerations)
 
     def __reduce__(self) -> Any:
-        """Find a ship of this package by name in another process, others by their file."""
+        """Find a shipped ship by name in another process, others by their file."""
         if self.path is not None:
             return read_ship_equations, (self.path,)
         return _named, (self.accelerations.__module__,)
@@ -193,7 +193,7 @@ class ShipEquations:
         return self.accelerations
 
     def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
-        """Make the functions to be compiled, the same for all coefficients of one form."""
+        """Functions to be compiled, the same for all coefficients of one form."""
         functions: dict[str, Any] = {"accelerations": self.form(coefficients)}
         if self.shaft_acceleration is not None:
             functions["shaft_acceleration"] = self.shaft_acceleration

@@ -79,8 +79,8 @@ class GreyBox(Structure):
             )
         if self.quantity != "acceleration":
             raise InputError(
-                f"{where}: expected quantity 'acceleration', because the terms are added"
-                " to the reference ship's accelerations, got 'force'"
+                f"{where}: expected quantity 'acceleration', because the terms are"
+                " added to the reference ship's accelerations, got 'force'"
             )
         if self.shaft and "n" not in self.reference.command_names:
             raise InputError(
@@ -141,7 +141,7 @@ class GreyBox(Structure):
     def compiled_with(
         self, terms: Record, functions: dict[str, Any], lag: bool, **staged: Any
     ) -> CompiledShip:
-        """Make the functions to be compiled of the reference ship and a sum of terms."""
+        """Functions to be compiled of the reference ship and a sum of terms."""
         reference = self.ship.compiled
         hooks = {
             **reference.functions,
@@ -166,7 +166,7 @@ class GreyBox(Structure):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Numbers of the compiled functions: those of the reference ship, then the terms'."""
+        """Numbers of the compiled functions: the reference ship's, then the terms'."""
         terms = self.term_numbers(coefficients, particulars, shaft_speed)
         return np.concatenate([self.ship.ship_numbers(), terms])
 
@@ -194,7 +194,7 @@ class GreyBox(Structure):
         particulars: Particulars,
         ship: Ship,
     ) -> dict[str, Floats]:
-        """Accelerations at samples, without compiling: the converted ship's and the terms'."""
+        """Accelerations at samples, not compiled, of reference ship and terms."""
         at = self._reference_channels(channels, particulars, ship.shaft)
         known = self.ship.accelerations(at)
         found = self._converted_back(known, particulars)
@@ -266,7 +266,7 @@ class GreyBox(Structure):
     def read(
         cls, table: Mapping[str, Any], where: str, reference: ManoeuvringModel
     ) -> Self:
-        """Read what `to_dict` wrote, given the reference ship; errors begin with `where`."""
+        """Read what `to_dict` wrote, given the reference; errors begin with `where`."""
         shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
         fields = structure_fields(table, where)
         return cls(**fields, reference=reference, shaft=shaft)

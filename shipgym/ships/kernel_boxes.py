@@ -179,7 +179,7 @@ class KernelBox(GreyBox):
         return np.asarray(UU[:, None] * features)
 
     def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
-        """Make the functions to be compiled: the reference ship's and the sum over centres."""
+        """Functions to be compiled: the reference ship's and the sum over centres."""
         size = self.kernel.size
         functions = {
             "N_CENTRES": size,
@@ -226,7 +226,7 @@ class KernelBox(GreyBox):
     def read(
         cls, table: Mapping[str, Any], where: str, reference: ManoeuvringModel
     ) -> Self:
-        """Read what `to_dict` wrote, given the reference ship; errors begin with `where`."""
+        """Read what `to_dict` wrote, given the reference; errors begin with `where`."""
         kernel = Kernel.from_dict(table["kernel"], f"{where}.kernel")
         shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
         name = check_text(table.get("name"), f"{where}.name")
@@ -243,7 +243,7 @@ def kernel_box(box: GreyBox, kernel: Kernel) -> KernelBox:
 def _kernel_fields(
     name: str, reference: ManoeuvringModel, shaft: bool, kernel: Kernel
 ) -> dict[str, Any]:
-    """Fields of a `KernelBox`, whose terms are the kernel's features in all equations."""
+    """Fields of a `KernelBox`, whose terms are the kernel's features everywhere."""
     n_features = kernel.basis.shape[1]
     terms = tuple(KernelTerm(f"k{i + 1}", (), i) for i in range(n_features))
     return {

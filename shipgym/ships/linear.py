@@ -218,7 +218,7 @@ def linearise(
     by = [sway, "r", "delta"]
     steering = _block(jacobian, to, by)
     if roll:
-        # roll is balanced, 0 = R_s s + R_p p, where s is (v, r, delta): p = -R_p^-1 R_s s
+        # roll is balanced, 0 = R_s s + R_p p, s = (v, r, delta): p = -R_p^-1 R_s s
         R_s = _block(jacobian, roll, by)
         R_p = _block(jacobian, roll, roll)
         by_roll = _block(jacobian, to, roll)
@@ -297,8 +297,8 @@ def nomoto_of(A: Floats, B: Floats) -> Nomoto:
     numerator = float(A[1, 0] * B[0, 0] - A[0, 0] * B[1, 0])
     if numerator == 0.0 or determinant == 0.0:
         raise InputError(
-            "nomoto: expected a ship with damping, whose rudder has a steady effect, got"
-            " none"
+            "nomoto: expected a ship with damping, whose rudder has a steady effect,"
+            " got none"
         )
     time_constants = [np.nan, np.nan]
     poles = np.linalg.eigvals(A)

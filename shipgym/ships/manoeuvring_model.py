@@ -31,7 +31,7 @@ MODEL_FORMAT = 1  # of model files
 
 @dataclass(frozen=True, eq=False)
 class ManoeuvringModel:
-    """Structure and coefficients of a ship, with uncertainty and envelope; see `ShipModel`."""
+    """Structure and coefficients of a ship, with uncertainty; see `ShipModel`."""
 
     name: str
     structure: str
@@ -41,7 +41,7 @@ class ManoeuvringModel:
     covariance: Floats | None = None
     envelope: Envelope | None = None
     provenance: dict[str, Any] | None = None
-    # by default, and for a copy with another structure, what is registered under its name
+    # by default, and for a copy with another structure, what is registered by its name
     dynamics: Structure | ShipEquations = None  # type: ignore[assignment]
     service_shaft_speed: float = 0.0
 
@@ -82,7 +82,7 @@ class ManoeuvringModel:
 
     @property
     def acceleration_matrix(self) -> Floats:
-        """Matrix from coefficients to accelerations, as `Structure.acceleration_matrix`."""
+        """Matrix from coefficients to accelerations, as a `Structure` has it."""
         return self.table.acceleration_matrix(
             self.particulars, self.service_shaft_speed
         )
@@ -93,7 +93,7 @@ class ManoeuvringModel:
         return replace(self, coefficients=coefficients)
 
     def with_accelerations(self, coefficients: Mapping[str, Floats]) -> Self:
-        """Copy with coefficients that follow from each regression on accelerations, SI."""
+        """Copy with the coefficients of regressions on accelerations, SI."""
         stacked = np.concatenate([coefficients[q] for q in self.table.regressed])
         values = np.linalg.solve(self.acceleration_matrix, stacked)
         return self.with_coefficients(values)
@@ -102,12 +102,12 @@ class ManoeuvringModel:
 
     @property
     def compiled(self) -> CompiledShip:
-        """Functions and records to compile, shared by models that differ in numbers only."""
+        """Functions and records to compile, shared by models that differ in numbers."""
         lag = self.steering.time_constant > 0.0
         return self.dynamics.compiled(self.coefficients, lag)
 
     def ship_numbers(self, water_depth: float = np.inf, step: float = 0.0) -> Floats:
-        """Numbers that `compiled` reads, in the order of its layout: `Ship`, then coefficients.
+        """Numbers that `compiled` reads, in its layout: `Ship`, then coefficients.
 
         `step`, s, is that of her simulation, which a lag of her steering gear has to be
         long enough for.
@@ -153,7 +153,7 @@ class ManoeuvringModel:
 
     @cached_property
     def service_state(self) -> Floats:
-        """State straight ahead north at service speed, rudder amidships; shape (n_state,)."""
+        """State straight ahead north at service speed, shape (n_state,)."""
         values = {"u": self.particulars["speed"], "n": self.service_shaft_speed}
         return np.array([values.get(name, 0.0) for name in self.state_names])
 
@@ -206,7 +206,7 @@ class ManoeuvringModel:
     def rates(
         self, channels: Mapping[str, Floats], water_depth: float = np.inf
     ) -> dict[str, Floats]:
-        """`derivatives` by name at channels of shape (n_samples,); absent states are 0."""
+        """`derivatives` by name at channels (n_samples,); absent states are 0."""
         none = np.zeros(len(channels["u"]))
         states = [channels.get(name, none) for name in self.state_names]
         commands = [channels[name] for name in self.command_names]
@@ -256,7 +256,7 @@ class ManoeuvringModel:
         }
 
     def check_depth(self, water_depth: float) -> None:
-        """Refuse water that is too shallow, or shallow water for a model that has none."""
+        """Refuse water too shallow, or shallow water for a deep-water model."""
         if water_depth == np.inf:
             return
         hint = "in m, or inf for deep water"
@@ -289,8 +289,8 @@ def _with_last_axis(argument: str, given: ArrayLike, names: tuple[str, ...]) -> 
     array = np.asarray(given, dtype=float)
     if array.ndim == 0 or array.shape[-1] != len(names):
         raise InputError(
-            f"{argument}: expected shape (..., {len(names)}) for {', '.join(names)}, got"
-            f" {array.shape}"
+            f"{argument}: expected shape (..., {len(names)}) for {', '.join(names)},"
+            f" got {array.shape}"
         )
     return array
 

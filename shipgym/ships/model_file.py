@@ -114,8 +114,8 @@ def read_model(
             f"{where}: sha256",
             f"{expected!r}, that of the file's coefficients and covariance",
             fields["sha256"],
-            "they were changed after the file was written; take another copy, or, if the"
-            " change is yours, leave out the field sha256",
+            "they were changed after the file was written; take another copy, or, if"
+            " the change is yours, leave out the field sha256",
         )
     model.ship_numbers()  # refuses particulars that the structure cannot do with
     return model

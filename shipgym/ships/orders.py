@@ -53,7 +53,7 @@ def checked_orders(model: Commanded, commands: ArrayLike) -> Floats:
 
 
 def check_units(model: Commanded, orders: Floats, where: str = "commands") -> None:
-    """Refuse orders of shape (n, n_command) that are not finite or not in rad and 1/s."""
+    """Refuse orders, shape (n, n_command), not finite or not in rad and 1/s."""
     names = model.command_names
     wrong = np.argwhere(~np.isfinite(orders))
     if len(wrong):

@@ -145,7 +145,7 @@ class Particulars(Mapping[str, Any]):
             return cls(**table, **added, estimated=estimated)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the values by name, ready for JSON; :meth:`from_mapping` reads them."""
+        """Values by name, ready for JSON; :meth:`from_mapping` reads them."""
         # left out where not known, so that hashes of models from before them stay
         later = {
             "rudder_aspect_ratio",
@@ -211,7 +211,7 @@ Estimates = Mapping[str, Callable[[Particulars], float | None]]
 
 
 def with_estimates(ship: Particulars, estimates: Estimates) -> Particulars:
-    """Particulars with absent values estimated in turn, and marked so, where possible."""
+    """Particulars with absent values estimated in turn, and marked so."""
     for name, estimate in estimates.items():
         value = estimate(ship) if ship[name] is None else None
         if value is not None:

@@ -72,7 +72,7 @@ class Share:
 
 @dataclass(frozen=True)
 class SharedStructure(Structure):
-    """Table for hydrodynamic forces X, Y, N, prime system, identified from captive tests.
+    """Table for forces X, Y, N, prime system, identified from captive tests.
 
     Its `equations` are the terms that a simulation sums up: those of velocities of the
     shares, the same for sway and yaw, and the centripetal ones of the ship's own mass.
@@ -116,7 +116,7 @@ class SharedStructure(Structure):
         return tuple(dict.fromkeys(share.coefficient for share in shares))
 
     def added_mass(self, coefficients: Mapping[str, float]) -> Floats:
-        """Derivatives of (X, Y, N) by (udot, vdot, rdot), prime system, shape (3, 3)."""
+        """Derivatives of (X, Y, N) by (udot, vdot, rdot), prime system, (3, 3)."""
         matrix = np.zeros((3, 3))
         for row, axis in zip(matrix, AXES, strict=True):
             for share in self.shares[axis]:
@@ -136,9 +136,9 @@ class SharedStructure(Structure):
         return total_inertia(
             particulars,
             self.added_mass(coefficients),
-            f"structure '{self.name}': expected a positive inertia, got mass of the ship"
-            " and added mass of the coefficients that are not positive together; X_udot,"
-            " Y_vdot and N_rdot are derivatives below 0",
+            f"structure '{self.name}': expected a positive inertia, got mass of the"
+            " ship and added mass of the coefficients that are not positive together;"
+            " X_udot, Y_vdot and N_rdot are derivatives below 0",
         )
 
     def term_numbers(
@@ -157,7 +157,7 @@ class SharedStructure(Structure):
     def _velocity_forces(
         self, axis: str, coefficients: Mapping[str, float], p: Particulars
     ) -> Floats:
-        """Coefficient of each term in an equation's force, that of the ship's mass included."""
+        """Coefficient of each term of a force, that of the ship's mass included."""
         terms = self.terms(axis)
         force = dict.fromkeys([term.product for term in terms], 0.0)
         for share in self.shares[axis]:
@@ -181,8 +181,8 @@ class SharedStructure(Structure):
     ) -> Floats:
         """Refuse: free-running trials cannot tell unknown added masses from mass."""
         raise InputError(
-            f"structure '{self.name}': expected captive tests with the channels X, Y, N,"
-            " got free-running trials: its added masses are among the unknowns; use"
+            f"structure '{self.name}': expected captive tests with the channels X, Y,"
+            " N, got free-running trials: its added masses are among the unknowns; use"
             " identification.identify_forces"
         )
 

@@ -159,7 +159,7 @@ class ShipModel(ManoeuvringModel):
 
 
 def _root(covariance: Floats) -> Floats:
-    """Square root of a covariance by its correlations: 1e-5 and 1 are drawn equally well."""
+    """Square root of a covariance by its correlations, which are alike in size."""
     deviation = np.sqrt(np.diag(covariance))
     scale = np.where(deviation > 0.0, deviation, 1.0)
     correlations = covariance / np.outer(scale, scale)

@@ -65,13 +65,13 @@ class Passage:
             self.sea = np.zeros(len(leaves(Sea))), random, parameters
 
     def loop(self, name: str) -> Any:
-        """Loop of `shipgym.engine.loops`, compiled for the ship in calm water or weather."""
+        """Loop of `shipgym.engine.loops` for the ship in calm water or weather."""
         return ship_loop(self.compiled, name, self.windy)
 
     def run(
         self, name: str, states: Floats, *arguments: Any, since: float = 0.0
     ) -> Any:
-        """Fill the states after the first by a loop, from its arguments but sea and ship.
+        """Fill the states after the first by a loop; sea and ship are added here.
 
         Returns what the loop returns: the last row, or that and more. Raises
         UnstableModelError where the ship leaves every physical range, `since` s after
@@ -210,7 +210,7 @@ def as_trial(
     commands: Floats,
     kind: str | None = None,
 ) -> Trial:
-    """Trial of states dt apart, their weather, and the commands held from each sample on."""
+    """Trial of states dt apart, their weather, and the commands held from each on."""
     channels = _channels(model, states)
     rolls = "phi" in model.state_names
     weather = states[:, len(model.state_names) :]

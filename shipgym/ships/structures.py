@@ -41,7 +41,7 @@ REGISTERED_EQUATIONS: dict[str, ShipEquations] = {}
 Read = TypeVar("Read")
 
 
-# ---- what is shipped -------------------------------------------------------------------
+# ---- what is shipped -----------------------------------------------------------------
 
 
 @cache
@@ -75,7 +75,7 @@ def _by_axis(texts: Mapping[str, str], read: Callable[[str], Read]) -> dict[str,
     return {axis: read(text) for axes, text in texts.items() for axis in axes.split()}
 
 
-# ---- by name ---------------------------------------------------------------------------
+# ---- by name -------------------------------------------------------------------------
 
 
 def list_structures() -> list[str]:
@@ -111,13 +111,13 @@ def get_equations(name: str) -> ShipEquations:
 
 
 def get_dynamics(name: str) -> Structure | ShipEquations:
-    """Return a structure, or a ship's own equations, by name; InputError if there is none."""
+    """Return a structure, or a ship's own equations, by name; InputError if unknown."""
     if name in list_equations():
         return get_equations(name)
     return get_structure(name)
 
 
-# ---- a user's own ----------------------------------------------------------------------
+# ---- a user's own --------------------------------------------------------------------
 
 
 def register_structure(
@@ -161,14 +161,14 @@ def register_structure(
 
 
 def own_structure(table: Any, where: str) -> Structure:
-    """Make a structure from `register_structure`'s arguments; errors begin with `where`."""
+    """Structure from `register_structure`'s arguments; errors begin with `where`."""
     own: dict[str, Any] = {**USUAL, **check_table(table, where)}
     check_keys(own, ("name", "equations", *USUAL), where)
     for key in ("name", "equations"):
         if key not in own:
             raise InputError(
-                f'{where}: expected a name and equations, such as r = "r, delta", got no'
-                f" {key}"
+                f'{where}: expected a name and equations, such as r = "r, delta", got'
+                f" no {key}"
             )
     equations = check_table(own["equations"], f"{where}: equations")
     own["equations"] = {

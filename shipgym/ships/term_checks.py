@@ -18,7 +18,7 @@ Equations = Mapping[str, tuple[Term, ...]]
 def check_structure(
     name: str, source: str, equations: Equations, normalisation: str, quantity: str
 ) -> None:
-    """Refuse names, units, equations or terms of a `Structure` that cannot be computed."""
+    """Refuse names, units, equations or terms that a `Structure` cannot compute."""
     where = f"structure '{name}'"
     check_text(name, "structure: name")
     check_text(source, f"{where}: source")
@@ -39,8 +39,8 @@ def check_structure(
             symbols.update(symbol for symbol, _ in term.powers)
     if symbols.intersection(ROLL) and "p" not in equations:
         raise InputError(
-            f"{where}: expected an equation of roll 'p' where terms have roll, got none;"
-            " give its terms, or leave roll out"
+            f"{where}: expected an equation of roll 'p' where terms have roll, got"
+            " none; give its terms, or leave roll out"
         )
     if "p" in equations or "q" in equations:
         _check_roll_and_memory(equations, quantity, where)
@@ -94,7 +94,7 @@ def _check_forces(equations: Equations, normalisation: str, where: str) -> None:
     yaw = [term.powers for term in equations["r"]]
     if sway != yaw:
         raise InputError(
-            f"{where}: expected the same terms in the same order in 'v' and 'r', because"
-            " inertia couples the two forces, got others; make them the same, or write"
-            " accelerations"
+            f"{where}: expected the same terms in the same order in 'v' and 'r',"
+            " because inertia couples the two forces, got others; make them the same,"
+            " or write accelerations"
         )

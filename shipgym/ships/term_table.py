@@ -84,7 +84,7 @@ class Structure:
     # ---- what stands in the table ----------------------------------------------------
 
     def names(self, equation: str) -> tuple[str, ...]:
-        """Names of an equation's coefficients, such as X_u of forces or a_u of accelerations."""
+        """Names of an equation's coefficients, such as X_u (force) or a_u."""
         letters = ACCELERATION_OF_EQUATION
         if self.quantity == "force":
             letters = FORCE_OF_EQUATION
@@ -165,7 +165,7 @@ class Structure:
 
     @property
     def regressed(self) -> tuple[str, ...]:
-        """Equations with a regression of their own; the memory's terms belong to yaw."""
+        """Equations with a regression of their own; the memory belongs to yaw."""
         return tuple(equation for equation in self.equations if equation != "q")
 
     def regression_names(self, equation: str) -> tuple[str, ...]:
@@ -193,7 +193,7 @@ class Structure:
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Terms of one equation on samples, SI units; the acceleration combines them linearly.
+        """Terms of one equation on samples, SI; the acceleration is linear in them.
 
         Channels, each of shape (n_samples,), are at least those of its terms and u, v,
         in SI units; the service speed is in the particulars, the shaft speed that at
@@ -223,7 +223,7 @@ class Structure:
         return np.stack(columns, axis=-1)
 
     def speed_power(self, equation: str, term: Term) -> int:
-        """Power of U in the feature, prime system: 2 (memory: 3) less one per velocity."""
+        """Power of U in the feature, prime: 2 (memory: 3), less one a velocity."""
         if self.normalisation != "prime":
             return 0
         return term_functions.speed_power(equation, term)
@@ -257,7 +257,7 @@ class Structure:
         return float(scale)
 
     def term_scales(self, particulars: Particulars, shaft_speed: float = 0.0) -> Floats:
-        """`feature_scale` of all terms, by equation, for a ship; shape (n_coefficients,)."""
+        """`feature_scale` of all terms, by equation; shape (n_coefficients,)."""
         ship = particulars["length"], particulars["speed"], shaft_speed
         scales = []
         for equation, terms in self.equations.items():
@@ -296,7 +296,7 @@ class Structure:
         return prime_inertia(particulars)
 
     def _from_forces(self, inertia: Floats) -> Floats:
-        """Matrix from coefficients of forces to accelerations, by an inertia of shape (3, 3)."""
+        """Matrix from force coefficients to accelerations, by an inertia (3, 3)."""
         order = list(FORCE_OF_EQUATION)
         axes = [order.index(equation) for equation in self.equations]
         mobility = np.linalg.inv(inertia[np.ix_(axes, axes)])
@@ -325,7 +325,7 @@ class Structure:
         particulars: Particulars,
         ship: Ship,
     ) -> dict[str, Floats]:
-        """Accelerations by equation at samples of shape (n_samples,), without compiling."""
+        """Accelerations by equation at samples (n_samples,), without compiling."""
         found = self._sums_at(channels, coefficients, particulars, ship.shaft)
         for name in ("v", "r"):
             if name not in found:

@@ -1,4 +1,4 @@
-"""Terms of a manoeuvring model: products of powers of velocities, rudder angle and so on."""
+"""Terms of a manoeuvring model: products of powers of velocities and rudder angle."""
 
 import re
 from collections.abc import Mapping
