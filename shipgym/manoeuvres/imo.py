@@ -41,9 +41,10 @@ def imo_assessment(
     InputError for draws without covariance.
     """
     if n_draws is None:
-        n_draws = 0 if model.covariance is None else DRAWS
+        identified = model.covariance is not None
+        n_draws = DRAWS if identified else 0
     check_number(n_draws, "n_draws", at_least=0)
-    draws = list[ShipModel]()
+    draws: list[ShipModel] = []
     if n_draws > 0:
         draws = model.sample(int(n_draws), seed)
     return assess_draws(model, draws)
@@ -54,7 +55,8 @@ def assess_draws(model: ShipModel, draws: Sequence[ShipModel]) -> dict[str, Crit
     needed = imo_manoeuvres(model)
     own = own_indices(model, needed)
     evaluations = {name: test.evaluate for name, test in needed.items()}
-    return imo_criteria(model, intervals_of(own, draws, evaluations))
+    found = intervals_of(own, draws, evaluations)
+    return imo_criteria(model, found)
 
 
 def imo_criteria(
@@ -66,18 +68,22 @@ def imo_criteria(
     criterion is decided only where the manoeuvre is within the envelope of her trials
     and the draws are on one side of the limit.
     """
-    needed = imo_manoeuvres(model)
-    known = [name for name in found if name in needed]
-    outside = {name for name in known if outside_envelope(model, needed[name])}
+    outside = {}
+    for name, manoeuvre in imo_manoeuvres(model).items():
+        if name in found:
+            outside[name] = outside_envelope(model, manoeuvre)
+
     criteria = {}
     for criterion, rule in ship_rules(model).items():
-        names = [name for name in known if name.startswith(rule.manoeuvre)]
-        by_model = criterion_of(rule, [found[name] for name in names])
-        trial = trial_in_words(model, rule.manoeuvre)
+        names = [name for name in outside if name.startswith(rule.manoeuvre)]
+        runs = [found[name] for name in names]
         criteria[criterion] = decided_by_model(
-            by_model, trial, outside=not outside.isdisjoint(names)
+            criterion_of(rule, runs),
+            trial_in_words(model, rule.manoeuvre),
+            outside=any(outside[name] for name in names),
         )
-    criteria["stopping"] = stopping_criterion(model, found.get(STOPPING.manoeuvre))
+    stop = found.get(STOPPING.manoeuvre)
+    criteria["stopping"] = stopping_criterion(model, stop)
     return criteria
 
 

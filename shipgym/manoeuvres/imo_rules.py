@@ -51,18 +51,20 @@ def imo_manoeuvres(model: ShipModel) -> dict[str, Manoeuvre]:
     """The standard manoeuvres that the criteria need."""
     needed = standard_circles(model) | standard_zigzags(model)
     stops = standard_stops(model)
-    if STOPPING.manoeuvre in stops:
-        needed[STOPPING.manoeuvre] = stops[STOPPING.manoeuvre]
+    name = STOPPING.manoeuvre
+    if name in stops:
+        needed[name] = stops[name]
     return needed
 
 
 def ship_rules(model: ShipModel) -> dict[str, Rule]:
     """The rules of turning and yaw checking, with the limits for a ship."""
-    first, second = overshoot_limits_deg(model.travel_time)
-    return RULES | {
-        "overshoot_1_10_10": replace(RULES["overshoot_1_10_10"], limit=first),
-        "overshoot_2_10_10": replace(RULES["overshoot_2_10_10"], limit=second),
-    }
+    limits = overshoot_limits_deg(model.travel_time)
+    rules = dict(RULES)
+    names = ("overshoot_1_10_10", "overshoot_2_10_10")
+    for name, limit in zip(names, limits, strict=True):
+        rules[name] = replace(rules[name], limit=limit)
+    return rules
 
 
 def overshoot_limits_deg(seconds_per_length: float) -> tuple[float, float]:

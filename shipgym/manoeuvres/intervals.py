@@ -123,17 +123,20 @@ def index_intervals(
     >>> low < found["overshoot_1_deg"].value < high
     True
     """
-    evaluate: Evaluation
-    if isinstance(manoeuvre, str):
+    evaluate = manoeuvre
+    if isinstance(evaluate, str):
         known = standard_manoeuvres(model)
-        name = check_choice(manoeuvre, tuple(known), "manoeuvre")
-        evaluate = known[name].evaluate
-    else:
-        name, evaluate = "manoeuvre", manoeuvre
+        check_choice(evaluate, tuple(known), "manoeuvre")
+        evaluate = known[evaluate].evaluate
     check_number(n_draws, "n_draws", at_least=2)
-    own = {name: asdict(evaluate(model))}
+    own = asdict(evaluate(model))
     draws = model.sample(int(n_draws), seed)
-    return intervals_of(own, draws, {name: evaluate})[name]
+    intervals = intervals_of(
+        {"manoeuvre": own},
+        draws,
+        {"manoeuvre": evaluate},
+    )
+    return intervals["manoeuvre"]
 
 
 def own_indices(
@@ -143,7 +146,9 @@ def own_indices(
     own = {}
     for name, manoeuvre in needed.items():
         indices, _ = attempt(manoeuvre.evaluate, model)
-        own[name] = indices or manoeuvre.no_indices
+        if not indices:
+            indices = manoeuvre.no_indices
+        own[name] = indices
     return own
 
 
@@ -159,13 +164,17 @@ def intervals_of(
     manoeuvre. Without draws the values stand alone. `progress` is called with the
     number of draws done.
     """
-    found = {name: _without_draws(indices, len(draws)) for name, indices in own.items()}
+    found = {}
+    for name, indices in own.items():
+        found[name] = _without_draws(indices, len(draws))
+
     for k, draw in enumerate(draws):
         for name, intervals in found.items():
             indices, ran_away = attempt(evaluations[name], draw)
             for index, interval in intervals.items():
                 value = indices.get(index)
-                interval.values[k] = np.nan if value is None else value
+                if value is not None:
+                    interval.values[k] = value
                 interval.ran_away[k] = ran_away
         if progress is not None:
             progress(k + 1)
@@ -206,9 +215,11 @@ def worst(runs: Sequence[IndexInterval]) -> IndexInterval:
     It has no value where one of the manoeuvres has none.
     """
     own = [run.value for run in runs if run.value is not None]
-    complete = len(own) == len(runs)
+    draws = [run.values for run in runs]
+    ran_away = [run.ran_away for run in runs]
+    is_complete = len(own) == len(runs)
     return IndexInterval(
-        value=max(own) if complete else None,
-        values=np.max([run.values for run in runs], axis=0),
-        ran_away=np.any([run.ran_away for run in runs], axis=0),
+        value=max(own) if is_complete else None,
+        values=np.max(draws, axis=0),
+        ran_away=np.any(ran_away, axis=0),
     )

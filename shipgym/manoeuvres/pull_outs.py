@@ -66,8 +66,11 @@ def pull_out_indices(trial: Trial) -> PullOutIndices:
     require(trial, ("r",), "a pull-out")
     delta = np.abs(rudder(trial))
     held = np.flatnonzero(delta > 0.5 * delta.max())
-    release = int(held[-1]) + 1 if len(held) else 0
-    if min(release, len(trial) - release) < 10:
+    release = 0
+    if held.size:
+        release = int(held[-1]) + 1
+    amidships = len(trial) - release
+    if min(release, amidships) < 10:
         raise InputError(
             f"trial {trial.name!r}: expected a turn and then the rudder amidships, each"
             " for at least 10 samples, got no pull-out"

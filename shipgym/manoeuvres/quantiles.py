@@ -13,9 +13,10 @@ NORMAL_95 = 1.96
 def quantiles(values: Floats, *levels: float) -> tuple[float | None, ...]:
     """Quantiles of the values that are finite; None for each where none is."""
     known = values[np.isfinite(values)]
-    if not len(known):
+    if not known.size:
         return (None,) * len(levels)
-    return tuple(float(value) for value in np.quantile(known, levels))
+    found = np.quantile(known, levels)
+    return tuple(found.tolist())
 
 
 def upper_95(values: Floats) -> float:

@@ -52,11 +52,11 @@ class Manoeuvre:
 
 def check_physical(model: ShipModel, trial: Trial) -> None:
     """Refuse a run beyond every speed and yaw rate of a ship at service power."""
-    speed, length = model.particulars["speed"], model.particulars["length"]
+    speed = model.particulars["speed"]
     largest = {
         "u": FASTEST * speed,
         "v": speed,
-        "r": QUICKEST_TURN * speed / length,
+        "r": QUICKEST_TURN / model.travel_time,
     }
     for name, most in largest.items():
         if name not in trial:
@@ -64,12 +64,13 @@ def check_physical(model: ShipModel, trial: Trial) -> None:
         beyond = np.abs(trial[name]) > most
         if beyond.any():
             k = int(np.argmax(beyond))
-            time, value = float(trial.t[k]), trial[name][k]
+            time_s = float(trial.t[k])
+            state = {each: float(row[k]) for each, row in trial.channels.items()}
             raise UnstableModelError(
-                f"model {model.name!r} runs away after {time:.1f} s ({name} ="
-                f" {value:.3g})",
-                time,
-                {channel: float(row[k]) for channel, row in trial.channels.items()},
+                f"model {model.name!r} runs away after {time_s:.1f} s"
+                f" ({name} = {state[name]:.3g})",
+                time_s,
+                state,
             )
 
 
@@ -117,9 +118,11 @@ def register_manoeuvre(
         raise InputError(
             f"manoeuvre: expected a new name, got '{name}', which is registered already"
         )
-    FAMILIES[name] = Family(title or name.capitalize(), variants)
+    title = title or name.capitalize()
+    FAMILIES[name] = Family(title, variants)
     if kind is not None and kind not in KINDS:
-        KINDS.append(check_text(kind, "manoeuvre: kind"))
+        check_text(kind, "manoeuvre: kind")
+        KINDS.append(kind)
 
 
 def families_of(

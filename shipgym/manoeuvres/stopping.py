@@ -76,14 +76,15 @@ def stopping(
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
     leg = voyage.hold(0.0, order)
     n_steps = max(round(voyage.length_time / voyage.dt), 2)  # of a ship length
-    surge = model.state_names.index("u")
     target = speed_ratio * model.particulars["speed"]
+    column = model.state_names.index("u")
     for stretch in range(LONGEST):
         states, _ = voyage.go(leg, n_steps)
-        slow = np.flatnonzero(states[:, surge] <= target)
-        if len(slow):
-            last = stretch * n_steps + int(slow[0]) + 1
+        is_slow = states[:, column] <= target
+        if is_slow.any():
+            last = stretch * n_steps + int(is_slow.argmax()) + 1
             return voyage.trial("straight", max(last, 2))
+
     trial = voyage.trial("straight")
     raise ManoeuvreError(
         f"stopping of {model.name!r}: expected a surge speed of {target:.3g} m/s, got"
@@ -150,23 +151,28 @@ def stopping_indices(
     """
     require(trial, ("u", "v", "x", "y", "psi"), "a stopping trial")
     lpp = ship_length(trial, length)
-    end = float(trial.t[-1])
+    t = trial.t
+    psi = trial["psi"]
+    end = float(t[-1])
     if speed_ratio is not None:
         check_number(speed_ratio, "speed_ratio", at_least=0.0, below=1.0)
         u = trial["u"]
         end = _when(trial, -u, -speed_ratio * u[0])
 
     def change(values: Floats) -> float:
-        return float(np.interp(end, trial.t, values - values[0]))
+        return float(np.interp(end, t, values - values[0]))
 
-    north, east = change(trial["x"]), change(trial["y"])
-    ahead, aside = rotate_to_body(north, east, trial["psi"][0])
+    north = change(trial["x"])
+    east = change(trial["y"])
+    ahead, aside = rotate_to_body(north, east, psi[0])
+    sailed = change(distance_sailed(trial))
+    heading_change = change(psi)
     return StoppingIndices(
-        track_reach_lengths=change(distance_sailed(trial)) / lpp,
+        track_reach_lengths=sailed / lpp,
         head_reach_lengths=float(ahead) / lpp,
         side_reach_lengths=float(aside) / lpp,
-        heading_change_deg=float(np.degrees(change(trial["psi"]))),
-        time_s=end - float(trial.t[0]),
+        heading_change_deg=float(np.degrees(heading_change)),
+        time_s=end - float(t[0]),
     )
 
 
@@ -221,17 +227,19 @@ def acceleration_indices(
     require(trial, ("u", "v"), "an acceleration")
     check_number(part, "part", above=0.0, below=1.0)
     u = trial["u"]
-    if not u[-1] > u[0]:
+    first = u[0]
+    last = u[-1]
+    if not last > first:
         raise InputError(
-            f"trial {trial.name!r}: expected an acceleration, got u from {u[0]:.3g} to"
-            f" {u[-1]:.3g} m/s"
+            f"trial {trial.name!r}: expected an acceleration, got u from {first:.3g} to"
+            f" {last:.3g} m/s"
         )
-    end = _when(trial, u, u[0] + part * (u[-1] - u[0]))
-    sailed = float(np.interp(end, trial.t, distance_sailed(trial)))
+    end = _when(trial, u, first + part * (last - first))
+    sailed = np.interp(end, trial.t, distance_sailed(trial))
     return AccelerationIndices(
         time_s=end - float(trial.t[0]),
-        distance_lengths=sailed / ship_length(trial, length),
-        final_speed=float(u[-1]),
+        distance_lengths=float(sailed) / ship_length(trial, length),
+        final_speed=float(last),
     )
 
 
@@ -239,9 +247,11 @@ def _when(trial: Trial, values: Floats, threshold: float) -> float:
     """Time at which values first reach a threshold, by straight lines, s."""
     time = reached(values, threshold, trial.t)
     if time is None:
+        wanted = abs(threshold)
+        last = trial["u"][-1]
         raise ManoeuvreError(
-            f"trial {trial.name!r}: expected a surge speed of {abs(threshold):.3g} m/s,"
-            f" got {trial['u'][-1]:.3g} m/s at its end; give a larger speed_ratio",
+            f"trial {trial.name!r}: expected a surge speed of {wanted:.3g} m/s, got"
+            f" {last:.3g} m/s at its end; give a larger speed_ratio",
             trial,
         )
     return time

@@ -76,10 +76,17 @@ def turning_circle(
     rudder of 0 or beyond 90 degrees, or a duration or step that is not above 0,
     UnstableModelError if the ship runs away.
     """
-    rudder = np.full(number_of_steps(duration, dt), turning_rudder(rudder_deg, 90.0))
-    commands = orders(model, rudder)
-    kind = "turning-circle"
-    return simulate(model, commands, dt, None, water_depth, kind, weather, seed)
+    angle = turning_rudder(rudder_deg, 90.0)
+    rudder = np.full(number_of_steps(duration, dt), angle)
+    return simulate(
+        model,
+        orders(model, rudder),
+        dt,
+        water_depth=water_depth,
+        kind="turning-circle",
+        weather=weather,
+        seed=seed,
+    )
 
 
 def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices:
@@ -98,13 +105,15 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
     aside = side * track.aside[after]
     turned = side * track.turned[after]
 
+    half_turn = np.pi
+    quarter_turn = np.pi / 2
     steady = _SteadyTurn(None, None, None)
-    if turned[-1] > 1.5 * np.pi:
+    if turned[-1] > half_turn + quarter_turn:
         steady = _steady_turn(trial, after, turned, side, lpp)
     return TurningIndices(
-        advance_lengths=reached(turned, np.pi / 2, ahead),
-        transfer_lengths=reached(turned, np.pi / 2, aside),
-        tactical_diameter_lengths=reached(turned, np.pi, aside),
+        advance_lengths=reached(turned, quarter_turn, ahead),
+        transfer_lengths=reached(turned, quarter_turn, aside),
+        tactical_diameter_lengths=reached(turned, half_turn, aside),
         steady_diameter_lengths=steady.diameter_lengths,
         steady_speed_ratio=steady.speed_ratio,
         steady_drift_deg=steady.drift_deg,
@@ -129,17 +138,21 @@ def _steady_turn(
     trial: Trial, after: Flags, turned: Floats, side: float, length: float
 ) -> _SteadyTurn:
     """Steady turn in its last quarter; `turned` to its `side`, from the order on."""
-    u, v, r = (trial[name][after] for name in ("u", "v", "r"))
+    u = trial["u"][after]
+    v = trial["v"][after]
+    r = trial["r"][after]
     speed = np.hypot(u, v)
     drift = np.arctan2(-v, u)
 
     steady = turned >= turned[-1] - np.pi / 2
     mean_speed = speed[steady].mean()
-    rate = side * r[steady].mean()
+    mean_rate = side * r[steady].mean()
+    mean_drift = side * drift[steady].mean()
+    diameter = 2.0 * mean_speed / mean_rate
     return _SteadyTurn(
-        diameter_lengths=float(2.0 * mean_speed / rate / length),
+        diameter_lengths=float(diameter / length),
         speed_ratio=float(mean_speed / speed[0]),
-        drift_deg=float(side * np.degrees(drift[steady].mean())),
+        drift_deg=float(np.degrees(mean_drift)),
     )
 
 

@@ -18,6 +18,7 @@ from shipgym.manoeuvres.zigzags import (
     switch_heading_deg,
     zigzag_indices,
 )
+from shipgym.ships.envelope import ENVELOPE_CHANNELS
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
 
@@ -101,9 +102,15 @@ def criterion_of(
 ) -> Criterion:
     """The worst value of some runs against its limit; an incomplete run fails it."""
     drawn = worst([run[rule.index] for run in runs])
-    passed = drawn.value is not None and drawn.value <= rule.limit
+    value = drawn.value
     return Criterion(
-        drawn.value, rule.limit, passed, rule.unit, rule.source, drawn, note
+        value=value,
+        limit=rule.limit,
+        passed=value is not None and value <= rule.limit,
+        unit=rule.unit,
+        source=rule.source,
+        drawn=drawn,
+        note=note,
     )
 
 
@@ -133,7 +140,8 @@ def _on_both_sides(criterion: Criterion) -> bool:
         return False
     passes = drawn.values <= criterion.limit
     fails = ~passes & ~drawn.ran_away
-    return max(float(np.mean(passes)), float(np.mean(fails))) < SURE
+    larger_share = max(passes.mean(), fails.mean())
+    return bool(larger_share < SURE)
 
 
 def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:
@@ -147,13 +155,16 @@ def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:
         run = test.sail(model)
     except (UnstableModelError, ManoeuvreError):
         return True
-    within_half_turn = np.abs(run["psi"] - run["psi"][0]) <= np.pi
+    psi = run["psi"]
+    within_half_turn = np.abs(psi - psi[0]) <= np.pi
     part = np.logical_and.accumulate(within_half_turn)
+    none = np.zeros(len(run))
     states = []
-    for name in ("u", "v", "r", "delta"):
-        values = run[name] if name in run else np.zeros(len(run))
+    for name in ENVELOPE_CHANNELS:
+        values = run.channels.get(name, none)
         states.append(values[part])
-    return bool(model.envelope.distance(*states).max() > 1.15)
+    distances = model.envelope.distance(*states)
+    return bool(distances.max() > 1.15)
 
 
 def with_measured(
@@ -164,18 +175,21 @@ def with_measured(
     `trials`: as recorded; those of another rudder angle, heading or approach speed
     count for nothing.
     """
-    largest = dict[str, float]()
+    decided = dict(criteria)
     for trial in trials:
         for name, value in measured_indices(model, trial).items():
-            largest[name] = max(value, largest.get(name, value))
-
-    decided = dict(criteria)
-    for name, value in largest.items():
-        if name in criteria:
-            passed = value <= criteria[name].limit
-            decided[name] = replace(
-                criteria[name], measured=value, decided=True, passed=passed, note=""
-            )
+            criterion = decided.get(name)
+            if criterion is None:
+                continue
+            worse = criterion.measured is None or value > criterion.measured
+            if worse:
+                decided[name] = replace(
+                    criterion,
+                    measured=value,
+                    decided=True,
+                    passed=value <= criterion.limit,
+                    note="",
+                )
     return decided
 
 
@@ -207,10 +221,10 @@ def _at_speed(model: ShipModel, trial: Trial) -> bool:
     """Whether a trial begins at service speed, to a tenth."""
     if "u" not in trial or "v" not in trial:
         return False
-    service_speed = model.particulars["speed"]
-    u, v = trial["u"][0], trial["v"][0]
-    off = abs(float(np.hypot(u, v)) - service_speed)
-    return bool(off <= 0.1 * service_speed)
+    service = model.particulars["speed"]
+    first = np.hypot(trial["u"][0], trial["v"][0])
+    off = abs(first - service)
+    return bool(off <= 0.1 * service)
 
 
 def _manoeuvre_of(model: ShipModel, trial: Trial) -> str | None:
@@ -221,6 +235,8 @@ def _manoeuvre_of(model: ShipModel, trial: Trial) -> str | None:
         return "turning circle" if off <= 1.0 else None
     heading_deg = switch_heading_deg(trial) or 0.0
     for angle in STANDARD_DEG:
-        if max(abs(rudder_deg - angle), abs(heading_deg - angle)) <= 1.0:
+        rudder_off = abs(rudder_deg - angle)
+        heading_off = abs(heading_deg - angle)
+        if rudder_off <= 1.0 and heading_off <= 1.0:
             return f"zigzag {angle:.0f}/{angle:.0f}"
     return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -72,23 +73,27 @@ def panels(
     rows = max(math.ceil(len(shown) / columns), 1)
     titles = [panel.title for panel in shown]
     is_titled = any(titles)
-    settings = {"vertical_spacing": 0.36 / max(rows, 2), **(grid or {})}
+    settings = {"vertical_spacing": 0.36 / max(rows, 2)}
+    if grid is not None:
+        settings |= grid
     figure = subplots(rows, columns, titles if is_titled else (), **settings)
 
     # as plain dicts, since plotly checks a whole figure faster than one change after
     # the other
     drawn = figure.layout.to_plotly_json()
-    last_row = columns * (rows - 1)
+    in_last_row = columns * (rows - 1)
     for k, panel in enumerate(shown):
-        number = _axis_number(k)
-        x, y = _axis(panel.x), _axis(panel.y)
-        if outer and k < last_row:
+        x = _axis(panel.x)
+        y = _axis(panel.y)
+        if outer and k < in_last_row:
             x["title"] = {"text": ""}
         if outer and k % columns:
             y["title"] = {"text": ""}
+        number = _axis_number(k)
         drawn[f"xaxis{number}"] |= x
         drawn[f"yaxis{number}"] |= y
-    figure.layout = drawn | layout(height, titled=is_titled, **changes)
+    drawn |= layout(height, titled=is_titled, **changes)
+    figure.layout = drawn
     figure.add_traces(_placed_traces(shown))
     return figure
 
@@ -108,13 +113,15 @@ def _placed_traces(shown: Sequence[Panel]) -> list[dict[str, Any]]:
     names = set[str]()
     for k, panel in enumerate(shown):
         number = _axis_number(k)
-        axes = {"xaxis": f"x{number}", "yaxis": f"y{number}"}
         for trace in panel.traces:
             name = trace.legendgroup
             if name is not None and trace.showlegend is not False:
                 trace.showlegend = name not in names
                 names.add(name)
-            traces.append(trace.to_plotly_json() | axes)
+            drawn = trace.to_plotly_json()
+            drawn["xaxis"] = f"x{number}"
+            drawn["yaxis"] = f"y{number}"
+            traces.append(drawn)
     return traces
 
 
@@ -173,14 +180,12 @@ def compact(values: ArrayLike) -> NDArray[np.float32]:
 def line_styles(labels: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Line of each label: measurements thin and dark, others by the palette."""
     styles: dict[str, dict[str, Any]] = {}
-    coloured = 0
+    palette = cycle(PALETTE)
     for label in labels:
         if label == "measured":
             styles[label] = {"colour": MEASURED, "width": 1.5}
         else:
-            colour = PALETTE[coloured % len(PALETTE)]
-            styles[label] = {"colour": colour, "width": 2.0}
-            coloured += 1
+            styles[label] = {"colour": next(palette), "width": 2.0}
     return styles
 
 

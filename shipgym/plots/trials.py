@@ -55,7 +55,8 @@ def quantity(trial: Trial, name: str) -> Floats | None:
         return trial[name]
     if "u" not in trial or "v" not in trial:
         return None
-    u, v = trial["u"], trial["v"]
+    u = trial["u"]
+    v = trial["v"]
     if name == "speed":
         return np.hypot(u, v)
     if name == "drift":
@@ -97,11 +98,17 @@ def _history(trials: Mapping[str, Trial], channel: str) -> Panel:
     lines = []
     for label, trial in trials.items():
         values = quantity(trial, channel)
-        if values is not None:
-            part = thinned(trial)
-            drawn = factor * values[part]
-            style = {**styles[label], "hovertemplate": "%{y:.3g}"}
-            lines.append(line(trial.t[part], drawn, label, **style))
+        if values is None:
+            continue
+        part = thinned(trial)
+        history = line(
+            trial.t[part],
+            factor * values[part],
+            label,
+            **styles[label],
+            hovertemplate="%{y:.3g}",
+        )
+        lines.append(history)
     return Panel(lines, "time, s", title)
 
 
@@ -114,12 +121,18 @@ def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
     styles = line_styles(trials)
     tracks = []
     for label, trial in trials.items():
-        if "x" in trial and "y" in trial:
-            part = thinned(trial)
-            east, north = trial["y"][part], trial["x"][part]
-            tracks.append(line(east, north, label, **styles[label]))
+        if "x" not in trial or "y" not in trial:
+            continue
+        part = thinned(trial)
+        north = trial["x"][part]
+        east = trial["y"][part]
+        track = line(east, north, label, **styles[label])
+        tracks.append(track)
     if not tracks:
         raise InputError("figure: expected a trial with the channels x and y, got none")
-    to_scale = axis(CHANNEL_AXES["x"].title, scaleanchor="x", scaleratio=1)
-    shown = Panel(tracks, CHANNEL_AXES["y"].title, to_scale)
-    return panels([shown], height, hovermode="closest")
+    panel = Panel(
+        tracks,
+        x=CHANNEL_AXES["y"].title,
+        y=axis(CHANNEL_AXES["x"].title, scaleanchor="x", scaleratio=1),
+    )
+    return panels([panel], height, hovermode="closest")

@@ -83,7 +83,14 @@ def oscillator_step(turn: float, damping: float, ringing: float) -> OscillatorSt
     n22 = sqrt(max(second, SMALLEST_VARIANCE))
     n12 = shared / n22
     n11 = sqrt(max(first - n12 * n12, 0.0))
-    return OscillatorStep(p11, swing, p22, n11, n12, n22)
+    return OscillatorStep(
+        p11=p11,
+        p12=swing,
+        p22=p22,
+        n11=n11,
+        n12=n12,
+        n22=n22,
+    )
 
 
 def stepped(
@@ -95,6 +102,6 @@ def stepped(
     moved = step.p11 * z1 + step.p12 * z2
     turned = step.p22 * z2 - step.p12 * z1
     return Oscillator(
-        moved + step.n11 * first_noise + step.n12 * second_noise,
-        turned + step.n22 * second_noise,
+        displacement=moved + step.n11 * first_noise + step.n12 * second_noise,
+        velocity=turned + step.n22 * second_noise,
     )

@@ -28,7 +28,8 @@ class GaussMarkov(NamedTuple):
         """One-sided spectral density at frequencies in Hz."""
         T = self.time_constant
         variance = self.standard_deviation**2
-        omega = 2.0 * pi * np.asarray(frequency, dtype=float)
+        f = np.asarray(frequency, dtype=float)
+        omega = 2.0 * pi * f
         return 4.0 * variance * T / (1.0 + (omega * T) ** 2)
 
 
@@ -61,9 +62,10 @@ def gust_spectrum(
 def froya_spectrum(f: Floats, speed: float) -> Floats:
     """NORSOK's density at frequencies in Hz (`gust_spectrum`)."""
     n = 0.468
+    power = 5.0 / (3.0 * n)
     relative = speed / 10.0
     y = 172.0 * f * relative**-0.75
-    density: Floats = 320.0 * relative**2 / (1.0 + y**n) ** (5.0 / (3.0 * n))
+    density: Floats = 320.0 * relative**2 / (1.0 + y**n) ** power
     return density
 
 
@@ -78,13 +80,15 @@ def gust_variance(speed: float, spectrum: str = "harris") -> float:
     Harris: 2^(2/3) B(1/2, 1/3) k V^2 = 6.677 k V^2 (B is Euler's beta function);
     Davenport: 6 k V^2; NORSOK: over the band for which it is given.
     """
-    if spectrum == "davenport":
-        return 6.0 * SURFACE_DRAG * speed**2
+    if spectrum == "norsok":
+        f = froya_frequencies(400)
+        energy = f * froya_spectrum(f, speed)
+        return float(np.trapezoid(energy, np.log(f)))
+    factor = 6.0
     if spectrum == "harris":
         beta = gamma(1.0 / 2.0) * gamma(1.0 / 3.0) / gamma(5.0 / 6.0)
-        return float(2.0 ** (2.0 / 3.0)) * beta * SURFACE_DRAG * speed**2
-    f = froya_frequencies(400)
-    return float(np.trapezoid(f * froya_spectrum(f, speed), np.log(f)))
+        factor = float(2.0 ** (2.0 / 3.0)) * beta
+    return factor * SURFACE_DRAG * speed**2
 
 
 def gust_filter(wind: Wind) -> GaussMarkov:
@@ -97,12 +101,16 @@ def gust_filter(wind: Wind) -> GaussMarkov:
     """
     if not wind.gust or wind.calm:
         return GaussMarkov(1.0, 0.0)
+    V = wind.speed
     if wind.spectrum == "norsok":
         f = froya_frequencies(2000)
-        energy = f * froya_spectrum(f, wind.speed)
+        energy = f * froya_spectrum(f, V)
         peak = float(f[np.argmax(energy)])
     else:
-        peak = sqrt(3.0) * wind.speed / LENGTH_SCALES[wind.spectrum]
-    time_constant = 1.0 / (2.0 * pi * peak)
-    deviation = sqrt(gust_variance(wind.speed, wind.spectrum))
-    return GaussMarkov(time_constant, deviation)
+        L = LENGTH_SCALES[wind.spectrum]
+        peak = sqrt(3.0) * V / L
+    variance = gust_variance(V, wind.spectrum)
+    return GaussMarkov(
+        time_constant=1.0 / (2.0 * pi * peak),
+        standard_deviation=sqrt(variance),
+    )

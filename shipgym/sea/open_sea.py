@@ -136,8 +136,10 @@ def relative_wind(
     aside = east * cosine - north * sine + motion.v
 
     squared = ahead * ahead + aside * aside
-    per_speed = 1.0 / sqrt(max(squared, SLOWEST_WIND * SLOWEST_WIND))
-    return RelativeWind(squared, FromBow(ahead * per_speed, aside * per_speed))
+    least = SLOWEST_WIND * SLOWEST_WIND
+    per_speed = 1.0 / sqrt(max(squared, least))
+    angle = FromBow(cosine=ahead * per_speed, sine=aside * per_speed)
+    return RelativeWind(squared, angle)
 
 
 def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
@@ -145,14 +147,16 @@ def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
     if not HAS_SEA:
         return Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     sine, cosine = sin_cos(motion.psi)
-    wind = by_wind(motion, relative_wind(motion, sine, cosine, sea, p), p)
+    felt = relative_wind(motion, sine, cosine, sea, p)
+    wind = by_wind(motion, felt, p)
     waves = from_bow(sine, cosine, sea.waves_north, sea.waves_east)
     drift = by_waves(waves, 1.0 + sea.drift, p)
+    roll = wind.roll + drift.roll if HAS_ROLL else 0.0
     return Push(
         wind.surge + drift.surge,
         wind.sway + drift.sway,
         wind.yaw + drift.yaw,
-        wind.roll + drift.roll if HAS_ROLL else 0.0,
+        roll,
         sea.current_north,
         sea.current_east,
     )
@@ -163,22 +167,28 @@ def by_wind(motion: Motion, wind: RelativeWind, p: SeaParameters) -> Acceleratio
     cosine, sine = wind.angle
     squared = wind.squared_speed
     still_air = motion.u * fabs(motion.u) * p.still_air
+    roll = 0.0
+    if HAS_ROLL:
+        roll = squared * sum_of_sines(cosine, sine, p.wind_roll)
     return Accelerations(
         surge=squared * sum_of_cosines(cosine, p.wind_surge) + still_air,
         sway=squared * sum_of_sines(cosine, sine, p.wind_sway),
         yaw=squared * sum_of_sines(cosine, sine, p.wind_yaw),
-        roll=squared * sum_of_sines(cosine, sine, p.wind_roll) if HAS_ROLL else 0.0,
+        roll=roll,
     )
 
 
 def by_waves(waves: FromBow, drift: float, p: SeaParameters) -> Accelerations:
     """Accelerations by the drift force, which is `drift` times its mean."""
     cosine, sine = waves
+    roll = 0.0
+    if HAS_ROLL:
+        roll = drift * sum_of_sines(cosine, sine, p.drift_roll)
     return Accelerations(
         surge=drift * sum_of_cosines(cosine, p.drift_surge),
         sway=drift * sum_of_sines(cosine, sine, p.drift_sway),
         yaw=drift * sum_of_sines(cosine, sine, p.drift_yaw),
-        roll=drift * sum_of_sines(cosine, sine, p.drift_roll) if HAS_ROLL else 0.0,
+        roll=roll,
     )
 
 
@@ -212,14 +222,18 @@ def first_order_motion(
     part of it that swings, -w times the displacement: of variance w^2 and a quarter of
     a period ahead, as in waves of one frequency.
     """
-    yaw = sqrt(max(sum_of_cosines(waves.cosine, p.heading_variance), 0.0))
-    psi = yaw * heading.velocity
-    r = -yaw * frequency * heading.displacement
-    if not HAS_ROLL:
-        return FirstOrderMotion(psi, r, 0.0, 0.0)
-    heel = sqrt(max(sum_of_cosines(waves.cosine, p.roll_variance), 0.0))
-    phi = heel * roll.velocity
-    return FirstOrderMotion(psi, r, phi, -heel * frequency * roll.displacement)
+    variance = sum_of_cosines(waves.cosine, p.heading_variance)
+    yaw = sqrt(max(variance, 0.0))
+    heel = 0.0
+    if HAS_ROLL:
+        variance = sum_of_cosines(waves.cosine, p.roll_variance)
+        heel = sqrt(max(variance, 0.0))
+    return FirstOrderMotion(
+        psi=yaw * heading.velocity,
+        r=-yaw * frequency * heading.displacement,
+        phi=heel * roll.velocity,
+        p=-heel * frequency * roll.displacement,
+    )
 
 
 def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> Sea:
@@ -241,12 +255,6 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
         roll = stepped(roll, normal(word, DRAW[6]), normal(word, DRAW[7]), step)
     first_order = first_order_motion(waves, frequency, heading, roll, p)
 
-    north = first_order_step(
-        sea.current_north, sea.mean_north, p.current, normal(word, DRAW[0])
-    )
-    east = first_order_step(
-        sea.current_east, sea.mean_east, p.current, normal(word, DRAW[1])
-    )
     return Sea(
         mean_north=sea.mean_north,
         mean_east=sea.mean_east,
@@ -254,10 +262,30 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
         wind_east=sea.wind_east,
         waves_north=sea.waves_north,
         waves_east=sea.waves_east,
-        current_north=north,
-        current_east=east,
-        gust=first_order_step(sea.gust, 0.0, p.gust, normal(word, DRAW[2])),
-        drift=first_order_step(sea.drift, 0.0, p.drift, normal(word, DRAW[3])),
+        current_north=first_order_step(
+            sea.current_north,
+            sea.mean_north,
+            p.current,
+            normal(word, DRAW[0]),
+        ),
+        current_east=first_order_step(
+            sea.current_east,
+            sea.mean_east,
+            p.current,
+            normal(word, DRAW[1]),
+        ),
+        gust=first_order_step(
+            sea.gust,
+            0.0,
+            p.gust,
+            normal(word, DRAW[2]),
+        ),
+        drift=first_order_step(
+            sea.drift,
+            0.0,
+            p.drift,
+            normal(word, DRAW[3]),
+        ),
         heading_displacement=heading.displacement,
         heading_velocity=heading.velocity,
         roll_displacement=roll.displacement,

@@ -92,11 +92,12 @@ def state_space(
         A = np.vstack([np.hstack([A, B]), gear_row])
         B = np.vstack([np.zeros_like(B), [[1.0 / lag]]])
         names.append("delta")
+    n_states = len(names)
     return control.ss(
         A,
         B,
-        np.eye(len(A)),
-        np.zeros((len(A), 1)),
+        np.eye(n_states),
+        np.zeros((n_states, 1)),
         name=model.name.replace(".", "-"),
         states=names,
         outputs=names,
@@ -113,14 +114,20 @@ def transfer_function(form: Nomoto, order: int = 2) -> "TransferFunction":
     """
     import control
 
-    if order == 1:
-        return control.tf([form.K], [form.T, 1.0], inputs=["delta"], outputs=["r"])
-    if order != 2:
+    if order not in (1, 2):
         raise unexpected("order", "2 or 1", order)
-    _need_time_constants(form)
-    denominator = np.polymul([form.T1, 1.0], [form.T2, 1.0])
+    numerator = [form.K]
+    denominator = [form.T, 1.0]
+    if order == 2:
+        _need_time_constants(form)
+        numerator = [form.K * form.T3, form.K]
+        product = np.polymul([form.T1, 1.0], [form.T2, 1.0])
+        denominator = product.tolist()
     return control.tf(
-        [form.K * form.T3, form.K], denominator, inputs=["delta"], outputs=["r"]
+        numerator,
+        denominator,
+        inputs=["delta"],
+        outputs=["r"],
     )
 
 
@@ -237,8 +244,11 @@ def _checked(A: ArrayLike, B: ArrayLike) -> tuple[Floats, Floats]:
 def _matrix(name: str, given: ArrayLike, shape: tuple[int, int]) -> Floats:
     matrix = np.asarray(given, dtype=float)
     if matrix.shape != shape or not np.all(np.isfinite(matrix)):
-        expected = f"finite numbers of shape {shape}"
-        raise unexpected(name, expected, matrix.tolist())
+        raise unexpected(
+            name,
+            f"finite numbers of shape {shape}",
+            matrix.tolist(),
+        )
     return matrix
 
 
@@ -247,9 +257,9 @@ def _units(length: float, speed: float) -> tuple[Floats, Floats]:
     check_number(length, "length", above=0.0, hint="in m")
     check_number(speed, "speed", above=0.0, hint="in m/s")
     turn_rate = speed / length
-    state = np.array([speed, turn_rate])  # of v and r
-    per_time = turn_rate * state[:, None]
-    return per_time / state, per_time
+    states = np.array([speed, turn_rate])  # of v and r
+    rates = turn_rate * states[:, None]
+    return rates / states, rates
 
 
 def _need_time_constants(form: Nomoto) -> None:

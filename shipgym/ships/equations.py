@@ -41,9 +41,10 @@ Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, floa
 
 def record_of(values: Mapping[str, float], module: str) -> Any:
     """Make a record of coefficients with these values as defaults."""
-    names, defaults = list(values), list(values.values())
+    names = list(values)
+    defaults = list(values.values())
     record = namedtuple("Coefficients", names, defaults=defaults, module=module)  # type: ignore[misc]
-    record.__annotations__ = dict.fromkeys(values, float)
+    record.__annotations__ = dict.fromkeys(names, float)
     return record
 
 
@@ -85,15 +86,26 @@ class ShipEquations:
         for name in ("rolls", "shallow_water", "astern"):
             check_flag(getattr(self, name), f"{where}: {name}")
 
-        place, expected = f"{where}: accelerations", "a function (motion, c, ship)"
-        check_function(self.accelerations, 3, place, expected)
+        check_function(
+            self.accelerations,
+            3,
+            f"{where}: accelerations",
+            "a function (motion, c, ship)",
+        )
         shaft = self.shaft_acceleration
         if shaft is not None:
-            place = f"{where}: shaft_acceleration"
-            check_function(shaft, 4, place, "a function (n, command, c, ship)")
+            check_function(
+                shaft,
+                4,
+                f"{where}: shaft_acceleration",
+                "a function (n, command, c, ship)",
+            )
         if shaft is not None or self.service_shaft_speed:
-            place = f"{where}: service_shaft_speed"
-            check_number(self.service_shaft_speed, place, above=0.0)
+            check_number(
+                self.service_shaft_speed,
+                f"{where}: service_shaft_speed",
+                above=0.0,
+            )
         with placed(where):
             self.particulars.require("speed")
             self._try()
@@ -113,10 +125,19 @@ class ShipEquations:
 
     def _try(self) -> None:
         """Accelerations of one state in plain Python, for its clear messages."""
-        L, U = self.particulars["length"], self.particulars["speed"]
+        L = self.particulars["length"]
+        U = self.particulars["speed"]
         n = self.service_shaft_speed
-        gear = self.steering
-        ship = Ship(L, U, gear.limit, gear.rate, 0.0, n, math.inf, U)
+        ship = Ship(
+            length=L,
+            speed=U,
+            rudder_limit=self.steering.limit,
+            rudder_rate=self.steering.rate,
+            gear_frequency=0.0,
+            shaft=n,
+            water_depth=math.inf,
+            scale_speed=U,
+        )
         motion = Motion(
             x=0.0,
             y=0.0,
@@ -150,10 +171,10 @@ class ShipEquations:
         self, state: Mapping[str, float], coefficients: Mapping[str, float], ship: Ship
     ) -> str:
         """Place where plain Python fails at a state, and why."""
-        motion = Motion(*[state.get(name, 0.0) for name in Motion._fields])
+        at = {name: state.get(name, 0.0) for name in Motion._fields}
         c = self.coefficients_record(**coefficients)
         try:
-            asked(self.accelerations, motion, c, ship)
+            asked(self.accelerations, Motion(**at), c, ship)
         except InputError as error:
             return str(error)
         return place_of(self.accelerations)
@@ -194,12 +215,16 @@ class ShipEquations:
 
     def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
         """Functions to be compiled, the same for all coefficients of one form."""
-        functions: dict[str, Any] = {"accelerations": self.form(coefficients)}
+        hooks: list[tuple[str, Any]] = [("accelerations", self.form(coefficients))]
         if self.shaft_acceleration is not None:
-            functions["shaft_acceleration"] = self.shaft_acceleration
-        record = self.coefficients_record
-        hooks = tuple(functions.items())
-        return compiled_ship(self.name, self.state_names, record, hooks, lag)
+            hooks.append(("shaft_acceleration", self.shaft_acceleration))
+        return compiled_ship(
+            name=self.name,
+            state_names=self.state_names,
+            coefficients=self.coefficients_record,
+            functions=tuple(hooks),
+            lag=lag,
+        )
 
     def accelerations_at(
         self,
@@ -221,13 +246,16 @@ class ShipEquations:
         states = np.stack(columns, axis=-1)
         found = np.full((len(states), len(ACCELERATIONS)), math.nan)
         for row, state in zip(found, states.tolist(), strict=True):
+            motion = Motion(*state)
             with suppress(ArithmeticError, ValueError):
-                row[:] = accelerations(Motion(*state), c, ship)
-        rates = dict(zip(("u", "v", "r", "p", "q"), found.T, strict=True))
+                row[:] = accelerations(motion, c, ship)
+
+        equations = ("u", "v", "r", "p", "q")
+        rates = dict(zip(equations, found.T, strict=True))
         if self.shaft_acceleration is not None:
-            shaft = self.shaft_acceleration
-            lag = [shaft(n, ship.shaft, c, ship) for n in channels["n"].tolist()]
-            rates["n"] = np.array(lag)
+            rates["n"] = np.zeros(len(states))
+            for i, n in enumerate(channels["n"].tolist()):
+                rates["n"][i] = self.shaft_acceleration(n, ship.shaft, c, ship)
         return rates
 
     def numbers(
@@ -250,12 +278,13 @@ def read_ship_equations(path: str | Path) -> ShipEquations:
     Raises InputError for a file that is not there, cannot be run, or defines no `SHIP`.
     """
     path = Path(path).resolve()
-    expected = "a Python file that defines SHIP = ShipEquations(...)"
-    ship = getattr(load_file(path, expected), "SHIP", None)
+    expected = "SHIP = ShipEquations(...)"
+    module = load_file(path, f"a Python file that defines {expected}")
+    ship = getattr(module, "SHIP", None)
     if not isinstance(ship, ShipEquations):
-        raise unexpected(f"{path}", "SHIP = ShipEquations(...)", ship)
-    for function in (ship.accelerations, ship.shaft_acceleration):
-        refuse_closure(function)
+        raise unexpected(str(path), expected, ship)
+    refuse_closure(ship.accelerations)
+    refuse_closure(ship.shaft_acceleration)
     object.__setattr__(ship, "path", path)
     return ship
 

@@ -107,11 +107,11 @@ class GreyBox(Structure):
     @cached_property
     def required_channels(self) -> tuple[str, ...]:
         """Channels a trial needs: those of the terms and of the reference ship."""
-        needed = set(self.channels | ALWAYS_MEASURED)
+        needed = self.channels | ALWAYS_MEASURED
         if self.rolls:
             needed |= {"p", "phi"}
         if self.shaft:
-            needed.add("n")
+            needed |= {"n"}
         return tuple(name for name in MEASURED if name in needed)
 
     @property
@@ -131,12 +131,15 @@ class GreyBox(Structure):
 
     def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
         """Make what is compiled: the reference ship's functions and the terms."""
-        prime = self.normalisation == "prime"
         # an equation without terms is the reference ship's alone
-        source = accelerations_source(self.equations, prime, damped=False)
+        source = accelerations_source(
+            self.equations,
+            prime=self.normalisation == "prime",
+            damped=False,
+        )
+        functions = {"term_accelerations": accelerations_function(source)}
         terms = coefficients_record(self._n_terms, "GreyBoxTerms")
-        function = accelerations_function(source)
-        return self.compiled_with(terms, {"term_accelerations": function}, lag)
+        return self.compiled_with(terms, functions, lag)
 
     def compiled_with(
         self, terms: Record, functions: dict[str, Any], lag: bool, **staged: Any
@@ -152,12 +155,12 @@ class GreyBox(Structure):
         }
         hooks.pop("shaft_acceleration", None)  # the shaft turns as commanded
         return compiled_ship(
-            "a grey box",
-            self.state_names,
-            _coefficients(reference.coefficients, terms),
-            tuple(hooks.items()),
-            lag,
-            tuple(staged.items()),
+            name="a grey box",
+            state_names=self.state_names,
+            coefficients=_coefficients(reference.coefficients, terms),
+            functions=tuple(hooks.items()),
+            lag=lag,
+            staged=tuple(staged.items()),
         )
 
     def numbers(
@@ -267,7 +270,8 @@ class GreyBox(Structure):
         cls, table: Mapping[str, Any], where: str, reference: ManoeuvringModel
     ) -> Self:
         """Read what `to_dict` wrote, given the reference; errors begin with `where`."""
-        shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
+        shaft = table.get("shaft", False)
+        check_flag(shaft, f"{where}.shaft")
         fields = structure_fields(table, where)
         return cls(**fields, reference=reference, shaft=shaft)
 

@@ -119,8 +119,8 @@ class Kernel:
         table = check_table(content, where, shapes)
         arrays = {}
         for name, shape in shapes.items():
-            place = f"{where}.{name}"
-            arrays[name] = check_array(table.get(name), shape, place)
+            numbers = table.get(name)
+            arrays[name] = check_array(numbers, shape, f"{where}.{name}")
         return cls(**arrays)
 
 
@@ -130,22 +130,28 @@ def kernel_inputs(channels: Mapping[str, Any], particulars: Particulars) -> Floa
     v = np.asarray(channels["v"], dtype=float)
     r = np.asarray(channels["r"], dtype=float)
     delta = np.asarray(channels["delta"], dtype=float)
+    L = particulars["length"]
     U0 = particulars["speed"]
-    slowest = SLOWEST * U0
-    U = np.maximum(np.hypot(u, v), slowest)
-    turn = r * particulars["length"] / U
-    return np.stack([v / U, turn, delta, U / U0], axis=-1)
+    U = np.maximum(np.hypot(u, v), SLOWEST * U0)
+    inputs = [
+        v / U,
+        r * L / U,
+        delta,
+        U / U0,
+    ]
+    return np.stack(inputs, axis=-1)
 
 
 def gaussians(x: Floats, centres: Floats) -> Floats:
     """exp(-|x - centre|^2 / 2), shape (n_samples, n_centres)."""
     # |x - c|^2 = |x|^2 - 2 x c + |c|^2
-    own = (x**2).sum(axis=1)
-    theirs = (centres**2).sum(axis=1)
-    product = x @ centres.T
-    squares = own[:, None] - 2.0 * product + theirs
-    within = np.maximum(squares, 0.0)
-    return np.asarray(np.exp(-0.5 * within))
+    xx = (x**2).sum(axis=1)
+    cc = (centres**2).sum(axis=1)
+    xc = x @ centres.T
+    squares = xx[:, None] - 2.0 * xc + cc
+    # rounding may leave one below 0
+    squares = np.maximum(squares, 0.0)
+    return np.asarray(np.exp(-0.5 * squares))
 
 
 @dataclass(frozen=True)
@@ -227,11 +233,13 @@ class KernelBox(GreyBox):
         cls, table: Mapping[str, Any], where: str, reference: ManoeuvringModel
     ) -> Self:
         """Read what `to_dict` wrote, given the reference; errors begin with `where`."""
-        kernel = Kernel.from_dict(table["kernel"], f"{where}.kernel")
-        shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
-        name = check_text(table.get("name"), f"{where}.name")
         check_text(table.get("source"), f"{where}.source")
-        fields = _kernel_fields(name, reference, shaft, kernel)
+        fields = _kernel_fields(
+            name=check_text(table.get("name"), f"{where}.name"),
+            reference=reference,
+            shaft=check_flag(table.get("shaft", False), f"{where}.shaft"),
+            kernel=Kernel.from_dict(table["kernel"], f"{where}.kernel"),
+        )
         return cls(**fields)
 
 
@@ -244,8 +252,9 @@ def _kernel_fields(
     name: str, reference: ManoeuvringModel, shaft: bool, kernel: Kernel
 ) -> dict[str, Any]:
     """Fields of a `KernelBox`, whose terms are the kernel's features everywhere."""
-    n_features = kernel.basis.shape[1]
-    terms = tuple(KernelTerm(f"k{i + 1}", (), i) for i in range(n_features))
+    terms: tuple[Term, ...] = ()
+    for number in range(kernel.basis.shape[1]):
+        terms += (KernelTerm(f"k{number + 1}", (), number),)
     return {
         "name": name,
         "source": SOURCE,

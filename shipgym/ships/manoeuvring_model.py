@@ -48,28 +48,36 @@ class ManoeuvringModel:
     def __post_init__(self) -> None:
         self.particulars.require("speed")
         if self.dynamics is None or self.dynamics.name != self.structure:
-            object.__setattr__(self, "dynamics", get_dynamics(self.structure))
-        names = self.dynamics.coefficient_names
-        if self.coefficients.keys() != set(names):
-            raise _other_coefficients(self.name, names, self.coefficients)
-        coefficients = {}
-        for name in names:
-            value = self.coefficients[name]
-            coefficients[name] = check_number(value, f"coefficients.{name}")
+            dynamics = get_dynamics(self.structure)
+            object.__setattr__(self, "dynamics", dynamics)
+        coefficients = self._checked_coefficients()
         object.__setattr__(self, "coefficients", coefficients)
+
         shaft = self.service_shaft_speed
-        if self.dynamics.scales and "n" in self.command_names and not shaft > 0:
+        needs_shaft = self.dynamics.scales and "n" in self.command_names
+        if needs_shaft and not shaft > 0:
             raise InputError(
                 f"service_shaft_speed of {self.name!r}: expected that at service speed"
                 f" in 1/s, because structure {self.structure!r} has a shaft speed, got"
                 f" {shaft:g}"
             )
-        square = (len(names), len(names))
+        square = (len(coefficients), len(coefficients))
         if self.covariance is not None and self.covariance.shape != square:
             raise InputError(
                 f"covariance of {self.name!r}: expected shape {square}, one row and"
                 f" column a coefficient, got {self.covariance.shape}"
             )
+
+    def _checked_coefficients(self) -> dict[str, float]:
+        """Coefficients as floats, in the order of the structure."""
+        names = self.dynamics.coefficient_names
+        if self.coefficients.keys() != set(names):
+            raise _other_coefficients(self.name, names, self.coefficients)
+        checked = {}
+        for name in names:
+            value = self.coefficients[name]
+            checked[name] = check_number(value, f"coefficients.{name}")
+        return checked
 
     @property
     def table(self) -> Structure:
@@ -115,13 +123,14 @@ class ManoeuvringModel:
         Raises InputError for water that is too shallow, and for particulars that the
         structure cannot use.
         """
-        if water_depth != np.inf:
-            self.check_depth(water_depth)
+        self.check_depth(water_depth)
         values = tuple(self.coefficients.values())
         if values not in self._numbers:
             self._numbers.clear()
             self._numbers[values] = self.dynamics.numbers(
-                self.coefficients, self.particulars, self.service_shaft_speed
+                self.coefficients,
+                self.particulars,
+                self.service_shaft_speed,
             )
         ship = ship_of(self, water_depth, step)
         return np.concatenate([ship, self._numbers[values]])
@@ -191,16 +200,25 @@ class ManoeuvringModel:
             raise InputError(f"state: expected finite numbers, got {wrong[0]}")
 
         # one row for each state
-        leading = states.shape[:-1], commands.shape[:-1], depth.shape
-        shape = np.broadcast_shapes(*leading)
+        shape = np.broadcast_shapes(
+            states.shape[:-1],
+            commands.shape[:-1],
+            depth.shape,
+        )
         rows = _rows(states, shape)
         orders = _rows(commands, shape)
         check_units(self, orders, "command")
-        depths = _rows(depth[..., None], shape)[:, 0].copy()
+        depths = np.array(np.broadcast_to(depth, shape)).ravel()
 
         rates = np.empty_like(rows)
         loop = ship_loop(self.compiled, "derivatives")
-        loop(rows, two_commands(orders), depths, self.ship_numbers(), rates)
+        loop(
+            rows,
+            two_commands(orders),
+            depths,
+            self.ship_numbers(),
+            rates,
+        )
         return rates.reshape(*shape, len(self.state_names))
 
     def rates(
@@ -210,12 +228,13 @@ class ManoeuvringModel:
         none = np.zeros(len(channels["u"]))
         states = [channels.get(name, none) for name in self.state_names]
         commands = [channels[name] for name in self.command_names]
-        derivatives = self.derivatives(
+        rates = self.derivatives(
             np.stack(states, axis=-1),
             np.stack(commands, axis=-1),
             water_depth,
         )
-        return dict(zip(self.state_names, derivatives.T, strict=True))
+        columns = rates.T
+        return dict(zip(self.state_names, columns, strict=True))
 
     def accelerations(
         self, channels: Mapping[str, Floats], water_depth: float = np.inf
@@ -230,17 +249,24 @@ class ManoeuvringModel:
         none = np.zeros(len(channels["u"]))
         complete = dict.fromkeys((*self.state_names, *self.command_names), none)
         complete |= channels
-        ship = ship_of(self, water_depth)
-        found = self.dynamics.accelerations_at(
-            complete, self.coefficients, self.particulars, ship
+        known = self.dynamics.accelerations_at(
+            complete,
+            self.coefficients,
+            self.particulars,
+            ship_of(self, water_depth),
         )
-        return {q: found.get(q, none) for q in "uvrpqn" if q in self.state_names}
+        accelerations = {}
+        for name in self.state_names:
+            if name in ("u", "v", "r", "p", "q", "n"):
+                accelerations[name] = known.get(name, none)
+        return accelerations
 
     # ---- model file ------------------------------------------------------------------
 
     def to_dict(self) -> dict[str, Any]:
         """Content of a model file, ready for JSON (see `shipgym.ships.model_file`)."""
-        covariance, envelope = self.covariance, self.envelope
+        covariance = self.covariance
+        envelope = self.envelope
         return {
             "format": MODEL_FORMAT,
             "name": self.name,
@@ -287,10 +313,11 @@ def _other_coefficients(
 
 def _with_last_axis(argument: str, given: ArrayLike, names: tuple[str, ...]) -> Floats:
     array = np.asarray(given, dtype=float)
-    if array.ndim == 0 or array.shape[-1] != len(names):
+    n = len(names)
+    if array.ndim == 0 or array.shape[-1] != n:
+        listed = ", ".join(names)
         raise InputError(
-            f"{argument}: expected shape (..., {len(names)}) for {', '.join(names)},"
-            f" got {array.shape}"
+            f"{argument}: expected shape (..., {n}) for {listed}, got {array.shape}"
         )
     return array
 
@@ -306,7 +333,8 @@ def ship_of(
     model: ManoeuvringModel, water_depth: float = np.inf, step: float = 0.0
 ) -> Ship:
     """Record of the numbers that every ship has besides its coefficients."""
-    gear, p = model.steering, model.particulars
+    gear = model.steering
+    p = model.particulars
     return Ship(
         length=p["length"],
         speed=p["speed"],

@@ -50,7 +50,8 @@ def printed_tables() -> dict[str, dict[str, Any]]:
     tables = shipped_toml("shipgym.ships", "structures.toml")
     papers = tables.pop("papers")
     for table in tables.values():
-        table["source"] = table["source"].format(**papers)
+        source = table["source"]
+        table["source"] = source.format(**papers)
     return tables
 
 
@@ -64,15 +65,20 @@ def printed_structure(name: str) -> Structure:
         shares = _by_axis(table["shares"], read_shares)
         return shared_structure(name, table["source"], shares)
     if "letters" in table:
-        table["equations"] = _by_axis(table.pop("letters"), short_terms)
+        letters = table.pop("letters")
+        table["equations"] = _by_axis(letters, short_terms)
     else:
         table["equations"] = _by_axis(table["equations"], read_terms)
-    return Structure(**USUAL | table, name=name)
+    fields = USUAL | table
+    return Structure(name=name, **fields)
 
 
 def _by_axis(texts: Mapping[str, str], read: Callable[[str], Read]) -> dict[str, Read]:
     """Read each text for each of the axes in its key, such as "v r"."""
-    return {axis: read(text) for axes, text in texts.items() for axis in axes.split()}
+    by_axis: dict[str, Read] = {}
+    for axes, text in texts.items():
+        by_axis |= dict.fromkeys(axes.split(), read(text))
+    return by_axis
 
 
 # ---- by name -------------------------------------------------------------------------
@@ -93,7 +99,8 @@ def get_structure(name: str) -> Structure:
         return REGISTERED_STRUCTURES[name]
     if name in NO_TABLES:
         raise InputError(f"structure: expected {NO_TABLES[name]}")
-    return printed_structure(check_choice(name, list_structures(), "structure"))
+    check_choice(name, list_structures(), "structure")
+    return printed_structure(name)
 
 
 def list_equations() -> list[str]:
@@ -152,8 +159,13 @@ def register_structure(
     quantity : {"acceleration", "force"}
         What the terms add up to; forces need the ship's mass and added mass.
     """
-    units = {"normalisation": normalisation, "quantity": quantity}
-    table = {"name": name, "equations": equations, "source": source, **units}
+    table = {
+        "name": name,
+        "equations": equations,
+        "source": source,
+        "normalisation": normalisation,
+        "quantity": quantity,
+    }
     structure = own_structure(table, "register_structure")
     if name not in printed_tables():  # which it equals
         REGISTERED_STRUCTURES[name] = structure

@@ -34,6 +34,7 @@ from shipgym.ships.terms import (
     TURN_RATES,
     Term,
     read_term_list,
+    symbols_in,
 )
 
 FORCE_OF_EQUATION = {"u": "X", "v": "Y", "r": "N"}
@@ -85,10 +86,11 @@ class Structure:
 
     def names(self, equation: str) -> tuple[str, ...]:
         """Names of an equation's coefficients, such as X_u (force) or a_u."""
-        letters = ACCELERATION_OF_EQUATION
         if self.quantity == "force":
-            letters = FORCE_OF_EQUATION
-        return tuple(f"{letters[equation]}_{t.name}" for t in self.terms(equation))
+            letter = FORCE_OF_EQUATION[equation]
+        else:
+            letter = ACCELERATION_OF_EQUATION[equation]
+        return tuple(f"{letter}_{term.name}" for term in self.equations[equation])
 
     @cached_property
     def coefficient_names(self) -> tuple[str, ...]:
@@ -105,10 +107,7 @@ class Structure:
     @cached_property
     def symbols(self) -> tuple[str, ...]:
         """Symbols that stand in its terms."""
-        used: set[str] = set()
-        for terms in self.equations.values():
-            for term in terms:
-                used.update(symbol for symbol, _ in term.powers)
+        used = symbols_in(self.equations.values())
         return tuple(symbol for symbol in SYMBOLS if symbol in used)
 
     @cached_property
@@ -199,28 +198,38 @@ class Structure:
         in SI units; the service speed is in the particulars, the shaft speed that at
         service speed, 1/s. Returns shape (n_samples, n_terms).
         """
-        u = np.asarray(channels["u"], dtype=float)
-        v = np.asarray(channels["v"], dtype=float)
-        U = np.hypot(u, v)
-        offsets = {"du": particulars["speed"], "dn": shaft_speed}
-        values = {"U": U}
-        for symbol in self.symbols:
-            if symbol == "U":
-                continue
-            channel = np.asarray(channels[CHANNEL[symbol]], dtype=float)
-            if symbol in offsets:
-                channel = channel - offsets[symbol]
-            if symbol.startswith("|"):
-                channel = np.abs(channel)
-            values[symbol] = channel
-
+        values = self._symbol_values(channels, particulars, shaft_speed)
         columns = []
         for term in self.terms(equation):
-            column = U ** float(self.speed_power(equation, term))
+            speed_power = self.speed_power(equation, term)
+            column = values["U"] ** float(speed_power)
             for symbol, power in term.powers:
                 column = column * values[symbol] ** float(power)
             columns.append(column)
         return np.stack(columns, axis=-1)
+
+    def _symbol_values(
+        self,
+        channels: Mapping[str, Any],
+        particulars: Particulars,
+        shaft_speed: float,
+    ) -> dict[str, Floats]:
+        """Values of the speed `U` and of the terms' symbols at samples."""
+        u = np.asarray(channels["u"], dtype=float)
+        v = np.asarray(channels["v"], dtype=float)
+        values = {"U": np.hypot(u, v)}
+        offsets = {"du": particulars["speed"], "dn": shaft_speed}
+        for symbol in self.symbols:
+            if symbol == "U":
+                continue
+            name = CHANNEL[symbol]
+            value = np.asarray(channels[name], dtype=float)
+            if symbol in offsets:
+                value = value - offsets[symbol]
+            if symbol.startswith("|"):
+                value = np.abs(value)
+            values[symbol] = value
+        return values
 
     def speed_power(self, equation: str, term: Term) -> int:
         """Power of U in the feature, prime: 2 (memory: 3), less one a velocity."""
@@ -248,21 +257,28 @@ class Structure:
         if equation in ANGULAR:
             lengths -= 1
         if self.normalisation == "prime":
-            return float(length ** float(lengths + shaft_speeds))
+            lengths += shaft_speeds
+            return float(length ** float(lengths))
 
         speeds = unit - turn_rates - term.power(*SPEEDS)
-        scale = length ** float(lengths) * speed ** float(speeds)
+        scale = length ** float(lengths)
+        scale *= speed ** float(speeds)
         if shaft_speeds:
             scale /= shaft**shaft_speeds
         return float(scale)
 
     def term_scales(self, particulars: Particulars, shaft_speed: float = 0.0) -> Floats:
         """`feature_scale` of all terms, by equation; shape (n_coefficients,)."""
-        ship = particulars["length"], particulars["speed"], shaft_speed
         scales = []
         for equation, terms in self.equations.items():
             for term in terms:
-                scale = self.feature_scale(equation, term, *ship)
+                scale = self.feature_scale(
+                    equation,
+                    term,
+                    length=particulars["length"],
+                    speed=particulars["speed"],
+                    shaft=shaft_speed,
+                )
                 scales.append(scale)
         return np.array(scales)
 
@@ -299,13 +315,17 @@ class Structure:
         """Matrix from force coefficients to accelerations, by an inertia (3, 3)."""
         order = list(FORCE_OF_EQUATION)
         axes = [order.index(equation) for equation in self.equations]
-        mobility = np.linalg.inv(inertia[np.ix_(axes, axes)])
+        own_inertia = inertia[np.ix_(axes, axes)]
+        mobility = np.linalg.inv(own_inertia)
+
+        # only equations of the same terms are coupled
         counts = [len(terms) for terms in self.equations.values()]
         blocks = []
-        for row, n in zip(mobility, counts, strict=True):
-            # only equations of the same terms are coupled
-            columns = zip(row, counts, strict=True)
-            blocks.append([entry * np.eye(n, m) for entry, m in columns])
+        for row, n_rows in zip(mobility, counts, strict=True):
+            block = []
+            for entry, n_columns in zip(row, counts, strict=True):
+                block.append(entry * np.eye(n_rows, n_columns))
+            blocks.append(block)
         return np.block(blocks)
 
     def term_numbers(
@@ -326,7 +346,12 @@ class Structure:
         ship: Ship,
     ) -> dict[str, Floats]:
         """Accelerations by equation at samples (n_samples,), without compiling."""
-        found = self._sums_at(channels, coefficients, particulars, ship.shaft)
+        found = self._sums_at(
+            channels,
+            coefficients,
+            particulars,
+            shaft_speed=ship.shaft,
+        )
         for name in ("v", "r"):
             if name not in found:
                 found[name] = -channels[name] * (ship.speed / ship.length)
@@ -388,15 +413,18 @@ class Structure:
 
     def to_dict(self) -> dict[str, Any]:
         """Table as it stands in a model file."""
-        table: dict[str, Any] = {"name": self.name, "source": self.source}
+        table: dict[str, Any] = {
+            "name": self.name,
+            "source": self.source,
+        }
         if self.normalisation != "prime":
             table["normalisation"] = self.normalisation
         if self.quantity != "force":
             table["quantity"] = self.quantity
-        equations = {}
-        for equation, terms in self.equations.items():
-            equations[equation] = [term.to_dict() for term in terms]
-        table["equations"] = equations
+        table["equations"] = {
+            equation: [term.to_dict() for term in terms]
+            for equation, terms in self.equations.items()
+        }
         return table
 
     @classmethod
@@ -408,13 +436,17 @@ class Structure:
 def structure_fields(table: Mapping[str, Any], where: str) -> dict[str, Any]:
     """Fields of a `Structure` from a model file."""
     place = f"{where}.equations"
-    equations = check_table(table["equations"], place, EQUATION_NAMES)
-    given = {"name": table.get("name"), "source": table.get("source")}
+    lists = check_table(table["equations"], place, EQUATION_NAMES)
+    equations = {}
+    for equation, terms in lists.items():
+        equations[equation] = read_term_list(terms, f"{place}.{equation}")
+
+    fields = {
+        "name": table.get("name"),
+        "source": table.get("source"),
+        "equations": equations,
+    }
     for key in ("normalisation", "quantity"):
         if key in table:
-            given[key] = table[key]
-    read = {}
-    for equation, terms in equations.items():
-        read[equation] = read_term_list(terms, f"{place}.{equation}")
-    given["equations"] = read
-    return given
+            fields[key] = table[key]
+    return fields
