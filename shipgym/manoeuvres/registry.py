@@ -65,7 +65,9 @@ def check_physical(model: ShipModel, trial: Trial) -> None:
         if beyond.any():
             k = int(np.argmax(beyond))
             time_s = float(trial.t[k])
-            state = {each: float(row[k]) for each, row in trial.channels.items()}
+            state = {}
+            for channel, values in trial.channels.items():
+                state[channel] = float(values[k])
             raise UnstableModelError(
                 f"model {model.name!r} runs away after {time_s:.1f} s"
                 f" ({name} = {state[name]:.3g})",

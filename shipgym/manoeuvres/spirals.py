@@ -183,7 +183,8 @@ def one_way(
         numbers.append(number)
     steps = np.diff(numbers)
     strictly = np.all(steps > 0.0) or np.all(steps < 0.0)
-    if len(numbers) < 3 or not strictly or numbers[0] * numbers[-1] >= 0.0:
+    enough = len(numbers) >= 3
+    if not enough or not strictly or numbers[0] * numbers[-1] >= 0.0:
         raise InputError(
             f"{argument}: expected at least 3 values in {unit} that rise or fall from"
             f" one side to the other, such as 10, 5, 0, -5, -10, got {numbers}"
@@ -212,8 +213,8 @@ def spiral_from_trial(
         angle = float(delta[first:last].mean())
         if rudder_deg is not None and not _near(angle, rudder_deg, tolerance):
             continue
-        third = (last - first) // 3
-        steady = rate[last - max(third, 1) : last]
+        third = max((last - first) // 3, 1)
+        steady = rate[last - third : last]
         angles.append(angle)
         rates.append(float(steady.mean()))
     if len(angles) < 4:

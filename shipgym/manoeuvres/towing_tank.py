@@ -109,17 +109,17 @@ def static_drift(
     check_number(hold_s, "hold_s", above=0.0)
 
     drift = np.repeat(np.radians(drift_deg), tank.samples)
-    n_samples = len(drift)
     speed = tank.carriage_speed(model)
-    velocity = np.zeros((n_samples, 3))
+    velocity = np.zeros((len(drift), 3))
     velocity[:, 0] = speed * np.cos(drift)
     velocity[:, 1] = -speed * np.sin(drift)
+    step = hold_s / tank.samples
     return _tow(
         model,
         tank,
-        t=hold_s / tank.samples * np.arange(n_samples, dtype=float),
+        t=step * np.arange(len(drift), dtype=float),
         velocity=velocity,
-        acceleration=np.zeros((n_samples, 3)),
+        acceleration=np.zeros_like(velocity),
         name="static drift",
     )
 

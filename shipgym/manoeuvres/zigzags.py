@@ -119,8 +119,8 @@ def _refuse_without_reversal(
     raise ManoeuvreError(
         f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: expected the heading"
         f" to change by {heading_deg:g} deg, where the rudder is reversed, got"
-        f" {largest_deg:.3g} deg to the side of the rudder in {trial.duration:g} s; sail"
-        " longer, or order more rudder or less heading",
+        f" {largest_deg:.3g} deg to the side of the rudder in {trial.duration:g} s;"
+        " sail longer, or order more rudder or less heading",
         trial,
     )
 

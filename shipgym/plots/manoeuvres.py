@@ -235,18 +235,25 @@ def speed_figure(
     part = thinned(trial)
     t = trial.t[part]
     u = trial["u"][part]
-    over_distance = line(sailed[part], u, "surge speed", MODEL)
-    over_time = line(t, u, "surge speed", MODEL)
-    speed_axis = axis(CHANNEL_AXES["u"].title, zero=True)
-    shown = [
-        Panel([over_distance], "distance sailed, ship lengths", speed_axis),
-        Panel([over_time], "time, s", axis(zero=True)),
-    ]
+    over_distance = Panel(
+        [line(sailed[part], u, "surge speed", MODEL)],
+        x="distance sailed, ship lengths",
+        y=axis(CHANNEL_AXES["u"].title, zero=True),
+    )
+    over_time = Panel(
+        [line(t, u, "surge speed", MODEL)],
+        x="time, s",
+        y=axis(zero=True),
+    )
+    shown = [over_distance, over_time]
     shaft = quantity(trial, "n")
     if shaft is not None:
-        turned = line(t, shaft[part], "shaft", MEASURED)
-        shaft_axis = axis(CHANNEL_AXES["n"].title, zero=True)
-        shown.append(Panel([turned], "time, s", shaft_axis))
+        shaft_over_time = Panel(
+            [line(t, shaft[part], "shaft", MEASURED)],
+            x="time, s",
+            y=axis(CHANNEL_AXES["n"].title, zero=True),
+        )
+        shown.append(shaft_over_time)
     return panels(
         shown,
         height,

@@ -81,21 +81,38 @@ def panels(
     # as plain dicts, since plotly checks a whole figure faster than one change after
     # the other
     drawn = figure.layout.to_plotly_json()
-    in_last_row = columns * (rows - 1)
-    for k, panel in enumerate(shown):
-        x = _axis(panel.x)
-        y = _axis(panel.y)
-        if outer and k < in_last_row:
-            x["title"] = {"text": ""}
-        if outer and k % columns:
-            y["title"] = {"text": ""}
-        number = _axis_number(k)
-        drawn[f"xaxis{number}"] |= x
-        drawn[f"yaxis{number}"] |= y
+    axes = _outer_axes(shown, rows, columns) if outer else _axes(shown)
+    for name, settings in axes.items():
+        drawn[name] |= settings
     drawn |= layout(height, titled=is_titled, **changes)
     figure.layout = drawn
     figure.add_traces(_placed_traces(shown))
     return figure
+
+
+def _axes(shown: Sequence[Panel]) -> dict[str, dict[str, Any]]:
+    """Axes of panels, by their names in a layout."""
+    axes = {}
+    for k, panel in enumerate(shown):
+        number = _axis_number(k)
+        axes[f"xaxis{number}"] = _axis(panel.x)
+        axes[f"yaxis{number}"] = _axis(panel.y)
+    return axes
+
+
+def _outer_axes(
+    shown: Sequence[Panel], rows: int, columns: int
+) -> dict[str, dict[str, Any]]:
+    """Axes of panels, titles below the last row and beside the first column only."""
+    axes = _axes(shown)
+    in_last_row = columns * (rows - 1)
+    for k in range(len(shown)):
+        number = _axis_number(k)
+        if k < in_last_row:
+            axes[f"xaxis{number}"]["title"] = {"text": ""}
+        if k % columns:
+            axes[f"yaxis{number}"]["title"] = {"text": ""}
+    return axes
 
 
 def _axis_number(k: int) -> str:
@@ -103,8 +120,8 @@ def _axis_number(k: int) -> str:
     return str(k + 1) if k else ""
 
 
-def _axis(told: Axis) -> dict[str, Any]:
-    return axis(told) if isinstance(told, str) else dict(told)
+def _axis(given: Axis) -> dict[str, Any]:
+    return axis(given) if isinstance(given, str) else dict(given)
 
 
 def _placed_traces(shown: Sequence[Panel]) -> list[dict[str, Any]]:

@@ -69,10 +69,12 @@ def _radiated(omega: Floats, chi: Floats, hull: Hull, U: float) -> Floats:
     d1 = where(below_peak, d1_below, d1_above)
     with np.errstate(over="ignore", under="ignore"):
         past_peak = 1.0 - w**d1
-        shape = exp(b1 * log(w) + b1 / d1 * past_peak)
+        exponent = b1 * log(w) + b1 / d1 * past_peak
+        shape = exp(exponent)
 
     k_yy = PITCH_GYRADIUS
-    scale = 3859.2 * B**2 / L * CB**1.34 * k_yy**2
+    width = 3859.2 * B**2 / L
+    scale = width * CB**1.34 * k_yy**2
     radiated: Floats = scale * a1 * a2 * shape
     return radiated
 
@@ -94,10 +96,11 @@ def _reduced_frequency(omega: Floats, chi: Floats, hull: Hull, U: float) -> Floa
     by_direction = 0.618 * (13.0 + cos(2.0 * chi)) / 14.0
 
     k_yy = PITCH_GYRADIUS
-    unit = k_yy ** (1 / 3) * sqrt(L / (2.0 * pi * GRAVITY))
+    period = sqrt(L / (2.0 * pi * GRAVITY))
+    unit = k_yy ** (1 / 3) * period
     scale = 2.142 * unit * fullness * fineness
-    per_omega = scale * (by_speed + by_direction)
-    reduced: Floats = per_omega * omega
+    factor = by_speed + by_direction
+    reduced: Floats = scale * factor * omega
     return reduced
 
 
@@ -151,9 +154,10 @@ def _reflected(omega: Floats, chi: Floats, hull: Hull, E: float, U: float) -> Fl
     c = cos(chi)
 
     def side(alpha: Floats) -> Floats:
-        met = c - cos(E) * cos(E + alpha)
+        angle = E + alpha
+        met = c - cos(E) * cos(angle)
         by_speed = 2.0 * omega * U / GRAVITY * met
-        reflection: Floats = sin(E + alpha) ** 2 + by_speed
+        reflection: Floats = sin(angle) ** 2 + by_speed
         return reflection
 
     near = side(chi)
@@ -183,5 +187,5 @@ def _taken_up(omega: Floats, draught: Floats | float, length: float) -> Floats:
     wave_length = 2.0 * pi * GRAVITY / omega**2
     longest = 2.5 * length
     depth = draught / wave_length - draught / longest
-    reflected = 1.0 - exp(-4.0 * pi * depth)
-    return where(wave_length <= longest, reflected, 0.0)
+    passed = exp(-4.0 * pi * depth)
+    return where(wave_length <= longest, 1.0 - passed, 0.0)

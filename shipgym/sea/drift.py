@@ -128,12 +128,13 @@ def reflection_coefficients(chi: ArrayLike, ship: Particulars) -> tuple[Floats, 
     `chi`, rad, is where they come from, seen from the bow. Returns Y by rho g a^2 L / 2
     and N about midship by rho g a^2 L^2 / 2.
     """
+    L = ship.length
     x, half_breadth = waterline(ship)
     Y_starboard, N_starboard = _reflected(chi, x, half_breadth, side=1.0)
     Y_port, N_port = _reflected(chi, x, half_breadth, side=-1.0)
     Y = Y_starboard + Y_port
     N = N_starboard + N_port
-    return Y / ship.length, N / ship.length**2
+    return Y / L, N / L**2
 
 
 def _reflected(

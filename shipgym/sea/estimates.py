@@ -106,11 +106,13 @@ def _roll_period(ship: Particulars) -> float:
     L, B, T, _ = hull_of(ship)
     # the Code's length is in metres and of ships: smaller hulls, as models, are taken
     # for one of 100 m
-    code_length = max(L, 100.0)
-    C = 0.373 + 0.023 * B / T - 0.043 * code_length / 100.0
+    L = max(L, 100.0)
+    slender = 0.043 * L / 100.0
+    C = 0.373 + 0.023 * B / T - slender
     C = max(C, 0.3)
     GM = ship.require("metacentric_height")
-    return 2.0 * C * B / math.sqrt(GM)
+    root = math.sqrt(GM)
+    return 2.0 * C * B / root
 
 
 _ESTIMATES: Estimates = {  # in this order

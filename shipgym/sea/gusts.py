@@ -12,6 +12,10 @@ from shipgym.sea.current_wind_waves import Wind
 #: Surface drag coefficient of Harris's and Davenport's spectra for a rough sea.
 SURFACE_DRAG = 0.003
 LENGTH_SCALES = {"harris": 1800.0, "davenport": 1200.0}  # m
+#: 2^(2/3) B(1/2, 1/3), with Euler's beta function.
+HARRIS_VARIANCE = 2.0 ** (2.0 / 3.0) * (
+    gamma(1.0 / 2.0) * gamma(1.0 / 3.0) / gamma(5.0 / 6.0)
+)
 
 
 class GaussMarkov(NamedTuple):
@@ -84,10 +88,7 @@ def gust_variance(speed: float, spectrum: str = "harris") -> float:
         f = froya_frequencies(400)
         energy = f * froya_spectrum(f, speed)
         return float(np.trapezoid(energy, np.log(f)))
-    factor = 6.0
-    if spectrum == "harris":
-        beta = gamma(1.0 / 2.0) * gamma(1.0 / 3.0) / gamma(5.0 / 6.0)
-        factor = float(2.0 ** (2.0 / 3.0)) * beta
+    factor = HARRIS_VARIANCE if spectrum == "harris" else 6.0
     return factor * SURFACE_DRAG * speed**2
 
 
@@ -102,14 +103,16 @@ def gust_filter(wind: Wind) -> GaussMarkov:
     if not wind.gust or wind.calm:
         return GaussMarkov(1.0, 0.0)
     V = wind.speed
-    if wind.spectrum == "norsok":
+    spectrum = wind.spectrum
+    if spectrum == "norsok":
         f = froya_frequencies(2000)
         energy = f * froya_spectrum(f, V)
-        peak = float(f[np.argmax(energy)])
+        largest = np.argmax(energy)
+        peak = float(f[largest])
     else:
-        L = LENGTH_SCALES[wind.spectrum]
+        L = LENGTH_SCALES[spectrum]
         peak = sqrt(3.0) * V / L
-    variance = gust_variance(V, wind.spectrum)
+    variance = gust_variance(V, spectrum)
     return GaussMarkov(
         time_constant=1.0 / (2.0 * pi * peak),
         standard_deviation=sqrt(variance),

@@ -62,7 +62,10 @@ def roll_inertia(model: ManoeuvringModel) -> float:
 def _container_roll(model: ManoeuvringModel, mass: Floats) -> Floats:
     """Row of roll in Son & Nomoto's equations, whose inertia is symmetric."""
     c = model.coefficients
-    density = model.particulars.require("water_density")
-    unit = 0.5 * density * model.particulars.length**5
+    p = model.particulars
+    unit = 0.5 * p.require("water_density") * p.length**5
     prime = c["Ix"] + c["Jx"]
-    return np.array([0.0, mass[1, 3], 0.0, prime * unit])
+    row = np.zeros(4)
+    row[1] = mass[1, 3]
+    row[3] = prime * unit
+    return row

@@ -67,10 +67,12 @@ def _effective_wave_slope(omega: ArrayLike, chi: ArrayLike, hull: Hull) -> Float
     """Slope of the waves across a hull, averaged over it, by their amplitude, rad/m."""
     k = wave_number(omega)
     sine = sin(chi)
-    over_length = sinc(0.5 * k * hull.L * cos(chi) / pi)
-    over_beam = sinc(0.5 * k * hull.B * sine / pi)
+    cosine = cos(chi)
+    half_k = 0.5 * k
+    over_length = sinc(half_k * hull.L * cosine / pi)
+    over_beam = sinc(half_k * hull.B * sine / pi)
     across = abs(sine * over_length * over_beam)
-    attenuation = exp(-0.5 * k * hull.T)
+    attenuation = exp(-half_k * hull.T)
     return k * across * attenuation
 
 

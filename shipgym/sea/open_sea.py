@@ -132,8 +132,10 @@ def relative_wind(
     speed = p.wind_speed + sea.gust
     north = speed * sea.wind_north + sea.current_north
     east = speed * sea.wind_east + sea.current_east
-    ahead = north * cosine + east * sine + motion.u
-    aside = east * cosine - north * sine + motion.v
+    from_ahead = north * cosine + east * sine
+    from_aside = east * cosine - north * sine
+    ahead = from_ahead + motion.u
+    aside = from_aside + motion.v
 
     squared = ahead * ahead + aside * aside
     least = SLOWEST_WIND * SLOWEST_WIND
@@ -151,12 +153,11 @@ def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
     wind = by_wind(motion, felt, p)
     waves = from_bow(sine, cosine, sea.waves_north, sea.waves_east)
     drift = by_waves(waves, 1.0 + sea.drift, p)
-    roll = wind.roll + drift.roll if HAS_ROLL else 0.0
     return Push(
         wind.surge + drift.surge,
         wind.sway + drift.sway,
         wind.yaw + drift.yaw,
-        roll,
+        wind.roll + drift.roll,
         sea.current_north,
         sea.current_east,
     )
@@ -166,12 +167,14 @@ def by_wind(motion: Motion, wind: RelativeWind, p: SeaParameters) -> Acceleratio
     """Accelerations by the relative wind, beyond those that the model has of itself."""
     cosine, sine = wind.angle
     squared = wind.squared_speed
+    # the model's own surge has the resistance of still air already
     still_air = motion.u * fabs(motion.u) * p.still_air
+    surge = squared * sum_of_cosines(cosine, p.wind_surge)
     roll = 0.0
     if HAS_ROLL:
         roll = squared * sum_of_sines(cosine, sine, p.wind_roll)
     return Accelerations(
-        surge=squared * sum_of_cosines(cosine, p.wind_surge) + still_air,
+        surge=surge + still_air,
         sway=squared * sum_of_sines(cosine, sine, p.wind_sway),
         yaw=squared * sum_of_sines(cosine, sine, p.wind_yaw),
         roll=roll,
@@ -192,6 +195,12 @@ def by_waves(waves: FromBow, drift: float, p: SeaParameters) -> Accelerations:
     )
 
 
+def waves_from_bow(motion: Motion, sea: Sea) -> FromBow:
+    """Angle from the bow to where the waves come from."""
+    sine, cosine = sin_cos(motion.psi)
+    return from_bow(sine, cosine, sea.waves_north, sea.waves_east)
+
+
 def encounter(waves: FromBow, u: float, v: float, p: SeaParameters) -> float:
     """Frequency at which a ship meets the peak's waves, rad/s; Fossen 2011, (8.106)."""
     ahead = u * waves.cosine + v * waves.sine
@@ -203,8 +212,7 @@ def encounter_frequency(motion: Motion, sea: Sea, p: SeaParameters) -> float:
     """Frequency at which a ship meets the waves, rad/s; 0 in calm water."""
     if not HAS_SEA:
         return 0.0
-    sine, cosine = sin_cos(motion.psi)
-    waves = from_bow(sine, cosine, sea.waves_north, sea.waves_east)
+    waves = waves_from_bow(motion, sea)
     return encounter(waves, motion.u, motion.v, p)
 
 
@@ -242,8 +250,7 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
     `motion` is the ship at the end of the step, `sea` that at its beginning, `word`
     (uint64) the state of its random numbers, which then goes on by `EVOLVE_WORDS`.
     """
-    sine, cosine = sin_cos(motion.psi)
-    waves = from_bow(sine, cosine, sea.waves_north, sea.waves_east)
+    waves = waves_from_bow(motion, sea)
     frequency = encounter(waves, motion.u, motion.v, p)
 
     step = oscillator_step(frequency * h, p.wave_damping, p.wave_ringing)
@@ -309,14 +316,27 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
     The weather begins as if it had always been there. Wind and waves without a
     direction come from the same one. `word` then goes on by `BEGIN_WORDS`.
     """
-    towards_east, towards_north = sin_cos(direction(p.current_towards, word, DRAW[0]))
-    wind_east, wind_north = sin_cos(direction(p.wind_from, word, DRAW[1]))
-    waves_east, waves_north = sin_cos(direction(p.waves_from, word, DRAW[1]))
+    current_towards = direction(p.current_towards, word, DRAW[0])
+    towards_east, towards_north = sin_cos(current_towards)
     mean_north = p.current_speed * towards_north
     mean_east = p.current_speed * towards_east
+    north = p.current.deviation * normal(word, DRAW[2])
+    east = p.current.deviation * normal(word, DRAW[3])
 
-    heading = Oscillator(normal(word, DRAW[6]), normal(word, DRAW[7]))
-    roll = Oscillator(normal(word, DRAW[8]), normal(word, DRAW[9]))
+    # wind and waves of open direction come from the same one
+    wind_from = direction(p.wind_from, word, DRAW[1])
+    waves_from = direction(p.waves_from, word, DRAW[1])
+    wind_east, wind_north = sin_cos(wind_from)
+    waves_east, waves_north = sin_cos(waves_from)
+
+    heading = Oscillator(
+        displacement=normal(word, DRAW[6]),
+        velocity=normal(word, DRAW[7]),
+    )
+    roll = Oscillator(
+        displacement=normal(word, DRAW[8]),
+        velocity=normal(word, DRAW[9]),
+    )
     sine, cosine = sin_cos(motion.psi)
     waves = from_bow(sine, cosine, waves_north, waves_east)
     frequency = encounter(waves, motion.u, motion.v, p)
@@ -328,8 +348,8 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
         wind_east=wind_east,
         waves_north=waves_north,
         waves_east=waves_east,
-        current_north=mean_north + p.current.deviation * normal(word, DRAW[2]),
-        current_east=mean_east + p.current.deviation * normal(word, DRAW[3]),
+        current_north=mean_north + north,
+        current_east=mean_east + east,
         gust=p.gust.deviation * normal(word, DRAW[4]),
         drift=p.drift.deviation * normal(word, DRAW[5]),
         heading_displacement=heading.displacement,

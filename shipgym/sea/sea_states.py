@@ -49,15 +49,17 @@ def find_sea_state(name: str | int) -> SeaState:
     """Sea state by its name or WMO code; InputError for one that is not there."""
     states = sea_states()
     for state in states.values():
-        if not isinstance(name, bool) and name in (state.name, state.code):
+        if name in (state.name, state.code) and not isinstance(name, bool):
             return state
 
-    codes = ", ".join(str(state.code) for state in states.values())
     hint = ""
     if isinstance(name, str):
         hint = did_you_mean(name, states)
+    names = quoted(states)
+    codes = [str(state.code) for state in states.values()]
+    listed = ", ".join(codes)
     raise InputError(
-        f"sea state: expected one of {quoted(states)}, or their WMO codes {codes}, got"
+        f"sea state: expected one of {names}, or their WMO codes {listed}, got"
         f" {name!r}; for another sea give Weather(wind=Wind(...), waves=Waves(...))"
         f".{hint}"
     )

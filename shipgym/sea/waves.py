@@ -49,8 +49,9 @@ def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
     # the density is 0 below a fiftieth of the peak: exp(-1.25 * 50^4)
     ratio = np.maximum(omega, 0.02 * peak) / peak
     scale = 5.0 / 16.0 * Hs**2 / peak
-    tail = scale * ratio**-5
-    density: Floats = tail * exp(-1.25 * ratio**-4)
+    tail = ratio**-5
+    cut_off = exp(-1.25 * ratio**-4)
+    density: Floats = scale * tail * cut_off
     return density
 
 
@@ -191,7 +192,8 @@ def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
     if waves.calm:
         return GaussMarkov(1.0, 0.0)
     omega = frequencies(waves)
-    draught = weather_particulars(particulars).require("draught")
+    ship = weather_particulars(particulars)
+    draught = ship.require("draught")
     # the height does not matter
     shape = jonswap(omega, 1.0, waves.peak_period, waves.gamma)
     Sc = shape * draught_attenuation(omega, draught)

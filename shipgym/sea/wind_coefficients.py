@@ -93,8 +93,9 @@ class WindTable:
 
     def _check_angles(self) -> None:
         angles = self.angles_deg
-        enough = len(angles) >= 3 and angles[0] == 0.0 and angles[-1] == 180.0
-        if not enough or np.any(np.diff(angles) <= 0.0):
+        enough = len(angles) >= 3
+        rising = np.all(np.diff(angles) > 0.0)
+        if not (enough and rising and angles[0] == 0.0 and angles[-1] == 180.0):
             raise InputError(
                 "wind table angles_deg: expected at least three that rise from 0 to"
                 f" 180, got {angles}"
@@ -133,13 +134,15 @@ class WindTable:
 
     def at(self, angle: Floats) -> WindCoefficients:
         """Coefficients at angles from 0 to pi, straight between those of the table."""
-        none = [0.0] * len(self.angles_deg)
         at = degrees(angle)
+        CK = np.zeros_like(at)
+        if self.CK is not None:
+            CK = interp(at, self.angles_deg, self.CK)
         return WindCoefficients(
             CX=interp(at, self.angles_deg, self.CX),
             CY=interp(at, self.angles_deg, self.CY),
             CN=interp(at, self.angles_deg, self.CN),
-            CK=interp(at, self.angles_deg, self.CK or none),
+            CK=CK,
         )
 
 

@@ -193,8 +193,8 @@ def truth_of(model: str | Path | ShipModel) -> ShipModel:
     name = str(provenance.get("truth"))
     if name in REFERENCE_SHIPS:
         ship = REFERENCE_SHIPS[name]()
-        same_length = ship.particulars.length == model.particulars.length
-        if same_length:
+        length = model.particulars.length
+        if ship.particulars.length == length:
             return ship
     raise InputError(
         f"model {model.name!r}: provenance.truth: expected the reference ship of her"

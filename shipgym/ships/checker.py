@@ -185,8 +185,9 @@ def _root_mean_square(values: Floats) -> float:
 def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:
     """Run from service with the rudder held, over a number of ship lengths."""
     step = 0.02  # ship lengths
-    held = np.full(round(lengths / step), rudder)
-    return model.simulate(orders(model, held), step * model.travel_time)
+    n_steps = round(lengths / step)
+    held = orders(model, np.full(n_steps, rudder))
+    return model.simulate(held, step * model.travel_time)
 
 
 def _wrong_courses(model: ShipModel) -> Iterator[str]:

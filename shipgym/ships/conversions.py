@@ -77,8 +77,9 @@ def state_space(
     A, B = steering_state_space(model, speed)
     names = ["q" if "q" in model.state_names else "v", "r"]
     if heading:  # psidot = r
-        A = np.block([[A, np.zeros((2, 1))], [np.array([[0.0, 1.0, 0.0]])]])
-        B = np.vstack([B, [[0.0]]])
+        A = np.pad(A, (0, 1))
+        A[-1, 1] = 1.0
+        B = np.pad(B, ((0, 1), (0, 0)))
         names.append("psi")
     if gear:  # deltadot = (order - delta) / lag
         lag = model.steering.time_constant
@@ -87,11 +88,13 @@ def state_space(
                 f"steering of {model.name!r}: expected a time_constant above 0, got no"
                 " lag: a ramp of constant rate is not linear; leave gear=False"
             )
-        gear_row = np.zeros((1, len(A) + 1))
-        gear_row[0, -1] = -1.0 / lag
-        A = np.vstack([np.hstack([A, B]), gear_row])
-        B = np.vstack([np.zeros_like(B), [[1.0 / lag]]])
+        A = np.pad(A, (0, 1))
+        A[:-1, -1:] = B
+        A[-1, -1] = -1.0 / lag
+        B = np.zeros((len(A), 1))
+        B[-1] = 1.0 / lag
         names.append("delta")
+
     n_states = len(names)
     return control.ss(
         A,
@@ -150,9 +153,12 @@ def nomoto1_ship(
             "K and T: expected both positive (a stable ship) or both negative, because"
             f" a positive rudder turns to starboard, got {K:g} and {T:g}"
         )
-    coefficients = {"c_r": -1.0 / T, "c_d": K / T}
     return ShipModel(
-        name, "nomoto", _ship(particulars), steering or SteeringGear(), coefficients
+        name=name,
+        structure="nomoto",
+        particulars=_ship(particulars),
+        steering=steering or SteeringGear(),
+        coefficients={"c_r": -1.0 / T, "c_d": K / T},
     )
 
 
@@ -177,7 +183,11 @@ def nomoto2_ship(
         "e_d": form.K / product,
     }
     return ShipModel(
-        name, "nomoto2", _ship(particulars), steering or SteeringGear(), coefficients
+        name=name,
+        structure="nomoto2",
+        particulars=_ship(particulars),
+        steering=steering or SteeringGear(),
+        coefficients=coefficients,
     )
 
 
@@ -198,12 +208,16 @@ def linear_steering_ship(
     length = ship.require("length")
     speed = ship.require("speed")
     a, b = prime_matrices(A, B, length, speed)
-    structure = "linear-steering"
-    names = get_structure(structure).coefficient_names
+    structure = get_structure("linear-steering")
     values = np.hstack([a, b]).ravel().tolist()
-    coefficients = dict(zip(names, values, strict=True))
-    gear = steering or SteeringGear()
-    return ShipModel(name, structure, ship, gear, coefficients)
+    coefficients = dict(zip(structure.coefficient_names, values, strict=True))
+    return ShipModel(
+        name=name,
+        structure=structure.name,
+        particulars=ship,
+        steering=steering or SteeringGear(),
+        coefficients=coefficients,
+    )
 
 
 def _ship(particulars: Known) -> Particulars:

@@ -79,7 +79,11 @@ class Envelope:
             "centre": (4,),
             "shape": (4, 4),
         }
-        table = check_table(content, where, ("channels", *shapes))
+        table = check_table(
+            content,
+            where,
+            allowed=("channels", *shapes),
+        )
         names = table.get("channels")
         expected = list(ENVELOPE_CHANNELS)
         if names != expected:
@@ -123,8 +127,7 @@ def _khachiyan_weights(points: Floats, floor: Floats, tolerance: float) -> Float
         distances = np.einsum("ij,ij->i", lifted @ inverse, lifted)
         farthest = int(np.argmax(distances))
         distance = distances[farthest]
-        excess = distance / (d + 1.0) - 1.0
-        if excess <= tolerance:
+        if distance / (d + 1.0) - 1.0 <= tolerance:
             break
         step = (distance - d - 1.0) / ((d + 1.0) * (distance - 1.0))
         weights *= 1.0 - step

@@ -116,12 +116,11 @@ class ShipEquations:
             expected = "a NamedTuple of floats"
             raise unexpected(f"{where}: coefficients_record", expected, record)
         values = record._field_defaults  # type: ignore[attr-defined]
-        for name in record._fields:  # type: ignore[attr-defined]
+        for name in self.coefficient_names:
+            place = f"{where}: coefficient {name!r}"
             if name not in values:
-                raise InputError(
-                    f"{where}: coefficient {name!r}: expected a default, got no value"
-                )
-            check_number(values[name], f"{where}: coefficient {name!r}")
+                raise InputError(f"{place}: expected a default, got no value")
+            check_number(values[name], place)
 
     def _try(self) -> None:
         """Accelerations of one state in plain Python, for its clear messages."""
@@ -172,9 +171,10 @@ class ShipEquations:
     ) -> str:
         """Place where plain Python fails at a state, and why."""
         at = {name: state.get(name, 0.0) for name in Motion._fields}
+        motion = Motion(**at)
         c = self.coefficients_record(**coefficients)
         try:
-            asked(self.accelerations, Motion(**at), c, ship)
+            asked(self.accelerations, motion, c, ship)
         except InputError as error:
             return str(error)
         return place_of(self.accelerations)
@@ -241,21 +241,18 @@ class ShipEquations:
         numbers = self.numbers(coefficients, particulars, ship.shaft)
         c = self.coefficients_record(*numbers.tolist())
         accelerations = self.form(coefficients)
-        none = np.zeros(len(channels["u"]))
-        columns = [channels.get(name, none) for name in Motion._fields]
-        states = np.stack(columns, axis=-1)
-        found = np.full((len(states), len(ACCELERATIONS)), math.nan)
-        for row, state in zip(found, states.tolist(), strict=True):
-            motion = Motion(*state)
+        motions = _motions(channels)
+        found = np.full((len(motions), len(ACCELERATIONS)), math.nan)
+        for row, motion in zip(found, motions, strict=True):
             with suppress(ArithmeticError, ValueError):
                 row[:] = accelerations(motion, c, ship)
 
         equations = ("u", "v", "r", "p", "q")
         rates = dict(zip(equations, found.T, strict=True))
-        if self.shaft_acceleration is not None:
-            rates["n"] = np.zeros(len(states))
-            for i, n in enumerate(channels["n"].tolist()):
-                rates["n"][i] = self.shaft_acceleration(n, ship.shaft, c, ship)
+        shaft = self.shaft_acceleration
+        if shaft is not None:
+            lag = [shaft(motion.n, ship.shaft, c, ship) for motion in motions]
+            rates["n"] = np.array(lag)
         return rates
 
     def numbers(
@@ -270,6 +267,14 @@ class ShipEquations:
     def to_dict(self) -> dict[str, Any]:
         """As they stand in a model file."""
         return {"name": self.name, "source": self.source}
+
+
+def _motions(channels: Mapping[str, Floats]) -> list[Motion]:
+    """Motion at each sample of some channels; absent ones are 0."""
+    none = np.zeros(len(channels["u"]))
+    columns = [channels.get(name, none) for name in Motion._fields]
+    rows = np.stack(columns, axis=-1).tolist()
+    return [Motion(*row) for row in rows]
 
 
 def read_ship_equations(path: str | Path) -> ShipEquations:

@@ -22,6 +22,7 @@ from shipgym.engine.records import Record
 from shipgym.errors import InputError
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.particulars import Particulars
+from shipgym.ships.structures import GREY_BOX as GREY_BOX
 from shipgym.ships.term_functions import (
     accelerations_function,
     accelerations_source,
@@ -34,7 +35,6 @@ from shipgym.ships.term_table import (
     structure_fields,
 )
 
-GREY_BOX = "grey-box"
 SOURCE = (
     "Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via"
     " adaptive RM-SVM with minor rudder"
@@ -107,11 +107,12 @@ class GreyBox(Structure):
     @cached_property
     def required_channels(self) -> tuple[str, ...]:
         """Channels a trial needs: those of the terms and of the reference ship."""
-        needed = self.channels | ALWAYS_MEASURED
+        needed = set(self.channels | ALWAYS_MEASURED)
         if self.rolls:
-            needed |= {"p", "phi"}
+            needed.add("p")
+            needed.add("phi")
         if self.shaft:
-            needed |= {"n"}
+            needed.add("n")
         return tuple(name for name in MEASURED if name in needed)
 
     @property

@@ -75,11 +75,13 @@ class Kernel:
         shapes = [np.shape(array) for array in arrays]
         n = len(self.centres)
         fits = (
-            shapes[:3] == [(4,), (4,), (n, 4)]
-            and len(shapes[3]) == 2
-            and shapes[3][0] == n
-            and 0 < n <= SIZES[-1]
+            np.shape(self.offset) == (4,)
+            and np.shape(self.scale) == (4,)
             and np.all(self.scale > 0.0)
+            and np.shape(self.centres) == (n, 4)
+            and 0 < n <= SIZES[-1]
+            and np.ndim(self.basis) == 2
+            and len(self.basis) == n
         )
         if not fits:
             raise InputError(
@@ -207,12 +209,14 @@ class KernelBox(GreyBox):
         kernel = self.kernel
         per_root_ln_2 = 1.0 / np.sqrt(np.log(2.0))
         centres = per_root_ln_2 * kernel.centres
-        weights = self.term_numbers(coefficients, particulars, shaft_speed)
+        numbers = self.term_numbers(coefficients, particulars, shaft_speed)
+        weights = numbers.reshape(3, -1)
         table = np.zeros((kernel.size, ROW))
         rows = table[: len(centres)]
         rows[:, :4] = centres
+        # minus half the squared distance from the origin
         rows[:, 4] = -0.5 * (centres**2).sum(axis=1)
-        rows[:, 5:] = kernel.basis @ weights.reshape(3, -1).T
+        rows[:, 5:] = kernel.basis @ weights.T
         return np.concatenate(
             [
                 self.ship.ship_numbers(),

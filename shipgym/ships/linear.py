@@ -93,11 +93,12 @@ def straight_running(model: ShipModel, speed: float | None = None) -> StraightRu
         kept = [name for name in unknowns if name != "u"]
         found = _balance(model, kept, speed)
     if found is None:
+        most_deg = np.degrees(LARGEST_RUDDER)
         raise InputError(
             f"model {model.name!r}: expected a straight course with less than"
-            f" {np.degrees(LARGEST_RUDDER):.0f} deg of rudder at"
-            f" {speed or service:g} m/s, got none; identify it from trials that turn to"
-            " both sides, or check the sign of the rudder"
+            f" {most_deg:.0f} deg of rudder at {speed or service:g} m/s, got none;"
+            " identify it from trials that turn to both sides, or check the sign of the"
+            " rudder"
         )
     return StraightRunning(
         surge=found["u"],
@@ -120,7 +121,12 @@ def steady_turn_rudder(
     unknowns = [name for name in BALANCED_BY if name in model.state_names]
     if not slowed:
         unknowns.remove("u")
-    found = _balance(model, unknowns, rate=rate, largest_sway=1.0)
+    found = _balance(
+        model,
+        unknowns,
+        rate=rate,
+        largest_sway=1.0,
+    )
     if found is None or found["u"] <= 0.0:
         return None
     return found["delta"]
@@ -165,9 +171,11 @@ def _balance(
     state = state_with(solution)
     if not np.all(np.abs(imbalance(solution)) < 1e-8):
         return None
-    drifts_little = abs(state["v"]) < largest_sway * model.particulars["speed"]
-    steers_little = rate != 0.0 or abs(state["delta"]) < LARGEST_RUDDER
-    return state if drifts_little and steers_little else None
+    if abs(state["v"]) >= largest_sway * model.particulars["speed"]:
+        return None
+    if rate == 0.0 and abs(state["delta"]) >= LARGEST_RUDDER:
+        return None
+    return state
 
 
 def _units(model: ShipModel) -> dict[str, float]:
@@ -272,11 +280,11 @@ def _block(
     jacobian: dict[tuple[str, str], float], rates: list[str], by: list[str]
 ) -> Floats:
     """Entries of a Jacobian as a matrix, a row a rate."""
-    rows = []
-    for rate in rates:
-        row = [jacobian[rate, name] for name in by]
-        rows.append(row)
-    return np.array(rows)
+    matrix = np.empty((len(rates), len(by)))
+    for row, rate in enumerate(rates):
+        for column, name in enumerate(by):
+            matrix[row, column] = jacobian[rate, name]
+    return matrix
 
 
 def steering_state_space(

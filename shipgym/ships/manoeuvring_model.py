@@ -61,7 +61,8 @@ class ManoeuvringModel:
                 f" in 1/s, because structure {self.structure!r} has a shaft speed, got"
                 f" {shaft:g}"
             )
-        square = (len(coefficients), len(coefficients))
+        n = len(coefficients)
+        square = (n, n)
         if self.covariance is not None and self.covariance.shape != square:
             raise InputError(
                 f"covariance of {self.name!r}: expected shape {square}, one row and"
@@ -247,7 +248,8 @@ class ManoeuvringModel:
         service) where the model has them, each of shape (n_samples,).
         """
         none = np.zeros(len(channels["u"]))
-        complete = dict.fromkeys((*self.state_names, *self.command_names), none)
+        names = (*self.state_names, *self.command_names)
+        complete = dict.fromkeys(names, none)
         complete |= channels
         known = self.dynamics.accelerations_at(
             complete,

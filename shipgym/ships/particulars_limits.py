@@ -100,14 +100,16 @@ def _check_mass(values: Mapping[str, float]) -> None:
     """Refuse a mass, kg, that does not fit the dimensions."""
     mass = values["mass"]
     length = values["length"]
+    beam = values.get("beam")
+    draught = values.get("draught")
     density = values.get("water_density", SEA_WATER)
-    if "beam" not in values or "draught" not in values:
+    if beam is None or draught is None:
         cube = density * length**3
         low = 2e-4 * cube
         high = 0.2 * cube
         reason = "0.0002 to 0.2 times water_density * length^3"
     else:
-        box = density * length * values["beam"] * values["draught"]
+        box = density * length * beam * draught
         low = 0.2 * box
         high = box
         reason = "a block coefficient of 0.2 to 1"

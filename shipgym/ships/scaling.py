@@ -144,5 +144,6 @@ def _particulars(
     if water_density is not None:
         changes["water_density"] = water_density
         if ship.mass is not None:
-            changes["mass"] *= water_density / ship.require("water_density")
+            denser = water_density / ship.require("water_density")
+            changes["mass"] *= denser
     return replace(ship, **changes)

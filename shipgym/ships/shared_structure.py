@@ -105,13 +105,14 @@ class SharedStructure(Structure):
                 f"{where}: expected shares of {quoted(AXES)}, got {quoted(self.shares)}"
             )
         for axis, shares in self.shares.items():
-            allowed = {"udot"} if axis == "u" else {"vdot", "rdot"}
+            allowed = ("udot",) if axis == "u" else ("vdot", "rdot")
             for share in shares:
-                if share.acceleration not in (None, *allowed):
+                acceleration = share.acceleration
+                if acceleration is not None and acceleration not in allowed:
                     raise InputError(
                         f"{where}: expected 'udot' in the equation of surge, 'vdot' and"
-                        " 'rdot' in those of sway and yaw, got"
-                        f" '{share.acceleration}' in the equation of '{axis}'"
+                        f" 'rdot' in those of sway and yaw, got '{acceleration}' in the"
+                        f" equation of '{axis}'"
                     )
 
     @cached_property
@@ -170,20 +171,13 @@ class SharedStructure(Structure):
         self, axis: str, coefficients: Mapping[str, float], p: Particulars
     ) -> Floats:
         """Coefficient of each term of a force, that of the ship's mass included."""
-        m = p.mass_prime
-        m_xG = m * p.xg_prime
-        centripetal = {
-            "u": {VR: m, RR: m_xG},
-            "v": {UR: -m},
-            "r": {UR: -m_xG},
-        }
         products = [term.product for term in self.terms(axis)]
         force = dict.fromkeys(products, 0.0)
         for share in self.shares[axis]:
             if share.acceleration is None:
                 value = coefficients[share.coefficient]
                 force[share.term.product] += share.sign * value
-        for term, mass in centripetal[axis].items():
+        for term, mass in _centripetal(axis, p).items():
             force[term.product] += mass
         return np.array(list(force.values()))
 
@@ -230,6 +224,18 @@ class SharedStructure(Structure):
             shares=shares,
         )
         return cls(**fields)
+
+
+def _centripetal(axis: str, p: Particulars) -> dict[Term, float]:
+    """Terms of the ship's own mass in a force, prime system."""
+    m = p.mass_prime
+    m_xG = m * p.xg_prime
+    terms = {
+        "u": {VR: m, RR: m_xG},
+        "v": {UR: -m},
+        "r": {UR: -m_xG},
+    }
+    return terms[axis]
 
 
 def shared_structure(

@@ -111,10 +111,9 @@ class ShipModel(ManoeuvringModel):
                 " models have, to sample from, got none"
             )
         rng = np.random.default_rng(seed)
-        mean = np.array(list(self.coefficients.values()))
+        mean = list(self.coefficients.values())
         normal = rng.standard_normal((n, len(mean)))
-        root = _square_root(self.covariance)
-        draws = mean + normal @ root.T
+        draws = mean + normal @ _square_root(self.covariance).T
         tables = self._drawn_tables(n, rng)
         models = []
         for i in range(n):
@@ -124,7 +123,8 @@ class ShipModel(ManoeuvringModel):
                 covariance=None,
                 dynamics=tables[i],
             )
-            models.append(drawn.with_coefficients(draws[i]))
+            drawn = drawn.with_coefficients(draws[i])
+            models.append(drawn)
         return models
 
     def _drawn_tables(

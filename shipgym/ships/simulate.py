@@ -123,8 +123,11 @@ def simulate(
     """Simulate a ship with commands held over each step (see `ShipModel.simulate`)."""
     held = checked_orders(model, commands)
     check_number(dt, "dt", above=0.0, hint="in s")
-    conditions = Conditions(water_depth, weather, seed)
-    passage = Passage(model, conditions, dt)
+    passage = Passage(
+        model,
+        Conditions(water_depth, weather, seed),
+        dt,
+    )
     first = initial_state(model, state)
     states = passage.states(first, len(held))
     passage.run("simulate", states, two_commands(held), dt)

@@ -18,15 +18,17 @@ if TYPE_CHECKING:  # few models have equations
 
 #: Files of this package that define a ship with equations of her own, by her name.
 SHIPPED_EQUATIONS = ("container", "tanker", "kvlcc2", "mmg")
+GREY_BOX = "grey-box"
+MMG = "mmg"
 #: The grey box stands on a reference ship, which only a user can name; the MMG form is
 #: no table.
 NO_TABLES = {
-    "grey-box": (
+    GREY_BOX: (
         "a table of terms, got 'grey-box', which is a reference ship and a table; give"
         " the reference ship: identify(..., structure='grey-box',"
         " reference_model='tanker'), or shipgym.ships.grey_box"
     ),
-    "mmg": (
+    MMG: (
         "a table of terms, got 'mmg', which is none; choose one, such as 'abkowitz' or"
         " 'cubic'"
     ),
@@ -98,7 +100,8 @@ def get_structure(name: str) -> Structure:
     if name in REGISTERED_STRUCTURES:
         return REGISTERED_STRUCTURES[name]
     if name in NO_TABLES:
-        raise InputError(f"structure: expected {NO_TABLES[name]}")
+        expected = NO_TABLES[name]
+        raise InputError(f"structure: expected {expected}")
     check_choice(name, list_structures(), "structure")
     return printed_structure(name)
 

@@ -108,15 +108,14 @@ def accelerations_source(equations: Equations, prime: bool, damped: bool = True)
             if prime and not divided:
                 power = speed_power(equation, term)
             factors = _factors(term, power, divided)
-            needed.update(factors)
             monomials.append((f"c.c{number}", factors))
         first += len(terms)
         rate = f"({factored(monomials)})"
         if divided:
-            unit = ["s", "U"] if unit_speeds(equation) == 3 else ["s"]
-            needed.update(unit)
-            rate = " * ".join([*unit, rate])
+            unit = "s * U" if unit_speeds(equation) == 3 else "s"
+            rate = f"{unit} * {rate}"
         rates[equation] = rate
+        needed |= _variables_in(rate)
 
     return _written(rates, _with_their_makings(needed), memory="q" in equations)
 
@@ -229,8 +228,12 @@ def _with_their_makings(names: set[str]) -> set[str]:
     """Names of variables, and of those that they are made of in turn."""
     makings = set(names)
     for name in names:
-        words = re.findall(r"\w+", MADE_OF[name])
-        makings |= MADE_OF.keys() & words
+        makings |= _variables_in(MADE_OF[name])
     if makings == names:
         return makings
     return _with_their_makings(makings)
+
+
+def _variables_in(expression: str) -> set[str]:
+    """Variables that stand in an expression."""
+    return MADE_OF.keys() & re.findall(r"\w+", expression)

@@ -95,10 +95,10 @@ class Structure:
     @cached_property
     def coefficient_names(self) -> tuple[str, ...]:
         """Names in the order of the equations: `X_u`, ..., `Y_v`, ..., `N_r`."""
-        names: list[str] = []
+        names: tuple[str, ...] = ()
         for equation in self.equations:
             names += self.names(equation)
-        return tuple(names)
+        return names
 
     def terms(self, equation: str) -> tuple[Term, ...]:
         """Terms of one equation."""

@@ -158,13 +158,14 @@ def _read_term(formula: str) -> Term:
                 f" such as '|v| r' or 'v^3/U', got '{factor}' in"
                 f" '{formula}'.{did_you_mean(factor, SYMBOLS)}"
             )
+        stroke = parts["stroke"]
         symbol = parts["symbol"]
         exponent = parts["exponent"] or ""
-        name += parts["stroke"] + SHORT_NAMES.get(symbol, symbol) + exponent
+        name += stroke + SHORT_NAMES.get(symbol, symbol) + exponent
         if symbol == "1":
             continue
         power = int(exponent or 1)
-        if parts["stroke"]:
+        if stroke:
             power = -power
         powers[symbol] = powers.get(symbol, 0) + power
 
