@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,13 +10,26 @@ from numpy.typing import ArrayLike
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 
-if TYPE_CHECKING:  # which imports this file
-    from shipgym.ships.manoeuvring_model import ManoeuvringModel
-
 FASTEST_SHAFT = 5.0  # times the speed in service; beyond it stands in other units
 
 
-def checked_orders(model: ManoeuvringModel, commands: ArrayLike) -> Floats:
+class Commanded(Protocol):
+    """A model that takes orders."""
+
+    @property
+    def command_names(self) -> tuple[str, ...]:
+        """Rudder, and shaft speed where the model has one."""
+
+    @property
+    def service_shaft_speed(self) -> float:
+        """Shaft speed at service speed, 1/s."""
+
+    @property
+    def turns_astern(self) -> bool:
+        """True where the shaft may turn astern."""
+
+
+def checked_orders(model: Commanded, commands: ArrayLike) -> Floats:
     """Orders of shape (n_steps, n_command), within the limits of rudder and shaft.
 
     A rudder ordered beyond its limit is brought to the limit, as its gear would do;
@@ -44,9 +57,7 @@ def checked_orders(model: ManoeuvringModel, commands: ArrayLike) -> Floats:
     return orders
 
 
-def check_units(
-    model: ManoeuvringModel, orders: Floats, where: str = "commands"
-) -> None:
+def check_units(model: Commanded, orders: Floats, where: str = "commands") -> None:
     """Refuse orders, shape (n, n_command), not finite or not in rad and 1/s."""
     names = model.command_names
     wrong = np.argwhere(~np.isfinite(orders))

@@ -38,26 +38,15 @@ class SteeringGear:
     time_constant: float = 0.0
 
     def __post_init__(self) -> None:
-        checked = {
-            "rudder_limit_deg": check_number(
-                self.rudder_limit_deg,
-                "rudder_limit_deg",
-                above=0.0,
-                at_most=90.0,
-            ),
-            "rudder_rate_deg_s": check_number(
-                self.rudder_rate_deg_s,
-                "rudder_rate_deg_s",
-                above=0.0,
-            ),
-            "time_constant": check_number(
-                self.time_constant,
-                "time_constant",
-                at_least=0.0,
-            ),
+        bounds: dict[str, dict[str, Any]] = {
+            "rudder_limit_deg": {"above": 0.0, "at_most": 90.0},
+            "rudder_rate_deg_s": {"above": 0.0},
+            "time_constant": {"at_least": 0.0},
         }
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)
+        for name, allowed in bounds.items():
+            value = getattr(self, name)
+            number = check_number(value, name, **allowed)
+            object.__setattr__(self, name, number)
 
     @classmethod
     def from_mapping(
