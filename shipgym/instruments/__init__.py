@@ -1,1 +1,1 @@
-"""Sensor sets: what a ship's instruments show, as files of plain functions on named records."""
+"""Sensor sets: what instruments show, as files of plain functions on named records."""

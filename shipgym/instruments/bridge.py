@@ -1,4 +1,4 @@
-"""A bridge's instruments: first-order motion in waves, noise, and a filter against the waves.
+"""Instruments of a bridge: motion in waves, noise, and a filter against the waves.
 
 The notch filter (s^2 + 2 a w s + w^2) / (s^2 + 2 b w s + w^2) around the frequency of
 encounter: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control,
@@ -34,12 +34,23 @@ class Settings(NamedTuple):
 
 
 class Notch(NamedTuple):
-    """Memory of the filter: the last two signals, and the last two that were taken away."""
+    """Memory of the notch filter: the last two signals and what was taken from them."""
 
     signal_1: float
     signal_2: float
     taken_1: float
     taken_2: float
+
+
+class Noise(NamedTuple):
+    """White noise of one sample."""
+
+    psi: float
+    r: float
+    u: float
+    v: float
+    x: float
+    y: float
 
 
 class Memory(NamedTuple):
@@ -64,51 +75,73 @@ def measure(
     settings: Settings,
     random: Random,
 ) -> Memory:
-    """First-order motion, noise, and what the filter takes away (see `shipgym.instruments.perfect`)."""
-    psi = sea.psi_wave
-    r = sea.r_wave
-    x, y, u, v = 0.0, 0.0, 0.0, 0.0
-    if HAS_NOISE:
-        word = rng_state(random.key, random.episode) ^ INSTRUMENTS_STREAM
-        word = mix(word + np.uint64(interval.steps) * DRAW[1])
-        psi += settings.heading * normal(word, DRAW[0])
-        r += settings.yaw_rate * normal(word, DRAW[1])
-        u = settings.speed * normal(word, DRAW[2])
-        v = settings.speed * normal(word, DRAW[3])
-        x = settings.position * normal(word, DRAW[4])
-        y = settings.position * normal(word, DRAW[5])
-    if not HAS_FILTER:
-        return Memory(x, y, psi, u, v, r, memory.heading, memory.rate)
+    """Add first-order motion and noise; take away what the filter finds of the waves.
 
-    turn = clip(frequency * interval.dt, 0.0, STEEPEST)
-    first = interval.steps == 0.0
-    heading = notched(motion.psi + psi, turn, first, memory.heading)
-    rate = notched(motion.r + r, turn, first, memory.rate)
-    psi -= heading.taken_1
-    r -= rate.taken_1
-    return Memory(x, y, psi, u, v, r, heading, rate)
+    See `shipgym.instruments.perfect` for the arguments.
+    """
+    noise = Noise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if HAS_NOISE:
+        noise = drawn_noise(interval, settings, random)
+    psi = sea.psi_wave + noise.psi
+    r = sea.r_wave + noise.r
+    heading = memory.heading
+    rate = memory.rate
+    if HAS_FILTER:
+        turn = clip(frequency * interval.dt, 0.0, STEEPEST)
+        first = interval.steps == 0.0
+        heading = notched(motion.psi + psi, turn, first, memory.heading)
+        rate = notched(motion.r + r, turn, first, memory.rate)
+        psi -= heading.taken_1
+        r -= rate.taken_1
+    return Memory(
+        x=noise.x,
+        y=noise.y,
+        psi=psi,
+        u=noise.u,
+        v=noise.v,
+        r=r,
+        heading=heading,
+        rate=rate,
+    )
+
+
+def drawn_noise(interval: Interval, settings: Settings, random: Random) -> Noise:
+    """Noise of a sample, drawn by its number in the episode."""
+    word = rng_state(random.key, random.episode) ^ INSTRUMENTS_STREAM
+    word = mix(word + np.uint64(interval.steps) * DRAW[1])
+    return Noise(
+        psi=settings.heading * normal(word, DRAW[0]),
+        r=settings.yaw_rate * normal(word, DRAW[1]),
+        u=settings.speed * normal(word, DRAW[2]),
+        v=settings.speed * normal(word, DRAW[3]),
+        x=settings.position * normal(word, DRAW[4]),
+        y=settings.position * normal(word, DRAW[5]),
+    )
 
 
 def notched(signal: float, turn: float, first: bool, memory: Notch) -> Notch:
-    """Memory of a notch filter after a sample, around `turn` rad a sample; `taken_1` is taken away.
+    """Memory of a notch filter after a sample, around `turn` rad a sample.
+
+    `taken_1` is what it takes away.
 
     The notch is 1 less a band-pass, discretised bilinearly with its frequency kept. In
     the episode's first sample nothing is taken away.
     """
     sine, cosine = sin_cos(0.5 * turn)
     k = sine / cosine
-    per = 1.0 / (1.0 + 2.0 * WIDE * k + k * k)
+    kk = k * k
+    per = 1.0 / (1.0 + 2.0 * WIDE * k + kk)
     band = 2.0 * (WIDE - DEEP) * k * per * (signal - memory.signal_2)
     taken = (
         band
-        - 2.0 * (k * k - 1.0) * per * memory.taken_1
-        - (1.0 - 2.0 * WIDE * k + k * k) * per * memory.taken_2
+        - 2.0 * (kk - 1.0) * per * memory.taken_1
+        - (1.0 - 2.0 * WIDE * k + kk) * per * memory.taken_2
     )
     return Notch(
-        signal,
-        pick(first, signal, memory.signal_1),
-        pick(first, 0.0, taken),
-        pick(first, 0.0, memory.taken_1),
+        signal_1=signal,
+        signal_2=pick(first, signal, memory.signal_1),
+        taken_1=pick(first, 0.0, taken),
+        taken_2=pick(first, 0.0, memory.taken_1),
     )
 
 

@@ -1,4 +1,4 @@
-"""Sensor sets, shipped and a user's own: each a file of plain functions on named records."""
+"""Sensor sets, shipped and a user's own: files of plain functions on named records."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -40,7 +40,7 @@ class SensorSet(Configurable):
 
 
 def read_sensors(source: Any) -> SensorSet:
-    """Read the sensor set of a file or module; InputError names what is missing or of another form."""
+    """Read the sensor set of a file or module; InputError for what does not fit."""
     if isinstance(source, SensorSet):
         return source
     namespace, where = read_source(source)

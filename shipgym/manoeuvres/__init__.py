@@ -1,4 +1,4 @@
-"""Standard manoeuvres, their indices and the IMO criteria; the public names stand in `__init__.pyi`."""
+"""Standard manoeuvres, their indices and the IMO criteria (names in `__init__.pyi`)."""
 
 from lazy_loader import attach_stub
 

@@ -1,4 +1,4 @@
-"""Rudder and shaft sequences that excite a ship for identification, each replayed by its seed.
+"""Rudder and shaft sequences that excite a ship for identification, drawn by a seed.
 
 Signals: Ljung 1999, System Identification, 13.3 (pseudo-random binary and multi-sine
 signals).
@@ -28,7 +28,9 @@ def prbs_rudder(
 ) -> Trial:
     """Simulate a pseudo-random binary rudder.
 
-    It is put from one side to the other at multiples of a clock period. Raises InputError for an amplitude beyond the rudder's limit, or a time that is not
+    It is put from one side to the other at multiples of a clock period.
+
+    Raises InputError for an amplitude beyond the rudder's limit, or a time that is not
     above 0. Raises UnstableModelError if the ship runs away.
 
     Parameters
@@ -57,16 +59,23 @@ def prbs_rudder(
         check_number(clock, "clock_s", at_least=dt)
 
     n_bits = 10  # of the shift register
+    rng = np.random.default_rng(seed)
     register = np.zeros(n_bits, dtype=np.int8)
     while not register.any():
-        register = np.random.default_rng(seed).integers(0, 2, n_bits, dtype=np.int8)
+        register = rng.integers(0, 2, n_bits, dtype=np.int8)
     bits, _ = max_len_seq(n_bits, state=register)
 
-    tick = np.floor(times / clock * (1.0 + 1e-12)).astype(int)
     sides = 2.0 * bits - 1.0
-    rudder = amplitude * sides[tick % len(bits)]
+    ticks = times / clock * (1.0 + 1e-12)
+    bit = ticks.astype(int) % len(bits)
     return simulate(
-        model, orders(model, rudder), dt, None, water_depth, "random", weather, seed
+        model,
+        orders(model, amplitude * sides[bit]),
+        dt,
+        water_depth=water_depth,
+        kind="random",
+        weather=weather,
+        seed=seed,
     )
 
 
@@ -114,18 +123,27 @@ def multi_sine_rudder(
 
     rudder = amplitude * _least_crest(harmonics, times / whole, seed)
     return simulate(
-        model, orders(model, rudder), dt, None, water_depth, "random", weather, seed
+        model,
+        orders(model, rudder),
+        dt,
+        water_depth=water_depth,
+        kind="random",
+        weather=weather,
+        seed=seed,
     )
 
 
 def _least_crest(harmonics: Floats, turns: Floats, seed: Seed) -> Floats:
     """Sum of harmonics with its largest value 1, over parts of the longest period."""
     rng = np.random.default_rng(seed)
-    phases = rng.uniform(0.0, 2.0 * np.pi, (32, len(harmonics)))
-    angle = 2.0 * np.pi * np.outer(harmonics, turns)
+    circle = 2.0 * np.pi
+    phases = rng.uniform(0.0, circle, (32, len(harmonics)))
+    angles = circle * np.outer(harmonics, turns)
 
     # cos(angle + phase), summed over the harmonics
-    waves = np.cos(phases) @ np.cos(angle) - np.sin(phases) @ np.sin(angle)
+    in_phase = np.cos(phases) @ np.cos(angles)
+    out_of_phase = np.sin(phases) @ np.sin(angles)
+    waves = in_phase - out_of_phase
     crests = np.abs(waves).max(axis=1)
     best = int(np.argmin(crests))
     return np.asarray(waves[best] / crests[best])
@@ -154,7 +172,13 @@ def random_rudder_steps(
     longest = _seconds(model, longest_s, 4.0)
     rudder = random_levels(times, (-largest, largest), shortest, longest, seed)
     return simulate(
-        model, orders(model, rudder), dt, None, water_depth, "random", weather, seed
+        model,
+        orders(model, rudder),
+        dt,
+        water_depth=water_depth,
+        kind="random",
+        weather=weather,
+        seed=seed,
     )
 
 
@@ -173,11 +197,12 @@ def shaft_speed_steps(
 ) -> Trial:
     """Simulate steps of the ordered shaft speed, of random speed and length.
 
-    Both are evenly distributed: orders are `lowest_ratio` to `highest_ratio` of the shaft speed at service speed,
-    ahead and at most 1.5, each held for `shortest_s` to `longest_s`, s, by default 5 to
-    15 times the time to travel one ship length; the rudder is held at `rudder_deg`
-    meanwhile, degrees. The seed is that of the steps; otherwise as `prbs_rudder`.
-    InputError too for a ship whose propeller is not in its equations.
+    Both are evenly distributed: orders are `lowest_ratio` to `highest_ratio` of the
+    shaft speed at service speed, ahead and at most 1.5, each held for `shortest_s` to
+    `longest_s`, s, by default 5 to 15 times the time to travel one ship length; the
+    rudder is held at `rudder_deg` meanwhile, degrees. The seed is that of the steps;
+    otherwise as `prbs_rudder`. InputError too for a ship whose propeller is not in its
+    equations.
     """
     service = shaft_of(model)
     check_number(
@@ -202,9 +227,16 @@ def shaft_speed_steps(
     ratios = random_levels(
         times, (lowest_ratio, highest_ratio), shortest, longest, seed
     )
-    shaft = service * ratios
-    commands = orders(model, np.full(len(times), np.radians(rudder_deg)), shaft)
-    return simulate(model, commands, dt, None, water_depth, "random", weather, seed)
+    rudder = np.full(len(times), np.radians(rudder_deg))
+    return simulate(
+        model,
+        orders(model, rudder, service * ratios),
+        dt,
+        water_depth=water_depth,
+        kind="random",
+        weather=weather,
+        seed=seed,
+    )
 
 
 def shaft_of(model: ShipModel) -> float:
@@ -231,9 +263,11 @@ def random_levels(
     check_number(longest, "longest_s", at_least=shortest, hint="shortest_s or more")
     rng = np.random.default_rng(seed)
     most = int(times[-1] / shortest) + 2
-    ends = np.cumsum(rng.uniform(shortest, longest, most))
+    durations = rng.uniform(shortest, longest, most)
     drawn: Floats = rng.uniform(*levels, most)
-    return drawn[np.searchsorted(ends, times, side="right")]
+    ends = np.cumsum(durations)
+    place = np.searchsorted(ends, times, side="right")
+    return drawn[place]
 
 
 def _rudder_angle(model: ShipModel, angle_deg: float, argument: str) -> float:

@@ -1,4 +1,4 @@
-"""When a manoeuvre was executed, found from the rudder, ordered or measured; and other things all share."""
+"""When a manoeuvre was executed, by the ordered or measured rudder; shared helpers."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -40,7 +40,7 @@ def is_ordered(trial: Trial) -> bool:
 
 
 def usual_rudder(trial: Trial) -> float:
-    """The angle that a rudder has in a manoeuvre, whatever it has on the approach, rad."""
+    """Rudder angle that shows in a manoeuvre, whatever it is on the approach, rad."""
     return float(np.percentile(np.abs(rudder(trial)), 75))
 
 
@@ -55,15 +55,21 @@ def require(trial: Trial, names: Sequence[str], what: str) -> None:
 
 def execute_time(trial: Trial) -> float:
     """Time at which the first rudder order of a manoeuvre was given, s."""
-    t, delta = trial.t, rudder(trial)
+    t = trial.t
+    delta = rudder(trial)
     if is_ordered(trial):
         # a little helm on the approach is no order yet
-        given = np.abs(delta) > 0.5 * usual_rudder(trial)
-        return float(t[np.argmax(given)])
+        least = 0.5 * usual_rudder(trial)
+        first = np.argmax(np.abs(delta) > least)
+        return float(t[first])
 
     move = np.abs(delta - delta[0])
-    reach = float(np.percentile(move, 75))
-    left = departure(t, move, reach, _fastest_rate(t, delta))
+    left = departure(
+        t,
+        move,
+        reach=float(np.percentile(move, 75)),
+        fastest=_fastest_rate(t, delta),
+    )
     return max(left, float(t[0]))
 
 
@@ -73,29 +79,44 @@ def reversals(trial: Trial) -> Reversals:
     An ordered rudder reverses at the first sample that has the new order; a measured
     one when it left the angle at which it was held (`departure`).
     """
-    t, delta = trial.t, rudder(trial)
+    t = trial.t
+    delta = rudder(trial)
     start = execute_time(trial)
-    part = ORDERED if is_ordered(trial) else MEASURED
-    holds = _holds(t, delta, start, part * usual_rudder(trial))
+    usual = usual_rudder(trial)
     if is_ordered(trial):
+        holds = _holds(t, delta, start, ORDERED * usual)
         first_samples = [hold[0] for hold in holds[1:]]
-        return Reversals(start, t[first_samples].tolist())
-
-    fastest = _fastest_rate(t, delta)
-    turns = []
-    for hold, after in pairwise(holds):
-        moving = slice(hold[-1], after[0] + 1)
-        held = np.median(delta[hold])
-        move = np.abs(delta[moving] - held)
-        turns.append(departure(t[moving], move, float(move.max()), fastest))
+        turns = t[first_samples].tolist()
+    else:
+        holds = _holds(t, delta, start, MEASURED * usual)
+        turns = _departures(t, delta, holds)
     return Reversals(start, turns)
 
 
+def _departures(t: Floats, delta: Floats, holds: list[Floats]) -> list[float]:
+    """Times at which a measured rudder left each hold but the last, s."""
+    fastest = _fastest_rate(t, delta)
+    times = []
+    for hold, after in pairwise(holds):
+        held_at = np.median(delta[hold])
+        moving = slice(hold[-1], after[0] + 1)
+        move = np.abs(delta[moving] - held_at)
+        time = departure(
+            t[moving],
+            move,
+            reach=float(move.max()),
+            fastest=fastest,
+        )
+        times.append(time)
+    return times
+
+
 def _holds(t: Floats, delta: Floats, start: float, least: float) -> list[Floats]:
-    """Samples from the start on at which the rudder is held beyond an angle, side after side."""
+    """Samples where the rudder starts to be held beyond an angle, side after side."""
     beyond = np.abs(delta) > least
     held = np.flatnonzero(beyond & (t >= start))
-    turned = np.diff(np.sign(delta[held])) != 0.0
+    sides = np.sign(delta[held])
+    turned = np.diff(sides) != 0.0
     first_samples = np.flatnonzero(turned) + 1
     return np.split(held, first_samples)
 
@@ -114,9 +135,10 @@ def departure(t: Floats, move: Floats, reach: float, fastest: float) -> float:
     """
     if reach == 0.0:
         return float(t[0])
-    upper = int(np.argmax(move >= 0.5 * reach))
-    lower = 0
+    half = move >= 0.5 * reach
+    upper = int(np.argmax(half))
     still = np.flatnonzero(move[:upper] <= 0.1 * reach)
+    lower = 0
     if len(still):
         lower = int(still[-1]) + 1
 
@@ -134,22 +156,23 @@ def departure(t: Floats, move: Floats, reach: float, fastest: float) -> float:
 
 
 def distance_sailed(trial: Trial) -> Floats:
-    """Distance from the start, m, from the speed by the trapezoid rule, shape (n_samples,)."""
+    """Distance from the start, m, by the trapezoid rule, shape (n_samples,)."""
     return integral(trial.t, np.hypot(trial["u"], trial["v"]))
 
 
 def reached(values: Floats, threshold: float, other: Floats) -> float | None:
-    """Another quantity when values first reach a threshold, by straight lines; None if they never do."""
+    """Another quantity when values first reach a threshold; None if they never do."""
     past = np.flatnonzero(values >= threshold)
-    if len(past) == 0:
+    if not past.size:
         return None
-    last = max(int(past[0]), 1)
-    around = slice(last - 1, last + 1)
-    return float(np.interp(threshold, values[around], other[around]))
+    first = max(int(past[0]), 1)
+    around = slice(first - 1, first + 1)
+    at = np.interp(threshold, values[around], other[around])
+    return float(at)
 
 
 def turning_rudder(rudder_deg: float, limit: float, hint: str = "") -> float:
-    """A rudder angle that turns the ship, from degrees, rad; InputError for 0 or one beyond the limit."""
+    """Rudder angle from degrees, rad; InputError for 0 or one beyond the limit."""
     angle = check_number(
         rudder_deg, "rudder_deg", at_least=-limit, at_most=limit, hint=hint
     )

@@ -26,7 +26,9 @@ DRAWS = 100  # of an identified ship
 def imo_assessment(
     model: ShipModel, n_draws: int | None = None, seed: int | np.random.Generator = 0
 ) -> dict[str, Criterion]:
-    """Assess a ship by MSC.137(76): turning, initial turning, yaw checking, course keeping and stopping.
+    """Assess a ship by the criteria of MSC.137(76).
+
+    They are turning, initial turning, yaw checking, course keeping and stopping.
 
     Simulated from service speed in deep water: turning circles with 35 degrees of
     rudder, or the rudder's limit where that is less, and zigzags 10/10 and 20/20, each
@@ -39,9 +41,10 @@ def imo_assessment(
     InputError for draws without covariance.
     """
     if n_draws is None:
-        n_draws = 0 if model.covariance is None else DRAWS
+        identified = model.covariance is not None
+        n_draws = DRAWS if identified else 0
     check_number(n_draws, "n_draws", at_least=0)
-    draws = list[ShipModel]()
+    draws: list[ShipModel] = []
     if n_draws > 0:
         draws = model.sample(int(n_draws), seed)
     return assess_draws(model, draws)
@@ -52,37 +55,42 @@ def assess_draws(model: ShipModel, draws: Sequence[ShipModel]) -> dict[str, Crit
     needed = imo_manoeuvres(model)
     own = own_indices(model, needed)
     evaluations = {name: test.evaluate for name, test in needed.items()}
-    return imo_criteria(model, intervals_of(own, draws, evaluations))
+    found = intervals_of(own, draws, evaluations)
+    return imo_criteria(model, found)
 
 
 def imo_criteria(
     model: ShipModel, found: Mapping[str, Mapping[str, IndexInterval]]
 ) -> dict[str, Criterion]:
-    """The criteria of a ship from the indices of her standard manoeuvres, by their names.
+    """Criteria of a ship by name, from the indices of her standard manoeuvres.
 
     A manoeuvre that never got so far fails its criteria. Of an identified ship a
     criterion is decided only where the manoeuvre is within the envelope of her trials
     and the draws are on one side of the limit.
     """
-    needed = imo_manoeuvres(model)
-    known = [name for name in found if name in needed]
-    outside = {name for name in known if outside_envelope(model, needed[name])}
+    outside = {}
+    for name, manoeuvre in imo_manoeuvres(model).items():
+        if name in found:
+            outside[name] = outside_envelope(model, manoeuvre)
+
     criteria = {}
     for criterion, rule in ship_rules(model).items():
-        names = [name for name in known if name.startswith(rule.manoeuvre)]
-        by_model = criterion_of(rule, [found[name] for name in names])
-        trial = trial_in_words(model, rule.manoeuvre)
+        names = [name for name in outside if name.startswith(rule.manoeuvre)]
+        runs = [found[name] for name in names]
         criteria[criterion] = decided_by_model(
-            by_model, trial, outside=not outside.isdisjoint(names)
+            criterion_of(rule, runs),
+            trial_in_words(model, rule.manoeuvre),
+            outside=any(outside[name] for name in names),
         )
-    criteria["stopping"] = stopping_criterion(model, found.get(STOPPING.manoeuvre))
+    stop = found.get(STOPPING.manoeuvre)
+    criteria["stopping"] = stopping_criterion(model, stop)
     return criteria
 
 
 def stopping_criterion(
     model: ShipModel, stop: Mapping[str, IndexInterval] | None
 ) -> Criterion:
-    """The full astern stopping test; without verdict for a ship that cannot be ordered astern."""
+    """Full astern stopping test; no verdict for a ship that cannot go astern."""
     if stop is not None:
         note = (
             "where large displacement makes 15 lengths impracticable, the"

@@ -1,4 +1,4 @@
-"""The manoeuvring criteria of the International Maritime Organization: resolution MSC.137(76), 2002."""
+"""Criteria of the IMO (International Maritime Organization): MSC.137(76)."""
 
 from dataclasses import dataclass, replace
 
@@ -51,29 +51,31 @@ def imo_manoeuvres(model: ShipModel) -> dict[str, Manoeuvre]:
     """The standard manoeuvres that the criteria need."""
     needed = standard_circles(model) | standard_zigzags(model)
     stops = standard_stops(model)
-    if STOPPING.manoeuvre in stops:
-        needed[STOPPING.manoeuvre] = stops[STOPPING.manoeuvre]
+    name = STOPPING.manoeuvre
+    if name in stops:
+        needed[name] = stops[name]
     return needed
 
 
 def ship_rules(model: ShipModel) -> dict[str, Rule]:
     """The rules of turning and yaw checking, with the limits for a ship."""
-    first, second = overshoot_limits_deg(model.travel_time)
-    return RULES | {
-        "overshoot_1_10_10": replace(RULES["overshoot_1_10_10"], limit=first),
-        "overshoot_2_10_10": replace(RULES["overshoot_2_10_10"], limit=second),
-    }
+    limits = overshoot_limits_deg(model.travel_time)
+    rules = dict(RULES)
+    names = ("overshoot_1_10_10", "overshoot_2_10_10")
+    for name, limit in zip(names, limits, strict=True):
+        rules[name] = replace(rules[name], limit=limit)
+    return rules
 
 
 def overshoot_limits_deg(seconds_per_length: float) -> tuple[float, float]:
-    """Limits of the first and second overshoot in the 10/10 zigzag, degrees, for L/V in s."""
+    """Limits of the two overshoots of the 10/10 zigzag, degrees, for L/V in s."""
     first = np.clip(5.0 + 0.5 * seconds_per_length, 10.0, 20.0)
     second = np.clip(17.5 + 0.75 * seconds_per_length, 25.0, 40.0)
     return float(first), float(second)
 
 
 def trial_in_words(model: ShipModel, manoeuvre: str) -> str:
-    """A trial of a standard manoeuvre, of a turn with the rudder's limit where that is less than 35 deg."""
+    """Trial of a standard manoeuvre; turns are with 35 deg or the rudder's limit."""
     if manoeuvre == "turning circle":
         return f"{full_rudder_deg(model):g} deg turn"
     return f"{manoeuvre.removeprefix('zigzag ')} zigzag"

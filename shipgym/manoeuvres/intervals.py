@@ -1,4 +1,4 @@
-"""How certain the indices of an identified ship are: manoeuvres of models drawn from its covariance."""
+"""How certain the indices of an identified ship are, by models of its covariance."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -33,7 +33,7 @@ class IndexInterval:
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """The 95 % interval: quantiles of 2.5 and 97.5 per cent of the draws that have a value.
+        """The 95 % interval: quantiles of 2.5 and 97.5 per cent of the draws.
 
         It says nothing of those that ran away or never got so far: see their counts.
         None without any.
@@ -78,7 +78,7 @@ class IndexInterval:
 
     @property
     def lost_in_words(self) -> str:
-        """How many draws have no value, which are not in the interval; empty where all have one."""
+        """Say how many draws have no value, and so no part in the interval."""
         draws = len(self.values)
         lost = []
         if self.n_ran_away:
@@ -94,7 +94,7 @@ def index_intervals(
     n_draws: int = 200,
     seed: int | np.random.Generator = 0,
 ) -> dict[str, IndexInterval]:
-    """Indices of a manoeuvre with their 95 % intervals over the estimated covariance of a model.
+    """Indices of a manoeuvre with their 95 % intervals over a model's covariance.
 
     Returns an IndexInterval by the name of each index, with its unit in the name. Draws
     that run away or never get so far are counted. Raises InputError for a model without
@@ -117,32 +117,38 @@ def index_intervals(
     Examples
     --------
     >>> from shipgym import load_model, manoeuvres
-    >>> found = manoeuvres.index_intervals(load_model("mariner-tls-svm"), n_draws=50, seed=1)
+    >>> ship = load_model("mariner-tls-svm")
+    >>> found = manoeuvres.index_intervals(ship, n_draws=50, seed=1)
     >>> low, high = found["overshoot_1_deg"].interval
     >>> low < found["overshoot_1_deg"].value < high
     True
     """
-    evaluate: Evaluation
-    if isinstance(manoeuvre, str):
+    evaluate = manoeuvre
+    if isinstance(evaluate, str):
         known = standard_manoeuvres(model)
-        name = check_choice(manoeuvre, tuple(known), "manoeuvre")
-        evaluate = known[name].evaluate
-    else:
-        name, evaluate = "manoeuvre", manoeuvre
+        check_choice(evaluate, tuple(known), "manoeuvre")
+        evaluate = known[evaluate].evaluate
     check_number(n_draws, "n_draws", at_least=2)
-    own = {name: asdict(evaluate(model))}
+    own = asdict(evaluate(model))
     draws = model.sample(int(n_draws), seed)
-    return intervals_of(own, draws, {name: evaluate})[name]
+    intervals = intervals_of(
+        {"manoeuvre": own},
+        draws,
+        {"manoeuvre": evaluate},
+    )
+    return intervals["manoeuvre"]
 
 
 def own_indices(
     model: ShipModel, needed: Mapping[str, Manoeuvre]
 ) -> dict[str, dict[str, float | None]]:
-    """Indices of a model in some manoeuvres; all None in one that it cannot complete."""
+    """Indices of a model in some manoeuvres; None for one that it cannot complete."""
     own = {}
     for name, manoeuvre in needed.items():
         indices, _ = attempt(manoeuvre.evaluate, model)
-        own[name] = indices or manoeuvre.no_indices
+        if not indices:
+            indices = manoeuvre.no_indices
+        own[name] = indices
     return own
 
 
@@ -158,13 +164,17 @@ def intervals_of(
     manoeuvre. Without draws the values stand alone. `progress` is called with the
     number of draws done.
     """
-    found = {name: _without_draws(indices, len(draws)) for name, indices in own.items()}
+    found = {}
+    for name, indices in own.items():
+        found[name] = _without_draws(indices, len(draws))
+
     for k, draw in enumerate(draws):
         for name, intervals in found.items():
             indices, ran_away = attempt(evaluations[name], draw)
             for index, interval in intervals.items():
                 value = indices.get(index)
-                interval.values[k] = np.nan if value is None else value
+                if value is not None:
+                    interval.values[k] = value
                 interval.ran_away[k] = ran_away
         if progress is not None:
             progress(k + 1)
@@ -185,7 +195,7 @@ def _without_draws(
 def attempt(
     evaluate: Evaluation, model: ShipModel
 ) -> tuple[dict[str, float | None], bool]:
-    """Indices of a manoeuvre, none where it never got so far, and whether the ship ran away.
+    """Indices of a manoeuvre as far as it got, and whether the ship ran away.
 
     A spiral of a draw that turns to one side only, or whose rudder has the wrong sign,
     has no indices either: there the error lies in the draw and not in what the user
@@ -205,9 +215,11 @@ def worst(runs: Sequence[IndexInterval]) -> IndexInterval:
     It has no value where one of the manoeuvres has none.
     """
     own = [run.value for run in runs if run.value is not None]
-    complete = len(own) == len(runs)
+    draws = [run.values for run in runs]
+    ran_away = [run.ran_away for run in runs]
+    is_complete = len(own) == len(runs)
     return IndexInterval(
-        value=max(own) if complete else None,
-        values=np.max([run.values for run in runs], axis=0),
-        ran_away=np.any([run.ran_away for run in runs], axis=0),
+        value=max(own) if is_complete else None,
+        values=np.max(draws, axis=0),
+        ran_away=np.any(ran_away, axis=0),
     )

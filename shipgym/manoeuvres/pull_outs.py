@@ -40,7 +40,7 @@ def pull_out(
     weather: Weather | str | None = None,
     seed: Seed = 0,
 ) -> Trial:
-    """Simulate a pull-out: a steady turn, then the rudder amidships until the motion is steady again.
+    """Simulate a pull-out: a steady turn, then the rudder amidships until steady again.
 
     The ship is at service speed and the matching shaft speed, the rudder of the turn in
     degrees, negative to port; `dt`, the time between samples, s, is by default a
@@ -57,7 +57,7 @@ def pull_out(
 
 
 def pull_out_indices(trial: Trial) -> PullOutIndices:
-    """Yaw rate of the turn and the yaw rate left at the end of a measured or simulated pull-out.
+    """Yaw rate of the turn and the yaw rate left at the end of a pull-out.
 
     Means over the last tenth of the turn and of the time amidships. The trial has r and
     delta (or delta_command): the same rudder in a turn, then amidships to the end.
@@ -66,8 +66,11 @@ def pull_out_indices(trial: Trial) -> PullOutIndices:
     require(trial, ("r",), "a pull-out")
     delta = np.abs(rudder(trial))
     held = np.flatnonzero(delta > 0.5 * delta.max())
-    release = int(held[-1]) + 1 if len(held) else 0
-    if min(release, len(trial) - release) < 10:
+    release = 0
+    if held.size:
+        release = int(held[-1]) + 1
+    amidships = len(trial) - release
+    if min(release, amidships) < 10:
         raise InputError(
             f"trial {trial.name!r}: expected a turn and then the rudder amidships, each"
             " for at least 10 samples, got no pull-out"

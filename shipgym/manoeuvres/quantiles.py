@@ -1,4 +1,4 @@
-"""Intervals of 95 %: their quantiles, of values drawn and of the normal distribution."""
+"""Ends of 95 % intervals, of drawn values and of the normal distribution."""
 
 import numpy as np
 
@@ -13,9 +13,10 @@ NORMAL_95 = 1.96
 def quantiles(values: Floats, *levels: float) -> tuple[float | None, ...]:
     """Quantiles of the values that are finite; None for each where none is."""
     known = values[np.isfinite(values)]
-    if not len(known):
+    if not known.size:
         return (None,) * len(levels)
-    return tuple(float(value) for value in np.quantile(known, levels))
+    found = np.quantile(known, levels)
+    return tuple(found.tolist())
 
 
 def upper_95(values: Floats) -> float:
@@ -24,6 +25,6 @@ def upper_95(values: Floats) -> float:
 
 
 def band_95(values: Floats) -> tuple[Floats, Floats]:
-    """Both ends of the interval over the first axis, each of the shape of the others."""
+    """Both ends of the interval over the first axis, in the shape of the others."""
     low, high = np.quantile(values, LEVELS_95, axis=0)
     return low, high

@@ -1,4 +1,4 @@
-"""The manoeuvres known by name: those of this package, and those that a user registers."""
+"""Manoeuvres known by name: those of this package, and those that a user registers."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Manoeuvre:
         return dict.fromkeys(field.name for field in fields(self.outcome))
 
     def evaluate(self, model: ShipModel) -> Any:
-        """The indices of a ship in this manoeuvre; UnstableModelError where she does what no ship can."""
+        """Indices of a ship; UnstableModelError where she does what no ship can."""
         sailed = self.sail(model)
         if isinstance(sailed, Trial):
             check_physical(model, sailed)
@@ -51,12 +51,12 @@ class Manoeuvre:
 
 
 def check_physical(model: ShipModel, trial: Trial) -> None:
-    """Refuse a run beyond every speed and yaw rate of a ship at service power, short of overflow."""
-    speed, length = model.particulars["speed"], model.particulars["length"]
+    """Refuse a run beyond every speed and yaw rate of a ship at service power."""
+    speed = model.particulars["speed"]
     largest = {
         "u": FASTEST * speed,
         "v": speed,
-        "r": QUICKEST_TURN * speed / length,
+        "r": QUICKEST_TURN / model.travel_time,
     }
     for name, most in largest.items():
         if name not in trial:
@@ -64,12 +64,15 @@ def check_physical(model: ShipModel, trial: Trial) -> None:
         beyond = np.abs(trial[name]) > most
         if beyond.any():
             k = int(np.argmax(beyond))
-            time, value = float(trial.t[k]), trial[name][k]
+            time_s = float(trial.t[k])
+            state = {}
+            for channel, values in trial.channels.items():
+                state[channel] = float(values[k])
             raise UnstableModelError(
-                f"model {model.name!r} runs away after {time:.1f} s ({name} ="
-                f" {value:.3g})",
-                time,
-                {channel: float(row[k]) for channel, row in trial.channels.items()},
+                f"model {model.name!r} runs away after {time_s:.1f} s"
+                f" ({name} = {state[name]:.3g})",
+                time_s,
+                state,
             )
 
 
@@ -80,7 +83,7 @@ Variants = Callable[[ShipModel, float], Mapping[str, Manoeuvre]]
 
 @dataclass(frozen=True)
 class Family:
-    """Manoeuvres of one kind, which share a section of the page that `shipgym trials` writes."""
+    """Manoeuvres of one kind, a section of the page that `shipgym trials` writes."""
 
     title: str
     variants: Variants
@@ -93,7 +96,9 @@ FAMILIES: dict[str, Family] = {}
 def register_manoeuvre(
     name: str, variants: Variants, title: str = "", kind: str | None = None
 ) -> None:
-    """Make a family of manoeuvres known to `standard_manoeuvres`, `index_intervals` and `shipgym trials`.
+    """Register a family of manoeuvres.
+
+    `standard_manoeuvres`, `index_intervals` and `shipgym trials` then know it.
 
     Raises InputError if a family of that name is registered already.
 
@@ -115,15 +120,17 @@ def register_manoeuvre(
         raise InputError(
             f"manoeuvre: expected a new name, got '{name}', which is registered already"
         )
-    FAMILIES[name] = Family(title or name.capitalize(), variants)
+    title = title or name.capitalize()
+    FAMILIES[name] = Family(title, variants)
     if kind is not None and kind not in KINDS:
-        KINDS.append(check_text(kind, "manoeuvre: kind"))
+        check_text(kind, "manoeuvre: kind")
+        KINDS.append(kind)
 
 
 def families_of(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, dict[str, Manoeuvre]]:
-    """The manoeuvres that suit a ship, by family and name; arguments and errors of `standard_manoeuvres`."""
+    """Manoeuvres that suit a ship, by family and name; see `standard_manoeuvres`."""
     model.check_depth(water_depth)
     return {
         name: dict(family.variants(model, water_depth))
@@ -134,7 +141,7 @@ def families_of(
 def standard_manoeuvres(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, Manoeuvre]:
-    """The registered manoeuvres that suit a ship, from service speed, in deep water by default.
+    """Registered manoeuvres that suit a ship, from service speed.
 
     Raises InputError for water that is too shallow, or for shallow water with a
     deep-water model.

@@ -31,7 +31,7 @@ class SteadyMotion(NamedTuple):
 
 
 class Voyage:
-    """A manoeuvre in the making: one leg after the other, from service speed or a given state.
+    """Manoeuvre in the making: leg by leg, from service speed or a given state.
 
     Samples are dt apart, s; by default a fortieth of the time to travel one ship
     length. In weather the motion is never steady: legs that wait for it last their
@@ -62,13 +62,14 @@ class Voyage:
         return np.asarray(self._states[-1][-1])
 
     def go(self, sail: Sail, n_steps: int) -> tuple[Floats, Floats]:
-        """Sail some steps; states of shape (n_steps, n_columns) and commands of shape (n_steps, 2)."""
+        """Sail some steps; states (n_steps, n_columns) and commands (n_steps, 2)."""
         states = self.passage.states(self.state, n_steps)
         commands = np.empty((n_steps, 2))
         sail(states, commands)
-        self._states.append(states[1:])
+        after_start = states[1:]
+        self._states.append(after_start)
         self._commands.append(commands)
-        return states[1:], commands
+        return after_start, commands
 
     def _run(self, loop: str, states: Floats, *arguments: Any) -> None:
         steps = sum(len(commands) for commands in self._commands)
@@ -84,7 +85,7 @@ class Voyage:
         return sail
 
     def rate_helmsman(self) -> Callable[[float], Sail]:
-        """From a yaw rate, rad/s, to the leg in which a proportional-integral helmsman holds it.
+        """Map a yaw rate, rad/s, to the leg in which a helmsman holds it by PI control.
 
         The helmsman is designed from the rudder's effect at service speed, for a
         bandwidth of 2 U0 / L and a reset time of 4 L / U0; the integral part carries
@@ -99,8 +100,17 @@ class Voyage:
         def at_rate(rate: float) -> Sail:
             def sail(states: Floats, commands: Floats) -> None:
                 rudder = np.empty(len(commands))
-                helmsman = memory, rate, shaft, self.dt, gain, reset_time
-                self._run("steer_rate", states, rudder, *helmsman)
+                self._run(
+                    "steer_rate",
+                    states,
+                    rudder,
+                    memory,
+                    rate,
+                    shaft,
+                    self.dt,
+                    gain,
+                    reset_time,
+                )
                 commands[:, 0] = rudder
                 commands[:, 1] = shaft
 
@@ -110,22 +120,27 @@ class Voyage:
 
     def settle(self, sail: Sail) -> SteadyMotion:
         """Sail until the motion no longer changes, 300 ship lengths at most."""
-        n_steps = round(STRETCH * self.length_time / self.dt)
         speed = self.model.particulars["speed"]
         units = np.array([speed, speed, 1.0 / self.length_time, 1.0])
-        columns = [self.model.state_names.index(name) for name in "uvr"]
-
-        before = np.full(len(units), np.inf)
+        motion = np.full(len(units), np.inf)
         for _ in range(MOST_STRETCHES):
-            states, commands = self.go(sail, n_steps)
-            velocities = states[:, columns].mean(axis=0)
-            rudder = commands[:, 0].mean()
-            motion = np.append(velocities, rudder)
+            before = motion
+            motion = self._stretch(sail)
             change = np.abs(motion - before) / units
             if change.max() < STEADY:
                 break
-            before = motion
-        return SteadyMotion(float(rudder), float(velocities[-1]))
+        _, _, yaw_rate, rudder = motion.tolist()
+        return SteadyMotion(rudder, yaw_rate)
+
+    def _stretch(self, sail: Sail) -> Floats:
+        """Sail a stretch; means of u, v, r and the ordered rudder, shape (4,)."""
+        n_steps = round(STRETCH * self.length_time / self.dt)
+        states, commands = self.go(sail, n_steps)
+        names = self.model.state_names
+        columns = [names.index(name) for name in ("u", "v", "r")]
+        velocities = states[:, columns].mean(axis=0)
+        rudder = commands[:, 0].mean()
+        return np.append(velocities, rudder)
 
     def trial(self, kind: str | None = None, last: int | None = None) -> Trial:
         """Recording of the legs sailed so far, up to the sample number `last`."""
@@ -133,10 +148,15 @@ class Voyage:
         commands = np.concatenate(self._commands)
         # the last order is held at the last sample too
         commands = np.append(commands, commands[-1:], axis=0)
-        if last is not None:
-            states, commands = states[: last + 1], commands[: last + 1]
-        orders = commands[:, : len(self.model.command_names)]
-        return as_trial(self.model, self.dt, states, orders, kind)
+        end = len(states) if last is None else last + 1
+        n_orders = len(self.model.command_names)
+        return as_trial(
+            self.model,
+            self.dt,
+            states[:end],
+            commands[:end, :n_orders],
+            kind,
+        )
 
 
 def rudder_effect(model: ShipModel, water_depth: float) -> float:
@@ -150,7 +170,8 @@ def rudder_effect(model: ShipModel, water_depth: float) -> float:
         "delta": np.array([angle, -angle]),
         "n": np.full(2, model.service_shaft_speed),
     }
-    to_starboard, to_port = model.rates(columns, water_depth)["r"]
+    rates = model.rates(columns, water_depth)
+    to_starboard, to_port = rates["r"]
     effect = float(to_starboard - to_port) / (2.0 * angle)
     if not effect > 0.0:
         raise InputError(

@@ -1,4 +1,4 @@
-"""Spirals: the manoeuvres that show whether, and how far, a ship is unstable on a straight course.
+"""Spirals, which show whether, and how far, a ship is unstable on a straight course.
 
 Direct spiral of Dieudonne and reverse spiral of Bech as described in IMO MSC/Circ.1053
 and ITTC 7.5-04-02-01.
@@ -77,7 +77,7 @@ class SpiralIndices:
 
 
 class _Curve(NamedTuple):
-    """Yaw rate over rudder angle of the way there or back, in the order of the angles."""
+    """Yaw rate over rudder angle of the way there or back, by rising angle."""
 
     angles: Floats  # deg
     rates: Floats  # deg/s
@@ -91,7 +91,9 @@ def direct_spiral(
     weather: Weather | str | None = None,
     seed: Seed = 0,
 ) -> Spiral:
-    """Simulate a direct spiral (Dieudonne): rudder angles there and back, each held until the turn is steady.
+    """Simulate a direct spiral (Dieudonne).
+
+    Rudder angles there and back, each held until the turn is steady.
 
     The angles, degrees, go from one side to the other; they are sailed in this order
     and then back to the first. The loop is known to within their steps. Other arguments
@@ -105,9 +107,14 @@ def direct_spiral(
     rates = []
     for angle in angles:
         leg = voyage.hold(np.radians(angle), model.service_shaft_speed)
-        rates.append(voyage.settle(leg).yaw_rate)
-    trial = voyage.trial("spiral")
-    return Spiral(trial, np.array(angles), np.degrees(rates), "direct")
+        steady = voyage.settle(leg)
+        rates.append(steady.yaw_rate)
+    return Spiral(
+        trial=voyage.trial("spiral"),
+        rudder_deg=np.array(angles),
+        yaw_rate_deg_s=np.degrees(rates),
+        method="direct",
+    )
 
 
 def reverse_spiral(
@@ -118,7 +125,9 @@ def reverse_spiral(
     weather: Weather | str | None = None,
     seed: Seed = 0,
 ) -> Spiral:
-    """Simulate a reverse spiral (Bech): a helmsman keeps a sequence of yaw rates, each until it is steady.
+    """Simulate a reverse spiral (Bech).
+
+    A helmsman keeps a sequence of yaw rates, each until it is steady.
 
     It also finds the turns at which an unstable ship would not stay by itself. The
     helmsman is a proportional-integral controller, designed from the rudder's effect on
@@ -129,20 +138,30 @@ def reverse_spiral(
     ordered. Otherwise as `direct_spiral`.
     """
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
-    unit = voyage.length_time
+    length_time = voyage.length_time
     if yaw_rate_deg_s is None:
-        yaw_rate_deg_s = [float(np.degrees(rate / unit)) for rate in REVERSE_RATES]
-    most = float(np.degrees(1.0 / unit))
-    what = "one radian per ship length sailed"
-    rates = one_way(yaw_rate_deg_s, "yaw_rate_deg_s", "deg/s", most, what)
+        defaults = np.array(REVERSE_RATES) / length_time
+        yaw_rate_deg_s = np.degrees(defaults).tolist()
+    rates = one_way(
+        yaw_rate_deg_s,
+        "yaw_rate_deg_s",
+        "deg/s",
+        limit=float(np.degrees(1.0 / length_time)),
+        what="one radian per ship length sailed",
+    )
 
     helmsman = voyage.rate_helmsman()
     angles = []
     for rate in rates:
-        steady = voyage.settle(helmsman(np.radians(rate)))
+        leg = helmsman(np.radians(rate))
+        steady = voyage.settle(leg)
         angles.append(steady.rudder)
-    trial = voyage.trial("spiral")
-    return Spiral(trial, np.degrees(angles), np.array(rates), "reverse")
+    return Spiral(
+        trial=voyage.trial("spiral"),
+        rudder_deg=np.degrees(angles),
+        yaw_rate_deg_s=np.array(rates),
+        method="reverse",
+    )
 
 
 def one_way(
@@ -164,7 +183,8 @@ def one_way(
         numbers.append(number)
     steps = np.diff(numbers)
     strictly = np.all(steps > 0.0) or np.all(steps < 0.0)
-    if len(numbers) < 3 or not strictly or numbers[0] * numbers[-1] >= 0.0:
+    enough = len(numbers) >= 3
+    if not enough or not strictly or numbers[0] * numbers[-1] >= 0.0:
         raise InputError(
             f"{argument}: expected at least 3 values in {unit} that rise or fall from"
             f" one side to the other, such as 10, 5, 0, -5, -10, got {numbers}"
@@ -185,21 +205,29 @@ def spiral_from_trial(
     """
     require(trial, ("r",), "a spiral")
     tolerance = check_number(tolerance_deg, "tolerance_deg", above=0.0)
-    delta, rate = np.degrees(rudder(trial)), np.degrees(trial["r"])
-    angles, rates = [], []
+    delta = np.degrees(rudder(trial))
+    rate = np.degrees(trial["r"])
+    angles = []
+    rates = []
     for first, last in _plateaus(trial, delta, tolerance):
         angle = float(delta[first:last].mean())
         if rudder_deg is not None and not _near(angle, rudder_deg, tolerance):
             continue
-        steady = max(int((last - first) * (1.0 / 3.0)), 1)
+        third = max((last - first) // 3, 1)
+        steady = rate[last - third : last]
         angles.append(angle)
-        rates.append(float(rate[last - steady : last].mean()))
+        rates.append(float(steady.mean()))
     if len(angles) < 4:
         raise InputError(
             f"trial {trial.name!r}: expected at least 4 rudder angles, each held for a"
             f" while, got {len(angles)} steady turns"
         )
-    return Spiral(trial, np.array(angles), np.array(rates), "direct")
+    return Spiral(
+        trial=trial,
+        rudder_deg=np.array(angles),
+        yaw_rate_deg_s=np.array(rates),
+        method="direct",
+    )
 
 
 def _plateaus(trial: Trial, delta: Floats, tolerance: float) -> list[tuple[int, int]]:
@@ -209,18 +237,22 @@ def _plateaus(trial: Trial, delta: Floats, tolerance: float) -> list[tuple[int, 
     """
     allowed = 1e-9 if is_ordered(trial) else tolerance
     edges = [0]
-    for i in range(1, len(delta)):
-        if abs(delta[i] - delta[edges[-1]]) > allowed:
+    for i, angle in enumerate(delta):
+        held = delta[edges[-1]]
+        if abs(angle - held) > allowed:
             edges.append(i)
-    spans = list(pairwise([*edges, len(delta)]))
-    durations = [trial.t[last - 1] - trial.t[first] for first, last in spans]
-    shortest = 0.1 * max(durations)
+    edges.append(len(delta))
 
-    held = []
-    for span, duration in zip(spans, durations, strict=True):
-        if duration > 0.0 and duration >= shortest:
-            held.append(span)
-    return held
+    t = trial.t
+    durations = {}
+    for first, after in pairwise(edges):
+        durations[first, after] = t[after - 1] - t[first]
+    shortest = 0.1 * max(durations.values())
+    return [
+        span
+        for span, duration in durations.items()
+        if duration > 0.0 and duration >= shortest
+    ]
 
 
 def _near(angle: float, wanted: Sequence[float], tolerance: float) -> bool:
@@ -228,14 +260,16 @@ def _near(angle: float, wanted: Sequence[float], tolerance: float) -> bool:
 
 
 def spiral_indices(spiral: Spiral) -> SpiralIndices:
-    """Width and height of the loop of a spiral, simulated or measured (`spiral_from_trial`).
+    """Width and height of the loop of a spiral, simulated or from a trial.
 
     Raises InputError if the yaw rate never changes its side, or a direct spiral does
     not come back.
     """
     check_choice(spiral.method, ("direct", "reverse"), "spiral method")
-    angles, rates = spiral.rudder_deg, spiral.yaw_rate_deg_s
-    least, largest = rates.min(), rates.max()
+    angles = spiral.rudder_deg
+    rates = spiral.yaw_rate_deg_s
+    least = rates.min()
+    largest = rates.max()
     if least >= 0.0 or largest <= 0.0:
         raise InputError(
             "spiral: expected turns to both sides, got yaw rates from"
@@ -247,7 +281,7 @@ def spiral_indices(spiral: Spiral) -> SpiralIndices:
 
 
 def turning_point(angles: Floats) -> int:
-    """Number of the point at which a direct spiral turns back: the later of its extreme rudder angles."""
+    """Index at which a direct spiral turns back: the later of its extreme angles."""
     return int(max(np.argmin(angles), np.argmax(angles)))
 
 
@@ -261,17 +295,21 @@ def _direct_loop(angles: Floats, rates: Floats) -> SpiralIndices:
             "spiral: expected a direct spiral there and back, got rudder angles that go"
             " one way only"
         )
-    falling, rising = there, back
+    falling = there
+    rising = back
     if angles[turn] >= angles[0]:
-        falling, rising = back, there
+        falling = back
+        rising = there
 
     to_port = _change_of_side(falling, last=False)
     to_starboard = _change_of_side(rising, last=True)
+    width = to_starboard - to_port
     middle = 0.5 * (to_starboard + to_port)
-    height = np.interp(middle, *falling) - np.interp(middle, *rising)
+    upper = np.interp(middle, falling.angles, falling.rates)
+    lower = np.interp(middle, rising.angles, rising.rates)
     return SpiralIndices(
-        loop_width_deg=max(to_starboard - to_port, 0.0),
-        loop_height_deg_s=max(float(height), 0.0),
+        loop_width_deg=max(width, 0.0),
+        loop_height_deg_s=max(float(upper - lower), 0.0),
         loop_middle_deg=middle,
     )
 
@@ -283,15 +321,16 @@ def _ordered(angles: Floats, rates: Floats) -> _Curve:
 
 def _change_of_side(way: _Curve, last: bool) -> float:
     """Rudder at which the yaw rate of one way goes through zero, deg."""
-    angles, rates = way
-    changes = np.flatnonzero((rates[:-1] <= 0.0) & (rates[1:] > 0.0))
-    if len(changes) == 0:
+    to_starboard = way.rates > 0.0
+    changes = np.flatnonzero(~to_starboard[:-1] & to_starboard[1:])
+    if not changes.size:
         raise InputError(
             "spiral: expected turns to both sides, got one way that stays on one side"
         )
     k = int(changes[-1] if last else changes[0])
     around = slice(k, k + 2)
-    return float(np.interp(0.0, rates[around], angles[around]))
+    angle = np.interp(0.0, way.rates[around], way.angles[around])
+    return float(angle)
 
 
 def _reverse_loop(angles: Floats, rates: Floats) -> SpiralIndices:
@@ -299,27 +338,36 @@ def _reverse_loop(angles: Floats, rates: Floats) -> SpiralIndices:
     from scipy.interpolate import Akima1DInterpolator
 
     order = np.argsort(rates)
-    grid = np.linspace(rates.min(), rates.max(), 4001)
     interpolator = Akima1DInterpolator(rates[order], angles[order])
+    grid = np.linspace(rates.min(), rates.max(), 4001)
     curve = np.asarray(interpolator(grid))
+
+    # where the curve has fallen most from what it had reached
     highest = np.maximum.accumulate(curve)
-    lowest = int(np.argmax(highest - curve))
-    top, bottom = highest[lowest], curve[lowest]
-    width = float(top - bottom)
-    if width == 0.0:
-        straight = float(np.interp(0.0, grid, curve))
-        return SpiralIndices(0.0, 0.0, straight)
+    fold = int(np.argmax(highest - curve))
+    top = float(highest[fold])
+    bottom = float(curve[fold])
+    if top == bottom:
+        return SpiralIndices(
+            loop_width_deg=0.0,
+            loop_height_deg_s=0.0,
+            loop_middle_deg=float(np.interp(0.0, grid, curve)),
+        )
 
     middle = 0.5 * (top + bottom)
-    crossings = np.flatnonzero(np.diff(np.sign(curve - middle)))
-    height = float(np.ptp(grid[crossings]))
-    return SpiralIndices(width, height, float(middle))
+    sides = np.sign(curve - middle)
+    crossings = np.flatnonzero(np.diff(sides))
+    return SpiralIndices(
+        loop_width_deg=top - bottom,
+        loop_height_deg_s=float(np.ptp(grid[crossings])),
+        loop_middle_deg=middle,
+    )
 
 
 def standard_spirals(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, Manoeuvre]:
-    """A direct spiral, and a reverse one where the ship is unstable on a straight course."""
+    """A direct spiral, and a reverse one where the ship is unstable going straight."""
     limit = model.steering.rudder_limit_deg
     angles = [angle for angle in DIRECT_RUDDER_DEG if abs(angle) <= limit]
     spirals = {

@@ -1,4 +1,4 @@
-"""The registry with the manoeuvres of this package in it, in the order in which they are reported.
+"""The registry with this package's manoeuvres in it, in the order of reports.
 
 A new manoeuvre is a file and a call of `register_manoeuvre`: here, or in the file
 itself for one of a user.

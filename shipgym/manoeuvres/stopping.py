@@ -1,4 +1,4 @@
-"""Straight-line acceleration and stopping, and their indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
+"""Straight-line acceleration and stopping (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -54,7 +54,7 @@ def stopping(
     weather: Weather | str | None = None,
     seed: Seed = 0,
 ) -> Trial:
-    """Simulate a stop from service speed, the rudder amidships, until the ship is slow enough.
+    """Simulate a stop from service speed, rudder amidships, until the ship is slow.
 
     A shaft ordered astern needs equations that hold there: of the reference ships only
     those of `tanker` do. The propellers of `container` and `kvlcc2` are open-water
@@ -76,14 +76,15 @@ def stopping(
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
     leg = voyage.hold(0.0, order)
     n_steps = max(round(voyage.length_time / voyage.dt), 2)  # of a ship length
-    surge = model.state_names.index("u")
     target = speed_ratio * model.particulars["speed"]
+    column = model.state_names.index("u")
     for stretch in range(LONGEST):
         states, _ = voyage.go(leg, n_steps)
-        slow = np.flatnonzero(states[:, surge] <= target)
-        if len(slow):
-            last = stretch * n_steps + int(slow[0]) + 1
+        is_slow = states[:, column] <= target
+        if is_slow.any():
+            last = stretch * n_steps + int(is_slow.argmax()) + 1
             return voyage.trial("straight", max(last, 2))
+
     trial = voyage.trial("straight")
     raise ManoeuvreError(
         f"stopping of {model.name!r}: expected a surge speed of {target:.3g} m/s, got"
@@ -130,7 +131,7 @@ def goes_astern(model: ShipModel) -> bool:
 
 
 def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
-    """The full astern stopping test: the shaft ordered astern as fast as ahead, until dead in the water.
+    """Full astern stopping test: the shaft astern as fast as ahead, until at rest.
 
     InputError for a ship whose equations do not hold astern; `water_depth` as in
     `zigzag`.
@@ -141,7 +142,7 @@ def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
 def stopping_indices(
     trial: Trial, speed_ratio: float | None = None, length: float | None = None
 ) -> StoppingIndices:
-    """Stopping distance of a measured or simulated stop, from the first sample, that of the order, on.
+    """Stopping distance of a stop, from the first sample, that of the order, on.
 
     The trial has u, v, x, y and psi. She counts as stopped at `speed_ratio` of the
     surge speed at the start, by default at the end of the trial; `length`, between
@@ -150,23 +151,28 @@ def stopping_indices(
     """
     require(trial, ("u", "v", "x", "y", "psi"), "a stopping trial")
     lpp = ship_length(trial, length)
-    end = float(trial.t[-1])
+    t = trial.t
+    psi = trial["psi"]
+    end = float(t[-1])
     if speed_ratio is not None:
         check_number(speed_ratio, "speed_ratio", at_least=0.0, below=1.0)
         u = trial["u"]
         end = _when(trial, -u, -speed_ratio * u[0])
 
     def change(values: Floats) -> float:
-        return float(np.interp(end, trial.t, values - values[0]))
+        return float(np.interp(end, t, values - values[0]))
 
-    north, east = change(trial["x"]), change(trial["y"])
-    ahead, aside = rotate_to_body(north, east, trial["psi"][0])
+    north = change(trial["x"])
+    east = change(trial["y"])
+    ahead, aside = rotate_to_body(north, east, psi[0])
+    sailed = change(distance_sailed(trial))
+    heading_change = change(psi)
     return StoppingIndices(
-        track_reach_lengths=change(distance_sailed(trial)) / lpp,
+        track_reach_lengths=sailed / lpp,
         head_reach_lengths=float(ahead) / lpp,
         side_reach_lengths=float(aside) / lpp,
-        heading_change_deg=float(np.degrees(change(trial["psi"]))),
-        time_s=end - float(trial.t[0]),
+        heading_change_deg=float(np.degrees(heading_change)),
+        time_s=end - float(t[0]),
     )
 
 
@@ -179,7 +185,7 @@ def acceleration(
     weather: Weather | str | None = None,
     seed: Seed = 0,
 ) -> Trial:
-    """Simulate a straight-line acceleration: from a slow speed with the shaft ordered to service speed.
+    """Simulate an acceleration from a slow speed, the shaft ordered as in service.
 
     A helmsman keeps the yaw rate at zero, so that an unstable ship stays straight.
 
@@ -221,27 +227,31 @@ def acceleration_indices(
     require(trial, ("u", "v"), "an acceleration")
     check_number(part, "part", above=0.0, below=1.0)
     u = trial["u"]
-    if not u[-1] > u[0]:
+    first = u[0]
+    last = u[-1]
+    if not last > first:
         raise InputError(
-            f"trial {trial.name!r}: expected an acceleration, got u from {u[0]:.3g} to"
-            f" {u[-1]:.3g} m/s"
+            f"trial {trial.name!r}: expected an acceleration, got u from {first:.3g} to"
+            f" {last:.3g} m/s"
         )
-    end = _when(trial, u, u[0] + part * (u[-1] - u[0]))
-    sailed = float(np.interp(end, trial.t, distance_sailed(trial)))
+    end = _when(trial, u, first + part * (last - first))
+    sailed = np.interp(end, trial.t, distance_sailed(trial))
     return AccelerationIndices(
         time_s=end - float(trial.t[0]),
-        distance_lengths=sailed / ship_length(trial, length),
-        final_speed=float(u[-1]),
+        distance_lengths=float(sailed) / ship_length(trial, length),
+        final_speed=float(last),
     )
 
 
 def _when(trial: Trial, values: Floats, threshold: float) -> float:
-    """Time at which values first reach a threshold, between samples by straight lines, s."""
+    """Time at which values first reach a threshold, by straight lines, s."""
     time = reached(values, threshold, trial.t)
     if time is None:
+        wanted = abs(threshold)
+        last = trial["u"][-1]
         raise ManoeuvreError(
-            f"trial {trial.name!r}: expected a surge speed of {abs(threshold):.3g} m/s,"
-            f" got {trial['u'][-1]:.3g} m/s at its end; give a larger speed_ratio",
+            f"trial {trial.name!r}: expected a surge speed of {wanted:.3g} m/s, got"
+            f" {last:.3g} m/s at its end; give a larger speed_ratio",
             trial,
         )
     return time
@@ -250,7 +260,7 @@ def _when(trial: Trial, values: Floats, threshold: float) -> float:
 def standard_stops(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, Manoeuvre]:
-    """Inertia stop and acceleration of a ship with a shaft; a crash stop where she can go astern."""
+    """Inertia stop, acceleration and, if the shaft reverses, crash stop."""
     if "n" not in model.command_names:
         return {}
     found = {

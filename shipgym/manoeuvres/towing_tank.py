@@ -1,8 +1,9 @@
 """A virtual towing tank: captive tests of any ship model.
 
-The motion is prescribed and the forces are measured: each test returns a Trial with the motion and the forces X, Y (N) and N (N m); a number
-out of range is an InputError. The tests are those of the planar motion mechanism
-(Gertler 1967, The DTMB planar-motion-mechanism system; ITTC 7.5-02-06-02).
+The motion is prescribed and the forces are measured: each test returns a Trial with
+the motion and the forces X, Y (N) and N (N m); a number out of range is an InputError.
+The tests are those of the planar motion mechanism (Gertler 1967, The DTMB
+planar-motion-mechanism system; ITTC 7.5-02-06-02).
 """
 
 from collections.abc import Sequence
@@ -101,21 +102,26 @@ def static_drift(
     rows. Raises InputError for no angle, or a number out of range.
     """
     tank = tank or Tank()
-    angles = [
+    for i, angle in enumerate(drift_deg):
         check_number(angle, f"drift_deg[{i}]", at_least=-180.0, at_most=180.0)
-        for i, angle in enumerate(drift_deg)
-    ]
-    if not angles:
+    if not len(drift_deg):
         raise InputError("drift_deg: expected at least one angle, got none")
     check_number(hold_s, "hold_s", above=0.0)
 
-    drift = np.repeat(np.radians(angles), tank.samples)
-    t = hold_s / tank.samples * np.arange(len(drift), dtype=float)
+    drift = np.repeat(np.radians(drift_deg), tank.samples)
     speed = tank.carriage_speed(model)
-    u = speed * np.cos(drift)
-    v = -speed * np.sin(drift)
-    velocity = np.column_stack([u, v, np.zeros(len(t))])
-    return _tow(model, tank, t, velocity, np.zeros_like(velocity), "static drift")
+    velocity = np.zeros((len(drift), 3))
+    velocity[:, 0] = speed * np.cos(drift)
+    velocity[:, 1] = -speed * np.sin(drift)
+    step = hold_s / tank.samples
+    return _tow(
+        model,
+        tank,
+        t=step * np.arange(len(drift), dtype=float),
+        velocity=velocity,
+        acceleration=np.zeros_like(velocity),
+        name="static drift",
+    )
 
 
 def pure_surge(
@@ -139,7 +145,12 @@ def pure_surge(
         hint="less than the carriage's speed",
     )
     return _oscillate(
-        model, tank, period_s, (speed, 0.0, 0.0), (amplitude, 0.0, 0.0), "pure surge"
+        model,
+        tank,
+        period_s,
+        mean=(speed, 0.0, 0.0),
+        amplitude=(amplitude, 0.0, 0.0),
+        name="pure surge",
     )
 
 
@@ -157,7 +168,12 @@ def pure_sway(
     check_number(amplitude, "amplitude", above=0.0)
     speed = tank.carriage_speed(model)
     return _oscillate(
-        model, tank, period_s, (speed, 0.0, 0.0), (0.0, amplitude, 0.0), "pure sway"
+        model,
+        tank,
+        period_s,
+        mean=(speed, 0.0, 0.0),
+        amplitude=(0.0, amplitude, 0.0),
+        name="pure sway",
     )
 
 
@@ -192,9 +208,16 @@ def yaw_with_drift(
     drift = float(np.radians(drift_deg))
 
     speed = tank.carriage_speed(model)
-    mean = (speed * np.cos(drift), -speed * np.sin(drift), 0.0)
-    name = "pure yaw" if drift == 0.0 else "yaw with drift"
-    return _oscillate(model, tank, period_s, mean, (0.0, 0.0, rate), name)
+    u = speed * np.cos(drift)
+    v = -speed * np.sin(drift)
+    return _oscillate(
+        model,
+        tank,
+        period_s,
+        mean=(u, v, 0.0),
+        amplitude=(0.0, 0.0, rate),
+        name="pure yaw" if drift == 0.0 else "yaw with drift",
+    )
 
 
 def _oscillate(
@@ -213,9 +236,16 @@ def _oscillate(
     t = period / tank.samples * np.arange(n_steps + 1, dtype=float)
 
     frequency = 2.0 * np.pi / period
-    velocity = np.array(mean) + np.outer(np.cos(frequency * t), amplitude)
-    acceleration = -frequency * np.outer(np.sin(frequency * t), amplitude)
-    return _tow(model, tank, t, velocity, acceleration, name)
+    cosine = np.cos(frequency * t)
+    sine = np.sin(frequency * t)
+    return _tow(
+        model,
+        tank,
+        t=t,
+        velocity=np.array(mean) + np.outer(cosine, amplitude),
+        acceleration=-frequency * np.outer(sine, amplitude),
+        name=name,
+    )
 
 
 def _tow(
@@ -241,24 +271,30 @@ def _tow(
         "delta": np.full(len(t), rudder),
         "n": np.full(len(t), shaft),
     }
-    forces = _measured_forces(model, tank, columns, acceleration)
+    forces = _forces_on_ship(model, tank, columns, acceleration)
     if not tank.model_inertia:
         rigid = rigid_inertia(model)
         forces += rigid_body_forces(rigid, velocity.T, acceleration.T).T
-    noise = tank.noise * np.sqrt((forces**2).mean(axis=0))
-    forces += noise * np.random.default_rng(tank.seed).standard_normal(forces.shape)
 
     north, east = rotate_to_body(u, v, -psi)
     if "n" not in model.command_names:
         del columns["n"]
-    channels = {"x": integral(t, north), "y": integral(t, east), **columns}
-    channels |= zip("XYN", forces.T, strict=True)
-    title = f"{model.name}, {name}"
-    length = model.particulars["length"]
-    return Trial(t, channels, name=title, kind="captive", length=length)
+    channels = {
+        "x": integral(t, north),
+        "y": integral(t, east),
+        **columns,
+    }
+    channels |= zip("XYN", _measured(forces, tank).T, strict=True)
+    return Trial(
+        t,
+        channels,
+        name=f"{model.name}, {name}",
+        kind="captive",
+        length=model.particulars["length"],
+    )
 
 
-def _measured_forces(
+def _forces_on_ship(
     model: ShipModel, tank: Tank, columns: dict[str, Floats], acceleration: Floats
 ) -> Floats:
     """Forces X, Y and N on a balance, shape (n_samples, 3).
@@ -267,10 +303,21 @@ def _measured_forces(
     prescribed.
     """
     rates = model.rates(columns, tank.water_depth)
-    none = np.zeros(len(acceleration))
-    beyond = np.column_stack([rates.get(axis, none) for axis in "uvrp"])
+    beyond = np.zeros((len(acceleration), 4))
+    for column, axis in enumerate("uvrp"):
+        if axis in rates:
+            beyond[:, column] = rates[axis]
     beyond[:, :3] -= acceleration
-    return np.asarray(beyond @ inertia(model, tank.water_depth).T)
+    mass = inertia(model, tank.water_depth)
+    return np.asarray(beyond @ mass.T)
+
+
+def _measured(forces: Floats, tank: Tank) -> Floats:
+    """Forces with the noise of the balance."""
+    rng = np.random.default_rng(tank.seed)
+    root_mean_square = np.sqrt((forces**2).mean(axis=0))
+    noise = tank.noise * root_mean_square
+    return np.asarray(forces + noise * rng.standard_normal(forces.shape))
 
 
 def rigid_body_forces(
@@ -280,13 +327,15 @@ def rigid_body_forces(
 ) -> Floats:
     """Forces X, Y and moment N that accelerate a ship without water, about midship.
 
-    Fossen 2011, 3.3. All in SI units, or all in the prime system: `rigid` is mass, its static moment and
-    the yaw inertia; forces, and velocity and acceleration in surge, sway and yaw, have
-    the shape (3, n_samples).
+    Fossen 2011, 3.3. All in SI units or all in the prime system: `rigid` is mass, its
+    static moment and the yaw inertia; forces, and velocity and acceleration in surge,
+    sway and yaw, have the shape (3, n_samples).
     """
     m, static, yaw = rigid
-    (u, v, r), (udot, vdot, rdot) = velocity, acceleration
-    ahead, aside = udot - v * r, vdot + u * r
+    u, v, r = velocity
+    udot, vdot, rdot = acceleration
+    ahead = udot - v * r
+    aside = vdot + u * r
     return np.array(
         [
             m * ahead - static * r * r,

@@ -47,7 +47,7 @@ class TurningIndices:
 
 
 class TrackFromOrder(NamedTuple):
-    """A track from the position and along the heading at which the rudder was ordered."""
+    """Track from the position and along the heading at which the rudder was ordered."""
 
     ahead: Floats  # ship lengths, shape (n_samples,)
     aside: Floats  # to starboard, ship lengths
@@ -69,21 +69,28 @@ def turning_circle(
     weather: Weather | str | None = None,
     seed: Seed = 0,
 ) -> Trial:
-    """Simulate a turning circle from straight ahead at service speed, without an approach run.
+    """Simulate a turning circle from straight ahead at service speed, with no approach.
 
     The rudder is ordered at the start, degrees, negative to port; `duration` and `dt`,
     the time between samples, are in s; the rest as in `zigzag`. Raises InputError for a
     rudder of 0 or beyond 90 degrees, or a duration or step that is not above 0,
     UnstableModelError if the ship runs away.
     """
-    rudder = np.full(number_of_steps(duration, dt), turning_rudder(rudder_deg, 90.0))
-    commands = orders(model, rudder)
-    kind = "turning-circle"
-    return simulate(model, commands, dt, None, water_depth, kind, weather, seed)
+    angle = turning_rudder(rudder_deg, 90.0)
+    rudder = np.full(number_of_steps(duration, dt), angle)
+    return simulate(
+        model,
+        orders(model, rudder),
+        dt,
+        water_depth=water_depth,
+        kind="turning-circle",
+        weather=weather,
+        seed=seed,
+    )
 
 
 def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices:
-    """Advance, transfer, diameters and the steady turn of a measured or simulated turning circle.
+    """Advance, transfer, diameters and the steady turn of a turning circle.
 
     The trial has x, y, psi, u, v, r and delta (or delta_command); `length` is that
     between perpendiculars, m, by default the trial's own. Raises InputError if a
@@ -98,13 +105,15 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
     aside = side * track.aside[after]
     turned = side * track.turned[after]
 
+    half_turn = np.pi
+    quarter_turn = np.pi / 2
     steady = _SteadyTurn(None, None, None)
-    if turned[-1] > 1.5 * np.pi:
+    if turned[-1] > half_turn + quarter_turn:
         steady = _steady_turn(trial, after, turned, side, lpp)
     return TurningIndices(
-        advance_lengths=reached(turned, np.pi / 2, ahead),
-        transfer_lengths=reached(turned, np.pi / 2, aside),
-        tactical_diameter_lengths=reached(turned, np.pi, aside),
+        advance_lengths=reached(turned, quarter_turn, ahead),
+        transfer_lengths=reached(turned, quarter_turn, aside),
+        tactical_diameter_lengths=reached(turned, half_turn, aside),
         steady_diameter_lengths=steady.diameter_lengths,
         steady_speed_ratio=steady.speed_ratio,
         steady_drift_deg=steady.drift_deg,
@@ -128,23 +137,27 @@ def track_from_order(trial: Trial, length: float) -> TrackFromOrder:
 def _steady_turn(
     trial: Trial, after: Flags, turned: Floats, side: float, length: float
 ) -> _SteadyTurn:
-    """The turn over its last quarter; `turned` to the `side` of the turn, from the order on."""
-    u, v, r = (trial[name][after] for name in ("u", "v", "r"))
+    """Steady turn in its last quarter; `turned` to its `side`, from the order on."""
+    u = trial["u"][after]
+    v = trial["v"][after]
+    r = trial["r"][after]
     speed = np.hypot(u, v)
     drift = np.arctan2(-v, u)
 
     steady = turned >= turned[-1] - np.pi / 2
     mean_speed = speed[steady].mean()
-    rate = side * r[steady].mean()
+    mean_rate = side * r[steady].mean()
+    mean_drift = side * drift[steady].mean()
+    diameter = 2.0 * mean_speed / mean_rate
     return _SteadyTurn(
-        diameter_lengths=float(2.0 * mean_speed / rate / length),
+        diameter_lengths=float(diameter / length),
         speed_ratio=float(mean_speed / speed[0]),
-        drift_deg=float(side * np.degrees(drift[steady].mean())),
+        drift_deg=float(np.degrees(mean_drift)),
     )
 
 
 def full_rudder_deg(model: ShipModel) -> float:
-    """Rudder of the standard circle, degrees: 35, or the rudder's limit where that is less."""
+    """Rudder of the standard circle, degrees: 35, or the rudder's limit if less."""
     return min(35.0, model.steering.rudder_limit_deg)
 
 

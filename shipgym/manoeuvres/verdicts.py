@@ -1,4 +1,4 @@
-"""Verdicts on criteria: by a model and the models drawn from it, and by measured trials."""
+"""Verdicts on criteria by a model, the models drawn from it, and measured trials."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,6 +18,7 @@ from shipgym.manoeuvres.zigzags import (
     switch_heading_deg,
     zigzag_indices,
 )
+from shipgym.ships.envelope import ENVELOPE_CHANNELS
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
 
@@ -54,14 +55,14 @@ class Criterion:
 
     @property
     def share_passed(self) -> float | None:
-        """Share of the draws that pass; those that run away or never get so far do not."""
+        """Share of the draws that pass; runaways and incomplete runs do not."""
         if self.drawn is None or not len(self.drawn.values):
             return None
         return float(np.mean(self.drawn.values <= self.limit))  # NaN is not
 
     @property
     def probability(self) -> float | None:
-        """Of passing: 1 or 0 where it was measured, the share of the draws otherwise; None if not decided."""
+        """Probability to pass: 1 or 0 if measured; None if undecided."""
         if not self.decided:
             return None
         if self.measured is not None:
@@ -99,16 +100,24 @@ class Criterion:
 def criterion_of(
     rule: Rule, runs: Sequence[Mapping[str, IndexInterval]], note: str = ""
 ) -> Criterion:
-    """The worst value of some runs against its limit; a run that never got so far fails it."""
+    """The worst value of some runs against its limit; an incomplete run fails it."""
     drawn = worst([run[rule.index] for run in runs])
-    passed = drawn.value is not None and drawn.value <= rule.limit
+    value = drawn.value
     return Criterion(
-        drawn.value, rule.limit, passed, rule.unit, rule.source, drawn, note
+        value=value,
+        limit=rule.limit,
+        passed=value is not None and value <= rule.limit,
+        unit=rule.unit,
+        source=rule.source,
+        drawn=drawn,
+        note=note,
     )
 
 
 def decided_by_model(criterion: Criterion, manoeuvre: str, outside: bool) -> Criterion:
-    """The criterion without verdict where a model does not decide it, and the trial that would.
+    """The criterion without verdict where a model does not decide it.
+
+    It names the trial that would decide it.
 
     `manoeuvre`: the trial in words; `outside`: whether it is outside the envelope of
     the trials that the model was identified from.
@@ -125,17 +134,18 @@ def decided_by_model(criterion: Criterion, manoeuvre: str, outside: bool) -> Cri
 
 
 def _on_both_sides(criterion: Criterion) -> bool:
-    """Whether too few draws lie on one side of the limit; those that run away lie on none."""
+    """Whether too few draws lie on one side of the limit; runaways lie on none."""
     drawn = criterion.drawn
     if drawn is None or not len(drawn.values):
         return False
     passes = drawn.values <= criterion.limit
     fails = ~passes & ~drawn.ran_away
-    return max(float(np.mean(passes)), float(np.mean(fails))) < SURE
+    larger_share = max(passes.mean(), fails.mean())
+    return bool(larger_share < SURE)
 
 
 def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:
-    """Whether a manoeuvre leaves the envelope of the trials, in a turn up to 180 degrees of heading.
+    """Whether a manoeuvre leaves the trials' envelope, in a turn up to 180 degrees.
 
     By more than 0.15 of its size.
     """
@@ -145,40 +155,46 @@ def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:
         run = test.sail(model)
     except (UnstableModelError, ManoeuvreError):
         return True
-    within_half_turn = np.abs(run["psi"] - run["psi"][0]) <= np.pi
+    psi = run["psi"]
+    within_half_turn = np.abs(psi - psi[0]) <= np.pi
     part = np.logical_and.accumulate(within_half_turn)
+    none = np.zeros(len(run))
     states = []
-    for name in ("u", "v", "r", "delta"):
-        values = run[name] if name in run else np.zeros(len(run))
+    for name in ENVELOPE_CHANNELS:
+        values = run.channels.get(name, none)
         states.append(values[part])
-    return bool(model.envelope.distance(*states).max() > 1.15)
+    distances = model.envelope.distance(*states)
+    return bool(distances.max() > 1.15)
 
 
 def with_measured(
     criteria: Mapping[str, Criterion], model: ShipModel, trials: Sequence[Trial]
 ) -> dict[str, Criterion]:
-    """The criteria of a ship, decided by her trials where one of them is the manoeuvre; the worst counts.
+    """Criteria of a ship, by her trials where they measure them; the worst counts.
 
     `trials`: as recorded; those of another rudder angle, heading or approach speed
     count for nothing.
     """
-    largest = dict[str, float]()
+    decided = dict(criteria)
     for trial in trials:
         for name, value in measured_indices(model, trial).items():
-            largest[name] = max(value, largest.get(name, value))
-
-    decided = dict(criteria)
-    for name, value in largest.items():
-        if name in criteria:
-            passed = value <= criteria[name].limit
-            decided[name] = replace(
-                criteria[name], measured=value, decided=True, passed=passed, note=""
-            )
+            criterion = decided.get(name)
+            if criterion is None:
+                continue
+            worse = criterion.measured is None or value > criterion.measured
+            if worse:
+                decided[name] = replace(
+                    criterion,
+                    measured=value,
+                    decided=True,
+                    passed=value <= criterion.limit,
+                    note="",
+                )
     return decided
 
 
 def measured_indices(model: ShipModel, trial: Trial) -> dict[str, float]:
-    """The criteria that a trial measures, by name; none where it is not one of the manoeuvres."""
+    """Criteria that a trial measures, by name; none for another manoeuvre."""
     if trial.kind not in ("zigzag", "turning-circle") or not _at_speed(model, trial):
         return {}
     length = model.particulars["length"]
@@ -205,20 +221,22 @@ def _at_speed(model: ShipModel, trial: Trial) -> bool:
     """Whether a trial begins at service speed, to a tenth."""
     if "u" not in trial or "v" not in trial:
         return False
-    service_speed = model.particulars["speed"]
-    u, v = trial["u"][0], trial["v"][0]
-    off = abs(float(np.hypot(u, v)) - service_speed)
-    return bool(off <= 0.1 * service_speed)
+    service = model.particulars["speed"]
+    first = np.hypot(trial["u"][0], trial["v"][0])
+    off = abs(first - service)
+    return bool(off <= 0.1 * service)
 
 
 def _manoeuvre_of(model: ShipModel, trial: Trial) -> str | None:
-    """The manoeuvre of the rules that a trial is, its rudder and heading to a degree; None for another."""
+    """Manoeuvre of the rules that a trial is, to a degree; None for another."""
     rudder_deg = float(np.degrees(usual_rudder(trial)))
     if trial.kind == "turning-circle":
         off = abs(rudder_deg - full_rudder_deg(model))
         return "turning circle" if off <= 1.0 else None
     heading_deg = switch_heading_deg(trial) or 0.0
     for angle in STANDARD_DEG:
-        if max(abs(rudder_deg - angle), abs(heading_deg - angle)) <= 1.0:
+        rudder_off = abs(rudder_deg - angle)
+        heading_off = abs(heading_deg - angle)
+        if rudder_off <= 1.0 and heading_off <= 1.0:
             return f"zigzag {angle:.0f}/{angle:.0f}"
     return None

@@ -1,8 +1,9 @@
-"""The zigzag manoeuvre (Kempf 1932) and its indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
+"""Zigzags (Kempf 1932) and their indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -87,15 +88,20 @@ def zigzag(
     check_number(heading_deg, "heading_deg", above=0.0, at_most=180.0)
     n_steps = number_of_steps(duration, dt)
     check_choice(switch, ("inside", "step"), "switch")
-    angle, threshold = np.radians(rudder_deg), np.radians(heading_deg)
-    first_order = -angle if port_first else angle
+    angle = np.radians(rudder_deg)
 
     passage = Passage(model, Conditions(water_depth, weather, seed), dt)
     states = passage.states(model.service_state, n_steps)
     rudder = np.empty(n_steps + 1)
-    shaft, inside = model.service_shaft_speed, switch == "inside"
     _, n_reversals = passage.run(
-        "zigzag", states, rudder, first_order, threshold, shaft, dt, inside
+        "zigzag",
+        states,
+        rudder,
+        -angle if port_first else angle,
+        np.radians(heading_deg),
+        model.service_shaft_speed,
+        dt,
+        switch == "inside",
     )
     trial = as_trial(model, dt, states, orders(model, rudder), kind="zigzag")
     if must_reverse and n_reversals == 0:
@@ -106,13 +112,15 @@ def zigzag(
 def _refuse_without_reversal(
     model: ShipModel, trial: Trial, rudder_deg: float, heading_deg: float
 ) -> None:
+    psi = trial["psi"]
     side = np.sign(trial["delta_command"][0])
-    changes = side * (trial["psi"] - trial["psi"][0])
+    changes = side * (psi - psi[0])
+    largest_deg = np.degrees(changes.max())
     raise ManoeuvreError(
         f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: expected the heading"
         f" to change by {heading_deg:g} deg, where the rudder is reversed, got"
-        f" {np.degrees(changes.max()):.3g} deg to the side of the rudder in"
-        f" {trial.duration:g} s; sail longer, or order more rudder or less heading",
+        f" {largest_deg:.3g} deg to the side of the rudder in {trial.duration:g} s;"
+        " sail longer, or order more rudder or less heading",
         trial,
     )
 
@@ -130,12 +138,14 @@ def zigzag_indices(
     start, turns = reversals(trial)
     if not turns:
         return ZigzagIndices(None, None, None, None)
-    switch = switch_heading_deg(trial) if heading_deg is None else heading_deg
+    switch = heading_deg
+    if switch is None:
+        switch = switch_heading_deg(trial)
 
-    ends = [*turns[1:], float(trial.t[-1])]
-    overshoots = []
-    for turn, end in zip(turns[:2], ends, strict=False):
-        overshoots.append(_overshoot_deg(trial, start, turn, end, switch))
+    overshoots: list[float | None] = []
+    for turn, end in pairwise([*turns, float(trial.t[-1])]):
+        overshoot = _overshoot_deg(trial, start, turn, end, switch)
+        overshoots.append(overshoot)
     lpp = ship_length(trial, length)
     return ZigzagIndices(
         overshoot_1_deg=overshoots[0],
@@ -148,20 +158,22 @@ def zigzag_indices(
 def _initial_turning(
     trial: Trial, start: float, threshold_deg: float | None, length: float
 ) -> float | None:
-    """Lengths sailed from the first order until the heading has changed by the threshold, if it has."""
+    """Lengths sailed from the first order to the heading threshold, if reached."""
     if not threshold_deg:
         return None
-    times = trial.t[trial.t >= start]
+    t = trial.t
+    times = t[t >= start]
     change = np.abs(_heading_change(trial, start, times))
-    when = reached(change, float(np.radians(threshold_deg)), times)
+    threshold = float(np.radians(threshold_deg))
+    when = reached(change, threshold, times)
     if when is None:
         return None
-    before, then = np.interp([start, when], trial.t, distance_sailed(trial))
+    before, then = np.interp([start, when], t, distance_sailed(trial))
     return float(then - before) / length
 
 
 def switch_heading_deg(trial: Trial) -> float | None:
-    """Heading change at which the rudder of a zigzag was to be reversed, degrees; None without reversal.
+    """Heading change at which the rudder was to be reversed, degrees; None if never.
 
     Orders are given in whole degrees, in trials nearly always 1 or a multiple of 5, and
     carried out after a delay in which the heading moves on. So it is the largest such
@@ -173,17 +185,20 @@ def switch_heading_deg(trial: Trial) -> float | None:
         return None
     turn = turns[0]
     step = _sampling_step(trial, turn)
-    changes = np.abs(_heading_change(trial, start, [turn - step, turn]))
-    before, at = sorted(np.degrees(changes).tolist())
+    around = _heading_change(trial, start, [turn - step, turn])
+    changes_deg = np.degrees(np.abs(around))
+    before, at = sorted(changes_deg.tolist())
     if is_ordered(trial):
-        whole = float(np.floor(at + 1e-6))
-        passed_within_step = whole >= before - 1e-6
-        return whole if passed_within_step else float(0.5 * (before + at))
+        slack = 1e-6
+        whole = float(np.floor(at + slack))
+        if whole >= before - slack:  # passed within the step
+            return whole
+        return float(0.5 * (before + at))
 
-    usual = np.array([1.0, *np.arange(5.0, 95.0, 5.0)])
-    passed = usual[0.95 * usual <= at]
-    if len(passed) and at - passed[-1] < 3.0:
-        return float(passed[-1])
+    usual = [1.0, *range(5, 95, 5)]
+    passed = [float(angle) for angle in usual if 0.95 * angle <= at]
+    if passed and at - passed[-1] < 3.0:
+        return passed[-1]
     return float(at)
 
 
@@ -197,23 +212,27 @@ def _heading_change(
     trial: Trial, start: float, times: Sequence[float] | Floats
 ) -> Floats:
     """Heading at some times less the mean heading up to the start, rad."""
-    approach = trial["psi"][trial.t <= start].mean()
-    return np.asarray(np.interp(times, trial.t, trial["psi"]) - approach)
+    psi = trial["psi"]
+    approach = psi[trial.t <= start].mean()
+    heading = np.interp(times, trial.t, psi)
+    return np.asarray(heading - approach)
 
 
 def _overshoot_deg(
     trial: Trial, start: float, turn: float, end: float, switch: float | None
 ) -> float | None:
-    """Heading beyond that of the switch after the reversal at time `turn`; None if still growing at `end`."""
-    times = trial.t[(trial.t >= turn) & (trial.t <= end)]
+    """Heading beyond that of the reversal at time `turn`; None if growing at `end`."""
+    t = trial.t
+    times = t[(t >= turn) & (t <= end)]
     if switch is None or len(times) < 3:
         return None
     change = _heading_change(trial, start, times)
     side = np.sign(change[0])
-    beyond = np.degrees(side * change) - switch
-    if np.argmax(beyond) == len(beyond) - 1:
+    change_deg = np.degrees(side * change)
+    largest = int(np.argmax(change_deg))
+    if largest == len(change_deg) - 1:
         return None
-    return float(beyond.max())
+    return float(change_deg[largest]) - switch
 
 
 def standard_zigzags(

@@ -1,4 +1,4 @@
-"""Pages of results: one HTML file each, made from a template, which loads nothing from anywhere.
+"""Pages of results: one self-contained HTML file each, made from a template.
 
 A page extends `shipgym.pages/page.html` and is made of the macros in
 `shipgym.pages/parts.html`.

@@ -1,4 +1,4 @@
-"""The page of recorded trials, as they were read: facts, remarks, track and channels of each."""
+"""Page of recorded trials as they were read: facts, remarks, track and channels."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -40,17 +40,20 @@ def _record(trial: Trial) -> _Record:
 
 
 def _facts(trial: Trial) -> dict[str, str]:
-    step = trial.duration / (len(trial) - 1)
+    n_samples = len(trial)
+    step = trial.duration / (n_samples - 1)
     velocity = "over ground" if trial.over_ground else "through the water"
     facts = {
         "samples": (
-            f"{len(trial)} over {trial.duration:.5g} s, {step:.4g} s apart on average"
+            f"{n_samples} over {trial.duration:.5g} s, {step:.4g} s apart on average"
         ),
         "channels": ", ".join(trial.channels),
         "computed from others": ", ".join(sorted(trial.derived)) or "none",
         "u and v": velocity if "u" in trial else "not known",
     }
-    filled = [f"{count} values of {name}" for name, count in trial.repaired.items()]
+    filled = []
+    for name, count in trial.repaired.items():
+        filled.append(f"{count} values of {name}")
     if filled:
         facts["filled in"] = ", ".join(filled)
     return facts

@@ -1,4 +1,4 @@
-"""Numbers as a page shows them: a true minus, no needless digits, a dash where there is none."""
+"""Numbers as a page shows them: a true minus, no needless digits, a dash for none."""
 
 import math
 
@@ -13,14 +13,17 @@ def number(value: float | None, digits: int = 3) -> str:
         return NONE
     if value == 0.0:
         return "0"
+    after_first = digits - 1
     size = abs(value)
     if 1e-4 <= size < 1e7:
         magnitude = math.floor(math.log10(size))
-        return fixed(value, max(digits - 1 - magnitude, 0))
+        decimals = max(after_first - magnitude, 0)
+        return fixed(value, decimals)
 
-    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    mantissa, exponent = f"{value:.{after_first}e}".split("e")
+    mantissa = mantissa.replace("-", MINUS)
     power = str(int(exponent)).translate(_SUPERSCRIPTS)
-    return f"{mantissa.replace('-', MINUS)} · 10{power}"
+    return f"{mantissa} · 10{power}"
 
 
 def fixed(value: float | None, decimals: int = 2) -> str:

@@ -1,4 +1,4 @@
-"""Figures made with plotly, from the extra ``report``; the public names stand in `__init__.pyi`."""
+"""Figures made with plotly, from the extra ``report`` (names in `__init__.pyi`)."""
 
 from lazy_loader import attach_stub
 

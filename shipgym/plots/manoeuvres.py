@@ -1,15 +1,26 @@
 """Figures of the standard manoeuvres, each with what its indices are read from."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from contextlib import suppress
+from typing import Any
 
 import numpy as np
 
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import distance_sailed, rudder, ship_length
 from shipgym.manoeuvres.pull_outs import pull_out_indices
-from shipgym.manoeuvres.spirals import Spiral, spiral_indices, turning_point
-from shipgym.manoeuvres.turning import track_from_order, turning_indices
+from shipgym.manoeuvres.spirals import (
+    Spiral,
+    SpiralIndices,
+    spiral_indices,
+    turning_point,
+)
+from shipgym.manoeuvres.turning import (
+    TrackFromOrder,
+    TurningIndices,
+    track_from_order,
+    turning_indices,
+)
 from shipgym.manoeuvres.zigzags import switch_heading_deg
 from shipgym.plots.style import (
     LIMIT,
@@ -28,32 +39,42 @@ from shipgym.trials.trial import Trial
 
 
 def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
-    """A zigzag in the usual form: heading change and rudder over time, with the switch headings.
+    """Plot a zigzag: heading change and rudder over time, with the switch headings.
 
     Of a trial with psi and delta; height in pixels.
     """
-    heading = np.degrees(trial["psi"] - trial["psi"][0])
+    t = trial.t
+    psi = trial["psi"]
+    heading_deg = np.degrees(psi - psi[0])
     rudder_deg = np.degrees(trial["delta"])
     hover = {"hovertemplate": "%{y:.2f} deg"}
     lines = [
-        line(trial.t, heading, "heading change", MODEL, 2.0, **hover),
-        line(trial.t, rudder_deg, "rudder", MUTED, 1.4, **hover),
+        line(t, heading_deg, "heading change", MODEL, 2.0, **hover),
+        line(t, rudder_deg, "rudder", MUTED, 1.4, **hover),
     ]
     switch = switch_heading_deg(trial)
     if switch is not None:
-        ends = trial.t[[0, -1]]
-        dotted = {"line_dash": "dot", "hoverinfo": "skip"}
         for level in (switch, -switch):
-            levels = [level, level]
-            lines.append(line(ends, levels, "switch heading", LIMIT, 1.1, **dotted))
+            dotted = line(
+                t[[0, -1]],
+                [level, level],
+                "switch heading",
+                LIMIT,
+                1.1,
+                line_dash="dot",
+                hoverinfo="skip",
+            )
+            lines.append(dotted)
+
     title = axis("heading change and rudder, deg", zero=True)
-    return panels([Panel(lines, "time, s", title)], height)
+    panel = Panel(lines, "time, s", title)
+    return panels([panel], height)
 
 
 def turning_figure(
     trial: Trial, length: float | None = None, height: int = 480
 ) -> Figure:
-    """A turning circle seen from above, with advance, transfer and tactical diameter marked.
+    """Plot a turning circle, with advance, transfer and tactical diameter marked.
 
     In ship lengths, from the position and along the heading at which the rudder was
     ordered. The trial has x, y, psi, u, v, r and delta (or delta_command); `length` is
@@ -61,105 +82,138 @@ def turning_figure(
     channel or the length is missing.
     """
     indices = turning_indices(trial, length)
-    ahead, aside, turned = track_from_order(trial, ship_length(trial, length))
-    side = 1.0 if turned[-1] >= 0.0 else -1.0
-    lines = [line(aside, ahead, "path", MODEL, 2.0)]
-
-    advance, transfer = indices.advance_lengths, indices.transfer_lengths
-    if advance is not None and transfer is not None:
-        corner = side * transfer
-        name = f"advance {advance:.2f} L"
-        lines.append(_dimension([corner, corner], [0.0, advance], name, PALETTE[1]))
-        name = f"transfer {transfer:.2f} L"
-        lines.append(_dimension([0.0, corner], [advance, advance], name, PALETTE[2]))
-    diameter = indices.tactical_diameter_lengths
-    if diameter is not None:
-        level = float(np.interp(np.pi, side * turned, ahead))
-        across = side * diameter
-        name = f"tactical diameter {diameter:.2f} L"
-        lines.append(_dimension([0.0, across], [level, level], name, PALETTE[3]))
-
-    shown = Panel(
-        lines,
+    track = track_from_order(trial, ship_length(trial, length))
+    path = line(track.aside, track.ahead, "path", MODEL, 2.0)
+    panel = Panel(
+        [path, *_turning_dimensions(indices, track)],
         x=axis("to starboard, ship lengths", zero=True),
         y=axis("ahead, ship lengths", zero=True, scaleanchor="x", scaleratio=1),
     )
-    return panels([shown], height, hovermode="closest")
+    return panels([panel], height, hovermode="closest")
+
+
+def _turning_dimensions(indices: TurningIndices, track: TrackFromOrder) -> list[Any]:
+    """Advance, transfer and tactical diameter where the ship turned that far."""
+    side = 1.0 if track.turned[-1] >= 0.0 else -1.0
+    lines = []
+    advance = indices.advance_lengths
+    transfer = indices.transfer_lengths
+    if advance is not None and transfer is not None:
+        x = side * transfer
+        name = f"advance {advance:.2f} L"
+        lines.append(_dimension([x, x], [0.0, advance], name, PALETTE[1]))
+        name = f"transfer {transfer:.2f} L"
+        lines.append(_dimension([0.0, x], [advance, advance], name, PALETTE[2]))
+    diameter = indices.tactical_diameter_lengths
+    if diameter is not None:
+        x = side * diameter
+        y = float(np.interp(np.pi, side * track.turned, track.ahead))
+        name = f"tactical diameter {diameter:.2f} L"
+        lines.append(_dimension([0.0, x], [y, y], name, PALETTE[3]))
+    return lines
 
 
 def _dimension(x: list[float], y: list[float], name: str, colour: str) -> Any:
     """A measured length as a line with bars at both ends."""
-    across = "line-ew" if x[0] == x[1] else "line-ns"
-    mark = {"symbol": across, "size": 11, "line": {"width": 1.6, "color": colour}}
-    return line(x, y, name, colour, 1.5, "lines+markers", marker=mark, hoverinfo="name")
+    bar = {
+        "symbol": "line-ew" if x[0] == x[1] else "line-ns",
+        "size": 11,
+        "line": {"width": 1.6, "color": colour},
+    }
+    return line(
+        x,
+        y,
+        name,
+        colour,
+        width=1.5,
+        mode="lines+markers",
+        marker=bar,
+        hoverinfo="name",
+    )
 
 
 def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
-    """Yaw rate over rudder angle of a spiral, with the width of its loop; a direct one in two lines."""
-    angles, rates = spiral.rudder_deg, spiral.yaw_rate_deg_s
-    is_direct = spiral.method == "direct"
-    parts = {"reverse spiral": (slice(None), MODEL)}
-    if is_direct:
+    """Plot yaw rate over rudder angle of a spiral; a direct one in two lines."""
+    angles = spiral.rudder_deg
+    if spiral.method == "direct":
         turn = turning_point(angles)
-        parts = {
-            "there": (slice(0, turn + 1), MODEL),
-            "and back": (slice(turn, None), PALETTE[1]),
-        }
-    points = {"marker": {"size": 5}, "hovertemplate": "%{x:.2f} deg, %{y:.3f} deg/s"}
-    lines = []
-    for name, (part, colour) in parts.items():
-        x, y = angles[part], rates[part]
-        lines.append(line(x, y, name, colour, 1.6, "lines+markers", **points))
+        there = slice(0, turn + 1)
+        back = slice(turn, None)
+        lines = [
+            _spiral_line(spiral, there, "there", MODEL),
+            _spiral_line(spiral, back, "and back", PALETTE[1]),
+        ]
+        resolution = np.abs(np.diff(angles)).min()
+    else:
+        lines = [_spiral_line(spiral, slice(None), "reverse spiral", MODEL)]
+        resolution = 0.0
 
-    loop = _loop(spiral)
-    smallest_step = np.abs(np.diff(angles)).min() if is_direct else 0.0
-    if loop.width > smallest_step:
-        name = f"loop, {loop.width:.2f} deg wide"
-        ends = [loop.middle - loop.width / 2, loop.middle + loop.width / 2]
-        lines.append(line(ends, [0.0, 0.0], name, LIMIT, 2.6, hoverinfo="name"))
-    shown = Panel(
+    with suppress(InputError):  # a spiral with turns to one side only has no loop
+        indices = spiral_indices(spiral)
+        if indices.loop_width_deg > resolution:
+            lines.append(_loop_line(indices))
+    panel = Panel(
         lines,
         x=axis("rudder, deg", zero=True),
         y=axis("yaw rate, deg/s", zero=True),
     )
-    return panels([shown], height, hovermode="closest")
+    return panels([panel], height, hovermode="closest")
 
 
-class _Loop(NamedTuple):
-    """Rudder angles between which a spiral has two yaw rates, deg."""
+def _spiral_line(spiral: Spiral, part: slice, name: str, colour: str) -> Any:
+    return line(
+        spiral.rudder_deg[part],
+        spiral.yaw_rate_deg_s[part],
+        name,
+        colour,
+        width=1.6,
+        mode="lines+markers",
+        marker={"size": 5},
+        hovertemplate="%{x:.2f} deg, %{y:.3f} deg/s",
+    )
 
-    width: float = 0.0
-    middle: float = 0.0
 
-
-def _loop(spiral: Spiral) -> _Loop:
-    try:
-        indices = spiral_indices(spiral)
-    except InputError:  # turns to one side only
-        return _Loop()
-    return _Loop(indices.loop_width_deg, indices.loop_middle_deg)
+def _loop_line(indices: SpiralIndices) -> Any:
+    """Rudder angles between which a spiral has two yaw rates."""
+    width = indices.loop_width_deg
+    middle = indices.loop_middle_deg
+    return line(
+        [middle - width / 2, middle + width / 2],
+        [0.0, 0.0],
+        f"loop, {width:.2f} deg wide",
+        LIMIT,
+        width=2.6,
+        hoverinfo="name",
+    )
 
 
 def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
-    """Yaw rate of pull-outs over the time since the rudder was put amidships; those of a stable ship meet.
+    """Plot yaw rates of pull-outs since the rudder went amidships.
+
+    Those of a stable ship meet.
 
     The trials, usually one from each side, by the label of their line. InputError if
     one has no pull-out.
     """
     lines = []
-    for (label, trial), colour in zip(trials.items(), PALETTE, strict=False):
+    for label, colour in zip(trials, PALETTE, strict=False):
+        trial = trials[label]
+        indices = pull_out_indices(trial)
         part = thinned(trial)
-        since_release = trial.t[part] - _release(trial)
-        rate = np.degrees(trial["r"][part])
-        left = pull_out_indices(trial).residual_rate_deg_s
-        name = f"{label}: {left:.3f} deg/s left"
-        lines.append(line(since_release, rate, name, colour))
-    shown = Panel(
+        rate = trial["r"][part]
+        curve = line(
+            trial.t[part] - _release(trial),
+            np.degrees(rate),
+            f"{label}: {indices.residual_rate_deg_s:.3f} deg/s left",
+            colour,
+        )
+        lines.append(curve)
+    panel = Panel(
         lines,
         x=axis("time since the rudder was put amidships, s", zero=True),
         y=axis("yaw rate, deg/s", zero=True),
     )
-    return panels([shown], height)
+    return panels([panel], height)
 
 
 def _release(trial: Trial) -> float:
@@ -172,26 +226,34 @@ def _release(trial: Trial) -> float:
 def speed_figure(
     trial: Trial, length: float | None = None, height: int = 380
 ) -> Figure:
-    """A stop or an acceleration: surge speed and shaft over time, and speed over the distance sailed.
+    """Plot a stop or an acceleration: speed and shaft, and speed over distance.
 
     The trial has u and v, and n where the ship has a shaft; `length` as in
     `turning_figure`.
     """
     sailed = distance_sailed(trial) / ship_length(trial, length)
     part = thinned(trial)
-    t, u = trial.t[part], trial["u"][part]
-    over_distance = line(sailed[part], u, "surge speed", MODEL)
-    over_time = line(t, u, "surge speed", MODEL)
-    speed_axis = axis(CHANNEL_AXES["u"].title, zero=True)
-    shown = [
-        Panel([over_distance], "distance sailed, ship lengths", speed_axis),
-        Panel([over_time], "time, s", axis(zero=True)),
-    ]
+    t = trial.t[part]
+    u = trial["u"][part]
+    over_distance = Panel(
+        [line(sailed[part], u, "surge speed", MODEL)],
+        x="distance sailed, ship lengths",
+        y=axis(CHANNEL_AXES["u"].title, zero=True),
+    )
+    over_time = Panel(
+        [line(t, u, "surge speed", MODEL)],
+        x="time, s",
+        y=axis(zero=True),
+    )
+    shown = [over_distance, over_time]
     shaft = quantity(trial, "n")
     if shaft is not None:
-        turned = line(t, shaft[part], "shaft", MEASURED)
-        shaft_axis = axis(CHANNEL_AXES["n"].title, zero=True)
-        shown.append(Panel([turned], "time, s", shaft_axis))
+        shaft_over_time = Panel(
+            [line(t, shaft[part], "shaft", MEASURED)],
+            x="time, s",
+            y=axis(CHANNEL_AXES["n"].title, zero=True),
+        )
+        shown.append(shaft_over_time)
     return panels(
         shown,
         height,
@@ -202,7 +264,7 @@ def speed_figure(
 
 
 def excitation_figure(trial: Trial) -> Figure:
-    """A manoeuvre for identification, such as `prbs_rudder`: orders above the ship's response."""
+    """Plot a manoeuvre for identification: orders above the ship's response."""
     shown = []
     for name in ("delta_command", "delta", "n_command", "n"):
         if name in trial and np.ptp(trial[name]) > 0.0:
@@ -214,7 +276,7 @@ def excitation_figure(trial: Trial) -> Figure:
 
 
 def manoeuvre_figure(sailed: Trial | Spiral) -> Figure:
-    """The figure that suits a measured or simulated manoeuvre by its kind; else time histories.
+    """Plot a manoeuvre in the form of its kind; else time histories.
 
     Raises InputError if a channel or the ship's length is missing.
     """

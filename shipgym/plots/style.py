@@ -1,9 +1,10 @@
-"""The style that all figures share, and plotly itself, imported when it is first used."""
+"""Style that all figures share; plotly itself is imported when first used."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -72,25 +73,46 @@ def panels(
     rows = max(math.ceil(len(shown) / columns), 1)
     titles = [panel.title for panel in shown]
     is_titled = any(titles)
-    settings = {"vertical_spacing": 0.36 / max(rows, 2), **(grid or {})}
+    settings = {"vertical_spacing": 0.36 / max(rows, 2)}
+    if grid is not None:
+        settings |= grid
     figure = subplots(rows, columns, titles if is_titled else (), **settings)
 
     # as plain dicts, since plotly checks a whole figure faster than one change after
     # the other
     drawn = figure.layout.to_plotly_json()
-    last_row = columns * (rows - 1)
-    for k, panel in enumerate(shown):
-        number = _axis_number(k)
-        x, y = _axis(panel.x), _axis(panel.y)
-        if outer and k < last_row:
-            x["title"] = {"text": ""}
-        if outer and k % columns:
-            y["title"] = {"text": ""}
-        drawn[f"xaxis{number}"] |= x
-        drawn[f"yaxis{number}"] |= y
-    figure.layout = drawn | layout(height, titled=is_titled, **changes)
+    axes = _outer_axes(shown, rows, columns) if outer else _axes(shown)
+    for name, settings in axes.items():
+        drawn[name] |= settings
+    drawn |= layout(height, titled=is_titled, **changes)
+    figure.layout = drawn
     figure.add_traces(_placed_traces(shown))
     return figure
+
+
+def _axes(shown: Sequence[Panel]) -> dict[str, dict[str, Any]]:
+    """Axes of panels, by their names in a layout."""
+    axes = {}
+    for k, panel in enumerate(shown):
+        number = _axis_number(k)
+        axes[f"xaxis{number}"] = _axis(panel.x)
+        axes[f"yaxis{number}"] = _axis(panel.y)
+    return axes
+
+
+def _outer_axes(
+    shown: Sequence[Panel], rows: int, columns: int
+) -> dict[str, dict[str, Any]]:
+    """Axes of panels, titles below the last row and beside the first column only."""
+    axes = _axes(shown)
+    in_last_row = columns * (rows - 1)
+    for k in range(len(shown)):
+        number = _axis_number(k)
+        if k < in_last_row:
+            axes[f"xaxis{number}"]["title"] = {"text": ""}
+        if k % columns:
+            axes[f"yaxis{number}"]["title"] = {"text": ""}
+    return axes
 
 
 def _axis_number(k: int) -> str:
@@ -98,23 +120,25 @@ def _axis_number(k: int) -> str:
     return str(k + 1) if k else ""
 
 
-def _axis(told: Axis) -> dict[str, Any]:
-    return axis(told) if isinstance(told, str) else dict(told)
+def _axis(given: Axis) -> dict[str, Any]:
+    return axis(given) if isinstance(given, str) else dict(given)
 
 
 def _placed_traces(shown: Sequence[Panel]) -> list[dict[str, Any]]:
-    """Lines and points on the axes of their panels, the first of each name in the legend."""
+    """Traces on the axes of their panels, the first of each name in the legend."""
     traces = []
     names = set[str]()
     for k, panel in enumerate(shown):
         number = _axis_number(k)
-        axes = {"xaxis": f"x{number}", "yaxis": f"y{number}"}
         for trace in panel.traces:
             name = trace.legendgroup
             if name is not None and trace.showlegend is not False:
                 trace.showlegend = name not in names
                 names.add(name)
-            traces.append(trace.to_plotly_json() | axes)
+            drawn = trace.to_plotly_json()
+            drawn["xaxis"] = f"x{number}"
+            drawn["yaxis"] = f"y{number}"
+            traces.append(drawn)
     return traces
 
 
@@ -149,7 +173,7 @@ def layout(
 
 
 def axis(title: str = "", zero: bool = False, **changes: Any) -> dict[str, Any]:
-    """An axis in the shared style, with its title (quantity and unit) and perhaps a line at zero."""
+    """Axis in the shared style, with a title and perhaps a line at zero."""
     shared = {
         "title": {"text": title, "font": {"size": 12, "color": MUTED}, "standoff": 8},
         "gridcolor": GRID,
@@ -171,16 +195,14 @@ def compact(values: ArrayLike) -> NDArray[np.float32]:
 
 
 def line_styles(labels: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Line of each label: measurements thin and dark, the others by the palette in their order."""
+    """Line of each label: measurements thin and dark, others by the palette."""
     styles: dict[str, dict[str, Any]] = {}
-    coloured = 0
+    palette = cycle(PALETTE)
     for label in labels:
         if label == "measured":
             styles[label] = {"colour": MEASURED, "width": 1.5}
         else:
-            colour = PALETTE[coloured % len(PALETTE)]
-            styles[label] = {"colour": colour, "width": 2.0}
-            coloured += 1
+            styles[label] = {"colour": next(palette), "width": 2.0}
     return styles
 
 

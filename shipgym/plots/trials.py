@@ -47,7 +47,7 @@ MOST_SAMPLES = 1500
 
 
 def quantity(trial: Trial, name: str) -> Floats | None:
-    """A channel of a trial, or speed (m/s) or drift angle (rad) from u and v; None without them.
+    """Channel of a trial, or speed (m/s) or drift angle (rad); None without them.
 
     The drift angle is positive where the ship moves to port of her heading.
     """
@@ -55,7 +55,8 @@ def quantity(trial: Trial, name: str) -> Floats | None:
         return trial[name]
     if "u" not in trial or "v" not in trial:
         return None
-    u, v = trial["u"], trial["v"]
+    u = trial["u"]
+    v = trial["v"]
     if name == "speed":
         return np.hypot(u, v)
     if name == "drift":
@@ -73,7 +74,7 @@ def history_figure(
     trials: Mapping[str, Trial],
     channels: Sequence[str] = ("psi", "r", "u", "v", "delta"),
 ) -> Figure:
-    """Time histories: a panel for each channel, "speed" or "drift", a line for each trial by its label.
+    """Plot time histories: a panel a channel, a line for each trial by its label.
 
     The trial called "measured" is drawn dark; channels that no trial has are left out;
     InputError if all are.
@@ -97,16 +98,22 @@ def _history(trials: Mapping[str, Trial], channel: str) -> Panel:
     lines = []
     for label, trial in trials.items():
         values = quantity(trial, channel)
-        if values is not None:
-            part = thinned(trial)
-            drawn = factor * values[part]
-            style = {**styles[label], "hovertemplate": "%{y:.3g}"}
-            lines.append(line(trial.t[part], drawn, label, **style))
+        if values is None:
+            continue
+        part = thinned(trial)
+        history = line(
+            trial.t[part],
+            factor * values[part],
+            label,
+            **styles[label],
+            hovertemplate="%{y:.3g}",
+        )
+        lines.append(history)
     return Panel(lines, "time, s", title)
 
 
 def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
-    """Paths seen from above, north up, both axes to one scale, by the label of their line.
+    """Plot paths seen from above, north up, to one scale, by the label of their line.
 
     Trials without x and y are left out; InputError if no trial has a position. Height
     in pixels.
@@ -114,12 +121,18 @@ def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
     styles = line_styles(trials)
     tracks = []
     for label, trial in trials.items():
-        if "x" in trial and "y" in trial:
-            part = thinned(trial)
-            east, north = trial["y"][part], trial["x"][part]
-            tracks.append(line(east, north, label, **styles[label]))
+        if "x" not in trial or "y" not in trial:
+            continue
+        part = thinned(trial)
+        north = trial["x"][part]
+        east = trial["y"][part]
+        track = line(east, north, label, **styles[label])
+        tracks.append(track)
     if not tracks:
         raise InputError("figure: expected a trial with the channels x and y, got none")
-    to_scale = axis(CHANNEL_AXES["x"].title, scaleanchor="x", scaleratio=1)
-    shown = Panel(tracks, CHANNEL_AXES["y"].title, to_scale)
-    return panels([shown], height, hovermode="closest")
+    panel = Panel(
+        tracks,
+        x=CHANNEL_AXES["y"].title,
+        y=axis(CHANNEL_AXES["x"].title, scaleanchor="x", scaleratio=1),
+    )
+    return panels([panel], height, hovermode="closest")

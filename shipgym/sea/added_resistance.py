@@ -29,12 +29,14 @@ def added_resistance(
     """
     hull = hull_of(ship)
     U = min(speed, 0.4 * float(sqrt(GRAVITY * hull.L)))
-    omega = np.asarray(omega, dtype=float)
-    chi = np.asarray(chi, dtype=float)
-    omega, chi = np.broadcast_arrays(omega, chi)
+    omega, chi = np.broadcast_arrays(
+        np.asarray(omega, dtype=float),
+        np.asarray(chi, dtype=float),
+    )
     radiated = _radiated(omega, chi, hull, U)
     reflected = _reflected(omega, chi, hull, end_angle(ship), U)
-    return ship.require("water_density") * GRAVITY * (radiated + reflected)
+    weight_density = ship.require("water_density") * GRAVITY
+    return weight_density * (radiated + reflected)
 
 
 def end_angle(ship: Particulars) -> float:
@@ -66,9 +68,13 @@ def _radiated(omega: Floats, chi: Floats, hull: Hull, U: float) -> Floats:
     d1_above = -566.0 * (L / B) ** -2.66 * 4.0
     d1 = where(below_peak, d1_below, d1_above)
     with np.errstate(over="ignore", under="ignore"):
-        shape = exp(b1 * log(w) + b1 / d1 * (1.0 - w**d1))
+        past_peak = 1.0 - w**d1
+        exponent = b1 * log(w) + b1 / d1 * past_peak
+        shape = exp(exponent)
 
-    scale = 3859.2 * B**2 / L * CB**1.34 * PITCH_GYRADIUS**2
+    k_yy = PITCH_GYRADIUS
+    width = 3859.2 * B**2 / L
+    scale = width * CB**1.34 * k_yy**2
     radiated: Floats = scale * a1 * a2 * shape
     return radiated
 
@@ -83,13 +89,18 @@ def _reduced_frequency(omega: Floats, chi: Floats, hull: Hull, U: float) -> Floa
     L, _, _, CB = hull
     Fr = U / sqrt(GRAVITY * L)
     fullness = (CB / 0.65) ** 0.17
-    fineness = 1.0 - 0.111 / CB * (_slenderness(hull) - log(2.75))
-    by_speed = (-1.377 * Fr**2 + 1.157 * Fr) * abs(cos(chi))
+    slender = _slenderness(hull) - log(2.75)
+    fineness = 1.0 - 0.111 / CB * slender
+    head_on = abs(cos(chi))
+    by_speed = (-1.377 * Fr**2 + 1.157 * Fr) * head_on
     by_direction = 0.618 * (13.0 + cos(2.0 * chi)) / 14.0
 
-    unit = PITCH_GYRADIUS ** (1 / 3) * sqrt(L / (2.0 * pi * GRAVITY))
-    per_omega = 2.142 * unit * fullness * fineness * (by_speed + by_direction)
-    reduced: Floats = per_omega * omega
+    k_yy = PITCH_GYRADIUS
+    period = sqrt(L / (2.0 * pi * GRAVITY))
+    unit = k_yy ** (1 / 3) * period
+    scale = 2.142 * unit * fullness * fineness
+    factor = by_speed + by_direction
+    reduced: Floats = scale * factor * omega
     return reduced
 
 
@@ -100,23 +111,33 @@ def _amplitudes(
 
     Given for waves from ahead to abeam and from astern, linear in the angle between.
     """
-    unit = sqrt(GRAVITY * hull.L)
-    Fr = U / unit
-    bluntness = 0.87 / hull.CB
+    Fr = U / sqrt(GRAVITY * hull.L)
     c = np.maximum(cos(chi), 0.0)
-    a1_ahead = bluntness ** ((1.0 + Fr) * c) * (1.0 + 2.0 * c) / 3.0
+    fuller = (0.87 / hull.CB) ** ((1.0 + Fr) * c)
+    a1_ahead = fuller * (1.0 + 2.0 * c) / 3.0
     a2_ahead = speed_factor(Fr)
-
-    group_velocity = GRAVITY / (2.0 * omega)
-    Fr_over = np.maximum((U - group_velocity) / unit, 0.0)
-    a1_astern = where(Fr_over >= 0.12, bluntness ** (1.0 + Fr_over), bluntness)
-    a2_overtaken = 0.0072 * (2.0 * U / group_velocity - 1.0)
-    a2_astern = where(group_velocity < U, speed_factor(Fr_over), a2_overtaken)
+    a1_astern, a2_astern = _amplitudes_astern(omega, hull, U)
 
     astern = np.clip(chi / (0.5 * pi) - 1.0, 0.0, 1.0)
-    a1 = (1.0 - astern) * a1_ahead + astern * a1_astern
-    a2 = (1.0 - astern) * a2_ahead + astern * a2_astern
+    ahead = 1.0 - astern
+    a1 = ahead * a1_ahead + astern * a1_astern
+    a2 = ahead * a2_ahead + astern * a2_astern
     return a1 / _slenderness(hull), a2
+
+
+def _amplitudes_astern(omega: Floats, hull: Hull, U: float) -> tuple[Floats, Floats]:
+    """Factors a1, still times the slenderness, and a2 in waves from astern."""
+    bluntness = 0.87 / hull.CB
+    group_velocity = GRAVITY / (2.0 * omega)
+    faster = U - group_velocity
+    Fr_over = np.maximum(faster / sqrt(GRAVITY * hull.L), 0.0)
+    fuller = bluntness ** (1.0 + Fr_over)
+    a1 = where(Fr_over >= 0.12, fuller, bluntness)
+
+    overtaking = speed_factor(Fr_over)
+    overtaken = 0.0072 * (2.0 * U / group_velocity - 1.0)
+    a2 = where(group_velocity < U, overtaking, overtaken)
+    return a1, a2
 
 
 def speed_factor(Fr: ArrayLike) -> Floats:
@@ -131,31 +152,40 @@ def _reflected(omega: Floats, chi: Floats, hull: Hull, E: float, U: float) -> Fl
     """Part of the reflection at bow and stern by rho g, equations G-23 to G-31."""
     L, B, T, CB = hull
     c = cos(chi)
-    wave_length = 2.0 * pi * GRAVITY / omega**2
-    longest = 2.5 * L
-
-    def by_draught(draught: Floats | float) -> Floats:
-        depth = draught / wave_length - draught / longest
-        taken_up = 1.0 - exp(-4.0 * pi * depth)
-        return where(wave_length <= longest, taken_up, 0.0)
 
     def side(alpha: Floats) -> Floats:
-        met = c - cos(E) * cos(E + alpha)
-        reflection: Floats = sin(E + alpha) ** 2 + 2.0 * omega * U / GRAVITY * met
+        angle = E + alpha
+        met = c - cos(E) * cos(angle)
+        by_speed = 2.0 * omega * U / GRAVITY * met
+        reflection: Floats = sin(angle) ** 2 + by_speed
         return reflection
 
-    near_bow = where(chi <= pi - E, side(chi), 0.0)
-    far_bow = where(chi <= E, side(-chi), 0.0)
-    near_stern = where(chi >= E, side(-chi), 0.0)
-    far_stern = where(chi >= pi - E, side(chi), 0.0)
+    near = side(chi)
+    far = side(-chi)
+    near_bow = where(chi <= pi - E, near, 0.0)
+    far_bow = where(chi <= E, far, 0.0)
+    near_stern = where(chi >= E, far, 0.0)
+    far_stern = where(chi >= pi - E, near, 0.0)
 
     Fr = U / sqrt(GRAVITY * L)
     ahead = where(chi <= E, c, 0.0)
-    bluntness = (0.87 / CB) ** ((1.0 + 4.0 * sqrt(Fr)) * ahead)
-    bow = by_draught(T) * bluntness * (near_bow + far_bow)
+    power = (1.0 + 4.0 * sqrt(Fr)) * ahead
+    bluntness = (0.87 / CB) ** power
+    bow = _taken_up(omega, T, L) * bluntness * (near_bow + far_bow)
 
     root = sqrt(abs(c))
-    stern_draught = T * (4.0 + root) / 5.0 if CB <= 0.75 else T * (2.0 + root) / 3.0
-    stern = by_draught(stern_draught) * (near_stern + far_stern)
+    stern_draught = T * (2.0 + root) / 3.0
+    if CB <= 0.75:
+        stern_draught = T * (4.0 + root) / 5.0
+    stern = _taken_up(omega, stern_draught, L) * (near_stern + far_stern)
     reflected: Floats = 2.25 / 4.0 * B * (bow - stern)
     return reflected
+
+
+def _taken_up(omega: Floats, draught: Floats | float, length: float) -> Floats:
+    """Part of the waves that an end of some draught reflects; 0 for long waves."""
+    wave_length = 2.0 * pi * GRAVITY / omega**2
+    longest = 2.5 * length
+    depth = draught / wave_length - draught / longest
+    passed = exp(-4.0 * pi * depth)
+    return where(wave_length <= longest, 1.0 - passed, 0.0)

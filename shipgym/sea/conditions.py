@@ -58,7 +58,12 @@ class Weather:
         if state.wind_speed == 0.0:
             return cls(current=current, name=state.name)
         waves = Waves(state.significant_height, state.peak_period, from_deg)
-        return cls(current, Wind(state.wind_speed, from_deg), waves, state.name)
+        return cls(
+            current=current,
+            wind=Wind(state.wind_speed, from_deg),
+            waves=waves,
+            name=state.name,
+        )
 
     @property
     def calm(self) -> bool:
@@ -68,11 +73,7 @@ class Weather:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the parts by name, ready for JSON; :meth:`from_dict` reads it."""
-        content: dict[str, Any] = {"name": self.name}
-        for name in part_types():
-            part = getattr(self, name)
-            content[name] = None if part is None else asdict(part)
-        return content
+        return {"name": self.name, **asdict(self)}
 
     @classmethod
     def from_dict(cls, mapping: Mapping[str, Any], where: str = "weather") -> Weather:
@@ -85,9 +86,11 @@ class Weather:
         table = check_table(mapping, where, ("name", *kinds))
         parts = {}
         for name, kind in kinds.items():
-            if table.get(name) is not None:
-                parts[name] = _read_part(kind, table[name], f"{where} {name}")
-        return cls(**parts, name=table.get("name", "weather"))
+            content = table.get(name)
+            if content is not None:
+                parts[name] = _read_part(kind, content, f"{where} {name}")
+        name = table.get("name", "weather")
+        return cls(**parts, name=name)
 
 
 def part_types() -> dict[str, type[Any]]:
@@ -109,9 +112,14 @@ def _check_part(part: Any, name: str) -> None:
 def _read_part(kind: type[Any], content: Any, where: str) -> Any:
     from shipgym.sea.wind_coefficients import WindTable
 
-    known = [field.name for field in fields(kind)]
-    needed = [field.name for field in fields(kind) if field.default is MISSING]
-    values = dict(check_table(content, where, known, needed))
+    known = fields(kind)
+    table = check_table(
+        content,
+        where,
+        allowed=[field.name for field in known],
+        required=[field.name for field in known if field.default is MISSING],
+    )
+    values = dict(table)
     coefficients = values.get("coefficients")
     if isinstance(coefficients, Mapping):
         place = f"{where} coefficients"

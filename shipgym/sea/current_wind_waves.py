@@ -78,8 +78,11 @@ class Wind:
     def __post_init__(self) -> None:
         _keep_number(self, "wind", "speed", at_least=0.0, at_most=75.0)
         _keep_direction(self, "wind", "from_deg")
-        spectra = ("harris", "davenport", "norsok")
-        check_choice(self.spectrum, spectra, "wind spectrum")
+        check_choice(
+            self.spectrum,
+            ("harris", "davenport", "norsok"),
+            "wind spectrum",
+        )
         check_coefficients(self.coefficients, "wind coefficients")
         check_flag(self.gust, "wind gust")
 
@@ -127,14 +130,18 @@ class Waves:
         _keep_number(self, "waves", "peak_period", above=0.0, at_most=40.0, hint="in s")
         _keep_number(self, "waves", "peak_enhancement", at_least=1.0, at_most=20.0)
         _keep_direction(self, "waves", "from_deg")
-        spectra = ("jonswap", "pierson-moskowitz")
-        check_choice(self.spectrum, spectra, "waves spectrum")
         check_choice(
-            self.spreading, ("cosine-squared", "long-crested"), "waves spreading"
+            self.spectrum,
+            ("jonswap", "pierson-moskowitz"),
+            "waves spectrum",
         )
-
-        length = GRAVITY * self.peak_period**2 / (2.0 * math.pi)
-        highest = length / 10.0
+        check_choice(
+            self.spreading,
+            ("cosine-squared", "long-crested"),
+            "waves spreading",
+        )
+        wave_length = GRAVITY * self.peak_period**2 / (2.0 * math.pi)
+        highest = wave_length / 10.0
         if self.significant_height > highest:
             raise InputError(
                 f"waves significant_height: expected at most {highest:.3g} m with"

@@ -72,29 +72,31 @@ def wave_drift(
     too few; speed in m/s, by default that of service, or 0 where that is not known.
     """
     ship = weather_particulars(particulars)
-    U = (ship.speed or 0.0) if speed is None else speed
-    L = ship.length
+    if speed is None:
+        speed = ship.speed or 0.0
     chi = half_circle()
     omega = frequencies(waves)
     spectrum = wave_spectrum(waves, omega)
 
-    resistance = added_resistance(omega, chi[:, None], ship, U)
+    resistance = added_resistance(omega, chi[:, None], ship, speed)
     surge = -2.0 * trapezoid(resistance * spectrum, omega, axis=-1)
 
     share = draught_attenuation(omega, ship.require("draught"))
     taken_up = float(trapezoid(share * spectrum, omega))
     pressure = ship.require("water_density") * GRAVITY * taken_up
-    sway, yaw = reflection_coefficients(chi, ship)
+    by_length, by_length_squared = reflection_coefficients(chi, ship)
+    sway = by_length * ship.length * pressure
+    yaw = by_length_squared * ship.length**2 * pressure
 
-    time_constant, deviation = slow_drift(waves, ship)
+    variation = slow_drift(waves, ship)
     used = {"block_coefficient", "water_density"}
     return WaveDrift(
         circle(),
         X=over_directions(mirrored(surge), waves),
-        Y=over_directions(mirrored(sway * L * pressure, -1.0), waves),
-        N=over_directions(mirrored(yaw * L**2 * pressure, -1.0), waves),
-        time_constant=time_constant,
-        standard_deviation=deviation,
+        Y=over_directions(mirrored(sway, -1.0), waves),
+        N=over_directions(mirrored(yaw, -1.0), waves),
+        time_constant=variation.time_constant,
+        standard_deviation=variation.standard_deviation,
         estimated=tuple(sorted(ship.estimated & used)),
     )
 
@@ -106,12 +108,14 @@ def waterline(ship: Particulars) -> tuple[Floats, Floats]:
     waterplane coefficient, waterplane area by length * beam, is p / (p + 1) and
     estimated as (1 + 2 CB) / 3 (Schneekluth & Bertram 1998, section 1.6).
     """
-    L, B, _, CB = hull_of(ship)
-    CWP = (1.0 + 2.0 * CB) / 3.0
+    hull = hull_of(ship)
+    CWP = (1.0 + 2.0 * hull.CB) / 3.0
     p = CWP / (1.0 - CWP)
-    xi = cos(np.linspace(0.0, pi, 401))
-    x = 0.5 * L * xi
-    y = 0.5 * B * (1.0 - np.abs(xi) ** p)
+    from_bow = np.linspace(0.0, pi, 401)
+    xi = cos(from_bow)
+    breadth = 1.0 - np.abs(xi) ** p
+    x = 0.5 * hull.L * xi
+    y = 0.5 * hull.B * breadth
     return x, y
 
 
@@ -124,21 +128,32 @@ def reflection_coefficients(chi: ArrayLike, ship: Particulars) -> tuple[Floats, 
     `chi`, rad, is where they come from, seen from the bow. Returns Y by rho g a^2 L / 2
     and N about midship by rho g a^2 L^2 / 2.
     """
-    x, y = waterline(ship)
+    L = ship.length
+    x, half_breadth = waterline(ship)
+    Y_starboard, N_starboard = _reflected(chi, x, half_breadth, side=1.0)
+    Y_port, N_port = _reflected(chi, x, half_breadth, side=-1.0)
+    Y = Y_starboard + Y_port
+    N = N_starboard + N_port
+    return Y / L, N / L**2
+
+
+def _reflected(
+    chi: ArrayLike, x: Floats, half_breadth: Floats, side: float
+) -> tuple[Floats, Floats]:
+    """Sway force and yaw moment on one side, 1 starboard, -1 port, by rho g a^2 / 2."""
+    y = side * half_breadth
     dx = np.diff(x)
     dy = np.diff(y)
     length = np.hypot(dx, dy)
     middle_x = 0.5 * (x[1:] + x[:-1])
     middle_y = 0.5 * (y[1:] + y[:-1])
 
-    Y = np.zeros(np.shape(chi))
-    N = np.zeros(np.shape(chi))
-    for side in (1.0, -1.0):
-        # outward normal
-        nx = dy / length
-        ny = -side * dx / length
-        sine = np.multiply.outer(cos(chi), nx) + np.multiply.outer(sin(chi), ny)
-        force = np.maximum(sine, 0.0) ** 2 * length
-        Y = Y - force @ ny
-        N = N - force @ (middle_x * ny - side * middle_y * nx)
-    return Y / ship.length, N / ship.length**2
+    # outward normal
+    nx = side * dy / length
+    ny = -side * dx / length
+    along = np.multiply.outer(cos(chi), nx)
+    across = np.multiply.outer(sin(chi), ny)
+    sine = np.maximum(along + across, 0.0)
+    force = sine**2 * length
+    lever = middle_x * ny - middle_y * nx
+    return -(force @ ny), -(force @ lever)

@@ -45,14 +45,18 @@ def weather_particulars(particulars: Particulars) -> Particulars:
     Raises InputError, "weather without the particulars it needs", without length, beam,
     draught and mass or block coefficient.
     """
-    missing = [name for name in ("beam", "draught") if particulars[name] is None]
+    missing = []
+    for name in ("beam", "draught"):
+        if particulars[name] is None:
+            missing.append(name)
     if particulars.mass is None and particulars.block_coefficient is None:
         missing.append("block_coefficient (or mass)")
     if missing:
+        listed = ", ".join(missing)
         raise InputError(
-            f"weather without the particulars it needs: {', '.join(missing)} of"
-            f" {particulars.name} is not known, expected in [ship] of the ship file or"
-            " in the model's particulars"
+            f"weather without the particulars it needs: {listed} of {particulars.name}"
+            " is not known, expected in [ship] of the ship file or in the model's"
+            " particulars"
         )
     return with_estimates(particulars.completed(), _ESTIMATES)
 
@@ -102,9 +106,13 @@ def _roll_period(ship: Particulars) -> float:
     L, B, T, _ = hull_of(ship)
     # the Code's length is in metres and of ships: smaller hulls, as models, are taken
     # for one of 100 m
-    C = 0.373 + 0.023 * B / T - 0.043 * max(L, 100.0) / 100.0
+    L = max(L, 100.0)
+    slender = 0.043 * L / 100.0
+    C = 0.373 + 0.023 * B / T - slender
+    C = max(C, 0.3)
     GM = ship.require("metacentric_height")
-    return 2.0 * max(C, 0.3) * B / math.sqrt(GM)
+    root = math.sqrt(GM)
+    return 2.0 * C * B / root
 
 
 _ESTIMATES: Estimates = {  # in this order

@@ -76,14 +76,23 @@ def oscillator_step(turn: float, damping: float, ringing: float) -> OscillatorSt
     p11 = stay + damping * swing
     p22 = stay - damping * swing
 
-    # Cholesky factor of the covariance I - P P', whose entries these are
-    first = 1.0 - p11 * p11 - swing * swing
-    shared = swing * (p11 - p22)
-    second = 1.0 - swing * swing - p22 * p22
-    n22 = sqrt(max(second, SMALLEST_VARIANCE))
-    n12 = shared / n22
-    n11 = sqrt(max(first - n12 * n12, 0.0))
-    return OscillatorStep(p11, swing, p22, n11, n12, n22)
+    # covariance I - P P' of the noise
+    c11 = 1.0 - p11 * p11 - swing * swing
+    c12 = swing * (p11 - p22)
+    c22 = 1.0 - swing * swing - p22 * p22
+
+    # and its Cholesky factor
+    n22 = sqrt(max(c22, SMALLEST_VARIANCE))
+    n12 = c12 / n22
+    n11 = sqrt(max(c11 - n12 * n12, 0.0))
+    return OscillatorStep(
+        p11=p11,
+        p12=swing,
+        p22=p22,
+        n11=n11,
+        n12=n12,
+        n22=n22,
+    )
 
 
 def stepped(
@@ -92,9 +101,11 @@ def stepped(
     """State of an oscillator after a step."""
     z1 = now.displacement
     z2 = now.velocity
-    moved = step.p11 * z1 + step.p12 * z2
-    turned = step.p22 * z2 - step.p12 * z1
+    w1 = first_noise
+    w2 = second_noise
+    displacement = step.p11 * z1 + step.p12 * z2
+    velocity = step.p22 * z2 - step.p12 * z1
     return Oscillator(
-        moved + step.n11 * first_noise + step.n12 * second_noise,
-        turned + step.n22 * second_noise,
+        displacement=displacement + step.n11 * w1 + step.n12 * w2,
+        velocity=velocity + step.n22 * w2,
     )

@@ -12,6 +12,10 @@ from shipgym.sea.current_wind_waves import Wind
 #: Surface drag coefficient of Harris's and Davenport's spectra for a rough sea.
 SURFACE_DRAG = 0.003
 LENGTH_SCALES = {"harris": 1800.0, "davenport": 1200.0}  # m
+#: 2^(2/3) B(1/2, 1/3), with Euler's beta function.
+HARRIS_VARIANCE = 2.0 ** (2.0 / 3.0) * (
+    gamma(1.0 / 2.0) * gamma(1.0 / 3.0) / gamma(5.0 / 6.0)
+)
 
 
 class GaussMarkov(NamedTuple):
@@ -28,7 +32,8 @@ class GaussMarkov(NamedTuple):
         """One-sided spectral density at frequencies in Hz."""
         T = self.time_constant
         variance = self.standard_deviation**2
-        omega = 2.0 * pi * np.asarray(frequency, dtype=float)
+        f = np.asarray(frequency, dtype=float)
+        omega = 2.0 * pi * f
         return 4.0 * variance * T / (1.0 + (omega * T) ** 2)
 
 
@@ -61,9 +66,10 @@ def gust_spectrum(
 def froya_spectrum(f: Floats, speed: float) -> Floats:
     """NORSOK's density at frequencies in Hz (`gust_spectrum`)."""
     n = 0.468
+    power = 5.0 / (3.0 * n)
     relative = speed / 10.0
     y = 172.0 * f * relative**-0.75
-    density: Floats = 320.0 * relative**2 / (1.0 + y**n) ** (5.0 / (3.0 * n))
+    density: Floats = 320.0 * relative**2 / (1.0 + y**n) ** power
     return density
 
 
@@ -78,13 +84,12 @@ def gust_variance(speed: float, spectrum: str = "harris") -> float:
     Harris: 2^(2/3) B(1/2, 1/3) k V^2 = 6.677 k V^2 (B is Euler's beta function);
     Davenport: 6 k V^2; NORSOK: over the band for which it is given.
     """
-    if spectrum == "davenport":
-        return 6.0 * SURFACE_DRAG * speed**2
-    if spectrum == "harris":
-        beta = gamma(1.0 / 2.0) * gamma(1.0 / 3.0) / gamma(5.0 / 6.0)
-        return float(2.0 ** (2.0 / 3.0)) * beta * SURFACE_DRAG * speed**2
-    f = froya_frequencies(400)
-    return float(np.trapezoid(f * froya_spectrum(f, speed), np.log(f)))
+    if spectrum == "norsok":
+        f = froya_frequencies(400)
+        energy = f * froya_spectrum(f, speed)
+        return float(np.trapezoid(energy, np.log(f)))
+    factor = HARRIS_VARIANCE if spectrum == "harris" else 6.0
+    return factor * SURFACE_DRAG * speed**2
 
 
 def gust_filter(wind: Wind) -> GaussMarkov:
@@ -97,12 +102,18 @@ def gust_filter(wind: Wind) -> GaussMarkov:
     """
     if not wind.gust or wind.calm:
         return GaussMarkov(1.0, 0.0)
-    if wind.spectrum == "norsok":
+    V = wind.speed
+    spectrum = wind.spectrum
+    if spectrum == "norsok":
         f = froya_frequencies(2000)
-        energy = f * froya_spectrum(f, wind.speed)
-        peak = float(f[np.argmax(energy)])
+        energy = f * froya_spectrum(f, V)
+        largest = np.argmax(energy)
+        peak = float(f[largest])
     else:
-        peak = sqrt(3.0) * wind.speed / LENGTH_SCALES[wind.spectrum]
-    time_constant = 1.0 / (2.0 * pi * peak)
-    deviation = sqrt(gust_variance(wind.speed, wind.spectrum))
-    return GaussMarkov(time_constant, deviation)
+        L = LENGTH_SCALES[spectrum]
+        peak = sqrt(3.0) * V / L
+    variance = gust_variance(V, spectrum)
+    return GaussMarkov(
+        time_constant=1.0 / (2.0 * pi * peak),
+        standard_deviation=sqrt(variance),
+    )

@@ -1,5 +1,7 @@
 """Inverse of a ship's inertia, which makes accelerations of the forces of weather."""
 
+from collections.abc import Collection
+
 import numpy as np
 
 from shipgym.arrays import Floats
@@ -42,12 +44,12 @@ def mobility_matrix(model: ManoeuvringModel, water_depth: float = np.inf) -> Flo
 
 def _axes(model: ManoeuvringModel) -> list[int]:
     """Axes in which a model moves: 0 surge, 1 sway, 2 yaw, 3 roll."""
-    if not isinstance(model.dynamics, Structure):
-        return [0, 1, 2, 3] if "phi" in model.state_names else [0, 1, 2]
-    weather_particulars(model.particulars)  # raises for those that are missing
-    velocities = "uvrp"
-    equations = [name for name in model.dynamics.equations if name in velocities]
-    return [velocities.index(name) for name in equations]
+    velocities = ("u", "v", "r", "p")
+    moving: Collection[str] = model.state_names
+    if isinstance(model.dynamics, Structure):
+        weather_particulars(model.particulars)  # raises for those that are missing
+        moving = model.dynamics.equations
+    return [axis for axis, name in enumerate(velocities) if name in moving]
 
 
 def roll_inertia(model: ManoeuvringModel) -> float:
@@ -59,7 +61,11 @@ def roll_inertia(model: ManoeuvringModel) -> float:
 
 def _container_roll(model: ManoeuvringModel, mass: Floats) -> Floats:
     """Row of roll in Son & Nomoto's equations, whose inertia is symmetric."""
-    density = model.particulars.require("water_density")
-    unit = 0.5 * density * model.particulars.length**5
-    prime = model.coefficients["Ix"] + model.coefficients["Jx"]
-    return np.array([0.0, mass[1, 3], 0.0, prime * unit])
+    c = model.coefficients
+    p = model.particulars
+    unit = 0.5 * p.require("water_density") * p.length**5
+    prime = c["Ix"] + c["Jx"]
+    row = np.zeros(4)
+    row[1] = mass[1, 3]
+    row[3] = prime * unit
+    return row

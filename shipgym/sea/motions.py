@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.sea.current_wind_waves import Waves
-from shipgym.sea.estimates import hull_of, weather_particulars
+from shipgym.sea.estimates import Hull, hull_of, weather_particulars
 from shipgym.sea.harmonics import circle, cosine_coefficients, half_circle, mirrored
 from shipgym.sea.waves import (
     encounter_frequency,
@@ -34,11 +34,13 @@ def heading_response(
     """
     from scipy.special import spherical_jn
 
-    L, _, T, _ = hull_of(particulars)
+    hull = hull_of(particulars)
     k = wave_number(omega)
-    q = abs(0.5 * k * L * cos(chi))
-    sideways = abs(sin(chi)) * exp(-0.5 * k * T)
-    return sideways * 6.0 / L * abs(spherical_jn(1, q))
+    q = abs(0.5 * k * hull.L * cos(chi))
+    attenuation = exp(-0.5 * k * hull.T)
+    sideways = abs(sin(chi)) * attenuation
+    over_length = abs(spherical_jn(1, q))
+    return sideways * 6.0 / hull.L * over_length
 
 
 def roll_response(
@@ -54,17 +56,24 @@ def roll_response(
     a ship under way, with bilge keels (0.05 to 0.15 in the literature). Arguments are
     those of :func:`heading_response`, and the speed, m/s.
     """
-    L, B, T, _ = hull_of(particulars)
-    k = wave_number(omega)
-    over_length = sinc(0.5 * k * L * cos(chi) / pi)
-    over_beam = sinc(0.5 * k * B * sin(chi) / pi)
-    across = abs(sin(chi) * over_length * over_beam)
-    slope = k * across * exp(-0.5 * k * T)
-
+    slope = _effective_wave_slope(omega, chi, hull_of(particulars))
     natural = 2.0 * pi / particulars.require("roll_period")
     a = encounter_frequency(omega, speed, chi) / natural
     z = 0.1
     return slope / np.hypot(1.0 - a * a, 2.0 * z * a)
+
+
+def _effective_wave_slope(omega: ArrayLike, chi: ArrayLike, hull: Hull) -> Floats:
+    """Slope of the waves across a hull, averaged over it, by their amplitude, rad/m."""
+    k = wave_number(omega)
+    sine = sin(chi)
+    cosine = cos(chi)
+    half_k = 0.5 * k
+    over_length = sinc(half_k * hull.L * cosine / pi)
+    over_beam = sinc(half_k * hull.B * sine / pi)
+    across = abs(sine * over_length * over_beam)
+    attenuation = exp(-half_k * hull.T)
+    return k * across * attenuation
 
 
 @dataclass(frozen=True)

@@ -132,12 +132,16 @@ def relative_wind(
     speed = p.wind_speed + sea.gust
     north = speed * sea.wind_north + sea.current_north
     east = speed * sea.wind_east + sea.current_east
-    ahead = north * cosine + east * sine + motion.u
-    aside = east * cosine - north * sine + motion.v
+    from_ahead = north * cosine + east * sine
+    from_aside = east * cosine - north * sine
+    ahead = from_ahead + motion.u
+    aside = from_aside + motion.v
 
     squared = ahead * ahead + aside * aside
-    per_speed = 1.0 / sqrt(max(squared, SLOWEST_WIND * SLOWEST_WIND))
-    return RelativeWind(squared, FromBow(ahead * per_speed, aside * per_speed))
+    least = SLOWEST_WIND * SLOWEST_WIND
+    per_speed = 1.0 / sqrt(max(squared, least))
+    angle = FromBow(cosine=ahead * per_speed, sine=aside * per_speed)
+    return RelativeWind(squared, angle)
 
 
 def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
@@ -145,14 +149,15 @@ def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
     if not HAS_SEA:
         return Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     sine, cosine = sin_cos(motion.psi)
-    wind = by_wind(motion, relative_wind(motion, sine, cosine, sea, p), p)
+    felt = relative_wind(motion, sine, cosine, sea, p)
+    wind = by_wind(motion, felt, p)
     waves = from_bow(sine, cosine, sea.waves_north, sea.waves_east)
     drift = by_waves(waves, 1.0 + sea.drift, p)
     return Push(
         wind.surge + drift.surge,
         wind.sway + drift.sway,
         wind.yaw + drift.yaw,
-        wind.roll + drift.roll if HAS_ROLL else 0.0,
+        wind.roll + drift.roll,
         sea.current_north,
         sea.current_east,
     )
@@ -162,24 +167,38 @@ def by_wind(motion: Motion, wind: RelativeWind, p: SeaParameters) -> Acceleratio
     """Accelerations by the relative wind, beyond those that the model has of itself."""
     cosine, sine = wind.angle
     squared = wind.squared_speed
+    # the model's own surge has the resistance of still air already
     still_air = motion.u * fabs(motion.u) * p.still_air
+    surge = squared * sum_of_cosines(cosine, p.wind_surge)
+    roll = 0.0
+    if HAS_ROLL:
+        roll = squared * sum_of_sines(cosine, sine, p.wind_roll)
     return Accelerations(
-        surge=squared * sum_of_cosines(cosine, p.wind_surge) + still_air,
+        surge=surge + still_air,
         sway=squared * sum_of_sines(cosine, sine, p.wind_sway),
         yaw=squared * sum_of_sines(cosine, sine, p.wind_yaw),
-        roll=squared * sum_of_sines(cosine, sine, p.wind_roll) if HAS_ROLL else 0.0,
+        roll=roll,
     )
 
 
 def by_waves(waves: FromBow, drift: float, p: SeaParameters) -> Accelerations:
     """Accelerations by the drift force, which is `drift` times its mean."""
     cosine, sine = waves
+    roll = 0.0
+    if HAS_ROLL:
+        roll = drift * sum_of_sines(cosine, sine, p.drift_roll)
     return Accelerations(
         surge=drift * sum_of_cosines(cosine, p.drift_surge),
         sway=drift * sum_of_sines(cosine, sine, p.drift_sway),
         yaw=drift * sum_of_sines(cosine, sine, p.drift_yaw),
-        roll=drift * sum_of_sines(cosine, sine, p.drift_roll) if HAS_ROLL else 0.0,
+        roll=roll,
     )
+
+
+def waves_from_bow(motion: Motion, sea: Sea) -> FromBow:
+    """Angle from the bow to where the waves come from."""
+    sine, cosine = sin_cos(motion.psi)
+    return from_bow(sine, cosine, sea.waves_north, sea.waves_east)
 
 
 def encounter(waves: FromBow, u: float, v: float, p: SeaParameters) -> float:
@@ -193,8 +212,7 @@ def encounter_frequency(motion: Motion, sea: Sea, p: SeaParameters) -> float:
     """Frequency at which a ship meets the waves, rad/s; 0 in calm water."""
     if not HAS_SEA:
         return 0.0
-    sine, cosine = sin_cos(motion.psi)
-    waves = from_bow(sine, cosine, sea.waves_north, sea.waves_east)
+    waves = waves_from_bow(motion, sea)
     return encounter(waves, motion.u, motion.v, p)
 
 
@@ -212,14 +230,18 @@ def first_order_motion(
     part of it that swings, -w times the displacement: of variance w^2 and a quarter of
     a period ahead, as in waves of one frequency.
     """
-    yaw = sqrt(max(sum_of_cosines(waves.cosine, p.heading_variance), 0.0))
-    psi = yaw * heading.velocity
-    r = -yaw * frequency * heading.displacement
-    if not HAS_ROLL:
-        return FirstOrderMotion(psi, r, 0.0, 0.0)
-    heel = sqrt(max(sum_of_cosines(waves.cosine, p.roll_variance), 0.0))
-    phi = heel * roll.velocity
-    return FirstOrderMotion(psi, r, phi, -heel * frequency * roll.displacement)
+    variance = sum_of_cosines(waves.cosine, p.heading_variance)
+    yaw = sqrt(max(variance, 0.0))
+    heel = 0.0
+    if HAS_ROLL:
+        variance = sum_of_cosines(waves.cosine, p.roll_variance)
+        heel = sqrt(max(variance, 0.0))
+    return FirstOrderMotion(
+        psi=yaw * heading.velocity,
+        r=-yaw * frequency * heading.displacement,
+        phi=heel * roll.velocity,
+        p=-heel * frequency * roll.displacement,
+    )
 
 
 def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> Sea:
@@ -228,8 +250,7 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
     `motion` is the ship at the end of the step, `sea` that at its beginning, `word`
     (uint64) the state of its random numbers, which then goes on by `EVOLVE_WORDS`.
     """
-    sine, cosine = sin_cos(motion.psi)
-    waves = from_bow(sine, cosine, sea.waves_north, sea.waves_east)
+    waves = waves_from_bow(motion, sea)
     frequency = encounter(waves, motion.u, motion.v, p)
 
     step = oscillator_step(frequency * h, p.wave_damping, p.wave_ringing)
@@ -241,12 +262,6 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
         roll = stepped(roll, normal(word, DRAW[6]), normal(word, DRAW[7]), step)
     first_order = first_order_motion(waves, frequency, heading, roll, p)
 
-    north = first_order_step(
-        sea.current_north, sea.mean_north, p.current, normal(word, DRAW[0])
-    )
-    east = first_order_step(
-        sea.current_east, sea.mean_east, p.current, normal(word, DRAW[1])
-    )
     return Sea(
         mean_north=sea.mean_north,
         mean_east=sea.mean_east,
@@ -254,10 +269,30 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
         wind_east=sea.wind_east,
         waves_north=sea.waves_north,
         waves_east=sea.waves_east,
-        current_north=north,
-        current_east=east,
-        gust=first_order_step(sea.gust, 0.0, p.gust, normal(word, DRAW[2])),
-        drift=first_order_step(sea.drift, 0.0, p.drift, normal(word, DRAW[3])),
+        current_north=first_order_step(
+            sea.current_north,
+            sea.mean_north,
+            p.current,
+            normal(word, DRAW[0]),
+        ),
+        current_east=first_order_step(
+            sea.current_east,
+            sea.mean_east,
+            p.current,
+            normal(word, DRAW[1]),
+        ),
+        gust=first_order_step(
+            sea.gust,
+            0.0,
+            p.gust,
+            normal(word, DRAW[2]),
+        ),
+        drift=first_order_step(
+            sea.drift,
+            0.0,
+            p.drift,
+            normal(word, DRAW[3]),
+        ),
         heading_displacement=heading.displacement,
         heading_velocity=heading.velocity,
         roll_displacement=roll.displacement,
@@ -281,14 +316,27 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
     The weather begins as if it had always been there. Wind and waves without a
     direction come from the same one. `word` then goes on by `BEGIN_WORDS`.
     """
-    towards_east, towards_north = sin_cos(direction(p.current_towards, word, DRAW[0]))
-    wind_east, wind_north = sin_cos(direction(p.wind_from, word, DRAW[1]))
-    waves_east, waves_north = sin_cos(direction(p.waves_from, word, DRAW[1]))
+    current_towards = direction(p.current_towards, word, DRAW[0])
+    towards_east, towards_north = sin_cos(current_towards)
     mean_north = p.current_speed * towards_north
     mean_east = p.current_speed * towards_east
+    north = p.current.deviation * normal(word, DRAW[2])
+    east = p.current.deviation * normal(word, DRAW[3])
 
-    heading = Oscillator(normal(word, DRAW[6]), normal(word, DRAW[7]))
-    roll = Oscillator(normal(word, DRAW[8]), normal(word, DRAW[9]))
+    # wind and waves of open direction come from the same one
+    wind_from = direction(p.wind_from, word, DRAW[1])
+    waves_from = direction(p.waves_from, word, DRAW[1])
+    wind_east, wind_north = sin_cos(wind_from)
+    waves_east, waves_north = sin_cos(waves_from)
+
+    heading = Oscillator(
+        displacement=normal(word, DRAW[6]),
+        velocity=normal(word, DRAW[7]),
+    )
+    roll = Oscillator(
+        displacement=normal(word, DRAW[8]),
+        velocity=normal(word, DRAW[9]),
+    )
     sine, cosine = sin_cos(motion.psi)
     waves = from_bow(sine, cosine, waves_north, waves_east)
     frequency = encounter(waves, motion.u, motion.v, p)
@@ -300,8 +348,8 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
         wind_east=wind_east,
         waves_north=waves_north,
         waves_east=waves_east,
-        current_north=mean_north + p.current.deviation * normal(word, DRAW[2]),
-        current_east=mean_east + p.current.deviation * normal(word, DRAW[3]),
+        current_north=mean_north + north,
+        current_east=mean_east + east,
         gust=p.gust.deviation * normal(word, DRAW[4]),
         drift=p.drift.deviation * normal(word, DRAW[5]),
         heading_displacement=heading.displacement,
@@ -335,7 +383,7 @@ def sea_functions(windy: bool) -> dict[str, Any]:
 
 
 def sea_hooks(windy: bool, lanes: int = LANES) -> dict[str, Any]:
-    """Return `sea_functions`, and those that load state and parameters, a vector for all.
+    """Return `sea_functions`, and those that load state and parameters of all ships.
 
     `lanes` are those of a tile of states, 64, or 1 where they are vectors.
     """

@@ -28,13 +28,12 @@ def sea_states() -> dict[str, SeaState]:
     ships to the natural environment, Naval Engineers Journal 95(2), open ocean North
     Atlantic (also Lee & Bales, STANAG 4194).
     """
-    states = (
-        SeaState("calm", 0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        SeaState("slight", 3, 0.5, 1.25, 0.88, 7.5, wind_at_10_m(13.5)),
-        SeaState("moderate", 4, 1.25, 2.5, 1.88, 8.8, wind_at_10_m(19.0)),
-        SeaState("rough", 5, 2.5, 4.0, 3.25, 9.7, wind_at_10_m(24.5)),
-    )
-    return {state.name: state for state in states}
+    return {
+        "calm": SeaState("calm", 0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        "slight": SeaState("slight", 3, 0.5, 1.25, 0.88, 7.5, wind_at_10_m(13.5)),
+        "moderate": SeaState("moderate", 4, 1.25, 2.5, 1.88, 8.8, wind_at_10_m(19.0)),
+        "rough": SeaState("rough", 5, 2.5, 4.0, 3.25, 9.7, wind_at_10_m(24.5)),
+    }
 
 
 def wind_at_10_m(knots: float) -> float:
@@ -50,13 +49,17 @@ def find_sea_state(name: str | int) -> SeaState:
     """Sea state by its name or WMO code; InputError for one that is not there."""
     states = sea_states()
     for state in states.values():
-        if not isinstance(name, bool) and name in (state.name, state.code):
+        if name in (state.name, state.code) and not isinstance(name, bool):
             return state
 
-    codes = ", ".join(str(state.code) for state in states.values())
-    hint = did_you_mean(name, states) if isinstance(name, str) else ""
+    hint = ""
+    if isinstance(name, str):
+        hint = did_you_mean(name, states)
+    names = quoted(states)
+    codes = [str(state.code) for state in states.values()]
+    listed = ", ".join(codes)
     raise InputError(
-        f"sea state: expected one of {quoted(states)}, or their WMO codes {codes}, got"
+        f"sea state: expected one of {names}, or their WMO codes {listed}, got"
         f" {name!r}; for another sea give Weather(wind=Wind(...), waves=Waves(...))"
         f".{hint}"
     )

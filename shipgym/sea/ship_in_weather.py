@@ -88,11 +88,12 @@ def with_waves(
 def discrete(process: GaussMarkov, step: float) -> Filter:
     """First-order process in steps of so many seconds."""
     steps = step / process.time_constant
-    added = np.sqrt(-np.expm1(-2.0 * steps))
+    deviation = process.standard_deviation
+    added = float(np.sqrt(-np.expm1(-2.0 * steps)))
     return Filter(
         kept=float(np.exp(-steps)),
-        shock=process.standard_deviation * float(added),
-        deviation=process.standard_deviation,
+        shock=deviation * added,
+        deviation=deviation,
     )
 
 

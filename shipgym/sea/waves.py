@@ -34,7 +34,8 @@ class WaveFilter(NamedTuple):
         w0 = self.peak_frequency
         stiffness = w0**2 - w**2
         damping = 2.0 * self.damping * w0 * w
-        response = (self.gain * w) ** 2 / (stiffness**2 + damping**2)
+        amplitude = self.gain * w
+        response = amplitude**2 / (stiffness**2 + damping**2)
         return response / pi
 
 
@@ -47,8 +48,10 @@ def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
     peak = 2.0 * pi / Tp
     # the density is 0 below a fiftieth of the peak: exp(-1.25 * 50^4)
     ratio = np.maximum(omega, 0.02 * peak) / peak
-    tail = 5.0 / 16.0 * Hs**2 / peak * ratio**-5
-    density: Floats = tail * exp(-1.25 * ratio**-4)
+    scale = 5.0 / 16.0 * Hs**2 / peak
+    tail = ratio**-5
+    cut_off = exp(-1.25 * ratio**-4)
+    density: Floats = scale * tail * cut_off
     return density
 
 
@@ -74,11 +77,13 @@ def _enhancement(ratio: Floats, gamma: float) -> Floats:
 @lru_cache(maxsize=64)
 def _enhanced_variance(gamma: float) -> float:
     """Variance with peak enhancement by that without."""
-    logarithm = np.linspace(log(0.2), log(50.0), 4001)
-    ratio = exp(logarithm)
-    plain = pierson_moskowitz(ratio, 4.0, 2.0 * pi) * ratio
+    log_ratio = np.linspace(log(0.2), log(50.0), 4001)
+    ratio = exp(log_ratio)
+    plain = ratio * pierson_moskowitz(ratio, 4.0, 2.0 * pi)
     enhanced = plain * _enhancement(ratio, gamma)
-    return float(trapezoid(enhanced, logarithm) / trapezoid(plain, logarithm))
+    variance = trapezoid(plain, log_ratio)
+    enhanced_variance = trapezoid(enhanced, log_ratio)
+    return float(enhanced_variance / variance)
 
 
 def wave_spectrum(waves: Waves, omega: ArrayLike) -> Floats:
@@ -105,10 +110,12 @@ def over_directions(curve: Floats, waves: Waves) -> Floats:
     """
     if waves.spreading == "long-crested":
         return curve
-    toward = cos(circle(len(curve)))
-    weight = where(toward > 0.0, toward**2, 0.0)
-    convolution = rfft(curve) * rfft(weight / weight.sum())
-    return irfft(convolution, n=len(curve))
+    n = len(curve)
+    toward = cos(circle(n))
+    energy = where(toward > 0.0, toward**2, 0.0)
+    weight = energy / energy.sum()
+    convolution = rfft(curve) * rfft(weight)
+    return irfft(convolution, n=n)
 
 
 def encounter_frequency(omega: ArrayLike, speed: ArrayLike, chi: ArrayLike) -> Floats:
@@ -162,9 +169,11 @@ def draught_attenuation(omega: ArrayLike, draught: float) -> Floats:
     from scipy.special import i1e, k1e
 
     kT = wave_number(omega) * draught
+    # of the exponentially scaled functions; larger arguments would underflow
     scale = exp(-2.0 * np.minimum(kT, 300.0))
     K1_by_I1 = k1e(kT) * scale / i1e(kT)
-    return 1.0 / (1.0 + (K1_by_I1 / pi) ** 2)
+    ratio = K1_by_I1 / pi
+    return 1.0 / (1.0 + ratio**2)
 
 
 def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
@@ -183,9 +192,14 @@ def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
     if waves.calm:
         return GaussMarkov(1.0, 0.0)
     omega = frequencies(waves)
-    draught = weather_particulars(particulars).require("draught")
+    ship = weather_particulars(particulars)
+    draught = ship.require("draught")
     # the height does not matter
     shape = jonswap(omega, 1.0, waves.peak_period, waves.gamma)
     Sc = shape * draught_attenuation(omega, draught)
-    time_constant = pi * trapezoid(Sc**2, omega) / trapezoid(Sc, omega) ** 2
-    return GaussMarkov(float(time_constant), 1.0)
+    mean = trapezoid(Sc, omega)
+    time_constant = pi * trapezoid(Sc**2, omega) / mean**2
+    return GaussMarkov(
+        time_constant=float(time_constant),
+        standard_deviation=1.0,
+    )

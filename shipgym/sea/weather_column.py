@@ -52,10 +52,13 @@ def weather_column(
     from shipgym.sea.ship_in_weather import with_current, with_waves, with_wind
 
     sea = CALM
-    if weather.current is not None and not weather.current.calm:
-        sea = with_current(sea, weather.current, step)
-    if weather.wind is not None and not weather.wind.calm:
-        sea = with_wind(sea, model, weather.wind, step, water_depth)
-    if weather.waves is not None and not weather.waves.calm:
-        sea = with_waves(sea, model, weather.waves, step, water_depth)
+    current = weather.current
+    if current is not None and not current.calm:
+        sea = with_current(sea, current, step)
+    wind = weather.wind
+    if wind is not None and not wind.calm:
+        sea = with_wind(sea, model, wind, step, water_depth)
+    waves = weather.waves
+    if waves is not None and not waves.calm:
+        sea = with_waves(sea, model, waves, step, water_depth)
     return np.array(flat(sea))

@@ -114,10 +114,14 @@ def _coefficients(
     if coefficients == "isherwood":
         return _isherwood(ship, angle), height
 
-    row = BLENDERMANN[blendermann_type(coefficients, ship.require("block_coefficient"))]
-    area_ratio = ship.require("frontal_area") / lateral
-    centroid_ratio = ship.require("lateral_centroid") / length
-    return blendermann_coefficients(row, angle, area_ratio, centroid_ratio), height
+    type_of_ship = blendermann_type(coefficients, ship.require("block_coefficient"))
+    found = blendermann_coefficients(
+        BLENDERMANN[type_of_ship],
+        angle,
+        area_ratio=ship.require("frontal_area") / lateral,
+        centroid_ratio=ship.require("lateral_centroid") / length,
+    )
+    return found, height
 
 
 def _isherwood(ship: Particulars, angle: Floats) -> WindCoefficients:
@@ -142,4 +146,9 @@ def _isherwood(ship: Particulars, angle: Floats) -> WindCoefficients:
     )
     given_at = np.radians(np.arange(0, 181, 10))
     CX, CY, CN = (np.interp(angle, given_at, row) for row in rows)
-    return WindCoefficients(CX, CY, CN, CY)
+    return WindCoefficients(
+        CX=CX,
+        CY=CY,
+        CN=CN,
+        CK=CY,
+    )

@@ -93,8 +93,9 @@ class WindTable:
 
     def _check_angles(self) -> None:
         angles = self.angles_deg
-        rising = len(angles) >= 3 and bool(np.all(np.diff(angles) > 0.0))
-        if not rising or angles[0] != 0.0 or angles[-1] != 180.0:
+        enough = len(angles) >= 3
+        rising = np.all(np.diff(angles) > 0.0)
+        if not (enough and rising and angles[0] == 0.0 and angles[-1] == 180.0):
             raise InputError(
                 "wind table angles_deg: expected at least three that rise from 0 to"
                 f" 180, got {angles}"
@@ -123,14 +124,26 @@ class WindTable:
     ) -> WindTable:
         """Read a table from JSON; InputError for an unknown or missing row."""
         needed = ("angles_deg", "CX", "CY", "CN")
-        return cls(**check_table(mapping, where, (*needed, "CK"), needed))
+        table = check_table(
+            mapping,
+            where,
+            allowed=(*needed, "CK"),
+            required=needed,
+        )
+        return cls(**table)
 
     def at(self, angle: Floats) -> WindCoefficients:
         """Coefficients at angles from 0 to pi, straight between those of the table."""
-        CK = self.CK or (0.0,) * len(self.angles_deg)
-        rows = (self.CX, self.CY, self.CN, CK)
-        found = [interp(degrees(angle), self.angles_deg, row) for row in rows]
-        return WindCoefficients(*found)
+        at = degrees(angle)
+        CK = np.zeros_like(at)
+        if self.CK is not None:
+            CK = interp(at, self.angles_deg, self.CK)
+        return WindCoefficients(
+            CX=interp(at, self.angles_deg, self.CX),
+            CY=interp(at, self.angles_deg, self.CY),
+            CN=interp(at, self.angles_deg, self.CN),
+            CK=CK,
+        )
 
 
 def _numbers(values: Any, where: str) -> tuple[float, ...]:
@@ -152,7 +165,9 @@ def check_coefficients(value: Any, where: str) -> None:
     names = coefficient_names()
     if isinstance(value, str) and value in names:
         return
-    hint = did_you_mean(value, names) if isinstance(value, str) else ""
+    hint = ""
+    if isinstance(value, str):
+        hint = did_you_mean(value, names)
     raise InputError(
         f"{where}: expected a WindTable or one of {quoted(names)}, got {value!r}.{hint}"
     )
@@ -184,16 +199,20 @@ def blendermann_coefficients(
     centroid of the lateral area forward of midship by length overall. CK is by lateral
     area and the height of its centroid.
     """
-    CD_t, CD_l_bow, CD_l_stern, delta, kappa = row
-    CD_l_AF = where(angle <= pi / 2, CD_l_bow, CD_l_stern)
+    CD_l_AF = where(angle <= pi / 2, row.CD_l_bow, row.CD_l_stern)
     CD_l = CD_l_AF * area_ratio
-    cross = 0.5 * delta * (1.0 - CD_l / CD_t)
-    denominator = 1.0 - cross * sin(2.0 * angle) ** 2
+    cross_force = 0.5 * row.delta * (1.0 - CD_l / row.CD_t)
+    oblique = sin(2.0 * angle) ** 2
+    denominator = 1.0 - cross_force * oblique
 
-    CX = -CD_l_AF * cos(angle) / denominator
-    CY = CD_t * sin(angle) / denominator
-    CN = (centroid_ratio - 0.18 * (angle - pi / 2)) * CY
-    return WindCoefficients(CX, CY, CN, kappa * CY)
+    CY = row.CD_t * sin(angle) / denominator
+    lever = centroid_ratio - 0.18 * (angle - pi / 2)
+    return WindCoefficients(
+        CX=-CD_l_AF * cos(angle) / denominator,
+        CY=CY,
+        CN=lever * CY,
+        CK=row.kappa * CY,
+    )
 
 
 def isherwood_coefficients(

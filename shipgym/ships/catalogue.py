@@ -48,7 +48,7 @@ def model_of(
     )
 
 
-# ---- reference ships -------------------------------------------------------------------
+# ---- reference ships -----------------------------------------------------------------
 
 
 def mariner() -> ShipModel:
@@ -73,7 +73,7 @@ def tanker(rudder_limit_deg: float = 35.0) -> ShipModel:
 
 
 def kvlcc2(form: Form = "published") -> ShipModel:
-    """KVLCC2 at full scale, 320 m: the MMG standard method, or shipmmg 0.0.11's variant."""
+    """KVLCC2 at full scale, 320 m: MMG standard method, or shipmmg 0.0.11's variant."""
     from shipgym.ships import kvlcc2 as file
 
     model = kvlcc2_l7(form)
@@ -91,9 +91,13 @@ def kvlcc2(form: Form = "published") -> ShipModel:
 def kvlcc2_l7(form: Form = "published") -> ShipModel:
     """KVLCC2 as a model of 7 m; `form` as in `kvlcc2`."""
     ship = get_equations("kvlcc2")
-    model = model_of(ship, {"PACKAGE_FORM": float(form == "shipmmg")})
-    provenance = {"source": ship.source, "form": form}
-    return replace(model, name="kvlcc2-l7", provenance=provenance)
+    package_form = float(form == "shipmmg")
+    model = model_of(ship, {"PACKAGE_FORM": package_form})
+    return replace(
+        model,
+        name="kvlcc2-l7",
+        provenance={"source": ship.source, "form": form},
+    )
 
 
 REFERENCE_SHIPS: dict[str, Callable[[], ShipModel]] = {
@@ -105,7 +109,7 @@ REFERENCE_SHIPS: dict[str, Callable[[], ShipModel]] = {
 }
 
 
-# ---- by name or file -------------------------------------------------------------------
+# ---- by name or file -----------------------------------------------------------------
 
 
 def list_models() -> list[str]:
@@ -127,7 +131,11 @@ def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
     new = ship if isinstance(ship, ShipEquations) else read_ship_equations(ship)
     registered = REGISTERED_EQUATIONS.get(new.name)
     again = registered is not None and registered.path == new.path
-    taken = (*list_models(), *list_equations(), *list_structures())
+    taken = [
+        *list_models(),
+        *list_equations(),
+        *list_structures(),
+    ]
     if not again and new.name in taken:
         raise InputError(
             f"{new.path or 'register_ship_equations'}: name: expected a new one, got"
@@ -179,21 +187,23 @@ def truth_of(model: str | Path | ShipModel) -> ShipModel:
     >>> truth_of("mariner-tls-svm").name
     'mariner'
     """
-    given = model if isinstance(model, ShipModel) else load_model(model)
-    provenance = given.provenance or {}
+    if not isinstance(model, ShipModel):
+        model = load_model(model)
+    provenance = model.provenance or {}
     name = str(provenance.get("truth"))
     if name in REFERENCE_SHIPS:
         ship = REFERENCE_SHIPS[name]()
-        if ship.particulars.length == given.particulars.length:
+        length = model.particulars.length
+        if ship.particulars.length == length:
             return ship
     raise InputError(
-        f"model {given.name!r}: provenance.truth: expected the reference ship of her"
+        f"model {model.name!r}: provenance.truth: expected the reference ship of her"
         f" size behind the trials, as 'mariner-tls-svm' names it, got {name!r};"
         " evaluate on a ship that you name yourself"
     )
 
 
-# ---- grey boxes ------------------------------------------------------------------------
+# ---- grey boxes ----------------------------------------------------------------------
 
 
 def grey_box(
@@ -221,13 +231,21 @@ def grey_box(
         if isinstance(terms, str):
             terms = read_terms(terms)
         table[equation] = tuple(terms)
+
     bare = replace(ship, covariance=None, envelope=None, provenance=None)
-    known = "n" in ship.command_names if shaft is None else shaft
-    return GreyBox(name, SOURCE, table, "service", "acceleration", bare, known)
+    return GreyBox(
+        name=name,
+        source=SOURCE,
+        equations=table,
+        normalisation="service",
+        quantity="acceleration",
+        reference=bare,
+        shaft="n" in ship.command_names if shaft is None else shaft,
+    )
 
 
 def fitted_box(ship: ShipModel) -> GreyBox:
-    """Grey box on a model of the same ship, whose covariance and provenance it keeps."""
+    """Grey box on a model of the same ship, with its covariance and provenance."""
     reference = replace(ship, name=f"{ship.name}, {ship.structure}", envelope=None)
     return replace(grey_box(ship), reference=reference)
 

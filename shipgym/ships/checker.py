@@ -53,41 +53,48 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
     """
     name = str(model)
     try:
-        model = model if isinstance(model, ShipModel) else load_model(model)
+        if not isinstance(model, ShipModel):
+            model = load_model(model)
         name = model.name
         model.ship_numbers()
         problems = list(_wrong_accelerations(model))
     except InputError as error:  # a file, numbers or equations that cannot be used
         return ModelCheck(name, (str(error),), asymmetry=float("nan"))
+
     remarks: list[str] = []
     asymmetry = float("nan")
     if not problems:
         asymmetry = _asymmetry(model)
-        problems += [*_wrong_courses(model), *_wrong_rudder(model)]
+        problems += _wrong_courses(model)
+        problems += _wrong_rudder(model)
         remarks += _unusual(model, asymmetry)
     problems += _wrong_covariance(model)
-    return ModelCheck(name, tuple(problems), tuple(remarks), asymmetry=asymmetry)
+    return ModelCheck(
+        name,
+        tuple(problems),
+        tuple(remarks),
+        asymmetry=asymmetry,
+    )
 
 
 def _states(model: ShipModel) -> dict[str, Floats]:
     """States and commands over the range of hard manoeuvres, each of shape (n,)."""
     random = np.random.default_rng(0)
-    L, U0 = model.particulars["length"], model.particulars["speed"]
-
-    def drawn(low: float = -1.0, high: float = 1.0) -> Floats:
-        return random.uniform(low, high, SAMPLES)
-
-    u = U0 * drawn(0.2, 1.1)
-    return {
-        "u": u,
-        "delta": model.steering.limit * drawn(),
-        "v": 0.3 * u * drawn(),
-        "r": 0.8 * u / L * drawn(),
-        "p": 0.5 * u / L * drawn(),
-        "phi": np.radians(15.0) * drawn(),
-        "q": 0.5 * (U0 / L) ** 2 * drawn(),
-        "n": np.full(SAMPLES, model.service_shaft_speed),
+    L = model.particulars["length"]
+    U0 = model.particulars["speed"]
+    u = U0 * random.uniform(0.2, 1.1, SAMPLES)
+    largest = {
+        "delta": model.steering.limit,
+        "v": 0.3 * u,
+        "r": 0.8 * u / L,
+        "p": 0.5 * u / L,
+        "phi": np.radians(15.0),
+        "q": 0.5 * (U0 / L) ** 2,
     }
+    states = {"u": u, "n": np.full(SAMPLES, model.service_shaft_speed)}
+    for name, amplitude in largest.items():
+        states[name] = amplitude * random.uniform(-1.0, 1.0, SAMPLES)
+    return states
 
 
 def _rates(model: ShipModel) -> list[str]:
@@ -106,34 +113,45 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
     found = _accelerations(model, channels)
     wrong = np.argwhere(~np.isfinite(found))
     if len(wrong):
-        row, axis = wrong[0].tolist()
-        there = {name: float(values[row]) for name, values in channels.items()}
-        known = (*EQUATION_NAMES, "phi", "delta")
-        names = [name for name in known if name in model.state_names]
-        state = ", ".join(f"{name} = {there[name]:.4g}" for name in names)
-        look = "for coefficients that are far too large"
-        if isinstance(model.dynamics, ShipEquations):
-            place = model.dynamics.fault(there, model.coefficients, ship_of(model))
-            look = f"at {place}"
+        row, column = wrong[0].tolist()
+        at = {name: float(values[row]) for name, values in channels.items()}
+        yield _no_acceleration(model, _rates(model)[column], at, found[row, column])
+    elif isinstance(model.dynamics, Structure):
+        yield from _wrong_compilation(model, channels, found)
+
+
+def _wrong_compilation(
+    model: ShipModel, channels: dict[str, Floats], compiled: Floats
+) -> Iterator[str]:
+    """Problem of compiled accelerations that differ from those of the table."""
+    agreement = 1e-9
+    accelerations = model.accelerations(channels)
+    written = np.stack([accelerations[name] for name in _rates(model)], axis=-1)
+    scale = np.abs(written).max(axis=0) + np.finfo(float).tiny
+    differences = np.abs(compiled - written) / scale
+    worst = float(differences.max())
+    if not worst < agreement:
         yield (
-            f"derivatives: expected a number for the acceleration of"
-            f" '{_rates(model)[axis]}' at {state} (SI units), got {found[row, axis]};"
-            f" look {look}"
+            f"derivatives: expected compiled accelerations within {agreement:g} of"
+            f" those of the table, got {worst:.1e}; empty the cache of compiled ships"
         )
-        return
-    if isinstance(model.dynamics, Structure):
-        agreement = 1e-9
-        plain = model.accelerations(channels)
-        written = np.stack([plain[name] for name in _rates(model)], axis=-1)
-        scale = np.abs(written).max(axis=0) + np.finfo(float).tiny
-        differences = np.abs(found - written) / scale
-        worst = float(differences.max())
-        if not worst < agreement:
-            yield (
-                "derivatives: expected compiled accelerations within"
-                f" {agreement:g} of those of the table, got {worst:.1e}; empty the cache"
-                " of compiled ships"
-            )
+
+
+def _no_acceleration(
+    model: ShipModel, rate: str, at: dict[str, float], value: float
+) -> str:
+    """Problem of an acceleration that is not a number at a state."""
+    known = (*EQUATION_NAMES, "phi", "delta")
+    names = [name for name in known if name in model.state_names]
+    state = ", ".join(f"{name} = {at[name]:.4g}" for name in names)
+    look = "for coefficients that are far too large"
+    if isinstance(model.dynamics, ShipEquations):
+        place = model.dynamics.fault(at, model.coefficients, ship_of(model))
+        look = f"at {place}"
+    return (
+        f"derivatives: expected a number for the acceleration of '{rate}' at {state}"
+        f" (SI units), got {value}; look {look}"
+    )
 
 
 def _asymmetry(model: ShipModel) -> float:
@@ -144,7 +162,7 @@ def _asymmetry(model: ShipModel) -> float:
     rates = _rates(model)
     sign = [-1.0 if name in odd else 1.0 for name in rates]
     ours = _accelerations(model, channels)
-    image = _accelerations(model, mirrored) * sign
+    image = sign * _accelerations(model, mirrored)
 
     # units of the prime system, but for what all have
     length = model.particulars["length"]
@@ -152,9 +170,12 @@ def _asymmetry(model: ShipModel) -> float:
     units |= dict.fromkeys(ANGULAR, length)
     units["q"] = length * model.travel_time
     unit = [units[name] for name in rates]
+
     size = _root_mean_square(ours * unit)
     difference = _root_mean_square((ours - image) * unit)
-    return difference / (2.0 * size) if size > 0.0 else 0.0
+    if size == 0.0:
+        return 0.0
+    return difference / (2.0 * size)
 
 
 def _root_mean_square(values: Floats) -> float:
@@ -164,8 +185,9 @@ def _root_mean_square(values: Floats) -> float:
 def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:
     """Run from service with the rudder held, over a number of ship lengths."""
     step = 0.02  # ship lengths
-    held = np.full(round(lengths / step), rudder)
-    return model.simulate(orders(model, held), step * model.travel_time)
+    n_steps = round(lengths / step)
+    held = orders(model, np.full(n_steps, rudder))
+    return model.simulate(held, step * model.travel_time)
 
 
 def _wrong_courses(model: ShipModel) -> Iterator[str]:
@@ -261,7 +283,8 @@ def _wrong_covariance(model: ShipModel) -> Iterator[str]:
             return
     scale = np.where(variances > 0.0, np.sqrt(variances), 1.0)
     correlations = model.covariance / np.outer(scale, scale)
-    least = float(np.linalg.eigvalsh(correlations).min())
+    eigenvalues = np.linalg.eigvalsh(correlations)
+    least = float(eigenvalues.min())
     if not least > -1e-6:
         yield (
             "covariance: expected no eigenvalue of the correlations below 0, got"

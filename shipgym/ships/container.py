@@ -190,7 +190,10 @@ def propeller(
 def rudder_force(
     delta: float, v: float, r: float, u_P: float, K_T_nn: float, c: Any
 ) -> tuple[float, float, float]:
-    """Normal force F_N of the rudder, negative to starboard, and its angle's sine and cosine."""
+    """Normal force F_N of the rudder, and its angle's sine and cosine.
+
+    F_N is negative to starboard.
+    """
     v_R = c.gamma * v + c.c_Rr * r + c.c_Rrrr * r * r * r + c.c_Rrrv * r * r * v
     # u_R = epsilon u_P sqrt(1 + 8 kappa K_T / (pi J^2))
     jet = u_P * u_P + (8.0 * c.kappa / pi) * K_T_nn

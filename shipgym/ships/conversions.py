@@ -77,8 +77,9 @@ def state_space(
     A, B = steering_state_space(model, speed)
     names = ["q" if "q" in model.state_names else "v", "r"]
     if heading:  # psidot = r
-        A = np.block([[A, np.zeros((2, 1))], [np.array([[0.0, 1.0, 0.0]])]])
-        B = np.vstack([B, [[0.0]]])
+        A = np.pad(A, (0, 1))
+        A[-1, 1] = 1.0
+        B = np.pad(B, ((0, 1), (0, 0)))
         names.append("psi")
     if gear:  # deltadot = (order - delta) / lag
         lag = model.steering.time_constant
@@ -87,16 +88,19 @@ def state_space(
                 f"steering of {model.name!r}: expected a time_constant above 0, got no"
                 " lag: a ramp of constant rate is not linear; leave gear=False"
             )
-        gear_row = np.zeros((1, len(A) + 1))
-        gear_row[0, -1] = -1.0 / lag
-        A = np.vstack([np.hstack([A, B]), gear_row])
-        B = np.vstack([np.zeros_like(B), [[1.0 / lag]]])
+        A = np.pad(A, (0, 1))
+        A[:-1, -1:] = B
+        A[-1, -1] = -1.0 / lag
+        B = np.zeros((len(A), 1))
+        B[-1] = 1.0 / lag
         names.append("delta")
+
+    n_states = len(names)
     return control.ss(
         A,
         B,
-        np.eye(len(A)),
-        np.zeros((len(A), 1)),
+        np.eye(n_states),
+        np.zeros((n_states, 1)),
         name=model.name.replace(".", "-"),
         states=names,
         outputs=names,
@@ -113,14 +117,20 @@ def transfer_function(form: Nomoto, order: int = 2) -> "TransferFunction":
     """
     import control
 
-    if order == 1:
-        return control.tf([form.K], [form.T, 1.0], inputs=["delta"], outputs=["r"])
-    if order != 2:
+    if order not in (1, 2):
         raise unexpected("order", "2 or 1", order)
-    _need_time_constants(form)
-    denominator = np.polymul([form.T1, 1.0], [form.T2, 1.0])
+    numerator = [form.K]
+    denominator = [form.T, 1.0]
+    if order == 2:
+        _need_time_constants(form)
+        numerator = [form.K * form.T3, form.K]
+        product = np.polymul([form.T1, 1.0], [form.T2, 1.0])
+        denominator = product.tolist()
     return control.tf(
-        [form.K * form.T3, form.K], denominator, inputs=["delta"], outputs=["r"]
+        numerator,
+        denominator,
+        inputs=["delta"],
+        outputs=["r"],
     )
 
 
@@ -143,9 +153,12 @@ def nomoto1_ship(
             "K and T: expected both positive (a stable ship) or both negative, because"
             f" a positive rudder turns to starboard, got {K:g} and {T:g}"
         )
-    coefficients = {"c_r": -1.0 / T, "c_d": K / T}
     return ShipModel(
-        name, "nomoto", _ship(particulars), steering or SteeringGear(), coefficients
+        name=name,
+        structure="nomoto",
+        particulars=_ship(particulars),
+        steering=steering or SteeringGear(),
+        coefficients={"c_r": -1.0 / T, "c_d": K / T},
     )
 
 
@@ -170,7 +183,11 @@ def nomoto2_ship(
         "e_d": form.K / product,
     }
     return ShipModel(
-        name, "nomoto2", _ship(particulars), steering or SteeringGear(), coefficients
+        name=name,
+        structure="nomoto2",
+        particulars=_ship(particulars),
+        steering=steering or SteeringGear(),
+        coefficients=coefficients,
     )
 
 
@@ -191,12 +208,16 @@ def linear_steering_ship(
     length = ship.require("length")
     speed = ship.require("speed")
     a, b = prime_matrices(A, B, length, speed)
-    structure = "linear-steering"
-    names = get_structure(structure).coefficient_names
+    structure = get_structure("linear-steering")
     values = np.hstack([a, b]).ravel().tolist()
-    coefficients = dict(zip(names, values, strict=True))
-    gear = steering or SteeringGear()
-    return ShipModel(name, structure, ship, gear, coefficients)
+    coefficients = dict(zip(structure.coefficient_names, values, strict=True))
+    return ShipModel(
+        name=name,
+        structure=structure.name,
+        particulars=ship,
+        steering=steering or SteeringGear(),
+        coefficients=coefficients,
+    )
 
 
 def _ship(particulars: Known) -> Particulars:
@@ -223,7 +244,7 @@ def prime_matrices(
 def si_matrices(
     A: ArrayLike, B: ArrayLike, length: float, speed: float
 ) -> tuple[Floats, Floats]:
-    """Steering dynamics of the prime system in SI units, inverse of `prime_matrices`."""
+    """Steering dynamics of the prime system in SI, inverse of `prime_matrices`."""
     a, b = _checked(A, B)
     unit_a, unit_b = _units(length, speed)
     return a * unit_a, b * unit_b
@@ -237,8 +258,11 @@ def _checked(A: ArrayLike, B: ArrayLike) -> tuple[Floats, Floats]:
 def _matrix(name: str, given: ArrayLike, shape: tuple[int, int]) -> Floats:
     matrix = np.asarray(given, dtype=float)
     if matrix.shape != shape or not np.all(np.isfinite(matrix)):
-        expected = f"finite numbers of shape {shape}"
-        raise unexpected(name, expected, matrix.tolist())
+        raise unexpected(
+            name,
+            f"finite numbers of shape {shape}",
+            matrix.tolist(),
+        )
     return matrix
 
 
@@ -247,9 +271,9 @@ def _units(length: float, speed: float) -> tuple[Floats, Floats]:
     check_number(length, "length", above=0.0, hint="in m")
     check_number(speed, "speed", above=0.0, hint="in m/s")
     turn_rate = speed / length
-    state = np.array([speed, turn_rate])  # of v and r
-    per_time = turn_rate * state[:, None]
-    return per_time / state, per_time
+    states = np.array([speed, turn_rate])  # of v and r
+    rates = turn_rate * states[:, None]
+    return rates / states, rates
 
 
 def _need_time_constants(form: Nomoto) -> None:

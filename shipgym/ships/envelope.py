@@ -4,7 +4,7 @@ Outside it the model extrapolates. The summary is a box and, because v and r go 
 in every manoeuvre, the smallest ellipsoid around the data.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -40,22 +40,24 @@ class Envelope:
         low = samples.min(axis=0)
         high = samples.max(axis=0)
         width = np.maximum(high - low, 1e-6)
-        centre, quadratic = smallest_ellipsoid((samples - low) / width)
+        scaled = (samples - low) / width
+        scaled_centre, quadratic = smallest_ellipsoid(scaled)
 
-        middle = low + centre * width
+        centre = low + scaled_centre * width
         factor = np.linalg.cholesky(quadratic).T / width
         shape = np.linalg.qr(factor).R
-        offsets = (samples - middle) @ shape.T
-        reach = np.linalg.norm(offsets, axis=-1).max()
-        return cls(low, high, middle, shape / reach)
+        envelope = cls(low, high, centre, shape)
+        reach = envelope.distance(u, v, r, delta).max()
+        return replace(envelope, shape=shape / reach)
 
     def distance(
         self, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike
     ) -> Floats:
-        """Distance of states, SI units, from the centre: 1 on the ellipsoid, 2 at twice its size."""
-        states = np.stack(np.broadcast_arrays(u, v, r, delta), axis=-1)
-        offsets = states - self.centre
-        distance: Floats = np.linalg.norm(offsets @ self.shape.T, axis=-1)
+        """Distance of states, SI, from the centre; 1 on the ellipsoid."""
+        channels = np.broadcast_arrays(u, v, r, delta)
+        states = np.stack(channels, axis=-1)
+        offsets = (states - self.centre) @ self.shape.T
+        distance: Floats = np.linalg.norm(offsets, axis=-1)
         return distance
 
     def to_dict(self) -> dict[str, Any]:
@@ -71,16 +73,25 @@ class Envelope:
     @classmethod
     def from_dict(cls, content: Any, where: str) -> Self:
         """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
-        shapes = {"low": (4,), "high": (4,), "centre": (4,), "shape": (4, 4)}
-        table = check_table(content, where, ("channels", *shapes))
+        shapes = {
+            "low": (4,),
+            "high": (4,),
+            "centre": (4,),
+            "shape": (4, 4),
+        }
+        table = check_table(
+            content,
+            where,
+            allowed=("channels", *shapes),
+        )
         names = table.get("channels")
-        if names != list(ENVELOPE_CHANNELS):
-            expected = str(list(ENVELOPE_CHANNELS))
-            raise unexpected(f"{where}.channels", expected, names)
+        expected = list(ENVELOPE_CHANNELS)
+        if names != expected:
+            raise unexpected(f"{where}.channels", str(expected), names)
         arrays = {}
         for name, shape in shapes.items():
-            place = f"{where}.{name}"
-            arrays[name] = check_array(table.get(name), shape, place)
+            numbers = table.get(name)
+            arrays[name] = check_array(numbers, shape, f"{where}.{name}")
         return cls(**arrays)
 
 
@@ -94,11 +105,21 @@ def smallest_ellipsoid(
     the centre c, shape (n_dimensions,), and the positive definite Q of (z - c)' Q (z -
     c) <= 1.
     """
-    n, d = points.shape
+    d = points.shape[1]
     floor = 1e-6 * np.eye(d)
+    weights = _khachiyan_weights(points, floor, tolerance)
+    centre = weights @ points
+    second_moment = points.T @ (weights[:, None] * points)
+    scatter = second_moment - np.outer(centre, centre) + floor
+    return centre, np.linalg.inv(scatter) / d
+
+
+def _khachiyan_weights(points: Floats, floor: Floats, tolerance: float) -> Floats:
+    """Weights of the points whose moments are those of the ellipsoid."""
+    n, d = points.shape
+    lifted = np.column_stack([points, np.ones(n)])
     ridge = np.zeros((d + 1, d + 1))
     ridge[:d, :d] = floor
-    lifted = np.column_stack([points, np.ones(n)])
     weights = np.full(n, 1.0 / n)
     moment = lifted.T @ lifted / n
     for _ in range(1000):
@@ -113,8 +134,4 @@ def smallest_ellipsoid(
         weights[farthest] += step
         point = lifted[farthest]
         moment += step * (np.outer(point, point) - moment)
-
-    centre = weights @ points
-    second = points.T @ (weights[:, None] * points)
-    scatter = second - np.outer(centre, centre) + floor
-    return centre, np.linalg.inv(scatter) / d
+    return weights

@@ -41,9 +41,10 @@ Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, floa
 
 def record_of(values: Mapping[str, float], module: str) -> Any:
     """Make a record of coefficients with these values as defaults."""
-    names, defaults = list(values), list(values.values())
+    names = list(values)
+    defaults = list(values.values())
     record = namedtuple("Coefficients", names, defaults=defaults, module=module)  # type: ignore[misc]
-    record.__annotations__ = dict.fromkeys(values, float)
+    record.__annotations__ = dict.fromkeys(names, float)
     return record
 
 
@@ -85,15 +86,26 @@ class ShipEquations:
         for name in ("rolls", "shallow_water", "astern"):
             check_flag(getattr(self, name), f"{where}: {name}")
 
-        place, expected = f"{where}: accelerations", "a function (motion, c, ship)"
-        check_function(self.accelerations, 3, place, expected)
+        check_function(
+            self.accelerations,
+            3,
+            f"{where}: accelerations",
+            "a function (motion, c, ship)",
+        )
         shaft = self.shaft_acceleration
         if shaft is not None:
-            place = f"{where}: shaft_acceleration"
-            check_function(shaft, 4, place, "a function (n, command, c, ship)")
+            check_function(
+                shaft,
+                4,
+                f"{where}: shaft_acceleration",
+                "a function (n, command, c, ship)",
+            )
         if shaft is not None or self.service_shaft_speed:
-            place = f"{where}: service_shaft_speed"
-            check_number(self.service_shaft_speed, place, above=0.0)
+            check_number(
+                self.service_shaft_speed,
+                f"{where}: service_shaft_speed",
+                above=0.0,
+            )
         with placed(where):
             self.particulars.require("speed")
             self._try()
@@ -104,19 +116,27 @@ class ShipEquations:
             expected = "a NamedTuple of floats"
             raise unexpected(f"{where}: coefficients_record", expected, record)
         values = record._field_defaults  # type: ignore[attr-defined]
-        for name in record._fields:  # type: ignore[attr-defined]
+        for name in self.coefficient_names:
+            place = f"{where}: coefficient {name!r}"
             if name not in values:
-                raise InputError(
-                    f"{where}: coefficient {name!r}: expected a default, got no value"
-                )
-            check_number(values[name], f"{where}: coefficient {name!r}")
+                raise InputError(f"{place}: expected a default, got no value")
+            check_number(values[name], place)
 
     def _try(self) -> None:
-        """Compute the accelerations of one state in plain Python, for its clear messages."""
-        L, U = self.particulars["length"], self.particulars["speed"]
+        """Accelerations of one state in plain Python, for its clear messages."""
+        L = self.particulars["length"]
+        U = self.particulars["speed"]
         n = self.service_shaft_speed
-        gear = self.steering
-        ship = Ship(L, U, gear.limit, gear.rate, 0.0, n, math.inf, U)
+        ship = Ship(
+            length=L,
+            speed=U,
+            rudder_limit=self.steering.limit,
+            rudder_rate=self.steering.rate,
+            gear_frequency=0.0,
+            shaft=n,
+            water_depth=math.inf,
+            scale_speed=U,
+        )
         motion = Motion(
             x=0.0,
             y=0.0,
@@ -149,8 +169,9 @@ class ShipEquations:
     def fault(
         self, state: Mapping[str, float], coefficients: Mapping[str, float], ship: Ship
     ) -> str:
-        """Place where plain Python fails at a state, and why; else that of the accelerations."""
-        motion = Motion(*[state.get(name, 0.0) for name in Motion._fields])
+        """Place where plain Python fails at a state, and why."""
+        at = {name: state.get(name, 0.0) for name in Motion._fields}
+        motion = Motion(**at)
         c = self.coefficients_record(**coefficients)
         try:
             asked(self.accelerations, motion, c, ship)
@@ -159,7 +180,7 @@ class ShipEquations:
         return place_of(self.accelerations)
 
     def __reduce__(self) -> Any:
-        """Find a ship of this package by name in another process, others by their file."""
+        """Find a shipped ship by name in another process, others by their file."""
         if self.path is not None:
             return read_ship_equations, (self.path,)
         return _named, (self.accelerations.__module__,)
@@ -193,13 +214,17 @@ class ShipEquations:
         return self.accelerations
 
     def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
-        """Make the functions to be compiled, the same for all coefficients of one form."""
-        functions: dict[str, Any] = {"accelerations": self.form(coefficients)}
+        """Functions to be compiled, the same for all coefficients of one form."""
+        hooks: list[tuple[str, Any]] = [("accelerations", self.form(coefficients))]
         if self.shaft_acceleration is not None:
-            functions["shaft_acceleration"] = self.shaft_acceleration
-        record = self.coefficients_record
-        hooks = tuple(functions.items())
-        return compiled_ship(self.name, self.state_names, record, hooks, lag)
+            hooks.append(("shaft_acceleration", self.shaft_acceleration))
+        return compiled_ship(
+            name=self.name,
+            state_names=self.state_names,
+            coefficients=self.coefficients_record,
+            functions=tuple(hooks),
+            lag=lag,
+        )
 
     def accelerations_at(
         self,
@@ -216,17 +241,17 @@ class ShipEquations:
         numbers = self.numbers(coefficients, particulars, ship.shaft)
         c = self.coefficients_record(*numbers.tolist())
         accelerations = self.form(coefficients)
-        none = np.zeros(len(channels["u"]))
-        columns = [channels.get(name, none) for name in Motion._fields]
-        states = np.stack(columns, axis=-1)
-        found = np.full((len(states), len(ACCELERATIONS)), math.nan)
-        for row, state in zip(found, states.tolist(), strict=True):
+        motions = _motions(channels)
+        found = np.full((len(motions), len(ACCELERATIONS)), math.nan)
+        for row, motion in zip(found, motions, strict=True):
             with suppress(ArithmeticError, ValueError):
-                row[:] = accelerations(Motion(*state), c, ship)
-        rates = dict(zip(("u", "v", "r", "p", "q"), found.T, strict=True))
-        if self.shaft_acceleration is not None:
-            shaft = self.shaft_acceleration
-            lag = [shaft(n, ship.shaft, c, ship) for n in channels["n"].tolist()]
+                row[:] = accelerations(motion, c, ship)
+
+        equations = ("u", "v", "r", "p", "q")
+        rates = dict(zip(equations, found.T, strict=True))
+        shaft = self.shaft_acceleration
+        if shaft is not None:
+            lag = [shaft(motion.n, ship.shaft, c, ship) for motion in motions]
             rates["n"] = np.array(lag)
         return rates
 
@@ -244,18 +269,27 @@ class ShipEquations:
         return {"name": self.name, "source": self.source}
 
 
+def _motions(channels: Mapping[str, Floats]) -> list[Motion]:
+    """Motion at each sample of some channels; absent ones are 0."""
+    none = np.zeros(len(channels["u"]))
+    columns = [channels.get(name, none) for name in Motion._fields]
+    rows = np.stack(columns, axis=-1).tolist()
+    return [Motion(*row) for row in rows]
+
+
 def read_ship_equations(path: str | Path) -> ShipEquations:
     """Run a Python file and return the ship that it defines as `SHIP`.
 
     Raises InputError for a file that is not there, cannot be run, or defines no `SHIP`.
     """
     path = Path(path).resolve()
-    expected = "a Python file that defines SHIP = ShipEquations(...)"
-    ship = getattr(load_file(path, expected), "SHIP", None)
+    expected = "SHIP = ShipEquations(...)"
+    module = load_file(path, f"a Python file that defines {expected}")
+    ship = getattr(module, "SHIP", None)
     if not isinstance(ship, ShipEquations):
-        raise unexpected(f"{path}", "SHIP = ShipEquations(...)", ship)
-    for function in (ship.accelerations, ship.shaft_acceleration):
-        refuse_closure(function)
+        raise unexpected(str(path), expected, ship)
+    refuse_closure(ship.accelerations)
+    refuse_closure(ship.shaft_acceleration)
     object.__setattr__(ship, "path", path)
     return ship
 

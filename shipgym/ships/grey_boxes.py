@@ -22,6 +22,7 @@ from shipgym.engine.records import Record
 from shipgym.errors import InputError
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.particulars import Particulars
+from shipgym.ships.structures import GREY_BOX as GREY_BOX
 from shipgym.ships.term_functions import (
     accelerations_function,
     accelerations_source,
@@ -34,7 +35,6 @@ from shipgym.ships.term_table import (
     structure_fields,
 )
 
-GREY_BOX = "grey-box"
 SOURCE = (
     "Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via"
     " adaptive RM-SVM with minor rudder"
@@ -79,8 +79,8 @@ class GreyBox(Structure):
             )
         if self.quantity != "acceleration":
             raise InputError(
-                f"{where}: expected quantity 'acceleration', because the terms are added"
-                " to the reference ship's accelerations, got 'force'"
+                f"{where}: expected quantity 'acceleration', because the terms are"
+                " added to the reference ship's accelerations, got 'force'"
             )
         if self.shaft and "n" not in self.reference.command_names:
             raise InputError(
@@ -109,7 +109,8 @@ class GreyBox(Structure):
         """Channels a trial needs: those of the terms and of the reference ship."""
         needed = set(self.channels | ALWAYS_MEASURED)
         if self.rolls:
-            needed |= {"p", "phi"}
+            needed.add("p")
+            needed.add("phi")
         if self.shaft:
             needed.add("n")
         return tuple(name for name in MEASURED if name in needed)
@@ -131,17 +132,20 @@ class GreyBox(Structure):
 
     def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
         """Make what is compiled: the reference ship's functions and the terms."""
-        prime = self.normalisation == "prime"
         # an equation without terms is the reference ship's alone
-        source = accelerations_source(self.equations, prime, damped=False)
+        source = accelerations_source(
+            self.equations,
+            prime=self.normalisation == "prime",
+            damped=False,
+        )
+        functions = {"term_accelerations": accelerations_function(source)}
         terms = coefficients_record(self._n_terms, "GreyBoxTerms")
-        function = accelerations_function(source)
-        return self.compiled_with(terms, {"term_accelerations": function}, lag)
+        return self.compiled_with(terms, functions, lag)
 
     def compiled_with(
         self, terms: Record, functions: dict[str, Any], lag: bool, **staged: Any
     ) -> CompiledShip:
-        """Make the functions to be compiled of the reference ship and a sum of terms."""
+        """Functions to be compiled of the reference ship and a sum of terms."""
         reference = self.ship.compiled
         hooks = {
             **reference.functions,
@@ -152,12 +156,12 @@ class GreyBox(Structure):
         }
         hooks.pop("shaft_acceleration", None)  # the shaft turns as commanded
         return compiled_ship(
-            "a grey box",
-            self.state_names,
-            _coefficients(reference.coefficients, terms),
-            tuple(hooks.items()),
-            lag,
-            tuple(staged.items()),
+            name="a grey box",
+            state_names=self.state_names,
+            coefficients=_coefficients(reference.coefficients, terms),
+            functions=tuple(hooks.items()),
+            lag=lag,
+            staged=tuple(staged.items()),
         )
 
     def numbers(
@@ -166,7 +170,7 @@ class GreyBox(Structure):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Numbers of the compiled functions: those of the reference ship, then the terms'."""
+        """Numbers of the compiled functions: the reference ship's, then the terms'."""
         terms = self.term_numbers(coefficients, particulars, shaft_speed)
         return np.concatenate([self.ship.ship_numbers(), terms])
 
@@ -194,7 +198,7 @@ class GreyBox(Structure):
         particulars: Particulars,
         ship: Ship,
     ) -> dict[str, Floats]:
-        """Accelerations at samples, without compiling: the converted ship's and the terms'."""
+        """Accelerations at samples, not compiled, of reference ship and terms."""
         at = self._reference_channels(channels, particulars, ship.shaft)
         known = self.ship.accelerations(at)
         found = self._converted_back(known, particulars)
@@ -266,8 +270,9 @@ class GreyBox(Structure):
     def read(
         cls, table: Mapping[str, Any], where: str, reference: ManoeuvringModel
     ) -> Self:
-        """Read what `to_dict` wrote, given the reference ship; errors begin with `where`."""
-        shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
+        """Read what `to_dict` wrote, given the reference; errors begin with `where`."""
+        shaft = table.get("shaft", False)
+        check_flag(shaft, f"{where}.shaft")
         fields = structure_fields(table, where)
         return cls(**fields, reference=reference, shaft=shaft)
 

@@ -32,7 +32,7 @@ def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
 
 
 def rigid_inertia(model: ManoeuvringModel) -> tuple[float, float, float]:
-    """Mass, kg, static moment, kg m, and yaw inertia, kg m2, of the ship, about midship."""
+    """Mass, kg, static moment, kg m, and yaw inertia, kg m2, about midship."""
     c = model.coefficients
     if model.structure == "container":
         unit = _mass_unit(model.particulars.completed())
@@ -68,7 +68,7 @@ def _with_arms(prime: Floats, p: Particulars) -> Floats:
 
 
 def _container(model: ManoeuvringModel) -> Floats:
-    """Son & Nomoto 1981; the added mass in sway acts above the centre and couples to roll."""
+    """Son & Nomoto 1981; the added mass in sway acts above the centre (roll)."""
     c = model.coefficients
     L = model.particulars["length"]
     surge = c["m"] + c["mx"]
@@ -87,7 +87,8 @@ def _container(model: ManoeuvringModel) -> Floats:
 
 def _mmg(model: ManoeuvringModel) -> Floats:
     """Yasukawa & Yoshimura 2015: by rho L^2 d / 2, yaw inertia by rho L^4 d / 2."""
-    c, p = model.coefficients, model.particulars
+    c = model.coefficients
+    p = model.particulars
     L = c.get("L", p.length)
     d = c["d"] if "d" in c else p.require("draught")
     unit = 0.5 * p.require("water_density") * L**2 * d
@@ -104,8 +105,9 @@ def _mmg(model: ManoeuvringModel) -> Floats:
 
 
 def _tanker(model: ManoeuvringModel, water_depth: float) -> Floats:
-    """Van Berlekom & Goddard 1972, bis system: by mass, yaw inertia by mass and length^2."""
-    c, p = model.coefficients, model.particulars
+    """Van Berlekom & Goddard 1972, bis system: by mass, and by mass length^2."""
+    c = model.coefficients
+    p = model.particulars
     T = p["draught"]
     z = 0.0 if np.isposinf(water_depth) else T / (water_depth - T)
     surge = c["m11"] - c["X_udotz"] * z
@@ -116,4 +118,5 @@ def _tanker(model: ManoeuvringModel, water_depth: float) -> Floats:
         [0.0, sway, 0.0, 0.0],
         [0.0, 0.0, yaw, 0.0],
     ]
-    return float(p["mass"]) * np.array(rows)
+    mass = float(p["mass"])
+    return mass * np.array(rows)

@@ -75,11 +75,13 @@ class Kernel:
         shapes = [np.shape(array) for array in arrays]
         n = len(self.centres)
         fits = (
-            shapes[:3] == [(4,), (4,), (n, 4)]
-            and len(shapes[3]) == 2
-            and shapes[3][0] == n
-            and 0 < n <= SIZES[-1]
+            np.shape(self.offset) == (4,)
+            and np.shape(self.scale) == (4,)
             and np.all(self.scale > 0.0)
+            and np.shape(self.centres) == (n, 4)
+            and 0 < n <= SIZES[-1]
+            and np.ndim(self.basis) == 2
+            and len(self.basis) == n
         )
         if not fits:
             raise InputError(
@@ -119,8 +121,8 @@ class Kernel:
         table = check_table(content, where, shapes)
         arrays = {}
         for name, shape in shapes.items():
-            place = f"{where}.{name}"
-            arrays[name] = check_array(table.get(name), shape, place)
+            numbers = table.get(name)
+            arrays[name] = check_array(numbers, shape, f"{where}.{name}")
         return cls(**arrays)
 
 
@@ -130,22 +132,28 @@ def kernel_inputs(channels: Mapping[str, Any], particulars: Particulars) -> Floa
     v = np.asarray(channels["v"], dtype=float)
     r = np.asarray(channels["r"], dtype=float)
     delta = np.asarray(channels["delta"], dtype=float)
+    L = particulars["length"]
     U0 = particulars["speed"]
-    slowest = SLOWEST * U0
-    U = np.maximum(np.hypot(u, v), slowest)
-    turn = r * particulars["length"] / U
-    return np.stack([v / U, turn, delta, U / U0], axis=-1)
+    U = np.maximum(np.hypot(u, v), SLOWEST * U0)
+    inputs = [
+        v / U,
+        r * L / U,
+        delta,
+        U / U0,
+    ]
+    return np.stack(inputs, axis=-1)
 
 
 def gaussians(x: Floats, centres: Floats) -> Floats:
     """exp(-|x - centre|^2 / 2), shape (n_samples, n_centres)."""
     # |x - c|^2 = |x|^2 - 2 x c + |c|^2
-    own = (x**2).sum(axis=1)
-    theirs = (centres**2).sum(axis=1)
-    product = x @ centres.T
-    squares = own[:, None] - 2.0 * product + theirs
-    within = np.maximum(squares, 0.0)
-    return np.asarray(np.exp(-0.5 * within))
+    xx = (x**2).sum(axis=1)
+    cc = (centres**2).sum(axis=1)
+    xc = x @ centres.T
+    squares = xx[:, None] - 2.0 * xc + cc
+    # rounding may leave one below 0
+    squares = np.maximum(squares, 0.0)
+    return np.asarray(np.exp(-0.5 * squares))
 
 
 @dataclass(frozen=True)
@@ -179,7 +187,7 @@ class KernelBox(GreyBox):
         return np.asarray(UU[:, None] * features)
 
     def compiled(self, coefficients: Mapping[str, float], lag: bool) -> CompiledShip:
-        """Make the functions to be compiled: the reference ship's and the sum over centres."""
+        """Functions to be compiled: the reference ship's and the sum over centres."""
         size = self.kernel.size
         functions = {
             "N_CENTRES": size,
@@ -201,12 +209,14 @@ class KernelBox(GreyBox):
         kernel = self.kernel
         per_root_ln_2 = 1.0 / np.sqrt(np.log(2.0))
         centres = per_root_ln_2 * kernel.centres
-        weights = self.term_numbers(coefficients, particulars, shaft_speed)
+        numbers = self.term_numbers(coefficients, particulars, shaft_speed)
+        weights = numbers.reshape(3, -1)
         table = np.zeros((kernel.size, ROW))
         rows = table[: len(centres)]
         rows[:, :4] = centres
+        # minus half the squared distance from the origin
         rows[:, 4] = -0.5 * (centres**2).sum(axis=1)
-        rows[:, 5:] = kernel.basis @ weights.reshape(3, -1).T
+        rows[:, 5:] = kernel.basis @ weights.T
         return np.concatenate(
             [
                 self.ship.ship_numbers(),
@@ -226,12 +236,14 @@ class KernelBox(GreyBox):
     def read(
         cls, table: Mapping[str, Any], where: str, reference: ManoeuvringModel
     ) -> Self:
-        """Read what `to_dict` wrote, given the reference ship; errors begin with `where`."""
-        kernel = Kernel.from_dict(table["kernel"], f"{where}.kernel")
-        shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
-        name = check_text(table.get("name"), f"{where}.name")
+        """Read what `to_dict` wrote, given the reference; errors begin with `where`."""
         check_text(table.get("source"), f"{where}.source")
-        fields = _kernel_fields(name, reference, shaft, kernel)
+        fields = _kernel_fields(
+            name=check_text(table.get("name"), f"{where}.name"),
+            reference=reference,
+            shaft=check_flag(table.get("shaft", False), f"{where}.shaft"),
+            kernel=Kernel.from_dict(table["kernel"], f"{where}.kernel"),
+        )
         return cls(**fields)
 
 
@@ -243,9 +255,10 @@ def kernel_box(box: GreyBox, kernel: Kernel) -> KernelBox:
 def _kernel_fields(
     name: str, reference: ManoeuvringModel, shaft: bool, kernel: Kernel
 ) -> dict[str, Any]:
-    """Fields of a `KernelBox`, whose terms are the kernel's features in all equations."""
-    n_features = kernel.basis.shape[1]
-    terms = tuple(KernelTerm(f"k{i + 1}", (), i) for i in range(n_features))
+    """Fields of a `KernelBox`, whose terms are the kernel's features everywhere."""
+    terms: tuple[Term, ...] = ()
+    for number in range(kernel.basis.shape[1]):
+        terms += (KernelTerm(f"k{number + 1}", (), number),)
     return {
         "name": name,
         "source": SOURCE,

@@ -124,7 +124,7 @@ def accelerations(
 def package_accelerations(
     motion: Motion, c: Any, ship: Ship
 ) -> tuple[float, float, float, float, float]:
-    """Accelerations as in shipmmg 0.0.11: flow at the centre of gravity, Gaussian wake."""
+    """Accelerations as in shipmmg 0.0.11: flow at the centre of mass, Gaussian wake."""
     u, v, r = motion.u, motion.v, motion.r
     v_G = v - r * c.xG
     U = sqrt(u * u + v_G * v_G)
@@ -242,7 +242,8 @@ def rudder_force(
     gamma_R = c.gamma_minus if beta_R < 0.0 else c.gamma_plus
     v_R = flow.U * gamma_R * beta_R
 
-    # u_R = epsilon inflow sqrt(eta (1 + kappa (sqrt(1 + 8 K_T / (pi J^2)) - 1))^2 + 1 - eta)
+    # u_R = epsilon inflow sqrt(eta slip^2 + 1 - eta), and
+    # slip = 1 + kappa (sqrt(1 + 8 K_T / (pi J^2)) - 1)
     eta = c.D_P / c.H_R
     outside = inflow * inflow
     jet = outside + (8.0 / pi) * K_T_nn

@@ -93,11 +93,12 @@ def straight_running(model: ShipModel, speed: float | None = None) -> StraightRu
         kept = [name for name in unknowns if name != "u"]
         found = _balance(model, kept, speed)
     if found is None:
+        most_deg = np.degrees(LARGEST_RUDDER)
         raise InputError(
             f"model {model.name!r}: expected a straight course with less than"
-            f" {np.degrees(LARGEST_RUDDER):.0f} deg of rudder at"
-            f" {speed or service:g} m/s, got none; identify it from trials that turn to"
-            " both sides, or check the sign of the rudder"
+            f" {most_deg:.0f} deg of rudder at {speed or service:g} m/s, got none;"
+            " identify it from trials that turn to both sides, or check the sign of the"
+            " rudder"
         )
     return StraightRunning(
         surge=found["u"],
@@ -120,7 +121,12 @@ def steady_turn_rudder(
     unknowns = [name for name in BALANCED_BY if name in model.state_names]
     if not slowed:
         unknowns.remove("u")
-    found = _balance(model, unknowns, rate=rate, largest_sway=1.0)
+    found = _balance(
+        model,
+        unknowns,
+        rate=rate,
+        largest_sway=1.0,
+    )
     if found is None or found["u"] <= 0.0:
         return None
     return found["delta"]
@@ -163,10 +169,13 @@ def _balance(
 
     solution = root(imbalance, np.zeros(len(unknowns)), tol=1e-12).x
     state = state_with(solution)
-    at_rest = np.all(np.abs(imbalance(solution)) < 1e-8)
-    drifts_little = abs(state["v"]) < largest_sway * model.particulars["speed"]
-    steers_little = rate != 0.0 or abs(state["delta"]) < LARGEST_RUDDER
-    return state if at_rest and drifts_little and steers_little else None
+    if not np.all(np.abs(imbalance(solution)) < 1e-8):
+        return None
+    if abs(state["v"]) >= largest_sway * model.particulars["speed"]:
+        return None
+    if rate == 0.0 and abs(state["delta"]) >= LARGEST_RUDDER:
+        return None
+    return state
 
 
 def _units(model: ShipModel) -> dict[str, float]:
@@ -188,12 +197,13 @@ def _prime_rates(model: ShipModel, state: dict[str, float]) -> dict[str, float]:
     """Accelerations by name at a state, prime system, shaft as in service."""
     at = {"n": model.service_shaft_speed} | state
     channels = {name: np.array([value]) for name, value in at.items()}
-    units = _units(model)
     accelerations = model.accelerations(channels)
+    units = _units(model)
+    travel_time = model.travel_time
     rates = {}
-    for name, (rate,) in accelerations.items():
-        unit = units[name] / model.travel_time
-        rates[name] = float(rate) / unit
+    for name, values in accelerations.items():
+        unit = units[name] / travel_time
+        rates[name] = float(values[0]) / unit
     return rates
 
 
@@ -212,20 +222,21 @@ def linearise(
     yaw, whose ship does not drift, q stands in place of v.
     """
     sway = "q" if "q" in model.state_names else "v"
+    states = [sway, "r"]
+    inputs = [*states, "delta"]
     roll: list[str] = [name for name in ("p", "phi") if name in model.state_names]
-    jacobian = _jacobian(model, at, [sway, "r", *roll], side)
-    to = [sway, "r"]
-    by = [sway, "r", "delta"]
-    steering = _block(jacobian, to, by)
+    jacobian = _jacobian(model, at, [*states, *roll], side)
+    steering = _block(jacobian, states, inputs)
     if roll:
-        # roll is balanced, 0 = R_s s + R_p p, where s is (v, r, delta): p = -R_p^-1 R_s s
-        R_s = _block(jacobian, roll, by)
+        # roll is balanced, 0 = R_s s + R_p p, s = (v, r, delta): p = -R_p^-1 R_s s
+        R_s = _block(jacobian, roll, inputs)
         R_p = _block(jacobian, roll, roll)
-        by_roll = _block(jacobian, to, roll)
-        steering -= by_roll @ np.linalg.solve(R_p, R_s)
+        by_roll = _block(jacobian, states, roll)
+        roll_by_inputs = np.linalg.solve(R_p, R_s)
+        steering -= by_roll @ roll_by_inputs
 
-    all_units = _units(model)
-    units = np.array([all_units[name] for name in to])
+    prime_units = _units(model)
+    units = np.array([prime_units[name] for name in states])
     rates = steering * units[:, None] / model.travel_time
     A = rates[:, :2] / units
     B = rates[:, 2:]
@@ -245,8 +256,8 @@ def _jacobian(
     state = dict(zip(model.state_names, values, strict=True))
 
     def rates_off(name: str, step: float) -> dict[str, float]:
-        varied = state[name] + step * units[name]
-        off = state | {name: varied}
+        off = dict(state)
+        off[name] += step * units[name]
         found = _prime_rates(model, off)
         if "p" in found:
             found["phi"] = off["p"] / units["p"]
@@ -270,8 +281,9 @@ def _block(
 ) -> Floats:
     """Entries of a Jacobian as a matrix, a row a rate."""
     matrix = np.empty((len(rates), len(by)))
-    for row, rate in zip(matrix, rates, strict=True):
-        row[:] = [jacobian[rate, name] for name in by]
+    for row, rate in enumerate(rates):
+        for column, name in enumerate(by):
+            matrix[row, column] = jacobian[rate, name]
     return matrix
 
 
@@ -297,8 +309,8 @@ def nomoto_of(A: Floats, B: Floats) -> Nomoto:
     numerator = float(A[1, 0] * B[0, 0] - A[0, 0] * B[1, 0])
     if numerator == 0.0 or determinant == 0.0:
         raise InputError(
-            "nomoto: expected a ship with damping, whose rudder has a steady effect, got"
-            " none"
+            "nomoto: expected a ship with damping, whose rudder has a steady effect,"
+            " got none"
         )
     time_constants = [np.nan, np.nan]
     poles = np.linalg.eigvals(A)
@@ -375,11 +387,14 @@ def straight_line_stability(model: ShipModel) -> StraightLineStability:
     eigenvalues = {}
     for name, side in SIDES.items():
         A, _ = linearise(model, at, side)
-        values: list[complex] = np.linalg.eigvals(A).tolist()
-        values.sort(key=lambda value: -complex(value).real)
+        values = np.linalg.eigvals(A)
+        falling = np.argsort(-values.real, kind="stable")
         matrices[name] = A
-        eigenvalues[name] = tuple(values)
-    return StraightLineStability(eigenvalues, _criterion(model, matrices))
+        eigenvalues[name] = tuple(values[falling].tolist())
+    return StraightLineStability(
+        eigenvalues=eigenvalues,
+        criterion=_criterion(model, matrices),
+    )
 
 
 def _criterion(
@@ -389,14 +404,15 @@ def _criterion(
     if "q" in model.state_names:
         return None
     try:
-        M = inertia(model)[1:, 1:3]
+        sway_and_yaw = inertia(model)[1:, 1:3]
         p = model.particulars.completed()
         mass_unit = 0.5 * p.require("water_density") * p.length**3
     except InputError:
         return None
     unit = (mass_unit * model.particulars["speed"]) ** 2
+    mass = np.linalg.det(sway_and_yaw)
     criterion = {}
     for name, A in matrices.items():
-        forces = np.linalg.det(M) * np.linalg.det(A)
+        forces = mass * np.linalg.det(A)
         criterion[name] = float(forces / unit)
     return criterion

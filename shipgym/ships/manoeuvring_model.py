@@ -31,7 +31,7 @@ MODEL_FORMAT = 1  # of model files
 
 @dataclass(frozen=True, eq=False)
 class ManoeuvringModel:
-    """Structure and coefficients of a ship, with uncertainty and envelope; see `ShipModel`."""
+    """Structure and coefficients of a ship, with uncertainty; see `ShipModel`."""
 
     name: str
     structure: str
@@ -41,35 +41,44 @@ class ManoeuvringModel:
     covariance: Floats | None = None
     envelope: Envelope | None = None
     provenance: dict[str, Any] | None = None
-    # by default, and for a copy with another structure, what is registered under its name
+    # by default, and for a copy with another structure, what is registered by its name
     dynamics: Structure | ShipEquations = None  # type: ignore[assignment]
     service_shaft_speed: float = 0.0
 
     def __post_init__(self) -> None:
         self.particulars.require("speed")
         if self.dynamics is None or self.dynamics.name != self.structure:
-            object.__setattr__(self, "dynamics", get_dynamics(self.structure))
-        names = self.dynamics.coefficient_names
-        if self.coefficients.keys() != set(names):
-            raise _other_coefficients(self.name, names, self.coefficients)
-        coefficients = {}
-        for name in names:
-            value = self.coefficients[name]
-            coefficients[name] = check_number(value, f"coefficients.{name}")
+            dynamics = get_dynamics(self.structure)
+            object.__setattr__(self, "dynamics", dynamics)
+        coefficients = self._checked_coefficients()
         object.__setattr__(self, "coefficients", coefficients)
+
         shaft = self.service_shaft_speed
-        if self.dynamics.scales and "n" in self.command_names and not shaft > 0:
+        needs_shaft = self.dynamics.scales and "n" in self.command_names
+        if needs_shaft and not shaft > 0:
             raise InputError(
                 f"service_shaft_speed of {self.name!r}: expected that at service speed"
                 f" in 1/s, because structure {self.structure!r} has a shaft speed, got"
                 f" {shaft:g}"
             )
-        square = (len(names), len(names))
+        n = len(coefficients)
+        square = (n, n)
         if self.covariance is not None and self.covariance.shape != square:
             raise InputError(
                 f"covariance of {self.name!r}: expected shape {square}, one row and"
                 f" column a coefficient, got {self.covariance.shape}"
             )
+
+    def _checked_coefficients(self) -> dict[str, float]:
+        """Coefficients as floats, in the order of the structure."""
+        names = self.dynamics.coefficient_names
+        if self.coefficients.keys() != set(names):
+            raise _other_coefficients(self.name, names, self.coefficients)
+        checked = {}
+        for name in names:
+            value = self.coefficients[name]
+            checked[name] = check_number(value, f"coefficients.{name}")
+        return checked
 
     @property
     def table(self) -> Structure:
@@ -82,7 +91,7 @@ class ManoeuvringModel:
 
     @property
     def acceleration_matrix(self) -> Floats:
-        """Matrix from coefficients to accelerations, as `Structure.acceleration_matrix`."""
+        """Matrix from coefficients to accelerations, as a `Structure` has it."""
         return self.table.acceleration_matrix(
             self.particulars, self.service_shaft_speed
         )
@@ -93,7 +102,7 @@ class ManoeuvringModel:
         return replace(self, coefficients=coefficients)
 
     def with_accelerations(self, coefficients: Mapping[str, Floats]) -> Self:
-        """Copy with coefficients that follow from each regression on accelerations, SI."""
+        """Copy with the coefficients of regressions on accelerations, SI."""
         stacked = np.concatenate([coefficients[q] for q in self.table.regressed])
         values = np.linalg.solve(self.acceleration_matrix, stacked)
         return self.with_coefficients(values)
@@ -102,12 +111,12 @@ class ManoeuvringModel:
 
     @property
     def compiled(self) -> CompiledShip:
-        """Functions and records to compile, shared by models that differ in numbers only."""
+        """Functions and records to compile, shared by models that differ in numbers."""
         lag = self.steering.time_constant > 0.0
         return self.dynamics.compiled(self.coefficients, lag)
 
     def ship_numbers(self, water_depth: float = np.inf, step: float = 0.0) -> Floats:
-        """Numbers that `compiled` reads, in the order of its layout: `Ship`, then coefficients.
+        """Numbers that `compiled` reads, in its layout: `Ship`, then coefficients.
 
         `step`, s, is that of her simulation, which a lag of her steering gear has to be
         long enough for.
@@ -115,13 +124,14 @@ class ManoeuvringModel:
         Raises InputError for water that is too shallow, and for particulars that the
         structure cannot use.
         """
-        if water_depth != np.inf:
-            self.check_depth(water_depth)
+        self.check_depth(water_depth)
         values = tuple(self.coefficients.values())
         if values not in self._numbers:
             self._numbers.clear()
             self._numbers[values] = self.dynamics.numbers(
-                self.coefficients, self.particulars, self.service_shaft_speed
+                self.coefficients,
+                self.particulars,
+                self.service_shaft_speed,
             )
         ship = ship_of(self, water_depth, step)
         return np.concatenate([ship, self._numbers[values]])
@@ -153,7 +163,7 @@ class ManoeuvringModel:
 
     @cached_property
     def service_state(self) -> Floats:
-        """State straight ahead north at service speed, rudder amidships; shape (n_state,)."""
+        """State straight ahead north at service speed, shape (n_state,)."""
         values = {"u": self.particulars["speed"], "n": self.service_shaft_speed}
         return np.array([values.get(name, 0.0) for name in self.state_names])
 
@@ -191,31 +201,41 @@ class ManoeuvringModel:
             raise InputError(f"state: expected finite numbers, got {wrong[0]}")
 
         # one row for each state
-        leading = states.shape[:-1], commands.shape[:-1], depth.shape
-        shape = np.broadcast_shapes(*leading)
+        shape = np.broadcast_shapes(
+            states.shape[:-1],
+            commands.shape[:-1],
+            depth.shape,
+        )
         rows = _rows(states, shape)
         orders = _rows(commands, shape)
         check_units(self, orders, "command")
-        depths = _rows(depth[..., None], shape)[:, 0].copy()
+        depths = np.array(np.broadcast_to(depth, shape)).ravel()
 
         rates = np.empty_like(rows)
         loop = ship_loop(self.compiled, "derivatives")
-        loop(rows, two_commands(orders), depths, self.ship_numbers(), rates)
+        loop(
+            rows,
+            two_commands(orders),
+            depths,
+            self.ship_numbers(),
+            rates,
+        )
         return rates.reshape(*shape, len(self.state_names))
 
     def rates(
         self, channels: Mapping[str, Floats], water_depth: float = np.inf
     ) -> dict[str, Floats]:
-        """`derivatives` by name at channels of shape (n_samples,); absent states are 0."""
+        """`derivatives` by name at channels (n_samples,); absent states are 0."""
         none = np.zeros(len(channels["u"]))
         states = [channels.get(name, none) for name in self.state_names]
         commands = [channels[name] for name in self.command_names]
-        derivatives = self.derivatives(
+        rates = self.derivatives(
             np.stack(states, axis=-1),
             np.stack(commands, axis=-1),
             water_depth,
         )
-        return dict(zip(self.state_names, derivatives.T, strict=True))
+        columns = rates.T
+        return dict(zip(self.state_names, columns, strict=True))
 
     def accelerations(
         self, channels: Mapping[str, Floats], water_depth: float = np.inf
@@ -228,19 +248,27 @@ class ManoeuvringModel:
         service) where the model has them, each of shape (n_samples,).
         """
         none = np.zeros(len(channels["u"]))
-        complete = dict.fromkeys((*self.state_names, *self.command_names), none)
+        names = (*self.state_names, *self.command_names)
+        complete = dict.fromkeys(names, none)
         complete |= channels
-        ship = ship_of(self, water_depth)
-        found = self.dynamics.accelerations_at(
-            complete, self.coefficients, self.particulars, ship
+        known = self.dynamics.accelerations_at(
+            complete,
+            self.coefficients,
+            self.particulars,
+            ship_of(self, water_depth),
         )
-        return {q: found.get(q, none) for q in "uvrpqn" if q in self.state_names}
+        accelerations = {}
+        for name in self.state_names:
+            if name in ("u", "v", "r", "p", "q", "n"):
+                accelerations[name] = known.get(name, none)
+        return accelerations
 
     # ---- model file ------------------------------------------------------------------
 
     def to_dict(self) -> dict[str, Any]:
         """Content of a model file, ready for JSON (see `shipgym.ships.model_file`)."""
-        covariance, envelope = self.covariance, self.envelope
+        covariance = self.covariance
+        envelope = self.envelope
         return {
             "format": MODEL_FORMAT,
             "name": self.name,
@@ -256,7 +284,7 @@ class ManoeuvringModel:
         }
 
     def check_depth(self, water_depth: float) -> None:
-        """Refuse water that is too shallow, or shallow water for a model that has none."""
+        """Refuse water too shallow, or shallow water for a deep-water model."""
         if water_depth == np.inf:
             return
         hint = "in m, or inf for deep water"
@@ -287,10 +315,11 @@ def _other_coefficients(
 
 def _with_last_axis(argument: str, given: ArrayLike, names: tuple[str, ...]) -> Floats:
     array = np.asarray(given, dtype=float)
-    if array.ndim == 0 or array.shape[-1] != len(names):
+    n = len(names)
+    if array.ndim == 0 or array.shape[-1] != n:
+        listed = ", ".join(names)
         raise InputError(
-            f"{argument}: expected shape (..., {len(names)}) for {', '.join(names)}, got"
-            f" {array.shape}"
+            f"{argument}: expected shape (..., {n}) for {listed}, got {array.shape}"
         )
     return array
 
@@ -306,7 +335,8 @@ def ship_of(
     model: ManoeuvringModel, water_depth: float = np.inf, step: float = 0.0
 ) -> Ship:
     """Record of the numbers that every ship has besides its coefficients."""
-    gear, p = model.steering, model.particulars
+    gear = model.steering
+    p = model.particulars
     return Ship(
         length=p["length"],
         speed=p["speed"],

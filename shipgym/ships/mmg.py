@@ -24,8 +24,7 @@ from shipgym.ships import kvlcc2
 from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.kvlcc2 import Mass, planar_accelerations
 from shipgym.ships.particulars import Particulars
-
-MMG = "mmg"
+from shipgym.ships.structures import MMG as MMG
 
 #: What the general form has beyond the standard method, with the values that make it
 #: the standard one.
@@ -161,7 +160,7 @@ class Flow(NamedTuple):
 
 
 def power_law(x: float, power: float) -> float:
-    """Power of a speed by service speed, from the series of artanh at its eighth root."""
+    """Power of a speed by service speed, by the series of artanh at its eighth root."""
     least, most = 0.01, 4.0  # for which the series is good enough
     within = min(max(x, least), most)
     root = sqrt(sqrt(sqrt(within)))
@@ -272,7 +271,8 @@ def rudder_force(motion: Motion, c: Any, flow: Flow) -> tuple[float, float, floa
     side = c.gamma_R_side if beta_R >= 0.0 else -c.gamma_R_side
     v_R = flow.U * (c.gamma_R + side) * beta_R
 
-    # u_R = epsilon inflow sqrt(eta (1 + kappa (sqrt(1 + 8 K_T / (pi J^2)) - 1))^2 + 1 - eta)
+    # u_R = epsilon inflow sqrt(eta slip^2 + 1 - eta), and
+    # slip = 1 + kappa (sqrt(1 + 8 K_T / (pi J^2)) - 1)
     inflow = flow.inflow
     outside = inflow * inflow
     jet = outside + (8.0 / pi) * flow.K_T_nn
@@ -290,7 +290,7 @@ def rudder_force(motion: Motion, c: Any, flow: Flow) -> tuple[float, float, floa
 
 @dataclass(frozen=True)
 class MMGEquations(ShipEquations):
-    """General form: coefficients without unit, dimensions from each ship's particulars."""
+    """General form: non-dimensional coefficients, dimensions from the particulars."""
 
     scales: ClassVar[bool] = True
 
@@ -310,7 +310,7 @@ class MMGEquations(ShipEquations):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Numbers of coefficients, then dimensions; InputError if particulars do not suffice."""
+        """Coefficients, then dimensions; InputError if particulars do not suffice."""
         values = [coefficients[name] for name in self.coefficient_names]
         return np.array([*values, *dimensions(particulars).values()])
 

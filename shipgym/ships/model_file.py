@@ -77,28 +77,32 @@ def read_model(
     check_format(fields, MODEL_FORMAT, where)
     check_keys(fields, (*REQUIRED, *OPTIONAL), where, REQUIRED)
     dynamics = _read_dynamics(fields["structure"], f"{where}: structure", make)
-    unit = fields.get("normalisation", dynamics.normalisation)
-    if unit != dynamics.normalisation:
-        raise unexpected(f"{where}: normalisation", repr(dynamics.normalisation), unit)
-    names = dynamics.coefficient_names
-
+    own_unit = dynamics.normalisation
+    unit = fields.get("normalisation", own_unit)
+    if unit != own_unit:
+        raise unexpected(f"{where}: normalisation", repr(own_unit), unit)
     covariance = fields.get("covariance")
     if covariance is not None:
-        covariance = _read_covariance(covariance, len(names), f"{where}: covariance")
+        n = len(dynamics.coefficient_names)
+        covariance = _read_covariance(covariance, n, f"{where}: covariance")
     envelope = fields.get("envelope")
     if envelope is not None:
         envelope = Envelope.from_dict(envelope, f"{where}: envelope")
     provenance = fields.get("provenance")
     if provenance is not None:
         provenance = dict(check_table(provenance, f"{where}: provenance"))
-    shaft = fields.get("service_shaft_speed", 0.0)
-    place = f"{where}: service_shaft_speed"
+    shaft_speed = check_number(
+        fields.get("service_shaft_speed", 0.0),
+        f"{where}: service_shaft_speed",
+        at_least=0.0,
+    )
 
     model = make(
         name=check_text(fields["name"], f"{where}: name"),
         structure=dynamics.name,
         particulars=Particulars.from_mapping(
-            fields["particulars"], f"{where}: particulars"
+            fields["particulars"],
+            f"{where}: particulars",
         ),
         steering=SteeringGear.from_mapping(fields["steering"], f"{where}: steering"),
         coefficients=check_table(fields["coefficients"], f"{where}: coefficients"),
@@ -106,27 +110,34 @@ def read_model(
         envelope=envelope,
         provenance=provenance,
         dynamics=dynamics,
-        service_shaft_speed=check_number(shaft, place, at_least=0.0),
+        service_shaft_speed=shaft_speed,
     )
-    expected = numbers_hash(model)
-    if fields.get("sha256", expected) != expected:
-        raise unexpected(
-            f"{where}: sha256",
-            f"{expected!r}, that of the file's coefficients and covariance",
-            fields["sha256"],
-            "they were changed after the file was written; take another copy, or, if the"
-            " change is yours, leave out the field sha256",
-        )
+    if "sha256" in fields:
+        _check_hash(model, fields["sha256"], f"{where}: sha256")
     model.ship_numbers()  # refuses particulars that the structure cannot do with
     return model
 
 
+def _check_hash(model: ManoeuvringModel, given: Any, where: str) -> None:
+    """Refuse a file whose numbers are not those that its hash was made of."""
+    expected = numbers_hash(model)
+    if given != expected:
+        raise unexpected(
+            where,
+            f"{expected!r}, that of the file's coefficients and covariance",
+            given,
+            "they were changed after the file was written; take another copy, or, if"
+            " the change is yours, leave out the field sha256",
+        )
+
+
 def numbers_hash(model: ManoeuvringModel) -> str:
     """SHA-256 of coefficients and covariance, in the order of the structure."""
-    covariance = None if model.covariance is None else model.covariance.tolist()
-    return hashlib.sha256(
-        json.dumps([model.coefficients, covariance]).encode()
-    ).hexdigest()
+    covariance = None
+    if model.covariance is not None:
+        covariance = model.covariance.tolist()
+    text = json.dumps([model.coefficients, covariance])
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _read_dynamics(
@@ -178,15 +189,19 @@ def _read_reference(
     """Read the reference ship of a grey box."""
     place = f"{where}.reference"
     with placed(place):
-        return read_model(check_table(table.get("reference"), place), place, make)
+        fields = check_table(table.get("reference"), place)
+        return read_model(fields, place, make)
 
 
 def _read_covariance(value: Any, n: int, where: str) -> Floats:
     matrix = check_array(value, (n, n), where)
     if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):
         raise InputError(f"{where}: expected a symmetric matrix, got another")
-    variances = np.diag(matrix)
-    if np.any(variances < 0.0):
-        least = float(variances.min())
-        raise unexpected(where, "no negative variance on the diagonal", least)
+    least_variance = np.diag(matrix).min()
+    if least_variance < 0.0:
+        raise unexpected(
+            where,
+            "no negative variance on the diagonal",
+            float(least_variance),
+        )
     return matrix

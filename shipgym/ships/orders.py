@@ -38,22 +38,27 @@ def checked_orders(model: Commanded, commands: ArrayLike) -> Floats:
     """
     orders = np.asarray(commands, dtype=float)
     names = model.command_names
-    if orders.ndim != 2 or orders.shape[1] != len(names) or len(orders) < 2:
+    n = len(names)
+    if orders.ndim != 2 or orders.shape[1] != n or len(orders) < 2:
+        listed = ", ".join(names)
         raise InputError(
-            f"commands: expected shape (n_steps, {len(names)}) for {', '.join(names)},"
+            f"commands: expected shape (n_steps, {n}) for {listed},"
             f" with at least 2 steps, got {orders.shape}"
         )
     check_units(model, orders)
     if "n" in names and not model.turns_astern:
-        expected = (
-            "a shaft speed >= 0, because the equations hold for a shaft ahead only"
+        _check_within(
+            orders[:, names.index("n")],
+            0.0,
+            np.inf,
+            "a shaft speed >= 0, because the equations hold for a shaft ahead only",
+            "commands",
         )
-        _check_within(orders[:, names.index("n")], 0.0, np.inf, expected, "commands")
     return orders
 
 
 def check_units(model: Commanded, orders: Floats, where: str = "commands") -> None:
-    """Refuse orders of shape (n, n_command) that are not finite or not in rad and 1/s."""
+    """Refuse orders, shape (n, n_command), not finite or not in rad and 1/s."""
     names = model.command_names
     wrong = np.argwhere(~np.isfinite(orders))
     if len(wrong):
@@ -62,29 +67,35 @@ def check_units(model: Commanded, orders: Floats, where: str = "commands") -> No
             f"{where}: row {row}: expected finite numbers, got {orders[row, column]}"
         )
     if "delta" in names:
-        rudder = orders[:, names.index("delta")]
-        expected = "a rudder in rad (not degrees) between -pi/2 and pi/2"
-        _check_within(rudder, -np.pi / 2, np.pi / 2, expected, where)
-    if "n" in names:
-        shaft = orders[:, names.index("n")]
-        most = FASTEST_SHAFT * model.service_shaft_speed
-        least = -most if model.turns_astern else 0.0
-        expected = (
-            f"a shaft speed in 1/s (not rpm) between {least:.4g} and {most:.4g},"
-            f" {model.service_shaft_speed:.4g} at service speed"
+        _check_within(
+            orders[:, names.index("delta")],
+            -np.pi / 2,
+            np.pi / 2,
+            "a rudder in rad (not degrees) between -pi/2 and pi/2",
+            where,
         )
-        _check_within(shaft, -most, most, expected, where)
+    if "n" in names:
+        service = model.service_shaft_speed
+        most = FASTEST_SHAFT * service
+        least = -most if model.turns_astern else 0.0
+        _check_within(
+            orders[:, names.index("n")],
+            -most,
+            most,
+            f"a shaft speed in 1/s (not rpm) between {least:.4g} and {most:.4g},"
+            f" {service:.4g} at service speed",
+            where,
+        )
 
 
 def _check_within(
     values: Floats, low: float, high: float, expected: str, where: str
 ) -> None:
-    rows = np.flatnonzero((values < low) | (values > high))
-    if len(rows):
-        row = rows[0]
-        raise InputError(
-            f"{where}: row {row}: expected {expected}, got {values[row]:g}"
-        )
+    beyond = (values < low) | (values > high)
+    if beyond.any():
+        row = int(beyond.argmax())
+        value = values[row]
+        raise InputError(f"{where}: row {row}: expected {expected}, got {value:g}")
 
 
 def two_commands(commands: Floats) -> Floats:

@@ -12,7 +12,7 @@ from shipgym.checks import check_table, check_text, placed, unexpected
 from shipgym.constants import SEA_WATER
 from shipgym.errors import InputError
 from shipgym.ships.particulars_limits import ADDED_MASSES as ADDED_MASSES
-from shipgym.ships.particulars_limits import check_together, check_value
+from shipgym.ships.particulars_limits import LIMITS, check_together, check_value
 
 
 @dataclass(frozen=True)
@@ -90,12 +90,13 @@ class Particulars(Mapping[str, Any]):
     def __post_init__(self) -> None:
         check_text(self.name, "name")
         numbers = {}
-        for name in NAMES:
+        for name in LIMITS:
             value = getattr(self, name)
-            if name == "name" or (value is None and name != "length"):
+            if value is None and name != "length":
                 continue
-            numbers[name] = check_value(name, value)
-            object.__setattr__(self, name, numbers[name])
+            number = check_value(name, value)
+            numbers[name] = number
+            object.__setattr__(self, name, number)
         check_together(numbers)
 
         names = self.estimated
@@ -145,7 +146,7 @@ class Particulars(Mapping[str, Any]):
             return cls(**table, **added, estimated=estimated)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the values by name, ready for JSON; :meth:`from_mapping` reads them."""
+        """Values by name, ready for JSON; :meth:`from_mapping` reads them."""
         # left out where not known, so that hashes of models from before them stay
         later = {
             "rudder_aspect_ratio",
@@ -173,9 +174,9 @@ class Particulars(Mapping[str, Any]):
     @property
     def mass_prime(self) -> float:
         """Mass by rho L^3 / 2."""
-        return self.require("mass") / (
-            0.5 * self.require("water_density") * self.length**3
-        )
+        mass = self.require("mass")
+        unit = 0.5 * self.require("water_density") * self.length**3
+        return mass / unit
 
     @property
     def xg_prime(self) -> float:
@@ -185,9 +186,8 @@ class Particulars(Mapping[str, Any]):
     @property
     def inertia_prime(self) -> float:
         """Yaw inertia about MIDSHIP by rho L^5 / 2, m xg^2 included."""
-        return self.mass_prime * (
-            (self.require("yaw_gyradius") / self.length) ** 2 + self.xg_prime**2
-        )
+        gyradius = self.require("yaw_gyradius") / self.length
+        return self.mass_prime * (gyradius**2 + self.xg_prime**2)
 
     def completed(self) -> Particulars:
         """Return particulars with absent mass, inertia and added masses estimated.
@@ -211,12 +211,15 @@ Estimates = Mapping[str, Callable[[Particulars], float | None]]
 
 
 def with_estimates(ship: Particulars, estimates: Estimates) -> Particulars:
-    """Particulars with absent values estimated in turn, and marked so, where possible."""
+    """Particulars with absent values estimated in turn, and marked so."""
     for name, estimate in estimates.items():
-        value = estimate(ship) if ship[name] is None else None
+        if ship[name] is not None:
+            continue
+        value = estimate(ship)
         if value is not None:
-            known: dict[str, Any] = {name: value}
-            ship = replace(ship, **known, estimated=ship.estimated | {name})
+            marked = ship.estimated | {name}
+            fields: dict[str, Any] = {name: value, "estimated": marked}
+            ship = replace(ship, **fields)
     return ship
 
 
@@ -271,8 +274,12 @@ def _clarke(name: str, ship: Particulars) -> float:
     _check_known(ship, name, remedy)
     beam = ship.require("beam")
     draught = ship.require("draught")
-    fullness = ship.require("block_coefficient")
-    estimates = clarke_added_masses(ship.length, beam, draught, fullness)
+    estimates = clarke_added_masses(
+        ship.length,
+        beam,
+        draught,
+        ship.require("block_coefficient"),
+    )
     value = estimates[name]
     if name in ("Y_vdot", "N_rdot") and value >= 0.0:
         raise InputError(

@@ -68,7 +68,11 @@ def check_value(name: str, value: Any) -> float:
     limits = LIMITS[name]
     place = f"added_mass {name}" if name in ADDED_MASSES else name
     return check_number(
-        value, place, above=limits.above, below=limits.below, hint=limits.hint
+        value,
+        place,
+        above=limits.above,
+        below=limits.below,
+        hint=limits.hint,
     )
 
 
@@ -81,7 +85,9 @@ def check_together(values: Mapping[str, float]) -> None:
             continue
         largest = limits.share * length**limits.growth
         if abs(value) > largest:
-            squared, unit = ("", "m") if limits.growth == 1.0 else (" squared", "m2")
+            is_area = limits.growth == 2.0
+            squared = " squared" if is_area else ""
+            unit = "m2" if is_area else "m"
             raise InputError(
                 f"{name}: expected at most {limits.share:g} of the length{squared}, got"
                 f" {value:g} with length {length:g}; check the units ({unit})"
@@ -92,23 +98,27 @@ def check_together(values: Mapping[str, float]) -> None:
 
 def _check_mass(values: Mapping[str, float]) -> None:
     """Refuse a mass, kg, that does not fit the dimensions."""
-    mass, length = values["mass"], values["length"]
+    mass = values["mass"]
+    length = values["length"]
+    beam = values.get("beam")
+    draught = values.get("draught")
     density = values.get("water_density", SEA_WATER)
-    if "beam" not in values or "draught" not in values:
-        whole = density * length**3
-        least, most = 2e-4, 0.2
+    if beam is None or draught is None:
+        cube = density * length**3
+        low = 2e-4 * cube
+        high = 0.2 * cube
         reason = "0.0002 to 0.2 times water_density * length^3"
-    elif "block_coefficient" not in values:
-        whole = density * length * values["beam"] * values["draught"]
-        least, most = 0.2, 1.0
-        reason = "a block coefficient of 0.2 to 1"
     else:
-        box = density * length * values["beam"] * values["draught"]
-        whole = box * values["block_coefficient"]
-        least, most = 0.5, 2.0
-        reason = "half to twice what block_coefficient gives"
+        box = density * length * beam * draught
+        low = 0.2 * box
+        high = box
+        reason = "a block coefficient of 0.2 to 1"
+        if "block_coefficient" in values:
+            displaced = box * values["block_coefficient"]
+            low = 0.5 * displaced
+            high = 2.0 * displaced
+            reason = "half to twice what block_coefficient gives"
 
-    low, high = least * whole, most * whole
     if not low <= mass <= high:
         raise InputError(
             f"mass: expected {low:.4g} to {high:.4g} kg ({reason}), got {mass:g};"

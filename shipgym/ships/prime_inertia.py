@@ -22,15 +22,15 @@ def prime_inertia(particulars: Particulars) -> Floats:
         particulars,
         np.array(derivatives),
         "inertia of the ship: expected a positive one, got mass, xg, yaw_gyradius and"
-        " added masses that do not belong together; added masses are in the prime system"
-        " and negative (X_udot, Y_vdot, N_rdot)",
+        " added masses that do not belong together; added masses are in the prime"
+        " system and negative (X_udot, Y_vdot, N_rdot)",
     )
 
 
 def total_inertia(
     particulars: Particulars, derivatives: Floats, problem: str
 ) -> Floats:
-    """Inertia of the ship less the derivatives of (X, Y, N) by the accelerations, (3, 3).
+    """Inertia less the derivatives of (X, Y, N) by the accelerations, (3, 3).
 
     Raises InputError with the `problem` if it is not positive.
     """

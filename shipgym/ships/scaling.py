@@ -1,6 +1,7 @@
 """A model at another length and speed: from model scale to full scale and back."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -57,9 +58,10 @@ def scale_model(
     check_number(length, "length", above=0.0, hint="in m")
     size = length / model.particulars.length
     service = model.particulars["speed"]
-    speed = service * np.sqrt(size) if speed is None else speed
-    check_number(speed, "speed", above=0.0, hint="in m/s")
-    fast = float(speed) / service
+    if speed is None:
+        speed = float(service * np.sqrt(size))
+    speed = check_number(speed, "speed", above=0.0, hint="in m/s")
+    fast = speed / service
     quick = fast / size
 
     gear = replace(
@@ -67,35 +69,47 @@ def scale_model(
         rudder_rate_deg_s=model.steering.rudder_rate_deg_s * quick,
         time_constant=model.steering.time_constant / quick,
     )
-    factors = dict.fromkeys(model.coefficients, 1.0)  # those without unit
+    origin = {"from_length": model.particulars.length, "from_speed": service}
+    scaled = replace(
+        model,
+        steering=gear,
+        particulars=_particulars(
+            model.particulars,
+            size,
+            speed,
+            water_density,
+        ),
+        envelope=_envelope(model.envelope, fast, quick),
+        provenance=(model.provenance or {}) | {"scaled": origin},
+        service_shaft_speed=model.service_shaft_speed * fast / size,
+    )
     if isinstance(table, Structure) and table.normalisation == "si":
-        factors = _coefficient_factors(table, size, fast)
-    coefficients = {
-        name: value * factors[name] for name, value in model.coefficients.items()
-    }
+        return _with_coefficients(scaled, _coefficient_factors(table, size, fast))
+    return scaled  # coefficients without unit
+
+
+def _with_coefficients(model: ShipModel, factors: dict[str, float]) -> ShipModel:
+    """Copy whose coefficients, and their covariance, are those by some factors."""
+    coefficients = {}
+    for name, value in model.coefficients.items():
+        coefficients[name] = value * factors[name]
     covariance = model.covariance
     if covariance is not None:
         scale = np.array(list(factors.values()))
         covariance = covariance * np.outer(scale, scale)
-    envelope = model.envelope
-    if envelope is not None:
-        unit = np.array([fast, fast, quick, 1.0])  # of u, v, r, delta
-        envelope = Envelope(
-            low=envelope.low * unit,
-            high=envelope.high * unit,
-            centre=envelope.centre * unit,
-            shape=envelope.shape / unit,
-        )
-    origin = {"from_length": model.particulars.length, "from_speed": service}
-    return replace(
-        model,
-        steering=gear,
-        particulars=_particulars(model.particulars, size, float(speed), water_density),
-        coefficients=coefficients,
-        covariance=covariance,
-        envelope=envelope,
-        provenance=(model.provenance or {}) | {"scaled": origin},
-        service_shaft_speed=model.service_shaft_speed * fast / size,
+    return replace(model, coefficients=coefficients, covariance=covariance)
+
+
+def _envelope(envelope: Envelope | None, fast: float, quick: float) -> Envelope | None:
+    """Envelope at another speed and turn rate, by those before."""
+    if envelope is None:
+        return None
+    unit = np.array([fast, fast, quick, 1.0])  # of u, v, r, delta
+    return Envelope(
+        low=envelope.low * unit,
+        high=envelope.high * unit,
+        centre=envelope.centre * unit,
+        shape=envelope.shape / unit,
     )
 
 
@@ -117,14 +131,19 @@ def _coefficient_factors(
 def _particulars(
     ship: Particulars, size: float, speed: float, water_density: float | None
 ) -> Particulars:
-    changes = {}
+    changes: dict[str, Any] = {
+        "speed": speed,
+        "length": ship.length * size,
+    }
     for name, limits in LIMITS.items():
-        if limits.growth and ship[name] is not None:
-            changes[name] = ship[name] * size**limits.growth
-    density = ship.water_density if water_density is None else water_density
+        value = ship[name]
+        if limits.growth and value is not None:
+            changes[name] = value * size**limits.growth
     if ship.mass is not None:
         changes["mass"] = ship.mass * size**3
-        if water_density is not None:
-            changes["mass"] *= water_density / ship.require("water_density")
-    changes["length"] = ship.length * size
-    return replace(ship, speed=speed, water_density=density, **changes)
+    if water_density is not None:
+        changes["water_density"] = water_density
+        if ship.mass is not None:
+            denser = water_density / ship.require("water_density")
+            changes["mass"] *= denser
+    return replace(ship, **changes)

@@ -42,9 +42,10 @@ class Share:
         if self.acceleration is None:
             self.term.check(where)
             return
-        ((_, power), *others) = self.term.powers
+        (_, power), *others = self.term.powers
         if others or type(power) is not int or power != 1:
-            raise unexpected(where, "an acceleration alone", dict(self.term.powers))
+            powers = dict(self.term.powers)
+            raise unexpected(where, "an acceleration alone", powers)
 
     @property
     def acceleration(self) -> str | None:
@@ -61,18 +62,29 @@ class Share:
     def from_dict(cls, content: Any, where: str) -> Self:
         """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
         fields = ("coefficient", "name", "powers", "sign")
-        table = check_table(content, where, fields, fields)
-        coefficient = check_text(table["coefficient"], f"{where}.coefficient")
-        name_and_powers = {"name": table["name"], "powers": table["powers"]}
-        term = Term.from_dict(name_and_powers, where)
-        place = f"{where}.sign"
-        sign = check_number(table["sign"], place, at_least=-1.0, at_most=1.0)
-        return cls(coefficient, term, sign)
+        table = check_table(
+            content,
+            where,
+            allowed=fields,
+            required=fields,
+        )
+        name_and_powers = {name: table[name] for name in ("name", "powers")}
+        sign = check_number(
+            table["sign"],
+            f"{where}.sign",
+            at_least=-1.0,
+            at_most=1.0,
+        )
+        return cls(
+            coefficient=check_text(table["coefficient"], f"{where}.coefficient"),
+            term=Term.from_dict(name_and_powers, where),
+            sign=sign,
+        )
 
 
 @dataclass(frozen=True)
 class SharedStructure(Structure):
-    """Table for hydrodynamic forces X, Y, N, prime system, identified from captive tests.
+    """Table for forces X, Y, N, prime system, identified from captive tests.
 
     Its `equations` are the terms that a simulation sums up: those of velocities of the
     shares, the same for sway and yaw, and the centripetal ones of the ship's own mass.
@@ -93,22 +105,21 @@ class SharedStructure(Structure):
                 f"{where}: expected shares of {quoted(AXES)}, got {quoted(self.shares)}"
             )
         for axis, shares in self.shares.items():
-            allowed = {"udot"} if axis == "u" else {"vdot", "rdot"}
+            allowed = ("udot",) if axis == "u" else ("vdot", "rdot")
             for share in shares:
-                if share.acceleration not in (None, *allowed):
+                acceleration = share.acceleration
+                if acceleration is not None and acceleration not in allowed:
                     raise InputError(
                         f"{where}: expected 'udot' in the equation of surge, 'vdot' and"
-                        " 'rdot' in those of sway and yaw, got"
-                        f" '{share.acceleration}' in the equation of '{axis}'"
+                        f" 'rdot' in those of sway and yaw, got '{acceleration}' in the"
+                        f" equation of '{axis}'"
                     )
 
     @cached_property
     def coefficient_names(self) -> tuple[str, ...]:
         """Each coefficient once, those of X first."""
-        names: dict[str, None] = {}
-        for axis in AXES:
-            names |= dict.fromkeys(self.names(axis))
-        return tuple(names)
+        names = [*self.names("u"), *self.names("v"), *self.names("r")]
+        return tuple(dict.fromkeys(names))
 
     def names(self, equation: str) -> tuple[str, ...]:
         """Names of the coefficients in one equation."""
@@ -116,13 +127,15 @@ class SharedStructure(Structure):
         return tuple(dict.fromkeys(share.coefficient for share in shares))
 
     def added_mass(self, coefficients: Mapping[str, float]) -> Floats:
-        """Derivatives of (X, Y, N) by (udot, vdot, rdot), prime system, shape (3, 3)."""
+        """Derivatives of (X, Y, N) by (udot, vdot, rdot), prime system, (3, 3)."""
         matrix = np.zeros((3, 3))
         for row, axis in zip(matrix, AXES, strict=True):
             for share in self.shares[axis]:
-                if share.acceleration is not None:
-                    column = ACCELERATIONS.index(share.acceleration)
-                    row[column] += share.sign * coefficients[share.coefficient]
+                if share.acceleration is None:
+                    continue
+                column = ACCELERATIONS.index(share.acceleration)
+                value = coefficients[share.coefficient]
+                row[column] += share.sign * value
         return matrix
 
     def prime_inertia(
@@ -136,9 +149,9 @@ class SharedStructure(Structure):
         return total_inertia(
             particulars,
             self.added_mass(coefficients),
-            f"structure '{self.name}': expected a positive inertia, got mass of the ship"
-            " and added mass of the coefficients that are not positive together; X_udot,"
-            " Y_vdot and N_rdot are derivatives below 0",
+            f"structure '{self.name}': expected a positive inertia, got mass of the"
+            " ship and added mass of the coefficients that are not positive together;"
+            " X_udot, Y_vdot and N_rdot are derivatives below 0",
         )
 
     def term_numbers(
@@ -157,32 +170,24 @@ class SharedStructure(Structure):
     def _velocity_forces(
         self, axis: str, coefficients: Mapping[str, float], p: Particulars
     ) -> Floats:
-        """Coefficient of each term in an equation's force, that of the ship's mass included."""
-        terms = self.terms(axis)
-        force = dict.fromkeys([term.product for term in terms], 0.0)
+        """Coefficient of each term of a force, that of the ship's mass included."""
+        products = [term.product for term in self.terms(axis)]
+        force = dict.fromkeys(products, 0.0)
         for share in self.shares[axis]:
             if share.acceleration is None:
-                value = share.sign * coefficients[share.coefficient]
-                force[share.term.product] += value
-
-        m = p.mass_prime
-        m_xG = m * p.xg_prime
-        if axis == "u":
-            force[VR.product] += m
-            force[RR.product] += m_xG
-        elif axis == "v":
-            force[UR.product] -= m
-        else:
-            force[UR.product] -= m_xG
-        return np.array([force[term.product] for term in terms])
+                value = coefficients[share.coefficient]
+                force[share.term.product] += share.sign * value
+        for term, mass in _centripetal(axis, p).items():
+            force[term.product] += mass
+        return np.array(list(force.values()))
 
     def acceleration_matrix(
         self, particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
         """Refuse: free-running trials cannot tell unknown added masses from mass."""
         raise InputError(
-            f"structure '{self.name}': expected captive tests with the channels X, Y, N,"
-            " got free-running trials: its added masses are among the unknowns; use"
+            f"structure '{self.name}': expected captive tests with the channels X, Y,"
+            " N, got free-running trials: its added masses are among the unknowns; use"
             " identification.identify_forces"
         )
 
@@ -191,21 +196,46 @@ class SharedStructure(Structure):
         shares = {}
         for axis, listed in self.shares.items():
             shares[axis] = [share.to_dict() for share in listed]
-        return {"name": self.name, "source": self.source, "shares": shares}
+        return {
+            "name": self.name,
+            "source": self.source,
+            "shares": shares,
+        }
 
     @classmethod
     def from_dict(cls, table: Mapping[str, Any], where: str = "structure") -> Self:
         """Read what `to_dict` wrote; errors begin with `where`."""
         place = f"{where}.shares"
-        listed = check_table(table["shares"], place, AXES, AXES)
-        shares = {}
+        listed = check_table(
+            table["shares"],
+            place,
+            allowed=AXES,
+            required=AXES,
+        )
+        shares: dict[str, tuple[Share, ...]] = {}
         for axis in AXES:
+            shares[axis] = ()
             entries = list_entries(listed[axis], f"{place}.{axis}")
-            read = [Share.from_dict(entry, at) for at, entry in entries.items()]
-            shares[axis] = tuple(read)
-        name = table.get("name")
-        source = table.get("source")
-        return cls(**_shared_fields(name, source, shares))
+            for at, entry in entries.items():
+                shares[axis] += (Share.from_dict(entry, at),)
+        fields = _shared_fields(
+            name=table.get("name"),
+            source=table.get("source"),
+            shares=shares,
+        )
+        return cls(**fields)
+
+
+def _centripetal(axis: str, p: Particulars) -> dict[Term, float]:
+    """Terms of the ship's own mass in a force, prime system."""
+    m = p.mass_prime
+    m_xG = m * p.xg_prime
+    terms = {
+        "u": {VR: m, RR: m_xG},
+        "v": {UR: -m},
+        "r": {UR: -m_xG},
+    }
+    return terms[axis]
 
 
 def shared_structure(
@@ -219,11 +249,10 @@ def _shared_fields(
     name: Any, source: Any, shares: Mapping[str, tuple[Share, ...]]
 ) -> dict[str, Any]:
     """Fields of a `SharedStructure`: its equations follow from the shares."""
-    on_velocities: dict[str, list[Term]] = {axis: [] for axis in AXES}
-    for axis, listed in shares.items():
-        for share in listed:
-            if share.acceleration is None and axis in AXES:
-                on_velocities[axis].append(share.term)
+    on_velocities = {}
+    for axis in AXES:
+        listed = shares.get(axis, ())
+        on_velocities[axis] = [s.term for s in listed if s.acceleration is None]
     surge = _distinct([*on_velocities["u"], VR, RR])
     across = _distinct([*on_velocities["v"], *on_velocities["r"], UR])
     return {
@@ -240,8 +269,9 @@ def _distinct(terms: Iterable[Term]) -> tuple[Term, ...]:
     """Each product once, where it stands last, by its first name."""
     found: dict[object, Term] = {}
     for term in terms:
-        first = found.pop(term.product, term)
-        found[term.product] = first
+        product = term.product
+        first = found.pop(product, term)
+        found[product] = first
     return tuple(found.values())
 
 
@@ -253,13 +283,15 @@ def read_shares(text: str) -> tuple[Share, ...]:
     """
     shares = []
     for word in text.split():
-        sign = -1.0 if word[0] == "-" else 1.0
+        sign = -1.0 if word.startswith("-") else 1.0
         coefficient, _, name = word.removeprefix("-").partition(":")
         if not name:
-            name = coefficient.partition("_")[2]
+            _, name = coefficient.split("_", maxsplit=1)
         if name in ACCELERATIONS:
-            term = Term(name, ((name, 1),))
+            powers = ((name, 1),)
+            term = Term(name, powers)
         else:
             (term,) = short_terms(name, surge="u")
-        shares.append(Share(coefficient, term, sign))
+        share = Share(coefficient, term, sign)
+        shares.append(share)
     return tuple(shares)

@@ -111,15 +111,20 @@ class ShipModel(ManoeuvringModel):
                 " models have, to sample from, got none"
             )
         rng = np.random.default_rng(seed)
-        mean = np.array(list(self.coefficients.values()))
+        mean = list(self.coefficients.values())
         normal = rng.standard_normal((n, len(mean)))
-        draws = mean + normal @ _root(self.covariance).T
+        draws = mean + normal @ _square_root(self.covariance).T
         tables = self._drawn_tables(n, rng)
         models = []
-        for i, (values, dynamics) in enumerate(zip(draws, tables, strict=True)):
-            name = f"{self.name}-draw-{i}"
-            drawn = replace(self, name=name, covariance=None, dynamics=dynamics)
-            models.append(drawn.with_coefficients(values))
+        for i in range(n):
+            drawn = replace(
+                self,
+                name=f"{self.name}-draw-{i}",
+                covariance=None,
+                dynamics=tables[i],
+            )
+            drawn = drawn.with_coefficients(draws[i])
+            models.append(drawn)
         return models
 
     def _drawn_tables(
@@ -131,8 +136,9 @@ class ShipModel(ManoeuvringModel):
         box = self.dynamics
         if not isinstance(box, GreyBox) or box.ship.covariance is None:
             return [box] * n
-        assert isinstance(box.reference, ShipModel)
-        references = box.reference.sample(n, rng)
+        ship = box.reference
+        assert isinstance(ship, ShipModel)
+        references = ship.sample(n, rng)
         return [replace(box, reference=drawn) for drawn in references]
 
     def save(self, path: str | Path) -> None:
@@ -143,9 +149,8 @@ class ShipModel(ManoeuvringModel):
     def load(cls, path: str | Path) -> Self:
         """Read a model file; InputError, naming the file and the field at fault."""
         file = Path(path)
-        fields = read_json(
-            file, "model file", "identify the model again or take another copy"
-        )
+        remedy = "identify the model again or take another copy"
+        fields = read_json(file, "model file", remedy)
         return cls.from_dict(fields, str(file))
 
     @classmethod
@@ -158,12 +163,14 @@ class ShipModel(ManoeuvringModel):
             return read_model(fields, where, cls)
 
 
-def _root(covariance: Floats) -> Floats:
-    """Square root of a covariance by its correlations: 1e-5 and 1 are drawn equally well."""
+def _square_root(covariance: Floats) -> Floats:
+    """Square root of a covariance by its correlations, which are alike in size."""
     deviation = np.sqrt(np.diag(covariance))
     scale = np.where(deviation > 0.0, deviation, 1.0)
-    correlations = covariance / np.outer(scale, scale)
+    column = scale[:, None]
+    correlations = covariance / (column * scale)
     values, vectors = np.linalg.eigh(correlations)
-    lengths = np.sqrt(np.clip(values, 0.0, None))
-    root: Floats = scale[:, None] * vectors * lengths
+    # rounding may leave an eigenvalue below 0
+    variances = np.clip(values, 0.0, None)
+    root: Floats = column * vectors * np.sqrt(variances)
     return root

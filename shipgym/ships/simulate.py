@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole, unexpected
@@ -55,34 +55,39 @@ class Passage:
         self.windy = not weather.calm
         self.sea = np.zeros(0), np.zeros(0, dtype=np.uint64), np.zeros(0)
         if self.windy:
-            depth = conditions.water_depth
-            parameters = weather_column(model, weather, dt, depth)
-            seed = conditions.seed
-            if not isinstance(seed, np.random.Generator):
-                check_whole(seed, "seed", at_least=0)
-            word = np.random.default_rng(seed).integers(2**63)
-            random = np.array([word], dtype=np.uint64)
-            self.sea = np.zeros(len(leaves(Sea))), random, parameters
+            state = np.zeros(len(leaves(Sea)))
+            random = _random_word(conditions.seed)
+            parameters = weather_column(model, weather, dt, conditions.water_depth)
+            self.sea = state, random, parameters
 
     def loop(self, name: str) -> Any:
-        """Loop of `shipgym.engine.loops`, compiled for the ship in calm water or weather."""
+        """Loop of `shipgym.engine.loops` for the ship in calm water or weather."""
         return ship_loop(self.compiled, name, self.windy)
 
     def run(
         self, name: str, states: Floats, *arguments: Any, since: float = 0.0
     ) -> Any:
-        """Fill the states after the first by a loop, from its arguments but sea and ship.
+        """Fill the states after the first by a loop; sea and ship are added here.
 
         Returns what the loop returns: the last row, or that and more. Raises
         UnstableModelError where the ship leaves every physical range, `since` s after
         the manoeuvre began.
         """
         loop = self.loop(name)
-        found = loop(states, *arguments, *self.sea, self.numbers)
+        found = loop(
+            states,
+            *arguments,
+            *self.sea,
+            self.numbers,
+        )
         reached = found[0] if isinstance(found, tuple) else found
         if reached < len(states) - 1:
-            time_s = since + self.dt * reached
-            raise unstable(self.model, time_s, states[reached], self.dt)
+            raise unstable(
+                self.model,
+                since + self.dt * reached,
+                states[reached],
+                self.dt,
+            )
         return found
 
     def states(self, first: Floats, n_steps: int) -> Floats:
@@ -95,6 +100,14 @@ class Passage:
         if len(first) < width:
             self.loop("sample_sea")(states, *self.sea)
         return states
+
+
+def _random_word(seed: Seed) -> NDArray[np.uint64]:
+    """State of a loop's random numbers, by a seed, shape (1,)."""
+    if not isinstance(seed, np.random.Generator):
+        check_whole(seed, "seed", at_least=0)
+    word = np.random.default_rng(seed).integers(2**63)
+    return np.array([word], dtype=np.uint64)
 
 
 def simulate(
@@ -110,8 +123,11 @@ def simulate(
     """Simulate a ship with commands held over each step (see `ShipModel.simulate`)."""
     held = checked_orders(model, commands)
     check_number(dt, "dt", above=0.0, hint="in s")
-    conditions = Conditions(water_depth, weather, seed)
-    passage = Passage(model, conditions, dt)
+    passage = Passage(
+        model,
+        Conditions(water_depth, weather, seed),
+        dt,
+    )
     first = initial_state(model, state)
     states = passage.states(first, len(held))
     passage.run("simulate", states, two_commands(held), dt)
@@ -139,31 +155,25 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     the simulated state at its times. Raises InputError if a channel is missing,
     UnstableModelError where the simulated ship leaves every physical range.
     """
-    needed = ["psi", "u", "v", "r", "delta", *model.command_names[1:]]
-    for name in needed:
-        if name not in trial.channels:
-            raise InputError(
-                f"trial {trial.name!r}: channel {name!r} is missing, it is needed to"
-                " predict the trial"
-            )
     t = np.array(trial.t)
     states = np.zeros((len(t), len(model.state_names)))
-    for i, name in enumerate(model.state_names):
-        if name in trial.channels:
-            states[0, i] = trial[name][0]
-        elif name == "q":  # which no trial records: that of a steady yaw rate
-            first = {known: trial[known][:1] for known in needed}
-            states[0, i] = -model.rates(first)["r"][0]
-
-    delta = np.array(trial["delta"])
+    states[0] = _first_state(model, trial)
     n = np.zeros(len(t))
     if "n" in trial.channels:
         n = np.array(trial["n"])
     wind = wind_accelerations(trial, model.dynamics)
-    wind = 0.5 * (wind[1:] + wind[:-1])
-    longest_step = LONGEST_STEP * model.travel_time
-    loop = ship_loop(model.compiled, "open_loop", bool(wind.any()))
-    reached = loop(states, t, delta, n, wind, longest_step, model.ship_numbers())
+    mean_wind = 0.5 * (wind[1:] + wind[:-1])
+
+    loop = ship_loop(model.compiled, "open_loop", bool(mean_wind.any()))
+    reached = loop(
+        states,
+        t,
+        np.array(trial["delta"]),
+        n,
+        mean_wind,
+        LONGEST_STEP * model.travel_time,
+        model.ship_numbers(),
+    )
     if reached < len(t) - 1:
         raise unstable(model, t[reached], states[reached])
     return Trial(
@@ -176,19 +186,38 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     )
 
 
+def _first_state(model: ManoeuvringModel, trial: Trial) -> Floats:
+    """State at a trial's first sample, by its channels; 0 for those it has not."""
+    first = {}
+    for name in ("psi", "u", "v", "r", "delta", *model.command_names[1:]):
+        if name not in trial.channels:
+            raise InputError(
+                f"trial {trial.name!r}: channel {name!r} is missing, it is needed to"
+                " predict the trial"
+            )
+        first[name] = trial[name][:1]
+
+    state = np.zeros(len(model.state_names))
+    for i, name in enumerate(model.state_names):
+        if name in trial.channels:
+            state[i] = trial[name][0]
+        elif name == "q":  # which no trial records: that of a steady yaw rate
+            state[i] = -model.rates(first)["r"][0]
+    return state
+
+
 def wind_accelerations(trial: Trial, dynamics: Any = None) -> Floats:
     """Accelerations by wind in a trial: surge, sway, yaw; shape (n_samples, 3).
 
     Those of equations that a structure does not have are 0.
     """
-    own = dynamics.equations if isinstance(dynamics, Structure) else WIND
-    columns = []
-    for axis, name in WIND.items():
-        column = np.zeros(len(trial))
-        if axis in own and name in trial:
-            column = trial[name]
-        columns.append(column)
-    return np.column_stack(columns)
+    equations = dynamics.equations if isinstance(dynamics, Structure) else WIND
+    accelerations = np.zeros((len(trial), len(WIND)))
+    for column, axis in enumerate(WIND):
+        name = WIND[axis]
+        if axis in equations and name in trial:
+            accelerations[:, column] = trial[name]
+    return accelerations
 
 
 def initial_state(model: ManoeuvringModel, state: ArrayLike | None) -> Floats:
@@ -197,8 +226,10 @@ def initial_state(model: ManoeuvringModel, state: ArrayLike | None) -> Floats:
         return model.service_state
     start = np.asarray(state, dtype=float)
     names = model.state_names
-    if start.shape != (len(names),) or not np.all(np.isfinite(start)):
-        expected = f"{len(names)} finite numbers for {', '.join(names)}"
+    n = len(names)
+    if start.shape != (n,) or not np.all(np.isfinite(start)):
+        listed = ", ".join(names)
+        expected = f"{n} finite numbers for {listed}"
         raise unexpected("state", expected, start.tolist())
     return start
 
@@ -210,7 +241,7 @@ def as_trial(
     commands: Floats,
     kind: str | None = None,
 ) -> Trial:
-    """Trial of states dt apart, their weather, and the commands held from each sample on."""
+    """Trial of states dt apart, their weather, and the commands held from each on."""
     channels = _channels(model, states)
     rolls = "phi" in model.state_names
     weather = states[:, len(model.state_names) :]
@@ -222,9 +253,13 @@ def as_trial(
         if name == "n":
             # a shaft without lag turns as ordered, and is part of the record
             channels.setdefault("n", command)
-    t = dt * np.arange(len(states), dtype=float)
-    length = model.particulars["length"]
-    return Trial(t, channels, name=model.name, kind=kind, length=length)
+    return Trial(
+        dt * np.arange(len(states), dtype=float),
+        channels,
+        name=model.name,
+        kind=kind,
+        length=model.particulars["length"],
+    )
 
 
 def _channels(model: ManoeuvringModel, states: Floats) -> dict[str, Floats]:
@@ -238,12 +273,13 @@ def unstable(
 ) -> UnstableModelError:
     """Make the error for a ship whose state grew beyond bounds at a given time."""
     last = dict(zip(model.state_names, state.tolist(), strict=False))
+    turn_deg_s = np.degrees(last["r"])
     there = (
-        f"u = {last['u']:.3g} m/s, v = {last['v']:.3g} m/s,"
-        f" r = {np.degrees(last['r']):.3g} deg/s"
+        f"u = {last['u']:.3g} m/s, v = {last['v']:.3g} m/s, r = {turn_deg_s:.3g} deg/s"
     )
     if "phi" in last:
-        there += f", phi = {np.degrees(last['phi']):.3g} deg"
+        heel_deg = np.degrees(last["phi"])
+        there += f", phi = {heel_deg:.3g} deg"
     reason = "it is unstable there"
     longest = LONGEST_STEP * model.travel_time
     if step > longest:

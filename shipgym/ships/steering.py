@@ -44,8 +44,9 @@ class SteeringGear:
             "time_constant": {"at_least": 0.0},
         }
         for name, allowed in bounds.items():
-            value = check_number(getattr(self, name), name, **allowed)
-            object.__setattr__(self, name, value)
+            value = getattr(self, name)
+            number = check_number(value, name, **allowed)
+            object.__setattr__(self, name, number)
 
     @classmethod
     def from_mapping(

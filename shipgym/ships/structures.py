@@ -18,15 +18,17 @@ if TYPE_CHECKING:  # few models have equations
 
 #: Files of this package that define a ship with equations of her own, by her name.
 SHIPPED_EQUATIONS = ("container", "tanker", "kvlcc2", "mmg")
+GREY_BOX = "grey-box"
+MMG = "mmg"
 #: The grey box stands on a reference ship, which only a user can name; the MMG form is
 #: no table.
 NO_TABLES = {
-    "grey-box": (
+    GREY_BOX: (
         "a table of terms, got 'grey-box', which is a reference ship and a table; give"
         " the reference ship: identify(..., structure='grey-box',"
         " reference_model='tanker'), or shipgym.ships.grey_box"
     ),
-    "mmg": (
+    MMG: (
         "a table of terms, got 'mmg', which is none; choose one, such as 'abkowitz' or"
         " 'cubic'"
     ),
@@ -41,7 +43,7 @@ REGISTERED_EQUATIONS: dict[str, ShipEquations] = {}
 Read = TypeVar("Read")
 
 
-# ---- what is shipped -------------------------------------------------------------------
+# ---- what is shipped -----------------------------------------------------------------
 
 
 @cache
@@ -50,7 +52,8 @@ def printed_tables() -> dict[str, dict[str, Any]]:
     tables = shipped_toml("shipgym.ships", "structures.toml")
     papers = tables.pop("papers")
     for table in tables.values():
-        table["source"] = table["source"].format(**papers)
+        source = table["source"]
+        table["source"] = source.format(**papers)
     return tables
 
 
@@ -64,18 +67,23 @@ def printed_structure(name: str) -> Structure:
         shares = _by_axis(table["shares"], read_shares)
         return shared_structure(name, table["source"], shares)
     if "letters" in table:
-        table["equations"] = _by_axis(table.pop("letters"), short_terms)
+        letters = table.pop("letters")
+        table["equations"] = _by_axis(letters, short_terms)
     else:
         table["equations"] = _by_axis(table["equations"], read_terms)
-    return Structure(**USUAL | table, name=name)
+    fields = USUAL | table
+    return Structure(name=name, **fields)
 
 
 def _by_axis(texts: Mapping[str, str], read: Callable[[str], Read]) -> dict[str, Read]:
     """Read each text for each of the axes in its key, such as "v r"."""
-    return {axis: read(text) for axes, text in texts.items() for axis in axes.split()}
+    by_axis: dict[str, Read] = {}
+    for axes, text in texts.items():
+        by_axis |= dict.fromkeys(axes.split(), read(text))
+    return by_axis
 
 
-# ---- by name ---------------------------------------------------------------------------
+# ---- by name -------------------------------------------------------------------------
 
 
 def list_structures() -> list[str]:
@@ -92,8 +100,10 @@ def get_structure(name: str) -> Structure:
     if name in REGISTERED_STRUCTURES:
         return REGISTERED_STRUCTURES[name]
     if name in NO_TABLES:
-        raise InputError(f"structure: expected {NO_TABLES[name]}")
-    return printed_structure(check_choice(name, list_structures(), "structure"))
+        expected = NO_TABLES[name]
+        raise InputError(f"structure: expected {expected}")
+    check_choice(name, list_structures(), "structure")
+    return printed_structure(name)
 
 
 def list_equations() -> list[str]:
@@ -111,13 +121,13 @@ def get_equations(name: str) -> ShipEquations:
 
 
 def get_dynamics(name: str) -> Structure | ShipEquations:
-    """Return a structure, or a ship's own equations, by name; InputError if there is none."""
+    """Return a structure, or a ship's own equations, by name; InputError if unknown."""
     if name in list_equations():
         return get_equations(name)
     return get_structure(name)
 
 
-# ---- a user's own ----------------------------------------------------------------------
+# ---- a user's own --------------------------------------------------------------------
 
 
 def register_structure(
@@ -152,8 +162,13 @@ def register_structure(
     quantity : {"acceleration", "force"}
         What the terms add up to; forces need the ship's mass and added mass.
     """
-    units = {"normalisation": normalisation, "quantity": quantity}
-    table = {"name": name, "equations": equations, "source": source, **units}
+    table = {
+        "name": name,
+        "equations": equations,
+        "source": source,
+        "normalisation": normalisation,
+        "quantity": quantity,
+    }
     structure = own_structure(table, "register_structure")
     if name not in printed_tables():  # which it equals
         REGISTERED_STRUCTURES[name] = structure
@@ -161,14 +176,14 @@ def register_structure(
 
 
 def own_structure(table: Any, where: str) -> Structure:
-    """Make a structure from `register_structure`'s arguments; errors begin with `where`."""
+    """Structure from `register_structure`'s arguments; errors begin with `where`."""
     own: dict[str, Any] = {**USUAL, **check_table(table, where)}
     check_keys(own, ("name", "equations", *USUAL), where)
     for key in ("name", "equations"):
         if key not in own:
             raise InputError(
-                f'{where}: expected a name and equations, such as r = "r, delta", got no'
-                f" {key}"
+                f'{where}: expected a name and equations, such as r = "r, delta", got'
+                f" no {key}"
             )
     equations = check_table(own["equations"], f"{where}: equations")
     own["equations"] = {

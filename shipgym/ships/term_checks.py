@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from shipgym.checks import check_choice, check_text, quoted
 from shipgym.errors import InputError
-from shipgym.ships.terms import MOST_TERMS, ROLL, Term
+from shipgym.ships.terms import MOST_TERMS, ROLL, Term, symbols_in
 
 #: Equations in their order, with the first letter of the names of accelerations'
 #: coefficients: as Zhu 2018 has them for surge, sway and yaw; roll, and the memory of
@@ -18,13 +18,20 @@ Equations = Mapping[str, tuple[Term, ...]]
 def check_structure(
     name: str, source: str, equations: Equations, normalisation: str, quantity: str
 ) -> None:
-    """Refuse names, units, equations or terms of a `Structure` that cannot be computed."""
+    """Refuse names, units, equations or terms that a `Structure` cannot compute."""
     where = f"structure '{name}'"
     check_text(name, "structure: name")
     check_text(source, f"{where}: source")
-    units = ("prime", "service", "si")
-    check_choice(normalisation, units, f"{where}: normalisation")
-    check_choice(quantity, ("force", "acceleration"), f"{where}: quantity")
+    check_choice(
+        normalisation,
+        ("prime", "service", "si"),
+        f"{where}: normalisation",
+    )
+    check_choice(
+        quantity,
+        ("force", "acceleration"),
+        f"{where}: quantity",
+    )
     known = [equation for equation in EQUATION_NAMES if equation in equations]
     if not known or list(equations) != known:
         raise InputError(
@@ -33,14 +40,11 @@ def check_structure(
         )
     for equation, terms in equations.items():
         _check_terms(terms, normalisation, f"{where}: equations.{equation}")
-    symbols: set[str] = set()
-    for terms in equations.values():
-        for term in terms:
-            symbols.update(symbol for symbol, _ in term.powers)
-    if symbols.intersection(ROLL) and "p" not in equations:
+    has_roll = not symbols_in(equations.values()).isdisjoint(ROLL)
+    if has_roll and "p" not in equations:
         raise InputError(
-            f"{where}: expected an equation of roll 'p' where terms have roll, got none;"
-            " give its terms, or leave roll out"
+            f"{where}: expected an equation of roll 'p' where terms have roll, got"
+            " none; give its terms, or leave roll out"
         )
     if "p" in equations or "q" in equations:
         _check_roll_and_memory(equations, quantity, where)
@@ -94,7 +98,7 @@ def _check_forces(equations: Equations, normalisation: str, where: str) -> None:
     yaw = [term.powers for term in equations["r"]]
     if sway != yaw:
         raise InputError(
-            f"{where}: expected the same terms in the same order in 'v' and 'r', because"
-            " inertia couples the two forces, got others; make them the same, or write"
-            " accelerations"
+            f"{where}: expected the same terms in the same order in 'v' and 'r',"
+            " because inertia couples the two forces, got others; make them the same,"
+            " or write accelerations"
         )

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import cache
 from math import fabs, sqrt
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 from shipgym.engine.records import Record
@@ -96,11 +97,7 @@ def accelerations_source(equations: Equations, prime: bool, damped: bool = True)
     are divided by U, and the sum is multiplied by its power. `damped`: whether drift
     and turn die out where there is no equation of them; else their rate is 0.
     """
-    divided = prime and any(
-        speed_power(equation, term) < 0
-        for equation, terms in equations.items()
-        for term in terms
-    )
+    divided = prime and _has_negative_power(equations)
     rates = dict(DAMPED) if damped else {}
     needed: set[str] = set()
     first = 0
@@ -111,22 +108,38 @@ def accelerations_source(equations: Equations, prime: bool, damped: bool = True)
             if prime and not divided:
                 power = speed_power(equation, term)
             factors = _factors(term, power, divided)
-            needed.update(factors)
             monomials.append((f"c.c{number}", factors))
         first += len(terms)
         rate = f"({factored(monomials)})"
         if divided:
-            unit = ["s", "U"] if unit_speeds(equation) == 3 else ["s"]
-            needed.update(unit)
-            rate = " * ".join([*unit, rate])
+            unit = "s * U" if unit_speeds(equation) == 3 else "s"
+            rate = f"{unit} * {rate}"
         rates[equation] = rate
+        needed |= _variables_in(rate)
 
-    needed = _with_their_makings(needed)
-    yaw = "rdot + motion.q" if "q" in equations else "rdot"
-    lines = [f"{name} = {made}" for name, made in MADE_OF.items() if name in needed]
-    lines += [f"{name}dot = {rates.get(name, '0.0')}" for name in MOTION_RATES]
-    lines.append(f"return udot, vdot, {yaw}, pdot, qdot")
-    return "\n    ".join(["def accelerations(motion, c, ship):", *lines]) + "\n"
+    return _written(rates, _with_their_makings(needed), memory="q" in equations)
+
+
+def _written(rates: Mapping[str, str], variables: set[str], memory: bool) -> str:
+    """Source of the function, by the expressions of the rates."""
+    lines = ["def accelerations(motion, c, ship):"]
+    for name, made in MADE_OF.items():
+        if name in variables:
+            lines.append(f"    {name} = {made}")
+    for name in MOTION_RATES:
+        rate = rates.get(name, "0.0")
+        lines.append(f"    {name}dot = {rate}")
+    yaw = "rdot + motion.q" if memory else "rdot"
+    lines.append(f"    return udot, vdot, {yaw}, pdot, qdot\n")
+    return "\n".join(lines)
+
+
+def _has_negative_power(equations: Equations) -> bool:
+    """True where a term has more velocities than the sum it stands in."""
+    for equation, terms in equations.items():
+        if any(speed_power(equation, term) < 0 for term in terms):
+            return True
+    return False
 
 
 @cache
@@ -137,11 +150,18 @@ def accelerations_function(source: str) -> Any:
             "accelerations: expected sums of products of known symbols, got"
             f" {source[:200]!r}"
         )
-    namespace: dict[str, Any] = {"sqrt": sqrt, "fabs": fabs, "__name__": __name__}
-    name = f"<accelerations {hashlib.sha256(source.encode()).hexdigest()[:12]}>"
-    exec(compile(source, name, "exec"), namespace)
+    digest = hashlib.sha256(source.encode()).hexdigest()
+    name = f"<accelerations {digest[:12]}>"
+    namespace: dict[str, Any] = {
+        "sqrt": sqrt,
+        "fabs": fabs,
+        "__name__": __name__,
+    }
+    code = compile(source, name, "exec")
+    exec(code, namespace)
+    # for tracebacks
     lines = source.splitlines(keepends=True)
-    linecache.cache[name] = (len(source), None, lines, name)  # for tracebacks
+    linecache.cache[name] = (len(source), None, lines, name)
     return namespace["accelerations"]
 
 
@@ -157,12 +177,15 @@ def factored(monomials: Sequence[Monomial]) -> str:
     Half as many operations as a sum of products, and short chains of them: three times
     as fast. A monomial is its coefficient and the powers of its variables.
     """
-    shared = Counter(variable for _, powers in monomials for variable in powers)
-    variable, count = shared.most_common(1)[0] if shared else ("", 0)
+    shared: Counter[str] = Counter()
+    for _, powers in monomials:
+        shared.update(powers.keys())
+    variable, count = max(shared.items(), key=itemgetter(1), default=("", 0))
     if count < 2:
         return " + ".join(_product(*monomial) for monomial in monomials)
 
-    inside, outside = [], []
+    inside = []
+    outside = []
     for coefficient, powers in monomials:
         if variable not in powers:
             outside.append((coefficient, powers))
@@ -172,6 +195,7 @@ def factored(monomials: Sequence[Monomial]) -> str:
         if not left[variable]:
             del left[variable]
         inside.append((coefficient, left))
+
     product = f"{variable} * ({factored(inside)})"
     if outside:
         product += f" + ({factored(outside)})"
@@ -204,8 +228,12 @@ def _with_their_makings(names: set[str]) -> set[str]:
     """Names of variables, and of those that they are made of in turn."""
     makings = set(names)
     for name in names:
-        words = re.findall(r"\w+", MADE_OF[name])
-        makings.update(word for word in words if word in MADE_OF)
+        makings |= _variables_in(MADE_OF[name])
     if makings == names:
         return makings
     return _with_their_makings(makings)
+
+
+def _variables_in(expression: str) -> set[str]:
+    """Variables that stand in an expression."""
+    return MADE_OF.keys() & re.findall(r"\w+", expression)

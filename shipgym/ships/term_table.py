@@ -34,6 +34,7 @@ from shipgym.ships.terms import (
     TURN_RATES,
     Term,
     read_term_list,
+    symbols_in,
 )
 
 FORCE_OF_EQUATION = {"u": "X", "v": "Y", "r": "N"}
@@ -84,19 +85,20 @@ class Structure:
     # ---- what stands in the table ----------------------------------------------------
 
     def names(self, equation: str) -> tuple[str, ...]:
-        """Names of an equation's coefficients, such as X_u of forces or a_u of accelerations."""
-        letters = ACCELERATION_OF_EQUATION
+        """Names of an equation's coefficients, such as X_u (force) or a_u."""
         if self.quantity == "force":
-            letters = FORCE_OF_EQUATION
-        return tuple(f"{letters[equation]}_{t.name}" for t in self.terms(equation))
+            letter = FORCE_OF_EQUATION[equation]
+        else:
+            letter = ACCELERATION_OF_EQUATION[equation]
+        return tuple(f"{letter}_{term.name}" for term in self.equations[equation])
 
     @cached_property
     def coefficient_names(self) -> tuple[str, ...]:
         """Names in the order of the equations: `X_u`, ..., `Y_v`, ..., `N_r`."""
-        names: list[str] = []
+        names: tuple[str, ...] = ()
         for equation in self.equations:
             names += self.names(equation)
-        return tuple(names)
+        return names
 
     def terms(self, equation: str) -> tuple[Term, ...]:
         """Terms of one equation."""
@@ -105,10 +107,7 @@ class Structure:
     @cached_property
     def symbols(self) -> tuple[str, ...]:
         """Symbols that stand in its terms."""
-        used: set[str] = set()
-        for terms in self.equations.values():
-            for term in terms:
-                used.update(symbol for symbol, _ in term.powers)
+        used = symbols_in(self.equations.values())
         return tuple(symbol for symbol in SYMBOLS if symbol in used)
 
     @cached_property
@@ -165,7 +164,7 @@ class Structure:
 
     @property
     def regressed(self) -> tuple[str, ...]:
-        """Equations with a regression of their own; the memory's terms belong to yaw."""
+        """Equations with a regression of their own; the memory belongs to yaw."""
         return tuple(equation for equation in self.equations if equation != "q")
 
     def regression_names(self, equation: str) -> tuple[str, ...]:
@@ -193,37 +192,47 @@ class Structure:
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Terms of one equation on samples, SI units; the acceleration combines them linearly.
+        """Terms of one equation on samples, SI; the acceleration is linear in them.
 
         Channels, each of shape (n_samples,), are at least those of its terms and u, v,
         in SI units; the service speed is in the particulars, the shaft speed that at
         service speed, 1/s. Returns shape (n_samples, n_terms).
         """
-        u = np.asarray(channels["u"], dtype=float)
-        v = np.asarray(channels["v"], dtype=float)
-        U = np.hypot(u, v)
-        offsets = {"du": particulars["speed"], "dn": shaft_speed}
-        values = {"U": U}
-        for symbol in self.symbols:
-            if symbol == "U":
-                continue
-            channel = np.asarray(channels[CHANNEL[symbol]], dtype=float)
-            if symbol in offsets:
-                channel = channel - offsets[symbol]
-            if symbol.startswith("|"):
-                channel = np.abs(channel)
-            values[symbol] = channel
-
+        values = self._symbol_values(channels, particulars, shaft_speed)
         columns = []
         for term in self.terms(equation):
-            column = U ** float(self.speed_power(equation, term))
+            speed_power = self.speed_power(equation, term)
+            column = values["U"] ** float(speed_power)
             for symbol, power in term.powers:
                 column = column * values[symbol] ** float(power)
             columns.append(column)
         return np.stack(columns, axis=-1)
 
+    def _symbol_values(
+        self,
+        channels: Mapping[str, Any],
+        particulars: Particulars,
+        shaft_speed: float,
+    ) -> dict[str, Floats]:
+        """Values of the speed `U` and of the terms' symbols at samples."""
+        u = np.asarray(channels["u"], dtype=float)
+        v = np.asarray(channels["v"], dtype=float)
+        values = {"U": np.hypot(u, v)}
+        offsets = {"du": particulars["speed"], "dn": shaft_speed}
+        for symbol in self.symbols:
+            if symbol == "U":
+                continue
+            name = CHANNEL[symbol]
+            value = np.asarray(channels[name], dtype=float)
+            if symbol in offsets:
+                value = value - offsets[symbol]
+            if symbol.startswith("|"):
+                value = np.abs(value)
+            values[symbol] = value
+        return values
+
     def speed_power(self, equation: str, term: Term) -> int:
-        """Power of U in the feature, prime system: 2 (memory: 3) less one per velocity."""
+        """Power of U in the feature, prime: 2 (memory: 3), less one a velocity."""
         if self.normalisation != "prime":
             return 0
         return term_functions.speed_power(equation, term)
@@ -248,21 +257,28 @@ class Structure:
         if equation in ANGULAR:
             lengths -= 1
         if self.normalisation == "prime":
-            return float(length ** float(lengths + shaft_speeds))
+            lengths += shaft_speeds
+            return float(length ** float(lengths))
 
         speeds = unit - turn_rates - term.power(*SPEEDS)
-        scale = length ** float(lengths) * speed ** float(speeds)
+        scale = length ** float(lengths)
+        scale *= speed ** float(speeds)
         if shaft_speeds:
             scale /= shaft**shaft_speeds
         return float(scale)
 
     def term_scales(self, particulars: Particulars, shaft_speed: float = 0.0) -> Floats:
-        """`feature_scale` of all terms, by equation, for a ship; shape (n_coefficients,)."""
-        ship = particulars["length"], particulars["speed"], shaft_speed
+        """`feature_scale` of all terms, by equation; shape (n_coefficients,)."""
         scales = []
         for equation, terms in self.equations.items():
             for term in terms:
-                scale = self.feature_scale(equation, term, *ship)
+                scale = self.feature_scale(
+                    equation,
+                    term,
+                    length=particulars["length"],
+                    speed=particulars["speed"],
+                    shaft=shaft_speed,
+                )
                 scales.append(scale)
         return np.array(scales)
 
@@ -296,16 +312,20 @@ class Structure:
         return prime_inertia(particulars)
 
     def _from_forces(self, inertia: Floats) -> Floats:
-        """Matrix from coefficients of forces to accelerations, by an inertia of shape (3, 3)."""
+        """Matrix from force coefficients to accelerations, by an inertia (3, 3)."""
         order = list(FORCE_OF_EQUATION)
         axes = [order.index(equation) for equation in self.equations]
-        mobility = np.linalg.inv(inertia[np.ix_(axes, axes)])
+        own_inertia = inertia[np.ix_(axes, axes)]
+        mobility = np.linalg.inv(own_inertia)
+
+        # only equations of the same terms are coupled
         counts = [len(terms) for terms in self.equations.values()]
         blocks = []
-        for row, n in zip(mobility, counts, strict=True):
-            # only equations of the same terms are coupled
-            columns = zip(row, counts, strict=True)
-            blocks.append([entry * np.eye(n, m) for entry, m in columns])
+        for row, n_rows in zip(mobility, counts, strict=True):
+            block = []
+            for entry, n_columns in zip(row, counts, strict=True):
+                block.append(entry * np.eye(n_rows, n_columns))
+            blocks.append(block)
         return np.block(blocks)
 
     def term_numbers(
@@ -325,8 +345,13 @@ class Structure:
         particulars: Particulars,
         ship: Ship,
     ) -> dict[str, Floats]:
-        """Accelerations by equation at samples of shape (n_samples,), without compiling."""
-        found = self._sums_at(channels, coefficients, particulars, ship.shaft)
+        """Accelerations by equation at samples (n_samples,), without compiling."""
+        found = self._sums_at(
+            channels,
+            coefficients,
+            particulars,
+            shaft_speed=ship.shaft,
+        )
         for name in ("v", "r"):
             if name not in found:
                 found[name] = -channels[name] * (ship.speed / ship.length)
@@ -388,15 +413,18 @@ class Structure:
 
     def to_dict(self) -> dict[str, Any]:
         """Table as it stands in a model file."""
-        table: dict[str, Any] = {"name": self.name, "source": self.source}
+        table: dict[str, Any] = {
+            "name": self.name,
+            "source": self.source,
+        }
         if self.normalisation != "prime":
             table["normalisation"] = self.normalisation
         if self.quantity != "force":
             table["quantity"] = self.quantity
-        equations = {}
-        for equation, terms in self.equations.items():
-            equations[equation] = [term.to_dict() for term in terms]
-        table["equations"] = equations
+        table["equations"] = {
+            equation: [term.to_dict() for term in terms]
+            for equation, terms in self.equations.items()
+        }
         return table
 
     @classmethod
@@ -408,13 +436,17 @@ class Structure:
 def structure_fields(table: Mapping[str, Any], where: str) -> dict[str, Any]:
     """Fields of a `Structure` from a model file."""
     place = f"{where}.equations"
-    equations = check_table(table["equations"], place, EQUATION_NAMES)
-    given = {"name": table.get("name"), "source": table.get("source")}
+    lists = check_table(table["equations"], place, EQUATION_NAMES)
+    equations = {}
+    for equation, terms in lists.items():
+        equations[equation] = read_term_list(terms, f"{place}.{equation}")
+
+    fields = {
+        "name": table.get("name"),
+        "source": table.get("source"),
+        "equations": equations,
+    }
     for key in ("normalisation", "quantity"):
         if key in table:
-            given[key] = table[key]
-    read = {}
-    for equation, terms in equations.items():
-        read[equation] = read_term_list(terms, f"{place}.{equation}")
-    given["equations"] = read
-    return given
+            fields[key] = table[key]
+    return fields

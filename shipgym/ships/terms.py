@@ -1,7 +1,8 @@
-"""Terms of a manoeuvring model: products of powers of velocities, rudder angle and so on."""
+"""Terms of a manoeuvring model: products of powers of velocities and rudder angle."""
 
 import re
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -44,6 +45,12 @@ ROLL = ("p", "|p|", "phi", "|phi|")
 SHAFT_SPEEDS = ("n", "dn", "|n|")
 VELOCITIES = (*SPEEDS, *TURN_RATES, *SHAFT_SPEEDS)
 
+#: A factor of a formula, such as `v`, `|r|`, `n^2` or `/U`.
+FACTOR = re.compile(
+    r"(?P<stroke>/?)(?P<symbol>\|?[A-Za-z]+\|?|1)(?:\^(?P<exponent>[1-9]))?"
+)
+SHORT_NAMES = {"delta": "d", "|delta|": "|d|", "phi": "f", "|phi|": "|f|"}
+
 #: Limits of what a file may ask for: power of a symbol, factors of a term, terms of an
 #: equation.
 LARGEST_POWER = 9
@@ -64,6 +71,11 @@ class Term:
         """Identity of the term, whatever its name."""
         return frozenset(self.powers)
 
+    @property
+    def symbols(self) -> frozenset[str]:
+        """Symbols that stand in the term."""
+        return frozenset(dict(self.powers))
+
     def power(self, *symbols: str) -> int:
         """Sum of the powers of the given symbols."""
         return sum(power for symbol, power in self.powers if symbol in symbols)
@@ -78,13 +90,16 @@ class Term:
                     f"{place}: expected symbols of {quoted(SYMBOLS)}, got"
                     f" '{symbol}'.{did_you_mean(symbol, SYMBOLS)}"
                 )
-            least = -LARGEST_POWER if symbol == "U" else 1
             at = f"{place}: power of '{symbol}'"
-            factors += abs(
-                check_whole(power, at, at_least=least, at_most=LARGEST_POWER)
+            whole = check_whole(
+                power,
+                at,
+                at_least=-LARGEST_POWER if symbol == "U" else 1,
+                at_most=LARGEST_POWER,
             )
-            if power == 0:
+            if whole == 0:
                 raise unexpected(at, "an integer other than 0", power)
+            factors += abs(whole)
         if factors > MOST_FACTORS:
             raise InputError(
                 f"{place}: expected at most {MOST_FACTORS} factors, got {factors}"
@@ -98,10 +113,26 @@ class Term:
     def from_dict(cls, content: Any, where: str) -> Self:
         """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
         fields = ("name", "powers")
-        table = check_table(content, where, fields, fields)
-        name = check_text(table["name"], f"{where}.name")
+        table = check_table(
+            content,
+            where,
+            allowed=fields,
+            required=fields,
+        )
         powers = check_table(table["powers"], f"{where}.powers")
-        return cls(name, tuple(powers.items()))
+        return cls(
+            name=check_text(table["name"], f"{where}.name"),
+            powers=tuple(powers.items()),
+        )
+
+
+def symbols_in(tables: Iterable[tuple[Term, ...]]) -> set[str]:
+    """Symbols that stand in any term of some equations."""
+    symbols: set[str] = set()
+    for terms in tables:
+        for term in terms:
+            symbols |= term.symbols
+    return symbols
 
 
 def read_terms(text: str) -> tuple[Term, ...]:
@@ -116,26 +147,28 @@ def read_terms(text: str) -> tuple[Term, ...]:
 
 
 def _read_term(formula: str) -> Term:
-    short = {"delta": "d", "|delta|": "|d|", "phi": "f", "|phi|": "|f|"}
     powers: dict[str, int] = {}
     name = ""
-    for factor in re.sub(r"\s*/\s*", " /", formula).split():
-        parts = re.fullmatch(r"(/?)(\|?[A-Za-z]+\|?|1)(?:\^([1-9]))?", factor)
-        symbol = parts[2] if parts else ""
-        if parts is None or symbol not in ("1", *SYMBOLS):
+    spaced = re.sub(r"\s*/\s*", " /", formula)
+    for factor in spaced.split():
+        parts = FACTOR.fullmatch(factor)
+        if parts is None or parts["symbol"] not in ("1", *SYMBOLS):
             raise InputError(
                 f"terms: expected products of {quoted(SYMBOLS)} with spaces between,"
                 f" such as '|v| r' or 'v^3/U', got '{factor}' in"
                 f" '{formula}'.{did_you_mean(factor, SYMBOLS)}"
             )
-        stroke = parts[1]
-        exponent = parts[3] or ""
-        name += stroke + short.get(symbol, symbol) + exponent
-        if symbol != "1":
-            power = int(exponent or 1)
-            if stroke:
-                power = -power
-            powers[symbol] = powers.get(symbol, 0) + power
+        stroke = parts["stroke"]
+        symbol = parts["symbol"]
+        exponent = parts["exponent"] or ""
+        name += stroke + SHORT_NAMES.get(symbol, symbol) + exponent
+        if symbol == "1":
+            continue
+        power = int(exponent or 1)
+        if stroke:
+            power = -power
+        powers[symbol] = powers.get(symbol, 0) + power
+
     if not name:
         raise InputError(
             "terms: expected a formula such as '|v| r' between two commas, got nothing"
@@ -152,12 +185,13 @@ def short_terms(words: str, surge: str = "du") -> tuple[Term, ...]:
     symbols = {"u": surge, "d": "delta"}
     terms = []
     for word in words.split():
-        powers: dict[str, int] = {}
+        powers: Counter[str] = Counter()
         letters = re.findall(r"\|.\||.", word.lstrip("0"))
         for letter in letters:
             symbol = symbols.get(letter, letter)
-            powers[symbol] = powers.get(symbol, 0) + 1
-        terms.append(Term(word, tuple(powers.items())))
+            powers[symbol] += 1
+        term = Term(word, tuple(powers.items()))
+        terms.append(term)
     return tuple(terms)
 
 

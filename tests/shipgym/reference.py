@@ -1,4 +1,6 @@
-"""Reference manoeuvres and derivatives of published ships, where they lie beside the checkout."""
+"""Reference manoeuvres and derivatives of published ships, where they lie beside the
+checkout.
+"""
 
 from pathlib import Path
 

@@ -29,7 +29,10 @@ def test_a_seed_replays_its_trial_and_another_gives_another(tanker, sequence):
 
 
 def test_a_binary_rudder_has_two_angles_and_no_long_memory(tanker):
-    """Over the whole sequence of 1023 clock periods: mean 1/1023, autocorrelation -1/1023 at each lag."""
+    """Over the whole sequence of 1023 clock periods.
+
+    Mean 1/1023, autocorrelation -1/1023 at each lag.
+    """
     trial = prbs_rudder(tanker, 5.0, seed=3, clock_s=2.0, duration=2046.0, dt=2.0)
     bits = trial["delta_command"][:-1] / np.radians(5.0)
     np.testing.assert_allclose(np.abs(bits), 1.0)
@@ -47,7 +50,10 @@ def test_a_binary_rudder_changes_at_its_clock_only(tanker):
 
 
 def test_a_multi_sine_has_power_in_its_band_alone(tanker):
-    """Periods of 20 to 100 s in 600 s: harmonics 6 to 30, of one amplitude, 10 deg at the most."""
+    """Periods of 20 to 100 s in 600 s.
+
+    Harmonics 6 to 30, of one amplitude, 10 deg at the most.
+    """
     trial = multi_sine_rudder(tanker, 10.0, 5, 100.0, 20.0, duration=600.0, dt=0.5)
     rudder = trial["delta_command"][:-1]
     assert np.abs(rudder).max() == pytest.approx(np.radians(10.0))
@@ -69,7 +75,9 @@ def test_random_steps_stay_within_angle_and_time(tanker):
 
 
 def test_sequences_go_by_the_time_to_travel_a_ship_length(tanker):
-    """A clock of half of it, periods of 20 to 2, rudder steps of 0.5 to 4, shaft steps of 5 to 15."""
+    """A clock of half of it, periods of 20 to 2, rudder steps of 0.5 to 4, shaft steps
+    of 5 to 15.
+    """
     travel = tanker.particulars["length"] / tanker.particulars["speed"]
     times = {"seed": 2, "duration": 400.0 * travel, "dt": 0.05 * travel}
 
@@ -125,7 +133,10 @@ def test_the_multi_sine_of_least_crest_is_taken(tanker):
 
 
 def test_the_multi_sine_is_of_the_least_crest_of_32_draws(tanker):
-    """Of 10 to 30 periods in 300 s; the seed is one whose 30th to 32nd is the least, and a later one less."""
+    """Of 10 to 30 periods in 300 s.
+
+    The seed is one whose 30th to 32nd is the least, and a later one less.
+    """
     phases = np.random.default_rng(139).uniform(0.0, 2.0 * np.pi, (40, 21))
     angles = 2.0 * np.pi * np.outer(np.arange(10, 31), np.arange(300) / 300.0)
     waves = np.cos(phases[:, :, None] + angles).sum(axis=1)
@@ -139,7 +150,9 @@ def test_the_multi_sine_is_of_the_least_crest_of_32_draws(tanker):
 
 @pytest.mark.parametrize("name", ["container", "kvlcc2"])
 def test_half_the_shaft_speed_gives_half_the_ship_s_speed(name):
-    """Resistance and thrust both grow with the square of speed at a given advance ratio."""
+    """Resistance and thrust both grow with the square of speed at a given advance
+    ratio.
+    """
     model = load_model(name)
     trial = shaft_speed_steps(model, 0.5, 0.5 + 1e-9, duration=15000.0, dt=1.0)
     assert trial["u"][-1] == pytest.approx(0.5 * model.particulars["speed"], rel=1e-3)

@@ -88,7 +88,9 @@ def test_a_bare_reference_ship_turns_in_as_many_ship_lengths_at_any_scale(
 def test_model_scale_and_full_scale_of_one_ship_are_nearly_similar(
     kvlcc2: ShipModel,
 ) -> None:
-    """What is left: the scale effect on the wake, another propeller and rounded particulars."""
+    """What is left: the scale effect on the wake, another propeller and rounded
+    particulars.
+    """
     model = shipgym.load_model("kvlcc2-l7")
     bare = converted_model(
         kvlcc2, model.particulars, model.steering, model.service_shaft_speed
@@ -132,7 +134,7 @@ def test_accelerations_are_the_converted_ones_and_the_terms(
 
 
 def test_a_memory_of_yaw_is_converted_as_the_state_it_is() -> None:
-    """It is a part of the yaw acceleration, which goes with the square of the yaw rate."""
+    """It is a part of the yaw acceleration, which goes with the yaw rate squared."""
     own = shipgym.load_model("mariner")
     ship = nomoto2_ship(nomoto(own), own.particulars, own.steering)
     small = converted_model(ship, scale_model(own, 7.0).particulars, own.steering)
@@ -236,7 +238,9 @@ def test_what_cannot_be_a_reference_is_refused(
 def test_the_reference_ship_of_the_regression_is_the_one_that_sails(
     bare: ShipModel,
 ) -> None:
-    """Without terms the box accelerates as its converted reference ship, at several states."""
+    """Without terms the box accelerates as its converted reference ship, at several
+    states.
+    """
     rng = np.random.default_rng(0)
     channels = {
         "u": rng.uniform(4.0, 8.0, 6),

@@ -34,7 +34,10 @@ CARD = {
 
 @pytest.fixture(scope="module")
 def episodes(tmp_path_factory):
-    """Two of one environment; the second is cut off and begins without a seed of its own."""
+    """Two of one environment.
+
+    The second is cut off and begins without a seed of its own.
+    """
     folder = tmp_path_factory.mktemp("recorded")
     env = shipgym.RecordEpisode(
         gymnasium.make("shipgym/CourseKeeping-v0", max_episode_steps=5), folder

@@ -28,7 +28,10 @@ def test_intervals_hold_the_value_and_replay(identified):
 
 
 def test_the_interval_is_that_of_the_linearised_index(identified):
-    """For small uncertainty an index is linear in the coefficients: its spread is root(g' S g)."""
+    """For small uncertainty an index is linear in the coefficients.
+
+    Its spread is root(g' S g).
+    """
     covariance = 1e-2 * identified.covariance
     model = replace(identified, covariance=covariance)
     found = manoeuvres.index_intervals(
@@ -128,7 +131,10 @@ def test_an_identified_ship_is_judged_with_intervals(identified):
     ],
 )
 def test_stopping_is_judged_where_the_ship_goes_astern(name, passed, said):
-    """Track reach of a full astern stop, MSC.137(76) 5.3.4: the tanker's 8.95 lengths are within 15."""
+    """Track reach of a full astern stop, MSC.137(76) 5.3.4.
+
+    The tanker's 8.95 lengths are within 15.
+    """
     ship = load_model(name)
     needed = {
         n: m for n, m in manoeuvres.standard_manoeuvres(ship).items() if "stop" not in n

@@ -1,4 +1,6 @@
-"""Linear steering: Mariner's published time constants, and small motions of the full model."""
+"""Linear steering: Mariner's published time constants, and small motions of the full
+model.
+"""
 
 from dataclasses import asdict, replace
 
@@ -122,7 +124,10 @@ def test_oscillating_steering_has_no_two_time_constants_but_a_first_order_form()
 
 @pytest.mark.parametrize("name", ["container", "tanker", "kvlcc2", "kvlcc2-l7"])
 def test_the_other_ships_run_straight_and_answer_small_rudder_as_linearised(name):
-    """Roll follows the turn; the rudder of KVLCC2 works differently in turns to either side."""
+    """Roll follows the turn.
+
+    The rudder of KVLCC2 works differently in turns to either side.
+    """
     model = load_model(name)
     neutral, found = straight_running(model), nomoto(model)
     length, speed = model.particulars["length"], model.particulars["speed"]
@@ -159,7 +164,10 @@ def test_a_model_without_straight_course_is_refused_by_name():
 
 
 def test_a_straight_course_has_less_than_20_deg_of_rudder_and_sway_of_half_the_speed():
-    """Of two linear equations, one for each: sway over all of the speed = -Y_0 / Y_v, rudder = -N_0 / N_d."""
+    """Of two linear equations, one for each.
+
+    Sway over all of the speed = -Y_0 / Y_v, rudder = -N_0 / N_d.
+    """
 
     def running(sway, rudder):  # sway over surge
         none = dict.fromkeys(MARINER.coefficients, 0.0) | {
@@ -204,7 +212,9 @@ def test_a_rudder_without_effect_has_no_nomoto_form():
     ("share", "believed"), [(0.74, False), (0.76, True), (1.24, True), (1.26, False)]
 )
 def test_a_steady_speed_is_believed_within_a_quarter_of_service_speed(share, believed):
-    """udot' = a_0 + a_du du / U is 0 where the ship is slower or faster by a given share."""
+    """udot' = a_0 + a_du du / U is 0 where the ship is slower or faster by a given
+    share.
+    """
     none = dict.fromkeys(get_structure("linear").coefficient_names, 0.0)
     steady = {"a_0": 0.01 * (share - 1.0) / share, "a_du": -0.01}
     steering = {"b_v": -0.5, "b_d": 0.1, "c_r": -1.0, "c_d": 1.0}
@@ -233,7 +243,10 @@ def test_similar_ships_have_the_same_prime_dynamics(size, fast):
 
 @pytest.mark.parametrize("name", ["mariner", "container", "kvlcc2", "kvlcc2-rm-svm"])
 def test_linear_dynamics_are_those_of_the_compiled_ship(name):
-    """Differences of `derivatives`, rolling aside: those of sway and yaw by the rudder."""
+    """Differences of `derivatives`, rolling aside.
+
+    Those of sway and yaw by the rudder.
+    """
     ship = load_model(name)
     at = straight_running(ship)
     _, B = linearise(ship, at)

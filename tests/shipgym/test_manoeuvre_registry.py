@@ -12,7 +12,10 @@ from shipgym.manoeuvres.standard import FAMILIES
 from shipgym.trials.trial import KINDS
 
 PARALLEL_SHIFT = '''
-"""The parallel course manoeuvre: rudder over, then as much to the other side, then amidships."""
+"""The parallel course manoeuvre.
+
+Rudder over, then as much to the other side, then amidships.
+"""
 
 from dataclasses import dataclass
 
@@ -37,7 +40,8 @@ def parallel_shift(model, rudder_deg=10.0, water_depth=np.inf):
 
 
 def shift_indices(trial):
-    return ShiftIndices(trial["y"][-1] / trial.length, float(np.degrees(trial["psi"][-1])))
+    lengths = trial["y"][-1] / trial.length
+    return ShiftIndices(lengths, float(np.degrees(trial["psi"][-1])))
 
 
 def variants(model, water_depth=np.inf):
@@ -45,7 +49,9 @@ def variants(model, water_depth=np.inf):
         parallel_shift, shift_indices, ShiftIndices, "Heading and rudder in degrees.")}
 
 
-manoeuvres.register_manoeuvre("shifts", variants, "Parallel courses", kind="parallel-shift")
+manoeuvres.register_manoeuvre(
+    "shifts", variants, "Parallel courses", kind="parallel-shift"
+)
 '''
 
 

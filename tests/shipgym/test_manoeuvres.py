@@ -23,7 +23,7 @@ def mariner():
 
 
 def test_the_rudder_reverses_at_the_very_heading(mariner):
-    """With the switch inside a step the result does not depend on where the steps lie."""
+    """With the switch inside a step it does not matter where the steps lie."""
     coarse = manoeuvres.zigzag(mariner, 20, 20, dt=0.5)
     fine = manoeuvres.zigzag(mariner, 20, 20, dt=0.05)
     np.testing.assert_allclose(coarse["psi"], fine["psi"][::10], atol=2e-4)
@@ -40,7 +40,10 @@ def test_port_first_starts_to_port(mariner):
 
 @pytest.fixture(scope="module")
 def triangle() -> Trial:
-    """A zigzag drawn by hand, 1 deg/s: reversals at 10 and -10 deg, the heading turns back at 16 and -18."""
+    """A zigzag drawn by hand, 1 deg/s.
+
+    Reversals at 10 and -10 deg, the heading turns back at 16 and -18.
+    """
     corners = np.array([(0, 0), (5, 0), (21, 16), (55, -18), (100, 27)], dtype=float)
     t = np.arange(0.0, 100.5, 0.5)
     psi = np.interp(t, *corners.T)
@@ -92,14 +95,16 @@ def test_measured_rudder_and_ordered_rudder_tell_the_same(mariner):
 
 
 def test_orders_count_by_the_rudder_that_is_exceeded_a_quarter_of_the_time():
-    """Here 10 degrees: helm on the approach below half of it is no order, below nine tenths no reversal."""
+    """Here 10 degrees: helm on the approach below half of it is no order, below nine
+    tenths no reversal.
+    """
     ordered = np.repeat([4.9, 10.0, -8.9, 10.0, -9.1, 30.0], [10, 40, 10, 10, 10, 20])
     trial = Trial(np.arange(100.0), {"delta_command": np.radians(ordered)})
     assert execute_time(trial) == 10.0
     assert reversals(trial) == (10.0, [70.0, 80.0])
 
 
-def test_a_measured_rudder_is_traced_back_along_its_slope_between_a_tenth_and_half_of_its_way():
+def test_a_measured_rudder_is_traced_back_along_its_slope():
     way = np.array([0.0, 0.0, 1.0, 1.05, 4.0, 5.2, *[10.0] * 10, *[30.0] * 4])
     t = np.arange(20.0)
     way[4] = 3.0  # a tenth is exceeded at 3 s, half at 5 s, by 4.15 degrees within 2 s
@@ -124,8 +129,10 @@ def test_a_little_helm_or_noise_on_the_approach_is_not_the_execution():
         assert 59.0 <= execute_time(Trial(t, {"delta": np.radians(delta)})) <= 60.0
 
 
-def test_between_few_samples_a_measured_rudder_moves_at_the_fastest_rate_of_the_trial_at_least():
-    """A rudder of 2.5 deg/s, ordered at 4 s, then from 20 to -20 degrees at 28 s, and back at 63 s."""
+def test_between_few_samples_a_measured_rudder_moves_at_the_fastest_rate():
+    """A rudder of 2.5 deg/s, ordered at 4 s, then from 20 to -20 degrees at 28 s, and
+    back at 63 s.
+    """
     t, way = np.arange(0.0, 100.0, 5.0), np.array([0.0, 0.0, 5.0, 17.5, 30.0, 40.0])
     assert departure(t[:6], way, 40.0, 0.0) == pytest.approx(8.0)
     assert departure(
@@ -140,7 +147,10 @@ def test_between_few_samples_a_measured_rudder_moves_at_the_fastest_rate_of_the_
 
 
 def test_a_sample_that_shows_a_measured_rudder_moving_is_not_before_it_moves():
-    """At 3 deg/s from 4 s on to 10 degrees; at 6 s it is at 6 of them, and where it is held at 9 s."""
+    """At 3 deg/s from 4 s on to 10 degrees.
+
+    At 6 s it is at 6 of them, and where it is held at 9 s.
+    """
     t, way = np.array([0.0, 3.0, 6.0, 9.0]), np.array([0.0, 0.0, 4.0, 10.0])
     assert departure(t, way, 10.0, 3.0) == pytest.approx(6.0 - 4.0 / 3.0)
     helm = np.array(
@@ -150,7 +160,7 @@ def test_a_sample_that_shows_a_measured_rudder_moving_is_not_before_it_moves():
 
 
 @pytest.mark.parametrize("offset", [-1.2, 1.2])
-def test_a_measured_rudder_whose_zero_is_off_reverses_as_often_and_when_it_was_ordered_to(
+def test_a_measured_rudder_whose_zero_is_off_reverses_when_ordered(
     offset,
 ):
     run = manoeuvres.zigzag(load_model("mariner"), 10, 10, dt=1.0)
@@ -162,7 +172,9 @@ def test_a_measured_rudder_whose_zero_is_off_reverses_as_often_and_when_it_was_o
 
 @pytest.mark.parametrize("name", ["mariner", "container", "kvlcc2", "tanker"])
 def test_a_measured_rudder_reverses_when_it_was_ordered_to(name):
-    """It is traced back to the angle at which it was held, not to where it passed nine tenths of it."""
+    """It is traced back to the angle at which it was held, not to where it passed nine
+    tenths of it.
+    """
     ordered = manoeuvres.zigzag(load_model(name), 10, 10, dt=0.1)
     measured = Trial(ordered.t, {"psi": ordered["psi"], "delta": ordered["delta"]})
     assert (
@@ -190,7 +202,10 @@ def test_a_duration_has_two_steps_at_least():
 
 
 def test_a_perfect_circle():
-    """R = 300 m at 6 m/s from the start: advance R, transfer R, tactical and steady diameter 2 R."""
+    """R = 300 m at 6 m/s from the start.
+
+    Advance R, transfer R, tactical and steady diameter 2 R.
+    """
     t = np.arange(0.0, 700.0, 0.5)
     psi = t * 6.0 / 300.0
     for side in (1, -1):
@@ -220,7 +235,9 @@ def test_a_turn_that_ends_early_has_no_tactical_diameter(mariner):
 
 
 def test_imo_limits_between_10_and_30_seconds_per_length():
-    """MSC.137(76) 5.3.3: 10 and 25 deg below 10 s, 20 and 40 above 30 s, linear between."""
+    """MSC.137(76) 5.3.3: 10 and 25 deg below 10 s, 20 and 40 above 30 s, linear
+    between.
+    """
     assert overshoot_limits_deg(5.0) == (10.0, 25.0)
     assert overshoot_limits_deg(20.0) == (15.0, 32.5)
     assert overshoot_limits_deg(35.0) == (20.0, 40.0)
@@ -253,7 +270,9 @@ def test_imo_limits_are_those_of_the_resolution(mariner):
 
 
 def test_imo_assessment_of_mariner(mariner):
-    """The toolbox's Mariner turns too wide at 35 deg (6.65 L to port) and is steady otherwise."""
+    """The toolbox's Mariner turns too wide at 35 deg (6.65 L to port) and is steady
+    otherwise.
+    """
     criteria = manoeuvres.imo_assessment(mariner)
     assert [
         name for name, criterion in criteria.items() if criterion.passed is False
@@ -279,7 +298,10 @@ def test_a_zigzag_that_never_reaches_its_heading_says_so_with_its_trial(mariner)
 
 
 def test_a_ship_that_does_not_answer_its_rudder_fails_the_zigzag_criteria(mariner):
-    """With rudder derivatives of nothing it turns neither 10 nor 90 degrees: every criterion fails."""
+    """With rudder derivatives of nothing it turns neither 10 nor 90 degrees.
+
+    Every criterion fails.
+    """
     numb = {
         name: 0.0 if "d" in name.split("_")[1] else value
         for name, value in mariner.coefficients.items()
@@ -364,7 +386,10 @@ def test_what_a_trial_lacks_is_named():
 
 
 def test_a_little_helm_on_the_approach_is_no_order(mariner):
-    """Steady running at the neutral rudder for 30 s, then the turn: the same advance as without approach."""
+    """Steady running at the neutral rudder for 30 s, then the turn.
+
+    The same advance as without approach.
+    """
     approach, turn = np.full((300, 1), -0.0193), np.full((6000, 1), np.radians(35.0))
     trial = mariner.simulate(np.vstack([approach, turn]), 0.1).with_(
         kind="turning-circle"
@@ -457,10 +482,12 @@ def test_a_turn_is_steady_after_three_quarters_of_a_circle(turned, steady):
         (3.9, 1.0),
     ],
 )
-def test_a_measured_zigzag_was_switched_at_the_last_usual_heading_three_degrees_back_at_most(
+def test_a_measured_zigzag_was_switched_at_the_last_usual_heading(
     reached_deg, switch_deg
 ):
-    """Usual are 1 and multiples of 5 deg, which a helmsman may take for reached 5 per cent before."""
+    """Usual are 1 and multiples of 5 deg, which a helmsman may take for reached 5 per
+    cent before.
+    """
     t = np.arange(101.0)
     psi = np.radians(
         np.interp(t, [0.0, 5.0, 50.0, 100.0], [0.0, 0.0, reached_deg, 0.0])

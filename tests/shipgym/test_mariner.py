@@ -1,4 +1,6 @@
-"""The Mariner class ship against the MSS toolbox (Fossen), rows and manoeuvres of ../shared/reference."""
+"""The Mariner class ship against the MSS toolbox (Fossen), rows and manoeuvres of
+../shared/reference.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,6 @@
-"""Orders out of range, ships that blow up, and what a simulated trial records of its shaft."""
+"""Orders out of range, ships that blow up, and what a simulated trial records of its
+shaft.
+"""
 
 from dataclasses import replace
 from functools import partial
@@ -169,7 +171,10 @@ def test_a_ship_is_changed_in_what_is_asked_for_alone():
 
 @pytest.mark.parametrize("command", [0.3, -0.3])
 def test_a_rudder_reverses_within_a_step_at_the_very_heading(command):
-    """Heading 0.3 t + 0.1 t^3 to the side of the order: it passes 0.07 at 0.2293 s of 2 s."""
+    """Heading 0.3 t + 0.1 t^3 to the side of the order.
+
+    It passes 0.07 at 0.2293 s of 2 s.
+    """
     asked = []
 
     def turned(asked, motion, command, n, h, *more):

@@ -53,7 +53,10 @@ def test_clarke_gives_the_kvlcc2_added_masses_within_20_per_cent():
 
 
 def test_clarkes_regressions_are_those_printed():
-    """L/B 100/15, B/T 3, CB 0.7, by -pi (T/L)^2: Clarke, Gedling & Hine 1983, worked out."""
+    """L/B 100/15, B/T 3, CB 0.7, by -pi (T/L)^2.
+
+    Clarke, Gedling & Hine 1983, worked out.
+    """
     scale = -math.pi * 0.05**2
     assert clarke_added_masses(100.0, 15.0, 5.0, 0.7) == pytest.approx(
         {
@@ -217,7 +220,7 @@ def test_what_no_ship_has_is_refused(values, message):
 
 
 def test_inertia_is_about_midship():
-    """The gyradius is about the centre of gravity, which stands xg forward (Steiner)."""
+    """The gyradius is about the centre of gravity, xg forward of midship (Steiner)."""
     ship = Particulars(
         length=100.0, mass=8e6, xg=5.0, yaw_gyradius=25.0, water_density=1000.0
     )

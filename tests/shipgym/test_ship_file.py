@@ -1,4 +1,4 @@
-"""One TOML file says what ship it is, how to read its data and what each trial is for."""
+"""One TOML file says what ship it is, how to read its data and what trials are for."""
 
 import tomllib
 from functools import partial

@@ -67,7 +67,9 @@ def test_a_body_heading_and_place_do_not_matter(mariner):
 
 
 def test_the_integrator_is_of_fourth_order(mariner):
-    """Halving the step divides the error by 16, with a rudder that stays off its rate limit."""
+    """Halving the step divides the error by 16, with a rudder that stays off its rate
+    limit.
+    """
 
     def end(dt: float) -> np.ndarray:
         trial = mariner.simulate(np.full((round(40.0 / dt), 1), 0.05), dt)

@@ -1,4 +1,7 @@
-"""A ship with equations of her own from one file outside the package: the one of its documentation page."""
+"""A ship with equations of her own from one file outside the package.
+
+The one of its documentation page.
+"""
 
 import math
 import pickle
@@ -238,7 +241,9 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
 
 
 def test_her_equations_are_tried_in_a_turn_in_deep_water(tug: Path) -> None:
-    """At nine tenths of her service speed, drifting and turning, so that no term is left out by a zero."""
+    """At nine tenths of her service speed, drifting and turning, so that no term is
+    left out by a zero.
+    """
     ship = register_ship_equations(tug)
     seen: list[tuple[Motion, Ship]] = []
     shafts: list[tuple[float, float]] = []

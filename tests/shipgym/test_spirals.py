@@ -19,7 +19,10 @@ from shipgym.ships.simulate import Conditions
     ],
 )
 def test_both_spirals_find_the_loop(name, width_deg, height_deg_s):
-    """The tankers are unstable; the direct spiral knows the loop to within its steps of 0.25 deg."""
+    """The tankers are unstable.
+
+    The direct spiral knows the loop to within its steps of 0.25 deg.
+    """
     model = load_model(name)
     direct = manoeuvres.spiral_indices(manoeuvres.direct_spiral(model))
     reverse = manoeuvres.spiral_indices(manoeuvres.reverse_spiral(model))
@@ -47,7 +50,10 @@ def test_both_spirals_are_the_same_curve_for_a_stable_ship():
 
 
 def test_a_point_of_the_reverse_spiral_is_an_equilibrium():
-    """Also where the tanker would not stay by itself: at r = 0 it needs 0.5 deg against its propeller."""
+    """Also where the tanker would not stay by itself.
+
+    At r = 0 it needs 0.5 deg against its propeller.
+    """
     model = load_model("tanker")
     spiral = manoeuvres.reverse_spiral(model)
     straight = spiral.rudder_deg[np.argmin(np.abs(spiral.yaw_rate_deg_s))]
@@ -93,7 +99,10 @@ def test_a_plateau_counts_from_a_tenth_of_the_longest_on_with_its_last_third():
 
 
 def test_a_loop_drawn_by_hand():
-    """Jumps between 2 and 4 deg either side: 6 deg wide; 2 * 0.5 deg/s high at rudder 0."""
+    """Jumps between 2 and 4 deg either side.
+
+    6 deg wide; 2 * 0.5 deg/s high at rudder 0.
+    """
     angles = np.array([10, 4, 0, -2, -4, -10, -4, 0, 2, 4, 10], dtype=float)
     rates = np.array([1, 0.7, 0.5, 0.4, -0.4, -1, -0.7, -0.5, -0.4, 0.4, 1])
     trial = Trial([0, 1, 2], {"r": [0, 0, 0]})
@@ -105,7 +114,10 @@ def test_a_loop_drawn_by_hand():
 
 
 def test_a_fold_drawn_by_hand():
-    """delta = r^3 - 3 r folds at r = -1 and 1, delta = 2 and -2; it meets 0 at r = -sqrt(3) and sqrt(3)."""
+    """delta = r^3 - 3 r folds at r = -1 and 1, delta = 2 and -2.
+
+    It meets 0 at r = -sqrt(3) and sqrt(3).
+    """
     rates = np.linspace(-3.0, 3.0, 61)
     trial = Trial([0, 1, 2], {"r": [0, 0, 0]})
     indices = manoeuvres.spiral_indices(
@@ -116,7 +128,10 @@ def test_a_fold_drawn_by_hand():
 
 
 def test_pull_outs_end_alike_only_for_a_stable_ship():
-    """Mariner is left with 0.17 deg/s to starboard from either side; KVLCC2 stays in its turn to port."""
+    """Mariner is left with 0.17 deg/s to starboard from either side.
+
+    KVLCC2 stays in its turn to port.
+    """
     ends = {
         name: [
             manoeuvres.pull_out_indices(
@@ -238,7 +253,9 @@ def test_a_leg_ends_after_sixty_stretches_of_five_lengths_steady_or_not(monkeypa
 def test_a_motion_is_steady_where_nothing_changes_by_two_parts_in_100_000(
     what, change, stretches, monkeypatch
 ):
-    """Speeds by that of service, yaw rate by that of service over the length, the rudder in rad."""
+    """Speeds by that of service, yaw rate by that of service over the length, the
+    rudder in rad.
+    """
     ship = load_model("mariner")
     length, speed = ship.particulars["length"], ship.particulars["speed"]
     unit = {"u": speed, "v": speed, "r": speed / length, "rudder": 1.0}[what]

@@ -45,7 +45,9 @@ def kvlcc2_with(lag):
 @pytest.mark.parametrize("lag", [0.01, 0.3, 1.0, 6.0])
 @pytest.mark.parametrize("step", [0.5, 4.0])
 def test_the_rudder_settles_at_its_order_however_short_its_lag(lag, step):
-    """Runge-Kutta alone would chatter, or settle elsewhere, where a lag is shorter than 0.36 of a step."""
+    """Runge-Kutta alone would chatter, or settle elsewhere, where a lag is shorter than
+    0.36 of a step.
+    """
     trial = kvlcc2_with(lag).simulate(np.tile([0.2, 1.5], (120, 1)), step)
     delta = trial["delta"][trial.t >= 30.0 + 10.0 * lag]
     np.testing.assert_allclose(delta[-20:], 0.2, rtol=1e-6)
@@ -53,7 +55,10 @@ def test_the_rudder_settles_at_its_order_however_short_its_lag(lag, step):
 
 
 def test_an_environment_follows_a_short_lag():
-    """In steps of two seconds; there, one of 0.45 of a step and a shorter one are the same."""
+    """In steps of two seconds.
+
+    There, one of 0.45 of a step and a shorter one are the same.
+    """
     rudders = []
     for lag in (0.1, 0.9):
         env = gymnasium.make("shipgym/CourseKeeping-v0", model=kvlcc2_with(lag))

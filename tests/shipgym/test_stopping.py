@@ -16,7 +16,10 @@ FULL_ASTERN = -80.0 / 60.0  # 1/s
 
 
 def test_the_tanker_stops_full_astern_in_9_lengths():
-    """Within the 15 lengths of MSC.137(76) 5.3.4; it swings 33 deg to starboard meanwhile."""
+    """Within the 15 lengths of MSC.137(76) 5.3.4.
+
+    It swings 33 deg to starboard meanwhile.
+    """
     trial = stopping(load_model("tanker"), FULL_ASTERN, speed_ratio=0.0)
     indices = stopping_indices(trial)
     assert trial["u"][-2] > 0.0 >= trial["u"][-1]
@@ -36,7 +39,9 @@ def test_a_weaker_order_astern_takes_longer():
 
 
 def test_a_container_ship_without_thrust_halves_its_speed_in_13_lengths():
-    """udot = X_uu u^2 / L / (m + mx), so each halving takes ln 2 (m + mx) / -X_uu ship lengths."""
+    """udot = X_uu u^2 / L / (m + mx), so each halving takes ln 2 (m + mx) / -X_uu ship
+    lengths.
+    """
     model = load_model("container")
     trial, numbers = stopping(model), model.coefficients
     quarter, eighth = (
@@ -56,7 +61,9 @@ def test_coasting_straight_needs_no_sideways_room(name):
 
 
 def test_full_scale_and_model_coast_alike():
-    """By Froude's law the same in ship lengths, but for the wake fraction, 0.35 against 0.40."""
+    """By Froude's law the same in ship lengths, but for the wake fraction, 0.35 against
+    0.40.
+    """
     full, small = (
         stopping_indices(stopping(load_model(name))).track_reach_lengths
         for name in ("kvlcc2", "kvlcc2-l7")
@@ -65,7 +72,10 @@ def test_full_scale_and_model_coast_alike():
 
 
 def test_stopping_distance_of_a_stop_drawn_by_hand():
-    """From 10 m/s at 0.1 m/s2 to the east: 500 m to standstill, 375 m to half the speed."""
+    """From 10 m/s at 0.1 m/s2 to the east.
+
+    500 m to standstill, 375 m to half the speed.
+    """
     t = np.arange(101.0)
     ahead = 10.0 * t - 0.05 * t**2
     still = np.zeros(101)
@@ -89,7 +99,9 @@ def test_stopping_distance_of_a_stop_drawn_by_hand():
     [("container", 8.27), ("tanker", 15.86), ("kvlcc2", 10.28), ("kvlcc2-l7", 10.43)],
 )
 def test_acceleration_to_service_speed(name, lengths):
-    """Ship lengths from a quarter of service speed until nine tenths of the rest are gained."""
+    """Ship lengths from a quarter of service speed until nine tenths of the rest are
+    gained.
+    """
     model = load_model(name)
     trial = acceleration(model)
     indices = acceleration_indices(trial)

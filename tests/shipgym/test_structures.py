@@ -1,4 +1,6 @@
-"""Tables of terms: the compiled accelerations, the regression features and the inertia agree."""
+"""Tables of terms: the compiled accelerations, the regression features and the inertia
+agree.
+"""
 
 import pickle
 from dataclasses import replace
@@ -53,7 +55,9 @@ def test_abkowitz_has_the_terms_of_the_paper():
 
 
 def test_a_force_along_one_axis_meets_the_coupled_inertia():
-    """M a = F in the prime system with Mariner's inertia (Chislett & Strom-Tejsen 1965)."""
+    """M a = F in the prime system with Mariner's inertia (Chislett & Strom-Tejsen
+    1965).
+    """
     p = shipgym.load_model("mariner").particulars
     matrix = ABKOWITZ.acceleration_matrix(p)
     y_v, n_v = (
@@ -84,7 +88,10 @@ def test_inertia_that_cannot_be_is_refused():
 
 
 def virtual_ship(name: str, **coefficients: float) -> ShipModel:
-    """The Mariner's size and speed in a structure; coefficients that are not given are 0."""
+    """The Mariner's size and speed in a structure.
+
+    Coefficients that are not given are 0.
+    """
     table = get_structure(name)
     mariner = shipgym.load_model("mariner").particulars
     return ShipModel(
@@ -146,7 +153,7 @@ def test_accelerations_of_every_structure_are_written_from_its_features(name):
 
 
 def test_nomoto_turns_at_the_rate_k_delta_after_some_time_constants():
-    """T rdot + r = K delta with K = 0.031 1/s, T = 30.2487 s (Zhu 2018, Table 7.4.8)."""
+    """T rdot + r = K delta, K = 0.031 1/s, T = 30.2487 s (Zhu 2018, Table 7.4.8)."""
     K, T = 0.031, 30.2487
     ship = virtual_ship("nomoto", c_r=-1.0 / T, c_d=K / T)
     start = [0.0, 0.0, 0.0, 7.0, 0.5, 0.0, 0.1]
@@ -164,7 +171,10 @@ def test_nomoto_turns_at_the_rate_k_delta_after_some_time_constants():
 
 
 def test_norrbin_turns_at_the_root_of_its_cubic():
-    """n1 r + n3 r^3 = K delta: r = 0.01 1/s for delta = 0.2, n1 = 1, n3 = 5000, K = 0.075."""
+    """n1 r + n3 r^3 = K delta.
+
+    r = 0.01 1/s for delta = 0.2, n1 = 1, n3 = 5000, K = 0.075.
+    """
     T, K, n3 = 20.0, 0.075, 5000.0
     ship = virtual_ship("norrbin", c_r=-1.0 / T, c_r3=-n3 / T, c_d=K / T)
     assert ship.simulate(np.full((800, 1), 0.2), 0.5)["r"][-1] == pytest.approx(
@@ -173,7 +183,9 @@ def test_norrbin_turns_at_the_root_of_its_cubic():
 
 
 def test_linear_steering_has_the_form_of_astrom_and_kallstrom():
-    """The Mariner of Zhu 2018, equation A.9 and table 7.3.1, rudder turned positive to starboard."""
+    """The Mariner of Zhu 2018, equation A.9 and table 7.3.1, rudder turned positive to
+    starboard.
+    """
     a11, a12, a21, a22, b11, b21 = -0.693, -0.304, -3.41, -2.17, -0.207, 1.63
     ship = virtual_ship(
         "linear-steering", b_v=a11, b_r=a12, b_d=b11, c_v=a21, c_r=a22, c_d=b21
@@ -207,7 +219,9 @@ def test_perturbed_surge_holds_service_speed_at_service_revolutions():
 
 
 def test_cubic_at_service_is_in_parts_of_service():
-    """udot L / U0^2 is the sum of the coefficients of n2, nu, u2 at service speed and revolutions."""
+    """udot L / U0^2 is the sum of the coefficients of n2, nu, u2 at service speed and
+    revolutions.
+    """
     ship = virtual_ship(
         "cubic", a_n2=0.03, a_nu=-0.01, a_u2=-0.005, b_Uv=-0.4, **{"c_v3/U": 2.0}
     )
@@ -386,7 +400,10 @@ def test_a_shaft_speed_is_asked_for_where_the_terms_have_one():
 
 
 def test_nomoto_is_recovered_from_its_own_linear_form():
-    """K and T of the table are those of the ship's transfer function: it has no sway to disturb them."""
+    """K and T of the table are those of the ship's transfer function.
+
+    It has no sway to disturb them.
+    """
     gain, time = 0.031, 30.2487
     found = nomoto(virtual_ship("nomoto", c_r=-1.0 / time, c_d=gain / time))
     np.testing.assert_allclose([found.K, found.T], [gain, time], rtol=1e-6)

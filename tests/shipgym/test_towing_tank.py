@@ -25,7 +25,10 @@ def mariner():
 def derivatives(
     trial: Trial, force: str, velocity: str, unit: float
 ) -> tuple[float, float]:
-    """Prime derivatives by velocity and acceleration: the parts of a force in and out of phase."""
+    """Prime derivatives by velocity and acceleration.
+
+    The parts of a force in and out of phase.
+    """
     swing = (trial[velocity] - trial[velocity].mean()) / unit
     acceleration = np.gradient(swing, trial.t, edge_order=2) * L / U
     regressors = np.stack([np.ones(len(trial)), swing, acceleration], axis=-1)[1:-1]
@@ -41,7 +44,10 @@ def derivatives(
     [("Y", -1160, -(798 + 748)), ("N", -264, -(-18.354 - 4.646))],
 )
 def test_pure_sway_of_mariner(mariner, force, by_velocity, by_acceleration):
-    """Y_v and N_v in phase with the sway speed; mass and added mass against the sway acceleration."""
+    """Y_v and N_v in phase with the sway speed.
+
+    Mass and added mass against the sway acceleration.
+    """
     trial = towing_tank.pure_sway(mariner, SMALL * U, tank=Tank(samples=1000))
     slow, fast = derivatives(trial, force, "v", U)
     assert slow * 1e5 == pytest.approx(by_velocity, rel=1e-4)
@@ -80,7 +86,9 @@ def test_without_the_ship_s_own_inertia_the_water_s_derivatives_are_left(mariner
 
 
 def test_samples_of_whole_cycles_with_both_ends_and_of_every_angle(mariner):
-    """By default three periods of 10 ship lengths each, 200 samples a period, and a second at an angle."""
+    """By default three periods of 10 ship lengths each, 200 samples a period, and a
+    second at an angle.
+    """
     swing = towing_tank.pure_sway(mariner, 0.5)
     np.testing.assert_allclose(swing.t, np.linspace(0.0, 30.0 * L / U, 601))
     assert (swing["v"][0], swing["v"][100], swing["v"][-1]) == pytest.approx(
@@ -95,7 +103,9 @@ def test_samples_of_whole_cycles_with_both_ends_and_of_every_angle(mariner):
 
 @pytest.mark.parametrize("drift_deg", [-12.0, 4.0, 9.0])
 def test_static_drift_of_mariner_with_rudder_by_hand(mariner, drift_deg):
-    """The whole polynomial of the sway force at a drift angle with 10 degrees of rudder."""
+    """The whole polynomial of the sway force at a drift angle with 10 degrees of
+    rudder.
+    """
     trial = towing_tank.static_drift(mariner, [drift_deg], tank=Tank(rudder_deg=10.0))
     v, u, d = (
         -np.sin(np.radians(drift_deg)),
@@ -120,7 +130,9 @@ def test_static_drift_of_mariner_with_rudder_by_hand(mariner, drift_deg):
 
 
 def test_yaw_with_drift_of_mariner_by_hand(mariner):
-    """The cross terms X_vr and Y_vvr at the largest yaw rate, where the yaw acceleration is zero."""
+    """The cross terms X_vr and Y_vvr at the largest yaw rate, where the yaw
+    acceleration is zero.
+    """
     rate, drift = 0.2, np.radians(8.0)
     trial = towing_tank.yaw_with_drift(mariner, np.degrees(rate * U / L), 8.0)
     v, u, r = -np.sin(drift), np.cos(drift) - 1.0, rate
@@ -149,7 +161,10 @@ def test_at_service_speed_thrust_and_resistance_balance(name):
 
 
 def test_drift_forces_of_kvlcc2_s_hull_by_hand():
-    """Without rudder the hull's polynomials are left: rho L d U^2 / 2 (Y_v v + Y_vvv v^3), N with L more."""
+    """Without rudder the hull's polynomials are left.
+
+    rho L d U^2 / 2 (Y_v v + Y_vvv v^3), N with L more.
+    """
     model = load_model("kvlcc2-l7")
     bare = replace(model, coefficients={**model.coefficients, "A_R": 0.0})
     trial = towing_tank.static_drift(bare, [10.0])
@@ -162,7 +177,10 @@ def test_drift_forces_of_kvlcc2_s_hull_by_hand():
 
 
 def test_the_container_s_roll_is_not_in_her_sway_force():
-    """The lever of the added mass couples roll to sway; the force on a ship held upright does not know it."""
+    """The lever of the added mass couples roll to sway.
+
+    The force on a ship held upright does not know it.
+    """
     model = load_model("container")
     level = replace(model, coefficients={**model.coefficients, "ly": 0.0})
     held, other = (towing_tank.pure_sway(ship, 0.5)["Y"] for ship in (model, level))
@@ -170,7 +188,10 @@ def test_the_container_s_roll_is_not_in_her_sway_force():
 
 
 def test_the_tanker_s_added_mass_grows_in_shallow_water():
-    """At a depth of 1.5 draughts z = 2: mass (m22 - 2 Y_vdotz) = 2.794 mass in sway instead of 2.02."""
+    """At a depth of 1.5 draughts z = 2.
+
+    Mass (m22 - 2 Y_vdotz) = 2.794 mass in sway instead of 2.02.
+    """
     model = load_model("tanker")
     tank = Tank(water_depth=1.5 * 18.46)
     mass = model.particulars["mass"]
@@ -209,7 +230,10 @@ def test_a_force_trial_is_a_file_like_any_other(mariner, tmp_path):
 
 
 def test_a_balance_at_the_centre_of_gravity_is_moved_to_midship(mariner, tmp_path):
-    """The moment about midship is that about the centre of gravity and xG Y; kilonewtons are converted."""
+    """The moment about midship is that about the centre of gravity and xG Y.
+
+    Kilonewtons are converted.
+    """
     trial = towing_tank.static_drift(mariner, [8.0])
     xg = mariner.particulars["xg"]
     channels = {"Y": trial["Y"], "N": trial["N"] - xg * trial["Y"]}
@@ -265,7 +289,10 @@ def test_wrong_arguments(mariner, call, message):
 
 
 def test_the_track_is_the_integral_of_the_velocity():
-    """Over a cycle of yaw with drift: velocities turned by the heading, summed along the way."""
+    """Over a cycle of yaw with drift.
+
+    Velocities turned by the heading, summed along the way.
+    """
     mariner = load_model("mariner")
     trial = towing_tank.yaw_with_drift(
         mariner, 0.5, 8.0, period_s=200.0, tank=Tank(samples=400, cycles=1)

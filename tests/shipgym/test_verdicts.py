@@ -159,9 +159,7 @@ def test_a_measured_turn_has_the_rudder_within_a_degree_and_a_tenth_of_the_speed
     ("channel", "most"),
     [("u", 1.5 * 7.7175), ("v", 7.7175), ("r", 3.0 * 7.7175 / 160.93)],
 )
-def test_no_ship_is_half_as_fast_again_or_as_fast_sideways_or_turns_three_radians_a_length(
-    channel, most
-):
+def test_no_ship_is_half_as_fast_again_or_turns_three_radians_a_length(channel, most):
     ship = load_model("mariner")
     for share, wild in ((0.99, False), (-1.01, True)):
         trial = Trial([0.0, 1.0, 2.0], {channel: [0.0, share * most, 0.0]})

@@ -1,4 +1,6 @@
-"""Second-order wave forces against published curves, limits and Newman's approximation; mobility."""
+"""Second-order wave forces against published curves, limits and Newman's approximation;
+mobility.
+"""
 
 from dataclasses import replace
 
@@ -66,7 +68,9 @@ def test_added_resistance_peaks_where_model_tests_have_it(ship, froude, peak, at
     ],
 )
 def test_added_resistance_is_that_of_the_procedure(ship, omega, expected):
-    """ITTC 7.5-04-01-01.1, appendix G, at service speed, N/m2: worked out apart, equation by equation.
+    """ITTC 7.5-04-01-01.1, appendix G, at service speed, N/m2.
+
+    Worked out apart, equation by equation.
 
     Waves from 0, 0.15, 1, 2, 2.6 and pi rad from the bow: all branches of its parts.
     """
@@ -207,7 +211,9 @@ def test_eight_harmonics_of_the_drift_suffice_in_a_spread_sea(ship, state):
 
 
 def newman_spectrum(sea, draught, mu):
-    """8 integral S(w) S(w + mu) c(w) c(w + mu) dw, over the square of the mean, 2 integral S c dw."""
+    """8 integral S(w) S(w + mu) c(w) c(w + mu) dw, over the square of the mean, 2
+    integral S c dw.
+    """
     w = np.linspace(0.15, 6.0, 4000)
     weighted = [
         wave_spectrum(sea, w + m) * draught_attenuation(w + m, draught)

@@ -122,7 +122,7 @@ THREE_ANGLES = "angles_deg: expected at least three that rise from 0 to 180"
         (lambda: Wind(5.0, gust="yes"), "wind gust: "),
         (
             lambda: Wind(5.0, coefficients="blendermann-tankerloaded"),
-            "wind coefficients: expected a WindTable or .*mean 'blendermann-tanker-load",
+            "wind coefficients: expected a WindTable or .*mean 'blendermann-tanker",
         ),
         (lambda: Waves(3.0, 3.0), "expected at most 1.4.* peak_period 3, got 3; steep"),
         (lambda: Waves(np.nan, 8.0), "waves significant_height: "),
@@ -181,7 +181,10 @@ def test_weather_is_refused_beyond_what_there_is(make, most):
 
 
 def test_what_is_not_said_of_the_weather():
-    """A steady current whose variation, if any, takes ten minutes; gusts; a growing sea that is spread."""
+    """A steady current whose variation, if any, takes ten minutes.
+
+    Gusts, and a growing sea that is spread.
+    """
     assert Current(1.0) == Current(1.0, None, 0.0, 600.0)
     assert Wind(5.0) == Wind(5.0, None, True, "harris", "blendermann")
     assert Waves(1.0, 8.0) == Waves(1.0, 8.0, None, "jonswap", 3.3, "cosine-squared")

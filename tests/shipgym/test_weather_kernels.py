@@ -74,7 +74,9 @@ def steady_wind(from_deg, speed=15.0):
 
 
 def sampling_error(correlation_time, duration):
-    """Relative standard error of a variance from a record of a Gauss-Markov process (Bendat & Piersol)."""
+    """Relative standard error of a variance from a record of a Gauss-Markov process
+    (Bendat & Piersol).
+    """
     return np.sqrt(2.0 * correlation_time / duration)
 
 
@@ -226,7 +228,10 @@ def test_gusts_have_the_variance_of_their_spectrum(mariner):
 
 @pytest.mark.parametrize("dt", [0.2, 1.0])
 def test_heading_in_waves_has_the_variance_and_the_rhythm_of_the_filter(mariner, dt):
-    """In waves too low to push a ship off her course: variance, correlation and yaw rate."""
+    """In waves too low to push a ship off her course.
+
+    Variance, correlation and yaw rate.
+    """
     waves, steps = Waves(1e-3, 9.7, 60.0), 40000
     model, state = inert(mariner, mariner.particulars["speed"])
     trial = ahead(model, Weather(waves=waves), steps, dt, state=state)
@@ -375,7 +380,10 @@ def test_an_oscillator_in_waves_steps_exactly(turn):
 
 @given(angle, angle, few, few, st.floats(0.0, 15.0), few)
 def test_wind_and_waves_push_by_where_they_come_from(psi, blows, u, v, speed, gust):
-    """Worked with vectors north and east: the air that the ship meets, and the waves from the bow."""
+    """Worked with vectors north and east.
+
+    The air that the ship meets, and the waves from the bow.
+    """
     nothing = [0.0] * 4
     p = parameters(
         wind_speed=speed,
@@ -422,7 +430,9 @@ def test_wind_and_waves_push_by_where_they_come_from(psi, blows, u, v, speed, gu
 
 
 def test_what_the_instruments_filter_takes_away_is_a_band_of_scipys():
-    """Notch (s^2 + 0.2 w s + w^2) / (s^2 + 1.4 w s + w^2), its frequency kept (Fossen 11.1.2)."""
+    """Notch (s^2 + 0.2 w s + w^2) / (s^2 + 1.4 w s + w^2), its frequency kept (Fossen
+    11.1.2).
+    """
     turn, signal = 0.4, np.random.default_rng(0).standard_normal(200)
     w = 2.0 * np.tan(0.5 * turn)
     b, a = bilinear([1.0, 0.2 * w, w * w], [1.0, 1.4 * w, w * w], fs=1.0)
@@ -436,7 +446,9 @@ def test_what_the_instruments_filter_takes_away_is_a_band_of_scipys():
 
 
 def test_a_sea_begins_and_goes_on_as_it_always_was():
-    """Over 3,000 episodes every process has its deviation and mean, at the beginning and 2 s later."""
+    """Over 3,000 episodes every process has its deviation and mean, at the beginning
+    and 2 s later.
+    """
     p = parameters(
         current_speed=0.8,
         current_towards=2.0,
@@ -653,8 +665,10 @@ engine = Engine(shipgym.load_model("mariner"), 2, course_keeping_task(sea="rough
 engine.reset([1, 2])
 for k in range(30):
     observations, *_ = engine.step(np.full((2, 1), np.sin(k)))
-trial = shipgym.load_model("mariner").simulate(np.full((50, 1), 0.2), 0.5, weather="rough")
-print(repr([*observations[1].tolist(), float(trial["r_wave"][-1]), float(trial["psi"][-1])]))
+ship = shipgym.load_model("mariner")
+trial = ship.simulate(np.full((50, 1), 0.2), 0.5, weather="rough")
+last = [float(trial[name][-1]) for name in ("r_wave", "psi")]
+print(repr([*observations[1].tolist(), *last]))
 """
 
 

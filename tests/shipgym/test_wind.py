@@ -1,4 +1,6 @@
-"""Wind on ships: published coefficients, symmetry, scaling, and gusts against their spectra."""
+"""Wind on ships: published coefficients, symmetry, scaling, and gusts against their
+spectra.
+"""
 
 from dataclasses import replace
 
@@ -225,7 +227,10 @@ def test_estimates_are_marked_and_given_areas_are_used():
 
 
 def test_what_is_not_known_above_the_water_is_estimated_as_documented():
-    """KVLCC2, 320 x 58 x 20.8 m, CB 0.81: a house of 48 x 22.4 m stands at 0.42 L aft, 0.6 B wide."""
+    """KVLCC2, 320 x 58 x 20.8 m, CB 0.81.
+
+    A house of 48 x 22.4 m stands at 0.42 L aft, 0.6 B wide.
+    """
     ship = weather_particulars(KVLCC2)
     deck, house = 20.8 * (1.3 - 1.05 * 0.81), 48.0 * 22.4
     assert ship.length_overall == pytest.approx(1.03 * 320.0)
@@ -307,7 +312,7 @@ def test_gusts_are_as_strong_as_over_a_rough_sea():
 
 
 def test_time_constants_of_gusts_are_those_of_their_most_energetic_frequency():
-    """T = 1 / (2 pi f): 165.4 m and 110.3 m by the wind speed for Harris and Davenport."""
+    """T = 1 / (2 pi f): 165.4 m and 110.3 m by the wind speed, Harris and Davenport."""
     for speed in (5.0, 20.0):
         assert gust_filter(Wind(speed)).time_constant == pytest.approx(
             165.4 / speed, rel=1e-3

@@ -1,4 +1,6 @@
-"""Two ships with cross-flow drag by strips, surge, sway and yaw; made for `scripts/opened_once.py`.
+"""Two ships with cross-flow drag by strips, surge, sway and yaw.
+
+Made for `scripts/opened_once.py`.
 
 A supply vessel with the main dimensions of `osv` of the MSS toolbox (Fossen 2021,
 Handbook of Marine Craft Hydrodynamics and Motion Control), which is steered by azimuth
@@ -53,7 +55,9 @@ def numbers(
     wake: float,
     n: float,
 ) -> dict[str, float]:
-    """Coefficients of a ship whose thrust balances her resistance, by rho L^2 / 2, at shaft speed n, 1/s."""
+    """Coefficients of a ship whose thrust balances her resistance, by rho L^2 / 2, at
+    shaft speed n, 1/s.
+    """
     L, D, speed = p.length, p["propeller_diameter"], p["speed"]
     thrust = HALF * L**2 * speed**2 * resistance / (screws * (1.0 - DEDUCTION))
     rest = thrust / (DENSITY * D**4 * n**2) - K_T_J * (1.0 - wake) * speed / (n * D)
@@ -84,7 +88,9 @@ def numbers(
 
 
 def known(particulars: Particulars) -> Particulars:
-    """Mass, a gyradius of a quarter of the length and Clarke's added mass filled in, as this ship's own."""
+    """Mass, a gyradius of a quarter of the length and Clarke's added mass filled in, as
+    this ship's own.
+    """
     return replace(particulars.completed(), estimated=frozenset())
 
 
@@ -129,7 +135,9 @@ Coefficients = record_of(SUPPLY, __name__)
 
 
 def cross_flow(v: float, r: float, length: float) -> tuple[float, float]:
-    """Integrals over the length of |v + x r| (v + x r), m^3/s^2, and of x times that, m^4/s^2."""
+    """Integrals over the length of |v + x r| (v + x r), m^3/s^2, and of x times that,
+    m^4/s^2.
+    """
     width = length / STRIPS
     force, moment = 0.0, 0.0
     for k in range(STRIPS):
@@ -141,7 +149,9 @@ def cross_flow(v: float, r: float, length: float) -> tuple[float, float]:
 
 
 def rudder_force(u: float, v: float, delta: float, c: Any) -> tuple[float, float]:
-    """Forward and starboard force of one rudder over rho / 2, m^4/s^2, in an inflow u, v, m/s."""
+    """Forward and starboard force of one rudder over rho / 2, m^4/s^2, in an inflow u,
+    v, m/s.
+    """
     sine, _ = sin_cos(delta + arctan2(v, u))
     cosine = sqrt(1.0 - min(sine * sine, 1.0))
     slope = (

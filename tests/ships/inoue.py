@@ -1,4 +1,5 @@
-"""A ferry, a product tanker and a training vessel with hull forces by Inoue, surge, sway and yaw: a hold-out.
+"""A ferry, a product tanker and a training vessel with hull forces by Inoue, surge,
+sway and yaw: a hold-out.
 
 They are for counting how often intervals hold the truth on ships that nothing was
 chosen by: their numbers were set by simulated manoeuvres alone, before any model was
@@ -44,7 +45,9 @@ SLOWEST = 1e-6  # m/s, below which angles of the flow are not formed
 
 @dataclass(frozen=True)
 class Stern:
-    """What the formulas for hulls do not give, without unit but for the shaft speed in 1/s."""
+    """What the formulas for hulls do not give, without unit but for the shaft speed in
+    1/s.
+    """
 
     resistance: float  # by rho L d U^2 / 2
     shaft_speed: float  # at service speed
@@ -58,7 +61,9 @@ class Stern:
 
 
 def hull(p: Particulars) -> dict[str, float]:
-    """Hydrodynamic derivatives by rho L d / 2, speed and length, from main dimensions; even keel."""
+    """Hydrodynamic derivatives by rho L d / 2, speed and length, from main dimensions;
+    even keel.
+    """
     L, B, d, full = p.length, p["beam"], p["draught"], p["block_coefficient"]
     k, wide, fine, m_y = (
         2.0 * d / L,
@@ -84,7 +89,10 @@ def hull(p: Particulars) -> dict[str, float]:
 
 
 def numbers(p: Particulars, stern: Stern) -> dict[str, float]:
-    """Coefficients of a ship whose thrust balances her resistance at service speed; masses as `hull`."""
+    """Coefficients of a ship whose thrust balances her resistance at service speed.
+
+    Masses as `hull`.
+    """
     L, d, D, speed, n = (
         p.length,
         p["draught"],
@@ -136,7 +144,10 @@ def numbers(p: Particulars, stern: Stern) -> dict[str, float]:
 
 
 def known(particulars: Particulars) -> Particulars:
-    """Masses filled in, by Clarke's formulas, as this ship's own; sway and yaw coupled by none of them."""
+    """Masses filled in, by Clarke's formulas, as this ship's own.
+
+    Sway and yaw coupled by none of them.
+    """
     uncoupled = replace(particulars, Y_rdot=0.0, N_vdot=0.0)
     return replace(uncoupled.completed(), estimated=frozenset())
 
@@ -226,7 +237,10 @@ Coefficients = record_of(numbers(FERRY, STERNS["ferry"]), __name__)
 def rudder_forces(
     u: float, v: float, r: float, motion: Motion, c: Any, ship: Ship
 ) -> tuple[float, float]:
-    """Propellers' thrust and the rudders' normal force by rho L d / 2, m^2/s^2; r in m/s, times L."""
+    """Propellers' thrust and the rudders' normal force by rho L d / 2, m^2/s^2.
+
+    r in m/s, times L.
+    """
     drift = arctan2(X_P * r + v, max(u, SLOWEST))
     inflow, tip = u * (1.0 - c.w_P * exponential(-4.0 * drift * drift)), motion.n * c.D
     K_T_nn = fabs(tip) * (c.K_0 * tip + K_1 * inflow)
@@ -247,7 +261,9 @@ def rudder_forces(
 def accelerations(
     motion: Motion, c: Any, ship: Ship
 ) -> tuple[float, float, float, float, float]:
-    """Accelerations in surge, sway and yaw, body frame, origin midship, from forces by rho L d / 2."""
+    """Accelerations in surge, sway and yaw, body frame, origin midship, from forces by
+    rho L d / 2.
+    """
     L = ship.length
     u, v, r = motion.u, motion.v, motion.r * L
     U, av, ar = sqrt(u * u + v * v), fabs(v), fabs(r)

@@ -1,4 +1,6 @@
-"""Two ships by the MMG standard method that no structure is made for: tests and `scripts/certainty.py`.
+"""Two ships by the MMG standard method that no structure is made for.
+
+Tests and `scripts/certainty.py`.
 
 The equations are those of Yasukawa & Yoshimura 2015 as `shipgym.ships.kvlcc2` has them;
 hull derivatives are by the formulas of Yoshimura & Masumoto 2012, Hydrodynamic database

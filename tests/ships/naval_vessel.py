@@ -1,4 +1,6 @@
-"""Naval vessel of 51.5 m, 4 degrees of freedom: surge, sway, yaw and roll; made for `scripts/opened_once.py`.
+"""Naval vessel of 51.5 m, 4 degrees of freedom.
+
+Surge, sway, yaw and roll; made for `scripts/opened_once.py`.
 
 Hull: Blanke & Christensen 1993, Rudder-roll damping autopilot robustness to
 sway-yaw-roll couplings, 10th Ship Control Systems Symposium, Ottawa; from roll planar
@@ -91,7 +93,10 @@ K_T = RESISTANCE / (THRUST * SERVICE_SHAFT_SPEED**2) - K_T_SLOPE * SPEED / (
 
 
 def rudder_force(u: float, delta: float) -> tuple[float, float]:
-    """Drag and lift of both rudders, N; beyond the stall angle the lift grows no more."""
+    """Drag and lift of both rudders, N.
+
+    Beyond the stall angle the lift grows no more.
+    """
     pressure = 0.5 * DENSITY * RUDDERS * RUDDER_AREA * u * u
     lift = LIFT_SLOPE * min(max(delta, -STALL), STALL)
     return (

@@ -1,4 +1,5 @@
-"""A ship of 120 m in four variants whose only other terms in sway and yaw than linear ones are v|v| and r|r|.
+"""A ship of 120 m in four variants whose only other terms in sway and yaw than linear
+ones are v|v| and r|r|.
 
 Sway and yaw are linear in v, r and delta at a given speed, as in Nomoto's equation of
 second order, but for the drag of either's own motion, as r|r| is to yaw in Norrbin's.
