@@ -1,4 +1,4 @@
-"""Coefficients by the errors of what the model simulates in segments, pulled toward a start.
+"""Coefficients by the errors of simulated segments, pulled toward a start.
 
 The output-error method of Maine & Iliff 1985, NASA RP-1138: noise is only in what is
 compared, while equation-error methods regress on noisy velocities, which biases them.
@@ -53,28 +53,29 @@ class OutputError:
 
     @property
     def bin_width(self) -> float:
-        """Bins of time in which residuals are added up, s: a block, or a sampling step."""
-        steps = [
-            float(np.median(np.diff(segment.times)))
-            for segment in self.fitted
-            if len(segment.times) > 1
-        ]
-        block = float(BLOCK * self.shooter.model.travel_time)
-        return max([block, *steps])
+        """Bins of time in which residuals are added up, s: blocks or sampling steps."""
+        widths = [float(BLOCK * self.shooter.model.travel_time)]
+        for segment in self.fitted:
+            if len(segment.times) > 1:
+                step = np.median(np.diff(segment.times))
+                widths.append(float(step))
+        return max(widths)
 
     def start_scales(self) -> Floats:
         """Scales of the residuals at the start; not finite where a ship runs away."""
         units = self.shooter.units
         segments = [*self.fitted, *self.further]
-        return self.scales(self.shooter.shoot(self.start, segments, units), units)
+        shooting = self.shooter.shoot(self.start, segments, units)
+        return self.scales(shooting, units)
 
     def scales(self, shooting: Shooting, scales: Floats) -> Floats:
-        """Root mean square of the residuals of each channel in the trials to fit, per sample.
+        """Root mean square of the residuals by channel, per sample of trials to fit.
 
         `scales`: those in which the residuals are given.
         """
         fitted = shooting.residuals[: self.n_rows]
-        errors = fitted.reshape(-1, len(scales)) * scales
+        by_channel = fitted.reshape(-1, len(scales))
+        errors = by_channel * scales
         squares = np.sum(errors**2, axis=0)
         n_samples = sum(len(segment.measured) for segment in self.fitted)
         rms = np.sqrt(squares / n_samples)
@@ -87,13 +88,17 @@ class OutputError:
         `pull`: cost of a coefficient by that of all samples being off by their scales.
         The zero of a rudder is known to a degree.
         """
+        n_terms = len(self.shooter.term_sizes)
         compared = sum(segment.measured.size for segment in self.fitted)
         weights = np.full(len(self.start), np.sqrt(pull * compared))
-        weights[len(self.shooter.term_sizes) :] = 1.0 / np.radians(1.0)
+        weights[n_terms:] = 1.0 / np.radians(1.0)
         return weights
 
     def solve(self, scales: Floats, pull: float) -> Solution:
-        """Fit, renew scales and starts of the segments, and fit again; `scales`: to begin with."""
+        """Fit, renew scales and starts of the segments, and fit again.
+
+        `scales`: to begin with.
+        """
         weights = self.pull_weights(pull)
         parameters = self.start
         segments = [*self.fitted, *self.further]
@@ -109,9 +114,9 @@ class OutputError:
 
         before = self.shooter.shoot(self.start, last_segments, last_scales)
         return Solution(
-            parameters,
-            last_scales,
-            shooting,
+            parameters=parameters,
+            scales=last_scales,
+            shooting=shooting,
             cost_before=self._mean_square(before),
             cost_after=self._mean_square(shooting),
             evaluations=evaluations,
@@ -130,16 +135,22 @@ class OutputError:
             shooting = self.shooter.shoot(parameters, segments, scales)
             pulled = weights * (parameters - self.start)
             return Linearised(
-                np.concatenate([shooting.residuals, pulled]),
-                np.vstack([shooting.jacobian, np.diag(weights)]),
+                residuals=np.concatenate([shooting.residuals, pulled]),
+                jacobian=np.vstack([shooting.jacobian, np.diag(weights)]),
             )
 
         return fit_least_squares(
-            linearised, start, x_scale="jac", ftol=1e-6, xtol=1e-6, max_nfev=30
+            linearised,
+            start,
+            x_scale="jac",
+            ftol=1e-6,
+            xtol=1e-6,
+            max_nfev=30,
         )
 
     def _mean_square(self, shooting: Shooting) -> float:
-        return float(np.mean(shooting.residuals[: self.n_rows] ** 2))
+        fitted = shooting.residuals[: self.n_rows]
+        return float(np.mean(fitted**2))
 
     def covariance(
         self, solution: Solution, pull: float, memory: float
@@ -151,31 +162,37 @@ class OutputError:
         count as known. The influences, by trial, are what each bin of time added to the
         coefficients, shape (n_bins, n_coefficients).
         """
-        jacobian = solution.shooting.jacobian
-        precision = np.diag(self.pull_weights(pull) ** 2)
-        information = jacobian.T @ jacobian + precision
-        inverse = np.asarray(
-            np.linalg.pinv(information, rcond=1e-14, hermitian=True), dtype=float
-        )
-
+        inverse = self._inverse_information(solution, pull)
         scores = self._scores(solution.shooting)
+        lags = round(memory / self.bin_width)
         total = np.zeros_like(inverse)
         for trial_scores in scores:
-            total += newey_west(trial_scores, round(memory / self.bin_width))
+            total += newey_west(trial_scores, lags)
 
         sizes = self.shooter.term_sizes
         terms = slice(len(sizes))
         factor = self._freedom_factor(solution.shooting, inverse)
         sandwich = factor * inverse @ total @ inverse
         covariance = sandwich[terms, terms] * np.outer(sizes, sizes)
-        influences = [
-            -np.sqrt(factor) * (trial_scores @ inverse)[:, terms] * sizes
-            for trial_scores in scores
-        ]
+        influences = []
+        for trial_scores in scores:
+            moves = (trial_scores @ inverse)[:, terms]
+            influences.append(-np.sqrt(factor) * moves * sizes)
         return 0.5 * (covariance + covariance.T), influences
 
+    def _inverse_information(self, solution: Solution, pull: float) -> Floats:
+        """Inverse of the information of the samples and the pull."""
+        jacobian = solution.shooting.jacobian
+        precision = np.diag(self.pull_weights(pull) ** 2)
+        information = jacobian.T @ jacobian + precision
+        inverse = np.linalg.pinv(information, rcond=1e-14, hermitian=True)
+        return np.asarray(inverse, dtype=float)
+
     def _scores(self, shooting: Shooting) -> list[Floats]:
-        """Slopes times residuals, by trial in bins of time, shape (n_bins, n_parameters)."""
+        """Slopes times residuals, by trial in bins of time.
+
+        Shape (n_bins, n_parameters).
+        """
         residuals = shooting.residuals[: self.n_rows]
         jacobian = shooting.jacobian[: self.n_rows]
         rows = jacobian * residuals[:, None]
@@ -186,7 +203,7 @@ class OutputError:
         return in_bins(blocks.sum(axis=1), self.fitted, self.bin_width)
 
     def _freedom_factor(self, shooting: Shooting, inverse: Floats) -> float:
-        """Samples by samples less the parameters and starts that were fitted to them."""
+        """Samples by samples less the parameters and starts fitted to them."""
         repeats = 2.0 if self.staggered else 1.0
         n_samples = self.n_rows / repeats
 
@@ -195,17 +212,19 @@ class OutputError:
         parameters = float(leverage.sum())
         moves = shooting.moves[: len(self.fitted)]
         starts = sum(len(move) for move in moves) / repeats
-        return n_samples / max(n_samples - parameters - starts, 1.0)
+        left = n_samples - parameters - starts
+        return n_samples / max(left, 1.0)
 
 
 def in_bins(scores: Floats, segments: Sequence[Segment], width: float) -> list[Floats]:
-    """Scores of blocks, shape (n_blocks, n_parameters), added up by trial in bins of time.
+    """Scores of blocks, shape (n_blocks, n_parameters), added up by trial and time.
 
-    Bins are `width` wide, s, from the first block of each trial on. Shapes (n_bins,
-    n_parameters).
+    Bins of time are `width` wide, s, from the first block of each trial on. Shapes
+    (n_bins, n_parameters).
     """
     counts = [len(segment.times) for segment in segments]
-    trial = np.repeat([segment.trial for segment in segments], counts)
+    trials = [segment.trial for segment in segments]
+    trial = np.repeat(trials, counts)
     times = np.concatenate([segment.times for segment in segments])
     bins = np.floor(times / width).astype(int)
 
