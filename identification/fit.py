@@ -61,7 +61,7 @@ class Fit:
 
     @property
     def coefficients(self) -> dict[str, float]:
-        """Coefficients by name, as the structure normalises them; rudder to starboard."""
+        """Coefficients by name, in units of the structure; rudder to starboard."""
         return self.model.coefficients
 
     @property

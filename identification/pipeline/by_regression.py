@@ -20,10 +20,10 @@ from shipgym import Trial
 
 
 def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationResult:
-    """Fit the regression of each equation, guard the model, and refine it where asked."""
-    method = get_method(options.method)
+    """Fit the regression of each equation, guard the model, and refine it if asked."""
     problem = pose(trials, options)
     task = FitTask(problem.samples, problem.blank, problem.used)
+    method = get_method(options.method)
     if options.prior is not None:
         from identification.simulation_error.pulled import with_prior
 
@@ -39,7 +39,8 @@ def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationRe
 
     provenance = provenance_of(options, method.name, fit, problem)
     if options.prior is not None:
-        provenance |= {"prior": name_of(options.prior.source), **_prior_report(fit)}
+        provenance["prior"] = name_of(options.prior.source)
+        provenance |= _prior_report(fit)
     if refined is not None:
         provenance["refinement"] = refined.report
     if options.uncertainty.covariance != "analytic":
