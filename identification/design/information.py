@@ -79,11 +79,14 @@ def fisher_information(
     by equation. Shape (n_coefficients, n_coefficients).
     """
     matrix = model.acceleration_matrix
-    moments = np.zeros(matrix.shape)
+    of_terms = np.zeros(matrix.shape)
     for q, rows in table_of(model).regression_rows.items():
         X = samples.features[q]
-        moments[rows, rows] = X.T @ X / noise[q]
-    return np.asarray(matrix.T @ moments @ matrix)
+        moment = X.T @ X
+        of_terms[rows, rows] = moment / noise[q]
+    # the terms' accelerations are linear in the coefficients
+    information = matrix.T @ of_terms @ matrix
+    return np.asarray(information)
 
 
 def trial_information(
@@ -117,8 +120,9 @@ def relative_covariance(information: Floats, size: Floats) -> Floats:
     relative = information * np.outer(size, size)
     values, vectors = np.linalg.eigh(relative)
     largest = max(values[-1], np.finfo(float).tiny)
-    values = np.maximum(values, 1e-14 * largest)
-    return np.asarray((vectors / values) @ vectors.T)
+    regular = np.maximum(values, 1e-14 * largest)
+    inverse = (vectors / regular) @ vectors.T
+    return np.asarray(inverse)
 
 
 def relative_errors(information: Floats, size: Floats) -> Floats:
@@ -142,6 +146,6 @@ def uncertainty(information: Floats, size: Floats, criterion: str, place: int) -
     positive = np.maximum(variances, np.finfo(float).tiny)
     axes = np.sqrt(positive)
     if criterion == "D":
-        geometric_mean = np.exp(np.mean(np.log(axes)))
-        return float(geometric_mean)
+        mean_log = np.mean(np.log(axes))
+        return float(np.exp(mean_log))
     return float(axes[-1])

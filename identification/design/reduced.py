@@ -67,8 +67,10 @@ def _plain_path(reduction: Reduction) -> list[dict[str, Any]]:
     """The steps of a reduction, infinite errors as null."""
     path = []
     for step in reduction.path:
-        errors = {name: finite(error) for name, error in step.relative_errors.items()}
-        path.append({**asdict(step), "relative_errors": errors})
+        fields = asdict(step)
+        errors = step.relative_errors.items()
+        fields["relative_errors"] = {name: finite(error) for name, error in errors}
+        path.append(fields)
     return path
 
 
@@ -169,8 +171,10 @@ def reduced_structure(
     kept = dict[str, set[str]]()
     for q in structure.equations:
         chosen = reductions[q].terms
-        labels = zip(structure.terms(q), structure.names(q), strict=True)
-        kept[q] = {term.name for term, label in labels if label in chosen}
+        kept[q] = set()
+        for term, label in zip(structure.terms(q), structure.names(q), strict=True):
+            if label in chosen:
+                kept[q].add(term.name)
     if structure.quantity == "force" and {"v", "r"} <= kept.keys():
         either = kept["v"] | kept["r"]
         kept["v"] = kept["r"] = either
@@ -179,5 +183,9 @@ def reduced_structure(
     for q, names in kept.items():
         terms = [term for term in structure.terms(q) if term.name in names]
         equations[q] = tuple(terms)
-    source = f"{structure.source}; reduced"
-    return replace(structure, name=name, source=source, equations=equations)
+    return replace(
+        structure,
+        name=name,
+        source=f"{structure.source}; reduced",
+        equations=equations,
+    )

@@ -130,10 +130,15 @@ class _Regression:
 
 def _relative_errors(estimator: TruncatedLSSVM) -> Floats:
     """Standard errors of the coefficients by their sizes, infinite for one of 0."""
-    deviation = np.sqrt(np.diag(estimator.covariance_))
+    variances = np.diag(estimator.covariance_)
     size = np.abs(estimator.coef_)
     errors = np.full(len(size), np.inf)
-    np.divide(deviation, size, out=errors, where=size > 0.0)
+    np.divide(
+        np.sqrt(variances),
+        size,
+        out=errors,
+        where=size > 0.0,
+    )
     return errors
 
 
@@ -225,10 +230,11 @@ def collinear_terms(features: Floats, kept: Sequence[int]) -> set[int]:
     """Terms that others nearly make up, by pair or by variance inflation."""
     own = features[:, kept]
     scaled = own / column_rms(own)
-    correlation = correlation_matrix(scaled)
+    correlation = np.abs(correlation_matrix(scaled))
     np.fill_diagonal(correlation, 0.0)
-    in_pair = (np.abs(correlation) > COLLINEAR).any(axis=0)
+    in_pair = np.any(correlation > COLLINEAR, axis=0)
 
+    # that of two terms whose correlation is at the limit
     largest_inflation = 1.0 / (1.0 - COLLINEAR**2)
     by_all = variance_inflation(scaled) > largest_inflation
     places = np.flatnonzero(in_pair | by_all).tolist()

@@ -79,14 +79,14 @@ def _scaled(model: ShipModel, name: str, factor: float) -> ShipModel:
 
 def _difference(up: Trial, down: Trial, spans: dict[str, float]) -> float:
     """Root mean square difference of two runs over the channels, each by its span."""
-    shorter = min(len(up), len(down))
-    common = slice(shorter)
+    n_common = min(len(up), len(down))
     squares = []
     for name, span in spans.items():
-        apart = up[name][common] - down[name][common]
+        apart = up[name][:n_common] - down[name][:n_common]
         square = mean_square(apart)
         squares.append(square / span**2)
-    return float(np.sqrt(np.mean(squares)))
+    mean = np.mean(squares)
+    return float(np.sqrt(mean))
 
 
 def zigzag_sensitivity(model: ShipModel) -> dict[str, float | None]:

@@ -59,8 +59,8 @@ def _errors_notes(ranked: tuple[RankedFit, ...], ran_away: list[str]) -> str:
     """What the figure of the errors does not show as it is."""
     notes = "."
     for fit in ranked:
-        errors = fit.errors.values()
-        if any(error is not None and error > LARGEST for error in errors):
+        known = [error for error in fit.errors.values() if error is not None]
+        if max(known, default=0.0) > LARGEST:
             notes = f"; those beyond {LARGEST:g} are drawn there."
     if ran_away:
         methods = ", ".join(ran_away)

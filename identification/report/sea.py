@@ -100,9 +100,9 @@ def _current_interval(row: Mapping[str, Any]) -> list[str]:
 
 def _set_and_drift(north: float, east: float) -> str:
     speed = np.hypot(north, east)
-    knots = speed / KNOT
     bearing = np.degrees(np.arctan2(east, north))
     towards = bearing % 360.0
+    knots = speed / KNOT
     return f"{speed:.2f} m/s ({knots:.2f} knots) towards {towards:03.0f} deg"
 
 

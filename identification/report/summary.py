@@ -99,11 +99,13 @@ def coefficients_table(fit: Fit) -> Table:
     table = lined_table(title, "name", ">value", ">standard error", ">t")
     for name, error in fit.standard_errors.items():
         value = fit.coefficients[name]
-        t = f"{value / error:.1f}" if error > 0.0 else "-"
-        cells = [f"{value:.6g}", f"{error:.2g}"]
+        t = "-"
+        if error > 0.0:
+            t = f"{value / error:.1f}"
+        shown = f"{value:.6g}", f"{error:.2g}"
         if derivatives:
-            cells = [f"{value / PRIME:.2f}", f"{error / PRIME:.2g}"]
-        table.add_row(name, *cells, t)
+            shown = f"{value / PRIME:.2f}", f"{error / PRIME:.2g}"
+        table.add_row(name, *shown, t)
     return table
 
 

@@ -90,11 +90,13 @@ class ErrorRow:
 
 def short_names(trials: Sequence[Trial]) -> dict[str, str]:
     """Names of trials without their folders, unless two would be the same."""
-    names = [trial.name for trial in trials]
-    short = [PurePath(name).name for name in names]
-    if len(set(short)) < len(set(names)):
-        short = names
-    return dict(zip(names, short, strict=True))
+    short = {}
+    for trial in trials:
+        short[trial.name] = PurePath(trial.name).name
+    unique = set(short.values())
+    if len(unique) < len(short):
+        return {name: name for name in short}
+    return short
 
 
 def trial_row(trial: Trial, name: str) -> TrialRow:

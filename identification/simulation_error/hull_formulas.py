@@ -32,13 +32,16 @@ def formula_coefficients(hull: str, ship: Particulars) -> dict[str, float]:
     `hull`: "yoshimura" or "kijima"; `ship`: as `mmg_prior.completed` gives it.
     """
     check_choice(hull, HULL_FORMULAS, "prior")
+    masses = added_mass(ship)
     coefficients = dict.fromkeys(SHIP.coefficients, 0.0)
-    coefficients |= added_mass(ship)
-    coefficients |= yoshimura_hull(ship, coefficients["mx"], coefficients["my"])
+    coefficients |= masses
+    coefficients |= yoshimura_hull(ship, masses["mx"], masses["my"])
     if hull == KIJIMA:
-        coefficients |= kijima_hull(ship, coefficients["mx"])
+        coefficients |= kijima_hull(ship, masses["mx"])
+    coefficients |= _propeller(ship)
+    coefficients |= _rudder(ship)
     coefficients["R_0"] = resistance(ship)
-    return coefficients | _propeller(ship) | _rudder(ship)
+    return coefficients
 
 
 def yoshimura_hull(ship: Particulars, mx: float, my: float) -> dict[str, float]:

@@ -60,12 +60,9 @@ def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, An
     2, 3 whose error, each trial predicted from the others, is within a tenth of the
     least. The report is for the provenance.
     """
-    blank = problem.blank
     asked = options.prior or PriorKnowledge()
     source = options.reference_model or asked.source or YOSHIMURA
-    prior = mmg_prior(source, blank.particulars)
-    ship = replace(blank, particulars=prior.ship)
-    posterior = Posterior(ship, problem.used, prior)
+    posterior = _posterior(problem, source)
     estimates = list[Estimate]()
     z = np.zeros(len(IDENTIFIED))
     for strength in _strengths(asked):
@@ -76,12 +73,21 @@ def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, An
     scales = estimates[0].scales
     held_out = [posterior.held_out(estimate, scales) for estimate in estimates]
     chosen = strongest_as_good([found.error for found in held_out])
+
     best = estimates[chosen]
     factor = held_out[chosen].factor
-
-    covariance = _coefficient_covariance(prior, factor**2 * best.covariance)
+    scaled = factor**2 * best.covariance
+    covariance = _coefficient_covariance(posterior.prior, scaled)
     model = replace(posterior.model(best.z), covariance=covariance)
     return model, _report(posterior, estimates, held_out, chosen)
+
+
+def _posterior(problem: Problem, source: str | ShipModel) -> Posterior:
+    """The trials to fit, and the prior of a reference ship or of formulas."""
+    blank = problem.blank
+    prior = mmg_prior(source, blank.particulars)
+    ship = replace(blank, particulars=prior.ship)
+    return Posterior(ship, problem.used, prior)
 
 
 def _strengths(asked: PriorKnowledge) -> tuple[float, ...]:

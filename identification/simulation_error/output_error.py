@@ -54,12 +54,13 @@ class OutputError:
     @property
     def bin_width(self) -> float:
         """Bins of time in which residuals are added up, s: blocks or sampling steps."""
-        widths = [float(BLOCK * self.shooter.model.travel_time)]
+        travel_time = self.shooter.model.travel_time
+        width = float(BLOCK * travel_time)
         for segment in self.fitted:
             if len(segment.times) > 1:
                 step = np.median(np.diff(segment.times))
-                widths.append(float(step))
-        return max(widths)
+                width = max(width, float(step))
+        return width
 
     def start_scales(self) -> Floats:
         """Scales of the residuals at the start; not finite where a ship runs away."""
@@ -77,10 +78,11 @@ class OutputError:
         by_channel = fitted.reshape(-1, len(scales))
         errors = by_channel * scales
         squares = np.sum(errors**2, axis=0)
+        # a residual is a mean over a block, times the root of its samples
         n_samples = sum(len(segment.measured) for segment in self.fitted)
-        rms = np.sqrt(squares / n_samples)
+        mean_squares = squares / n_samples
         smallest = 1e-9 * self.shooter.units
-        return np.asarray(np.maximum(rms, smallest))
+        return np.asarray(np.maximum(np.sqrt(mean_squares), smallest))
 
     def pull_weights(self, pull: float) -> Floats:
         """Weight of each parameter's distance from the start, shape (n_parameters,).
@@ -88,10 +90,13 @@ class OutputError:
         `pull`: cost of a coefficient by that of all samples being off by their scales.
         The zero of a rudder is known to a degree.
         """
-        n_terms = len(self.shooter.term_sizes)
         compared = sum(segment.measured.size for segment in self.fitted)
-        weights = np.full(len(self.start), np.sqrt(pull * compared))
-        weights[n_terms:] = 1.0 / np.radians(1.0)
+        of_coefficient = np.sqrt(pull * compared)
+        of_rudder_offset = 1.0 / np.radians(1.0)
+
+        n_terms = len(self.shooter.term_sizes)
+        weights = np.full(len(self.start), of_coefficient)
+        weights[n_terms:] = of_rudder_offset
         return weights
 
     def solve(self, scales: Floats, pull: float) -> Solution:
@@ -169,23 +174,32 @@ class OutputError:
         for trial_scores in scores:
             total += newey_west(trial_scores, lags)
 
-        sizes = self.shooter.term_sizes
-        terms = slice(len(sizes))
+        # of the parameters, then of the coefficients in SI units
         factor = self._freedom_factor(solution.shooting, inverse)
         sandwich = factor * inverse @ total @ inverse
-        covariance = sandwich[terms, terms] * np.outer(sizes, sizes)
+        sizes = self.shooter.term_sizes
+        terms = slice(len(sizes))
+        units = np.outer(sizes, sizes)
+        covariance = sandwich[terms, terms] * units
+
         influences = []
         for trial_scores in scores:
-            moves = (trial_scores @ inverse)[:, terms]
-            influences.append(-np.sqrt(factor) * moves * sizes)
+            moves = trial_scores @ inverse
+            influence = -np.sqrt(factor) * moves[:, terms] * sizes
+            influences.append(influence)
         return 0.5 * (covariance + covariance.T), influences
 
     def _inverse_information(self, solution: Solution, pull: float) -> Floats:
         """Inverse of the information of the samples and the pull."""
+        weights = self.pull_weights(pull)
         jacobian = solution.shooting.jacobian
-        precision = np.diag(self.pull_weights(pull) ** 2)
-        information = jacobian.T @ jacobian + precision
-        inverse = np.linalg.pinv(information, rcond=1e-14, hermitian=True)
+        of_samples = jacobian.T @ jacobian
+        of_pull = np.diag(weights**2)
+        inverse = np.linalg.pinv(
+            of_samples + of_pull,
+            rcond=1e-14,
+            hermitian=True,
+        )
         return np.asarray(inverse, dtype=float)
 
     def _scores(self, shooting: Shooting) -> list[Floats]:
@@ -193,23 +207,28 @@ class OutputError:
 
         Shape (n_bins, n_parameters).
         """
-        residuals = shooting.residuals[: self.n_rows]
-        jacobian = shooting.jacobian[: self.n_rows]
+        fitted = slice(self.n_rows)
+        residuals = shooting.residuals[fitted]
+        jacobian = shooting.jacobian[fitted]
         rows = jacobian * residuals[:, None]
 
         # the channels of a block stand together
         n_channels = len(self.shooter.channels)
-        blocks = rows.reshape(-1, n_channels, rows.shape[1])
-        return in_bins(blocks.sum(axis=1), self.fitted, self.bin_width)
+        n_parameters = rows.shape[1]
+        blocks = rows.reshape(-1, n_channels, n_parameters)
+        scores = blocks.sum(axis=1)
+        return in_bins(scores, self.fitted, self.bin_width)
 
     def _freedom_factor(self, shooting: Shooting, inverse: Floats) -> float:
         """Samples by samples less the parameters and starts fitted to them."""
         repeats = 2.0 if self.staggered else 1.0
         n_samples = self.n_rows / repeats
 
+        # parameters count by their leverage, as the pull gives some of them
         jacobian = shooting.jacobian[: self.n_rows]
         leverage = (jacobian @ inverse) * jacobian
         parameters = float(leverage.sum())
+
         moves = shooting.moves[: len(self.fitted)]
         starts = sum(len(move) for move in moves) / repeats
         left = n_samples - parameters - starts

@@ -105,12 +105,16 @@ class Posterior:
         """Errors and their slopes by forward differences."""
         step = 1e-4  # standard deviations of the prior
         ships = self._lanes(z, step)
-        parts = [self._weighted_errors(self.segments[index], ships) for index in which]
+        parts = []
+        for index in which:
+            segment = self.segments[index]
+            parts.append(self._weighted_errors(segment, ships))
         lanes = np.concatenate(parts)
 
         errors = lanes[:, :, 0]
         with np.errstate(invalid="ignore", over="ignore"):  # of ships that run away
-            slopes = (lanes[:, :, 1:] - errors[:, :, None]) / step
+            changes = lanes[:, :, 1:] - errors[:, :, None]
+            slopes = changes / step
         return errors, slopes
 
     def _weighted_errors(self, segment: Segment, ships: Floats) -> Floats:
@@ -132,15 +136,16 @@ class Posterior:
 
     def _lanes(self, z: Floats, step: float) -> Floats:
         """Numbers of ships; in each but the first a coefficient is larger by a step."""
-        varied = np.arange(len(IDENTIFIED))
-        coefficients = len(Ship._fields) + varied  # their rows
         deviation = self.prior.deviation
         values = self.mean + z * deviation
+        varied = np.arange(len(IDENTIFIED))
+        lane = 1 + varied
+        row = len(Ship._fields) + varied
 
         nominal = self.blank.ship_numbers()
         ships = np.repeat(nominal, LANES).reshape(-1, LANES)
-        ships[coefficients] = values[:, None]
-        ships[coefficients, 1 + varied] += step * deviation
+        ships[row] = values[:, None]
+        ships[row, lane] += step * deviation
         return ships
 
     def independent_errors(self, segment: Segment) -> float:
@@ -150,10 +155,10 @@ class Posterior:
 
     def scales(self, errors: Floats, which: Integers) -> Floats:
         """Root mean square of the errors by channel, not below the floors."""
-        count = self.count_errors(which)
+        n_errors = self.count_errors(which)
         with np.errstate(invalid="ignore", over="ignore"):
             squares = np.sum(errors**2, axis=0)
-            rms = np.sqrt(squares / count)
+            rms = np.sqrt(squares / n_errors)
 
         ran_away = ~np.isfinite(rms)
         rms[ran_away] = 1e2 * self.floors[ran_away]
@@ -174,10 +179,12 @@ class Posterior:
             slopes = slopes / scales[:, None]
 
         errors = np.nan_to_num(errors, nan=LARGEST)
-        residuals = np.clip(errors, -LARGEST, LARGEST).ravel()
+        errors = np.clip(errors, -LARGEST, LARGEST)
         slopes = np.nan_to_num(slopes, posinf=0.0, neginf=0.0)
-        jacobian = slopes.reshape(len(residuals), -1)
-        return Linearised(residuals, jacobian)
+        return Linearised(
+            residuals=errors.ravel(),
+            jacobian=slopes.reshape(errors.size, -1),
+        )
 
     def residuals(
         self, z: Floats, which: Integers, scales: Floats, strength: float
@@ -235,6 +242,7 @@ class Posterior:
         expect, one on average; at least 1.
         """
         groups = held_out_groups(self.segments)
+        n_channels = len(scales)
         mean_squares = []
         excess = expected = 0.0
         for group in np.unique(groups):
@@ -243,18 +251,22 @@ class Posterior:
             z, covariance = self._without(others, whole)
 
             errors, slopes = self.scaled_errors(z, held, whole.scales)
-            count = self.count_errors(held) * len(scales)
-            by_channel = errors.reshape(-1, len(scales))
+            n_errors = self.count_errors(held) * n_channels
+            by_channel = errors.reshape(-1, n_channels)
             in_scales = by_channel * (whole.scales / scales)
-            mean_squares.append(np.sum(in_scales**2) / count)
+            square = np.sum(in_scales**2)
+            mean_squares.append(square / n_errors)
 
-            excess += float(errors @ errors) - count
+            excess += float(errors @ errors) - n_errors
             variances = (slopes @ covariance) * slopes
             expected += float(variances.sum())
 
-        error = np.sqrt(np.mean(mean_squares))
-        factor = np.sqrt(max(excess / expected, 1.0))
-        return HeldOutError(float(error), float(factor))
+        mean_square = np.mean(mean_squares)
+        variance_ratio = max(excess / expected, 1.0)
+        return HeldOutError(
+            error=float(np.sqrt(mean_square)),
+            factor=float(np.sqrt(variance_ratio)),
+        )
 
     def _without(self, others: Integers, whole: Estimate) -> tuple[Floats, Floats]:
         """Coefficients fitted to some segments, and their covariance.
@@ -262,15 +274,17 @@ class Posterior:
         From those of all segments two Gauss-Newton steps come near enough.
         """
         z = whole.z
-        scales, strength = whole.scales, whole.strength
         for _ in range(2):
-            residuals, jacobian = self.residuals(z, others, scales, strength)
+            residuals, jacobian = self.residuals(
+                z, others, whole.scales, whole.strength
+            )
             moment = jacobian.T @ jacobian
             gradient = jacobian.T @ residuals
-            z = z - np.linalg.solve(moment, gradient)
+            step = np.linalg.solve(moment, gradient)
+            z = z - step
 
-        data = jacobian[: -len(z)]  # the rows of the prior come last
-        return z, covariance_of(data)
+        of_data = slice(-len(z))  # the rows of the prior come last
+        return z, covariance_of(jacobian[of_data])
 
 
 def covariance_of(slopes: Floats) -> Floats:
@@ -290,7 +304,8 @@ def held_out_groups(segments: Sequence[Segment]) -> Integers:
     Of a single trial a third.
     """
     trial = np.array([segment.trial for segment in segments])
-    if trial.max() == trial.min():
-        n_segments = len(trial)
-        return np.arange(n_segments) * 3 // n_segments
-    return trial % 5
+    several = trial.max() > trial.min()
+    if several:
+        return trial % 5
+    place = np.arange(len(segments))
+    return place * 3 // len(segments)

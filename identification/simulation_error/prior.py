@@ -42,12 +42,13 @@ def formula_prior(formula: str, blank: ShipModel) -> Prior:
     """
     ship, table = blank.particulars, blank.table
     sizes = hard_turn_features(table, ship, blank.service_shaft_speed)
-    centre, roots, known = {}, {}, {}
+    prior = Prior(formula, centre={}, roots={}, known={})
     for q, found in formula_coefficients(formula, table, ship).items():
-        centre[q] = found.values
-        roots[q] = np.diag(sizes[q])[found.known]
-        known[q] = found.known
-    return Prior(formula, centre, roots, known)
+        weights = np.diag(sizes[q])
+        prior.centre[q] = found.values
+        prior.known[q] = found.known
+        prior.roots[q] = weights[found.known]
+    return prior
 
 
 def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
@@ -58,6 +59,8 @@ def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
     for a reference that does not exist, or too little known to choose one.
     """
     model = _at_target(reference, blank)
+    box = model.table
+    assert isinstance(box, GreyBox)
     samples = build_samples(
         virtual_trials(model),
         blank.table,
@@ -67,16 +70,17 @@ def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
         window=1,
         shaft_speed=blank.service_shaft_speed,
     )
-    box = model.table
-    assert isinstance(box, GreyBox)
-    fitted = fit_all(get_method("ls").make, samples)
+    least_squares = get_method("ls")
+    fitted = fit_all(least_squares.make, samples)
     weight = 1.0 / (samples.duration[:, None] * np.sqrt(len(samples)))
-    centre, roots, known = {}, {}, {}
+
+    prior = Prior(box.ship.name, centre={}, roots={}, known={})
     for q, X in samples.features.items():
-        centre[q] = fitted[q].coef_
-        roots[q] = np.asarray(np.linalg.qr(X * weight, mode="r"))
-        known[q] = np.ones(X.shape[1], dtype=bool)
-    return Prior(box.ship.name, centre, roots, known)
+        root = np.linalg.qr(X * weight, mode="r")
+        prior.centre[q] = fitted[q].coef_
+        prior.known[q] = np.ones(X.shape[1], dtype=bool)
+        prior.roots[q] = np.asarray(root)
+    return prior
 
 
 def _at_target(reference: str | ShipModel, blank: ShipModel) -> ShipModel:

@@ -114,13 +114,15 @@ class Pulled:
         of those with the largest rudder by a fit to all that have less. Returns the
         error of each strength too, a mean square by that of no change at all.
         """
-        task = self.task
-        splits = sample_folds(task.trials, task.samples, folds)
-        errors = np.empty((len(STRENGTHS), len(splits)))
-        for row, strength in enumerate(STRENGTHS):
-            for column, split in enumerate(splits):
+        splits = sample_folds(self.task.trials, self.task.samples, folds)
+        rows = []
+        for strength in STRENGTHS:
+            row = []
+            for split in splits:
                 estimators = self.at(strength, split.fit)
-                errors[row, column] = relative_error(estimators, split.held)
+                row.append(relative_error(estimators, split.held))
+            rows.append(row)
+        errors = np.array(rows)
 
         names = [f"{strength:.3g}" for strength in STRENGTHS]
         scores = by_name(names, errors.mean(axis=1))
@@ -138,10 +140,11 @@ def strongest_as_good(errors: Floats) -> int:
     mean = errors.mean(axis=1)
     best = int(np.argmin(mean))
     excess = errors - errors[best]
+    deviation = excess.std(axis=1)
 
     n_folds = errors.shape[1]
-    deviation = excess.std(axis=1)
-    standard_error = deviation / np.sqrt(max(n_folds - 1, 1))
+    freedom = max(n_folds - 1, 1)
+    standard_error = deviation / np.sqrt(freedom)
     as_good = excess.mean(axis=1) <= standard_error
     places = np.flatnonzero(as_good)
     return int(places[-1])
@@ -199,8 +202,9 @@ def relative_error(estimators: Mapping[str, Estimator], held: Samples) -> float:
     smallest = np.finfo(float).tiny
     ratios = []
     for q, targets in held.targets.items():
-        predicted = held.features[q] @ estimators[q].coef_
-        errors = targets - predicted
+        features = held.features[q]
+        predicted = features @ estimators[q].coef_
+        error = mean_square(targets - predicted)
         size = max(mean_square(targets), smallest)
-        ratios.append(mean_square(errors) / size)
+        ratios.append(error / size)
     return float(np.mean(ratios))

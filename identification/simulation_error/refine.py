@@ -167,9 +167,11 @@ def term_sizes(samples: Samples, equation: str) -> Floats:
     """
     change = root_mean_square(samples.targets[equation])
     terms = column_rms(samples.features[equation])
-    terms[terms == 0.0] = np.inf
+    unseen = terms == 0.0
+    terms[unseen] = np.inf
     # never 0: coefficients are divided by the size of a term that is not seen, too
-    return change / terms + np.finfo(float).tiny
+    smallest = np.finfo(float).tiny
+    return change / terms + smallest
 
 
 def _model(blank: ShipModel, problem: OutputError, parameters: Floats) -> ShipModel:

@@ -192,11 +192,13 @@ def _segment(
 def _inputs(recorded: _Recorded, grid: Floats, model: ShipModel) -> Floats:
     """What drives a ship at times of a grid, as in `Segment.inputs`."""
     trial = recorded.trial
+    rudder = recorded.rudder(grid)
     shaft = np.zeros(len(grid))
     if "n" in trial:
         shaft = np.interp(grid, trial.t, trial["n"])
-    columns = [grid, recorded.rudder(grid), shaft]
-    for acceleration in wind_accelerations(trial, model.dynamics).T:
+    columns = [grid, rudder, shaft]
+    wind = wind_accelerations(trial, model.dynamics)
+    for acceleration in wind.T:
         columns.append(np.interp(grid, trial.t, acceleration))
     return np.column_stack(columns)
 
@@ -213,6 +215,7 @@ def _grid(t: Floats, longest_step: float, corners: Floats) -> Floats:
         between = begin + (end - begin) * parts / count
         points.extend(between)
 
-    inside = corners[corners > first]
-    inside = inside[inside < last]
+    after_first = corners > first
+    before_last = corners < last
+    inside = corners[after_first & before_last]
     return np.union1d(points, inside)

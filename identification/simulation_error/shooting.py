@@ -218,8 +218,7 @@ def about_mean(values: Floats) -> Floats:
 def averaged(values: Floats, blocks: Integers, counts: Integers) -> Floats:
     """Means over blocks along the first axis, from their first samples and sizes."""
     sums = np.add.reduceat(values, blocks)
-    others = (1,) * (values.ndim - 1)
-    sizes = counts.reshape(-1, *others)
+    sizes = np.expand_dims(counts, tuple(range(1, values.ndim)))
     return np.asarray(sums / sizes)
 
 

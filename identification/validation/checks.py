@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from identification.regression import preprocess
 from identification.regression.samples import Samples
@@ -74,14 +75,15 @@ def is_still(trial: Trial) -> bool:
     """
     delta = trial["delta"]
     width = min(5, len(delta))
-    windows = np.lib.stride_tricks.sliding_window_view(delta, width)
+    windows = sliding_window_view(delta, width)
     medians = np.median(windows, axis=1)
     moved = np.ptp(medians)
 
     noise = preprocess.noise_level(trial.t, delta)
-    scatter = min(6.0 * noise, np.radians(3.0))
-    least = max(np.radians(0.5), scatter)
-    return bool(moved < least)
+    most_scatter = np.radians(3.0)
+    scatter = min(6.0 * noise, most_scatter)
+    least_move = np.radians(0.5)
+    return bool(moved < max(least_move, scatter))
 
 
 def _refuse_still(trial: Trial) -> None:

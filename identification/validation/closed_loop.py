@@ -116,13 +116,13 @@ def _sail(
     longest = leg.duration
     if leg.target is not None:
         longest *= LONGEST_LEG
-    count = max(int(np.ceil(longest / dt)), 2)
-    steps = np.arange(count + 1, dtype=float)
+    n_steps = max(int(np.ceil(longest / dt)), 2)
+    steps = np.arange(n_steps + 1, dtype=float)
     t = begin + dt * steps
 
     commands = _commands(model, trial, leg, t[:-1])
     orders = two_commands(checked_orders(model, commands))
-    states = passage.states(state, count)
+    states = passage.states(state, n_steps)
     passage.run("simulate", states, orders, dt)
     if leg.target is None:
         return _Sailed(t[1:], states[1:])
@@ -150,21 +150,22 @@ def _commands(
 def _until(target: float, psi: Floats, t: Floats, states: Floats) -> _Sailed | None:
     """Samples up to the heading of the target; None where the leg never gets there.
 
-    Also None where it is passed already. The state between two steps is straight
-    enough: a step is a fiftieth of a length.
+    Also None where it is passed already.
     """
-    side = np.sign(target - psi[0])
-    beyond = (psi - target) * side >= 0.0
+    left = target - psi
+    side = np.sign(left[0])
+    beyond = left * side <= 0.0
     last = int(np.argmax(beyond))
     if last == 0:
         return None
 
+    # a step is a fiftieth of a length: between two the state is straight enough
     before = last - 1
-    left = target - psi[before]
     gained = psi[last] - psi[before]
-    part = float(left / gained)
+    part = float(left[before] / gained)
     step = t[last] - t[before]
     t[last] = t[before] + part * step
-    states[last] = (1.0 - part) * states[before] + part * states[last]
+    begin, end = states[before], states[last]
+    states[last] = (1.0 - part) * begin + part * end
     sailed = slice(1, last + 1)
     return _Sailed(t[sailed], states[sailed])

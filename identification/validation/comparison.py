@@ -30,7 +30,7 @@ from identification.validation.selection import (
     methods_of,
     reference_of,
 )
-from shipgym import InputError, Trial, list_structures
+from shipgym import InputError, ShipModel, Trial, list_structures
 from shipgym.checks import check_number
 from shipgym.files import write_json, write_text
 from shipgym.ships import Structure
@@ -67,23 +67,23 @@ class Comparison(Ranking):
         best model of each, `model-STRUCTURE.json`. Raises InputError if plotly is not
         installed.
         """
+        page = comparison_page(self)
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        page = comparison_page(self)
-        for name, result in self._models().items():
+        for name, model in self._models().items():
             path = folder / f"model-{name}.json"
-            result.model.save(path)
+            model.save(path)
         write_json(self.to_dict(), folder / "comparison.json")
         write_text(page, folder / "comparison.html")
 
-    def _models(self) -> dict[str, IdentificationResult]:
-        """Results to save: of each method, or the best of each structure."""
-        if self.ranked[0].method in self.results:
-            return self.results
-        best = dict[str, IdentificationResult]()
+    def _models(self) -> dict[str, ShipModel]:
+        """Models to save: of each method, or the best of each structure."""
+        one_structure = self.ranked[0].method in self.results
+        models = dict[str, ShipModel]()
         for fit, result in zip(self.ranked, self.results.values(), strict=True):
-            best.setdefault(fit.structure, result)
-        return best
+            name = fit.method if one_structure else fit.structure
+            models.setdefault(name, result.model)
+        return models
 
 
 def compare_methods(

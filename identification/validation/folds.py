@@ -98,9 +98,10 @@ def sample_folds(trials: Sequence[Trial], samples: Samples, folds: str) -> list[
 
 def pieces(trial: Trial) -> list[Trial]:
     """Thirds of a trial, which are no manoeuvres."""
-    edges = np.linspace(0, len(trial), 4).astype(int).tolist()
+    edges = np.linspace(0, len(trial), 4).astype(int)
     found = []
-    for number, (begin, end) in enumerate(pairwise(edges), start=1):
+    for number, (begin, end) in enumerate(pairwise(edges.tolist()), start=1):
         name = f"{trial.name}, part {number}"
-        found.append(trial.part(slice(begin, end), name))
+        samples = slice(begin, end)
+        found.append(trial.part(samples, name))
     return found

@@ -93,12 +93,15 @@ def reversed_rudder(model: ShipModel, rudder_deg: float, lengths: float) -> Tria
     """Simulate a rudder put over from side to side, at intervals in ship lengths."""
     n_steps = round(DURATION_LENGTHS / STEP)
     interval = round(lengths / STEP)
-    reversals = np.arange(n_steps) // interval
-    side = np.where(reversals % 2 == 0, 1.0, -1.0)
+    n_reversals = np.arange(n_steps) // interval
+    to_port = n_reversals % 2 == 1
+    rudder = np.full(n_steps, np.radians(rudder_deg))
+    rudder[to_port] *= -1.0
 
     commands = np.tile(model.service_command, (n_steps, 1))
-    commands[:, 0] = np.radians(rudder_deg) * side
-    return model.simulate(commands, STEP * model.travel_time)
+    commands[:, 0] = rudder
+    dt = STEP * model.travel_time
+    return model.simulate(commands, dt)
 
 
 def why_unphysical(model: ShipModel, simulation: Simulation) -> str | None:

@@ -85,18 +85,19 @@ def in_turn(
     `identify`: from the names held out; `groups`: at most one per trial, in their
     order. Returns what was identified, too.
     """
-    n_trials = len(trials)
-    groups = max(1, min(groups, n_trials))
-    group_of = np.arange(n_trials) * groups // n_trials
+    names = [trial.name for trial in trials]
+    groups = max(1, min(groups, len(names)))
+    group_of = np.arange(len(names)) * groups // len(names)
     metrics = dict[str, Any]()
     results = list[IdentificationResult]()
     for group in range(groups):
-        members = np.flatnonzero(group_of == group).tolist()
-        held = [trials[index].name for index in members]
+        members = np.flatnonzero(group_of == group)
+        held = [names[index] for index in members]
         result = identify(held)
         results.append(result)
+        of_trials = result.metrics["trials"]
         for name in held:
-            metrics[name] = result.metrics["trials"][name]
+            metrics[name] = of_trials[name]
     return metrics, results
 
 
@@ -112,20 +113,24 @@ def ranked_fit(
 
     `seen`: metrics of those held out, by name.
     """
-    measured = {trial.name: trial for trial in trials}
     errors = {}
-    for name, metrics in seen.items():
-        errors[name] = _relative_error(metrics, measured[name])
+    for trial in trials:
+        if trial.name in seen:
+            errors[trial.name] = _relative_error(seen[trial.name], trial)
     known = [error for error in errors.values() if error is not None]
-    all_known = len(known) == len(errors)
-    provenance = results[0].model.provenance or {}
+    mean_error = None
+    if len(known) == len(errors):
+        mean_error = float(np.mean(known))
+
+    model = results[0].model
+    provenance = model.provenance or {}
     return RankedFit(
         structure=provenance["structure"],
         method=provenance["method"],
-        coefficients=len(results[0].coefficients),
+        coefficients=len(model.coefficients),
         stable=all(result.stable for result in results),
         ran_away=sum(metrics["diverged"] for metrics in seen.values()),
-        error=float(np.mean(known)) if all_known else None,
+        error=mean_error,
         heading_deg=_mean_degrees(seen, "psi"),
         yaw_rate_deg_s=_mean_degrees(seen, "r"),
         errors=errors,

@@ -189,8 +189,8 @@ def _differs_by_chance(fit: RankedFit, first: RankedFit) -> bool:
     for name, error in first.errors.items():
         own = fit.errors[name] or 0.0
         differences.append(own - (error or 0.0))
-    excess = np.array(differences)
-    deviation = float(np.std(excess, ddof=1))
-    standard_error = deviation / np.sqrt(len(excess))
+    excess = np.mean(differences)
+    deviation = float(np.std(differences, ddof=1))
+    standard_error = deviation / np.sqrt(len(differences))
     nothing = 0.02 * (first.error or 0.0)
-    return bool(excess.mean() <= max(standard_error, nothing))
+    return bool(excess <= max(standard_error, nothing))

@@ -80,10 +80,11 @@ def _estimated(model: ShipModel, opening: _Opening, names: list[str]) -> Floats:
     start = np.array([opening.trial[name][0] for name in names])
     scales = opening.floors
     for _ in range(3):
-        start = start + _correction(model, opening, names, start, scales)
+        correction = _correction(model, opening, names, start, scales)
+        start = start + correction
         left = _errors(model, opening, names, start)
-        rms = np.sqrt(np.mean(left**2, axis=1, keepdims=True))
-        scales = np.maximum(rms, opening.floors)
+        mean_squares = np.mean(left**2, axis=1, keepdims=True)
+        scales = np.maximum(np.sqrt(mean_squares), opening.floors)
     return start
 
 
@@ -122,8 +123,11 @@ def _errors(
     """
     trial = opening.trial
     run = open_loop(model, _begun(trial, names, start))
-    errors = [run[name] - trial[name] for name in opening.channels]
-    return np.array(errors)[:, 1:]
+    errors = []
+    for name in opening.channels:
+        error = run[name] - trial[name]
+        errors.append(error[1:])
+    return np.array(errors)
 
 
 def _begun(trial: Trial, names: list[str], start: Floats) -> Trial:
