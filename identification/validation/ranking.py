@@ -122,12 +122,12 @@ def ranked_fit(
     if len(known) == len(errors):
         mean_error = float(np.mean(known))
 
-    model = results[0].model
-    provenance = model.provenance or {}
+    first = results[0]
+    provenance = first.model.provenance or {}
     return RankedFit(
         structure=provenance["structure"],
         method=provenance["method"],
-        coefficients=len(model.coefficients),
+        coefficients=len(first.coefficients),
         stable=all(result.stable for result in results),
         ran_away=sum(metrics["diverged"] for metrics in seen.values()),
         error=mean_error,
