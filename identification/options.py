@@ -20,7 +20,7 @@ from identification.uncertainty.uncertainty import Uncertainty
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.checks import check_flag, check_number, check_text
 from shipgym.ships import Structure
-from shipgym.ships.mmg import MMG
+from shipgym.ships.structures import MMG
 
 Given = Particulars | Mapping[str, Any] | None  # particulars, as `identify` takes them
 DEFAULT_METHOD = "tls-svm"

@@ -35,7 +35,7 @@ from shipgym.checks import quoted
 from shipgym.ships import GreyBox
 from shipgym.ships.catalogue import fitted_box
 from shipgym.ships.grey_boxes import GREY_BOX
-from shipgym.ships.mmg import MMG
+from shipgym.ships.structures import MMG
 
 #: The structure beneath a kernel where none is named.
 BLACK_BOX = "linear"

@@ -28,8 +28,9 @@ from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
 from shipgym.ships.catalogue import REFERENCE_SHIPS
-from shipgym.ships.mmg import IDENTIFIED, MMG, dimensions, standard_form
+from shipgym.ships.mmg import IDENTIFIED, dimensions, standard_form
 from shipgym.ships.particulars import ADDED_MASSES
+from shipgym.ships.structures import MMG
 
 
 class Deviation(NamedTuple):

@@ -35,7 +35,7 @@ from shipgym.checks import check_number
 from shipgym.files import write_json, write_text
 from shipgym.ships import Structure
 from shipgym.ships.grey_boxes import GREY_BOX
-from shipgym.ships.mmg import MMG
+from shipgym.ships.structures import MMG
 
 #: Compared where none are named; for a grey box also RM-SVM.
 USUAL = (

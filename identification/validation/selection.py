@@ -20,7 +20,7 @@ from identification.validation.ranking import (
 )
 from shipgym import InputError, Trial
 from shipgym.ships.grey_boxes import GREY_BOX
-from shipgym.ships.mmg import MMG
+from shipgym.ships.structures import MMG
 
 TABLES = (
     "nomoto",

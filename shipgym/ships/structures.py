@@ -16,8 +16,9 @@ from shipgym.ships.terms import Term, read_terms, short_terms
 if TYPE_CHECKING:  # few models have equations
     from shipgym.ships.equations import ShipEquations
 
+MMG = "mmg"  # the MMG method in its general form
 #: Files of this package that define a ship with equations of her own, by her name.
-SHIPPED_EQUATIONS = ("container", "tanker", "kvlcc2", "mmg")
+SHIPPED_EQUATIONS = ("container", "tanker", "kvlcc2", MMG)
 #: The grey box stands on a reference ship, which only a user can name; the MMG form is
 #: no table.
 NO_TABLES = {
@@ -26,7 +27,7 @@ NO_TABLES = {
         " the reference ship: identify(..., structure='grey-box',"
         " reference_model='tanker'), or shipgym.ships.grey_box"
     ),
-    "mmg": (
+    MMG: (
         "a table of terms, got 'mmg', which is none; choose one, such as 'abkowitz' or"
         " 'cubic'"
     ),
