@@ -119,14 +119,17 @@ class Advice:
     def _candidates(self) -> Table:
         shrunk = f" for {self.coefficient}" if self.criterion == "c" else ""
         title = f"Run next ({self.criterion}-optimal{shrunk})"
-        choices = range(1, len(self.chosen) + 1)
-        headings = [f">gain, choice {number}" for number in choices]
+        headings = []
+        for number, _ in enumerate(self.chosen, start=1):
+            headings.append(f">gain, choice {number}")
         table = lined_table(title, "candidate", *headings)
         for name, _ in _descending(self.steps[0]):
             cells = []
             for step, chosen in zip(self.steps, self.chosen, strict=True):
                 gain = f"{step[name]:.2f}"
-                cells.append(f"{gain} *" if name == chosen else gain)
+                if name == chosen:
+                    gain += " *"
+                cells.append(gain)
             table.add_row(name, *cells)
         return table
 

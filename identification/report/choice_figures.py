@@ -108,23 +108,23 @@ def search_figure(searches: Mapping[str, SearchResult]) -> Figure:
             objectives.append(curve)
 
     round_axis = axis("round", rangemode="tozero")
-    left = Panel(
-        objectives,
-        x=round_axis,
-        y=axis(),
-        title="best objective, relative to the final one",
-    )
-    right = Panel(best, round_axis, axis(range=[0.0, 1.0]), f"best {BAND}")
-    if all(_finds_weight(search) for search in searches.values()):
-        log_axis = axis(type="log", tickformat=".0e")
-        right = Panel(best, round_axis, log_axis, "best C")
+    title = "best objective, relative to the final one"
+    left = Panel(objectives, round_axis, axis(), title)
+    right = Panel(best, round_axis, *_setting_axis(searches))
     return panels(
         [left, right],
-        340,
+        height=340,
         columns=2,
         grid={"horizontal_spacing": 0.1},
         hovermode="closest",
     )
+
+
+def _setting_axis(searches: Mapping[str, SearchResult]) -> tuple[Any, str]:
+    """The axis of what was searched for, and the title above it."""
+    if all(_finds_weight(search) for search in searches.values()):
+        return axis(type="log", tickformat=".0e"), "best C"
+    return axis(range=[0.0, 1.0]), f"best {BAND}"
 
 
 def _finds_weight(search: SearchResult) -> bool:

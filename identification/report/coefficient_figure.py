@@ -50,7 +50,11 @@ def _bar(fit: Fit, name: str) -> _Bar:
     half = 100.0 * NORMAL_95 * error
     if value == 0.0:
         return _Bar(name, centre=0.0, half=half)
-    return _Bar(name, centre=100.0, half=half / abs(value))
+    return _Bar(
+        name,
+        centre=100.0,
+        half=half / abs(value),
+    )
 
 
 def _panel(bars: Sequence[_Bar], rows: int) -> Panel:

@@ -173,13 +173,15 @@ def residual_figure(fit: Fit) -> Figure:
         titles = ("", "")  # above the first row only
 
     count = len(errors)
-    grid = {"horizontal_spacing": 0.1, "vertical_spacing": 0.24 / count}
     return panels(
         shown,
         height=170 * count + 100,
         columns=1 if rudder is None else 2,
         outer=True,
-        grid=grid,
+        grid={
+            "horizontal_spacing": 0.1,
+            "vertical_spacing": 0.24 / count,
+        },
         hovermode="closest",
         bargap=0.5,
     )

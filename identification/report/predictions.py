@@ -110,12 +110,18 @@ def _path_panel(measured: Trial, predicted: Trial | None) -> Panel:
 
 
 def _path_line(
-    run: Trial, measured: Trial, turning: bool, name: str, colour: str, width: float
+    run: Trial,
+    measured: Trial,
+    turning: bool,
+    name: str,
+    colour: str,
+    width: float,
 ) -> Any:
     """The path of a run; ahead is upwards where the ship is turning."""
     north = run["x"] - measured["x"][0]
     east = run["y"] - measured["y"][0]
     first_course = measured["psi"][:1]
     ahead, aside = rotate_to_body(north, east, first_course)
-    x, y = (aside, ahead) if turning else (ahead, aside)
-    return line(x, y, name, colour, width)
+    if turning:
+        return line(aside, ahead, name, colour, width)
+    return line(ahead, aside, name, colour, width)

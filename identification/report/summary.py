@@ -111,9 +111,9 @@ def coefficients_table(fit: Fit) -> Table:
 
 def _inertia(fit: Fit) -> Table:
     ship = fit.model.particulars
-    table = lined_table("Inertia and service speed", "name", ">value", "unit", "source")
     units = {"mass": "kg", "xg": "m", "yaw_gyradius": "m", "speed": "m/s"}
     units |= dict.fromkeys(ADDED_MASSES, "1e-5")
+    table = lined_table("Inertia and service speed", "name", ">value", "unit", "source")
     for name, unit in units.items():
         value = ship[name]
         if value is None:  # not needed by a structure of accelerations
@@ -122,14 +122,21 @@ def _inertia(fit: Fit) -> Table:
             value = value / PRIME
         source = "estimated" if name in ship.estimated else "given"
         table.add_row(name, f"{value:.6g}", unit, source)
-
-    gear = fit.model.steering
-    provenance = fit.model.provenance or {}
-    source = provenance.get("steering", "given")
-    table.add_row("rudder limit", f"{gear.rudder_limit_deg:.4g}", "deg", source)
-    table.add_row("rudder rate", f"{gear.rudder_rate_deg_s:.4g}", "deg/s", source)
-    table.add_row("rudder lag", f"{gear.time_constant:.4g}", "s", source)
+    _add_gear(table, fit.model)
     return table
+
+
+def _add_gear(table: Table, model: ShipModel) -> None:
+    gear = model.steering
+    provenance = model.provenance or {}
+    source = provenance.get("steering", "given")
+    rows = [
+        ("rudder limit", gear.rudder_limit_deg, "deg"),
+        ("rudder rate", gear.rudder_rate_deg_s, "deg/s"),
+        ("rudder lag", gear.time_constant, "s"),
+    ]
+    for name, value, unit in rows:
+        table.add_row(name, f"{value:.4g}", unit, source)
 
 
 def _equations(fit: Fit) -> Table:

@@ -242,18 +242,15 @@ def in_bins(scores: Floats, segments: Sequence[Segment], width: float) -> list[F
     (n_bins, n_parameters).
     """
     counts = [len(segment.times) for segment in segments]
-    trials = [segment.trial for segment in segments]
-    trial = np.repeat(trials, counts)
+    trial = np.repeat([segment.trial for segment in segments], counts)
     times = np.concatenate([segment.times for segment in segments])
     bins = np.floor(times / width).astype(int)
 
     found = []
     for index in np.unique(trial):
         rows = trial == index
-        own_bins = bins[rows]
-        own_bins -= own_bins.min()
-        n_bins = own_bins.max() + 1
-        sums = np.zeros((n_bins, scores.shape[1]))
+        own_bins = bins[rows] - bins[rows].min()
+        sums = np.zeros((own_bins.max() + 1, scores.shape[1]))
         np.add.at(sums, own_bins, scores[rows])
         found.append(sums)
     return found

@@ -242,21 +242,21 @@ class Posterior:
         expect, one on average; at least 1.
         """
         groups = held_out_groups(self.segments)
-        n_channels = len(scales)
         mean_squares = []
         excess = expected = 0.0
         for group in np.unique(groups):
             others = np.flatnonzero(groups != group)
             held = np.flatnonzero(groups == group)
             z, covariance = self._without(others, whole)
-
             errors, slopes = self.scaled_errors(z, held, whole.scales)
-            n_errors = self.count_errors(held) * n_channels
-            by_channel = errors.reshape(-1, n_channels)
+            n_errors = self.count_errors(held) * len(scales)
+
+            by_channel = errors.reshape(-1, len(scales))
             in_scales = by_channel * (whole.scales / scales)
             square = np.sum(in_scales**2)
             mean_squares.append(square / n_errors)
 
+            # beyond the scatter, whose errors have a size of one
             excess += float(errors @ errors) - n_errors
             variances = (slopes @ covariance) * slopes
             expected += float(variances.sum())

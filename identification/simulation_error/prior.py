@@ -109,9 +109,8 @@ def virtual_trials(model: ShipModel) -> list[Trial]:
 
     Up to the rudder's limit.
     """
-    travel = model.travel_time
-    duration = 20.0 * travel
-    dt = 0.05 * travel
+    duration = 20.0 * model.travel_time
+    dt = 0.05 * model.travel_time
     limit = model.steering.rudder_limit_deg
     zigzags = [(10.0, 10.0, False), (20.0, 20.0, True), (35.0, 20.0, False)]
 
@@ -124,11 +123,16 @@ def virtual_trials(model: ShipModel) -> list[Trial]:
         angle = float(np.clip(rudder, -limit, limit))
         run = turning_circle(model, angle, duration, dt)
         runs.append(run)
+    return [_virtual(model, run, index) for index, run in enumerate(runs)]
 
-    trials = []
-    for index, run in enumerate(runs):
-        channels = {name: run[name] for name in model.state_names}
-        channels["n"] = np.full(len(run), model.service_shaft_speed)
-        trial = Trial(run.t, channels, name=f"virtual-{index}", kind=run.kind)
-        trials.append(trial)
-    return trials
+
+def _virtual(model: ShipModel, run: Trial, index: int) -> Trial:
+    """A run as a trial that records the state, and a shaft at service speed."""
+    channels = {name: run[name] for name in model.state_names}
+    channels["n"] = np.full(len(run), model.service_shaft_speed)
+    return Trial(
+        run.t,
+        channels,
+        name=f"virtual-{index}",
+        kind=run.kind,
+    )

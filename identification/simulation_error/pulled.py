@@ -160,12 +160,15 @@ def pulled_estimator(
     if np.isinf(strength):
         return _prior_itself(estimator, X, rest, centre, prior.known[q])
 
+    # so that the prior counts as the samples do, whatever their number
     window = float(np.mean(samples.duration))
     weight = strength * np.sqrt(len(X)) * window
     pull = weight * prior.roots[q]
-    rows = np.vstack([X, pull])
-    targets = np.concatenate([rest, np.zeros(len(pull))])
-    estimator.fit(rows, targets)
+    no_change = np.zeros(len(pull))
+    estimator.fit(
+        np.vstack([X, pull]),
+        np.concatenate([rest, no_change]),
+    )
     estimator.coef_ = estimator.coef_ + centre
     if hasattr(estimator, "weights_"):
         estimator.weights_ = estimator.weights_[: len(X)]

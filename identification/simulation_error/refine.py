@@ -176,7 +176,8 @@ def term_sizes(samples: Samples, equation: str) -> Floats:
 
 def _model(blank: ShipModel, problem: OutputError, parameters: Floats) -> ShipModel:
     sizes = problem.shooter.term_sizes
-    accelerations = parameters[: len(sizes)] * sizes
+    n_terms = len(sizes)
+    accelerations = parameters[:n_terms] * sizes
     values = np.linalg.solve(blank.acceleration_matrix, accelerations)
     return blank.with_coefficients(np.asarray(values, dtype=float))
 
@@ -186,9 +187,11 @@ def _estimators(
 ) -> Estimators:
     """The start's estimators with the refined coefficients, for the diagnostics."""
     sizes = problem.shooter.term_sizes
-    estimators = {q: copy.copy(estimator) for q, estimator in start.estimators.items()}
+    estimators = {}
     for q, rows in start.model.table.regression_rows.items():
-        estimators[q].coef_ = parameters[rows] * sizes[rows]
+        refined = copy.copy(start.estimators[q])
+        refined.coef_ = parameters[rows] * sizes[rows]
+        estimators[q] = refined
     return estimators
 
 
@@ -197,16 +200,14 @@ def _report(
 ) -> dict[str, Any]:
     """For the provenance."""
     shooter = problem.shooter
-    offsets_deg = dict[str, float]()
-    offsets = solution.parameters[len(shooter.term_sizes) :]
-    if len(offsets):
-        names = [trial.name for trial in trials]
-        offsets_deg = by_name(names, np.degrees(about_mean(offsets)))
+    n_terms = len(shooter.term_sizes)
+    offsets = about_mean(solution.parameters[n_terms:])
+    names = [trial.name for trial in trials[: len(offsets)]]
     return {
         "segments": len(problem.fitted),
         "cost_before": solution.cost_before,
         "cost_after": solution.cost_after,
         "evaluations": solution.evaluations,
         "residual_rms": by_name(shooter.channels, solution.scales),
-        "rudder_offsets_deg": offsets_deg,
+        "rudder_offsets_deg": by_name(names, np.degrees(offsets)),
     }

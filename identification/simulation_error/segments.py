@@ -1,6 +1,6 @@
 """Stretches of trials, each of which a model sails from a start of its own."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -88,15 +88,22 @@ def cut(
     for index, trial in enumerate(trials):
         for piece in between_gaps(trial, model.particulars):
             recorded = _recorded(index, piece, model)
-            sampling = float(np.median(np.diff(piece.t)))
-            every = max(int(least_step / sampling + 1e-9), 1)
-            for shift in shifts:
-                edges = segment_edges(piece.t, duration, shift)
-                for first, last in pairwise(edges):
-                    rows = slice(first, last + 1, every)
-                    segment = _segment(recorded, rows, channels, model)
-                    segments.append(segment)
+            for rows in _segment_rows(piece.t, duration, shifts, least_step):
+                segment = _segment(recorded, rows, channels, model)
+                segments.append(segment)
     return segments
+
+
+def _segment_rows(
+    t: Floats, duration: float, shifts: Sequence[float], least_step: float
+) -> Iterator[slice]:
+    """Samples of each segment of a record, a least step apart, s."""
+    sampling = float(np.median(np.diff(t)))
+    every = max(int(least_step / sampling + 1e-9), 1)
+    for shift in shifts:
+        edges = segment_edges(t, duration, shift)
+        for first, last in pairwise(edges):
+            yield slice(first, last + 1, every)
 
 
 def segment_edges(t: Floats, duration: float, shift: float) -> Integers:

@@ -131,33 +131,29 @@ class Shooter:
         Forward differences of parameters that are about 1: in each lane but the first
         one number of the ship, the offset or the start is larger by a step.
         """
-        step = 1e-5
         n_numbers = len(self.numbers)
         first_term = n_numbers - len(coefficients)  # the terms' numbers come last
         nominal = np.concatenate([self.numbers, [offset], segment.start])
         nominal[first_term:n_numbers] = coefficients
-
         starts = [n_numbers + 1 + column for column in self.free]
         varied = [*range(first_term, n_numbers + 1), *starts]
         units = np.concatenate([self.term_sizes, [1.0], self.start_units])
-        steps = step * units
 
-        shape = (len(segment.measured), len(self.channels))
-        channels = np.empty(shape)
-        slopes = np.empty((*shape, len(varied)))
+        step = 1e-5
+        parts = []
         for begin in range(0, len(varied), LANES - 1):
             batch = slice(begin, begin + LANES - 1)
             rows = varied[batch]
             lane = 1 + np.arange(len(rows))
             lanes = np.repeat(nominal, LANES).reshape(-1, LANES)
-            lanes[rows, lane] += steps[batch]
+            lanes[rows, lane] += step * units[batch]
 
             sailed = self._sailed(segment, lanes)
             channels = sailed[:, :, 0]
             with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
                 changes = sailed[:, :, lane] - channels[:, :, None]
-                slopes[:, :, batch] = changes / step
-        return channels, slopes
+                parts.append(changes / step)
+        return channels, np.concatenate(parts, axis=2)
 
     def _sailed(self, segment: Segment, lanes: Floats) -> Floats:
         """Compared channels of all lanes, shape (n_samples, n_channels, LANES).

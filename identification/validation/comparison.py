@@ -79,9 +79,12 @@ class Comparison(Ranking):
     def _models(self) -> dict[str, ShipModel]:
         """Models to save: of each method, or the best of each structure."""
         one_structure = self.ranked[0].method in self.results
+        results = self.results.values()
         models = dict[str, ShipModel]()
-        for fit, result in zip(self.ranked, self.results.values(), strict=True):
-            name = fit.method if one_structure else fit.structure
+        for fit, result in zip(self.ranked, results, strict=True):
+            name = fit.structure
+            if one_structure:
+                name = fit.method
             models.setdefault(name, result.model)
         return models
 

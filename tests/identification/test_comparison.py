@@ -142,7 +142,7 @@ def test_two_trials_are_enough_to_hold_each_out(
 
 
 def test_the_four_best_are_drawn_with_the_error_of_their_headings() -> None:
-    """Running means over a hundredth of 210 samples, which are two; three panels in two rows."""
+    """Running means over two of 210 samples; three panels in two rows."""
     t = np.arange(210.0)
     held = [
         Trial(t, {"psi": 0.1 * t}, name=f"runs/{k}.csv", use="validate")
@@ -188,7 +188,7 @@ def test_what_cannot_be_compared_is_named(
 
 
 def test_the_mmg_form_is_fitted_once_by_the_first_of_the_methods() -> None:
-    """Beside other structures, which each are by all of them; alone she is fitted as asked."""
+    """With other structures each is fitted by all of them; alone as asked."""
     asked = ["ls", "tls-svm"]
     assert fit_pairs(["abkowitz", "mmg"], asked, True) == [
         ("abkowitz", "ls"),

@@ -58,7 +58,8 @@ from identification import identify
 from shipgym import ShipFile
 ship = ShipFile.load("examples/mariner/ship.toml")
 identify(
-    ship.trials(), method="abc-lssvr", particulars=ship.particulars, steering=ship.steering,
+    ship.trials(), method="abc-lssvr",
+    particulars=ship.particulars, steering=ship.steering,
     hold_out=["zigzag_10_10.csv"], uncertainty="bootstrap",
 ).save(sys.argv[1])
 """
@@ -210,7 +211,7 @@ def test_a_grey_box_tells_of_its_search_where_it_searched(
 def test_a_channel_that_never_moves_is_no_trouble(
     mariner: ShipModel, cao_zigzag: Trial
 ) -> None:
-    """A term of constant shaft speed is 0 throughout; least squares leaves it out without a word."""
+    """A term of constant shaft speed is 0 throughout; least squares leaves it out."""
     steady = cao_zigzag.with_channels(
         {**cao_zigzag.channels, "n": np.full_like(cao_zigzag.t, 1.2)}
     )
@@ -369,7 +370,7 @@ def test_short_names_are_those_without_folders_where_they_differ() -> None:
 
 
 def regression(rows: int, error: Any, equations: str = "r", **more: Any) -> Any:
-    """As much of a fit as figures look at: windows of 2 s, whose targets go up to 1 over the first trial."""
+    """A fit as figures need it: windows of 2 s, targets up to 1 over the first."""
     targets = np.linspace(0.0, 2.0, rows)
     time, half = 2.0 * np.arange(rows), np.arange(rows) * 2 // rows
     samples = Samples(
@@ -385,7 +386,7 @@ def regression(rows: int, error: Any, equations: str = "r", **more: Any) -> Any:
 
 
 def test_of_many_windows_so_few_are_drawn_that_a_page_stays_small() -> None:
-    """Of 5200 every second, with a gap between the trials; by the second, yaw in degrees."""
+    """Of 5200 every second, with a gap between trials; yaw in degrees by the second."""
     figure = fit_figure(regression(5200, 0.1, "vr"))
     assert figure.layout.height == 95 * 4 + 80
     sway, yaw = (figure.data[k] for k in (0, 4))
@@ -409,7 +410,7 @@ def test_of_many_windows_so_few_are_drawn_that_a_page_stays_small() -> None:
 def test_residuals_of_a_trial_without_a_rudder_are_drawn_with_themselves_alone(
     alike: float, reach: float
 ) -> None:
-    """Up to a tenth beyond the largest correlation, but to three bounds of white noise and to 1.05."""
+    """A tenth beyond the largest correlation, at least three bounds, at most 1.05."""
     rng = np.random.default_rng(0)
     error = rng.choice([-1.0, 1.0], 400)
     for k in range(1, 400):
@@ -498,7 +499,7 @@ def test_an_l_curve_is_drawn_where_a_rank_was_chosen_or_given() -> None:
 
 
 def test_a_search_that_leaves_nothing_is_drawn_as_it_is() -> None:
-    """And a band between 0 and 1; objectives relative to the final one, weights as powers of ten."""
+    """A band between 0 and 1; objectives by the final one, weights as powers of 10."""
 
     def search(
         value: float, history: list[float], variable: str, course: list[float]
@@ -671,7 +672,7 @@ def test_a_bare_reference_ship_stands_beside_the_fit_by_the_names_of_trials() ->
 
 
 def test_coefficients_without_errors_are_significant_unless_they_are_zero() -> None:
-    """Accelerations in their own units; with an error it is two of these that make them so."""
+    """Accelerations in their own units; with an error two of these are needed."""
     dynamics = SimpleNamespace(normalisation="si", quantity="acceleration")
     given = {
         "b_v": (3.0, 0.0),
