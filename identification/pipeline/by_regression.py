@@ -1,17 +1,15 @@
 """From trials to a ship model by the regression of each equation of motion."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 from identification.estimators.estimator import FitTask
 from identification.estimators.methods import get_method
-from identification.options import Options, name_of, whole_call
+from identification.options import Options, name_of
 from identification.pipeline.evaluation import (
     MEMORY,
-    evaluated,
     provenance_of,
-    scaled_covariance,
+    with_uncertainty,
 )
 from identification.regression.problem import pose
 from identification.result import IdentificationResult
@@ -45,12 +43,7 @@ def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationRe
         provenance["refinement"] = refined.report
     if options.uncertainty.covariance != "analytic":
         provenance["uncertainty"] = options.uncertainty.covariance
-    covariance, error = scaled_covariance(options.uncertainty, fit, refined, problem)
-    if error:
-        provenance["model_error"] = error
-    model = replace(fit.model, covariance=covariance)
-    call = whole_call(options, problem.trials)
-    return evaluated(model, fit, problem, provenance, call)
+    return with_uncertainty(fit, refined, problem, provenance, options)
 
 
 def _prior_report(fit: GuardedFit) -> dict[str, Any]:

@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import shipgym
-from identification.options import Options, name_of, provenance_settings
+from identification.options import (
+    Options,
+    name_of,
+    provenance_settings,
+    whole_call,
+)
 from identification.regression.grey_box import bare_metrics
 from identification.regression.problem import Problem
 from identification.regression.samples import Samples
@@ -93,6 +98,21 @@ def _trial_record(trial: Trial) -> dict[str, Any]:
     if trial.repaired:
         record["repaired"] = dict(trial.repaired)
     return record
+
+
+def with_uncertainty(
+    fit: GuardedFit,
+    refined: Refined | None,
+    problem: Problem,
+    provenance: dict[str, Any],
+    options: Options,
+) -> IdentificationResult:
+    """The result of a fit, its covariance scaled by the model error."""
+    covariance, error = scaled_covariance(options.uncertainty, fit, refined, problem)
+    if error:
+        provenance = provenance | {"model_error": error}
+    model = replace(fit.model, covariance=covariance)
+    return evaluated(model, fit, problem, provenance, options)
 
 
 def scaled_covariance(
@@ -181,18 +201,18 @@ def evaluated(
     fit: GuardedFit,
     problem: Problem,
     provenance: Mapping[str, Any],
-    call: dict[str, Any],
+    options: Options,
 ) -> IdentificationResult:
     """The model with its provenance, diagnostics, and predictions of trials.
 
-    Of all that are not skipped. `call`: the arguments of `identify`, for settings.json.
+    Of all that are not skipped.
     """
     trials = tuple(trial for trial in problem.trials if trial.use != "skip")
     predictions = {trial.name: predict(model, trial) for trial in trials}
     lost = [name for name, predicted in predictions.items() if predicted is None]
 
     complete = {**provenance, **problem.sea}
-    complete["steering"] = "estimated" if call["steering"] is None else "given"
+    complete["steering"] = "estimated" if options.steering is None else "given"
     if lost:
         complete |= {"stable": False, "runs_away_on": lost}
     stable = bool(complete["stable"])
@@ -216,7 +236,7 @@ def evaluated(
         diagnostics=diagnose(fit.estimators, problem.samples, problem.table),
         samples=problem.samples,
         estimators=fit.estimators,
-        settings=call,
+        settings=whole_call(options, problem.trials),
         searches=_attributes(fit, "search_"),
     )
 

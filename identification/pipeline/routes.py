@@ -18,7 +18,7 @@ from identification.pipeline.by_regression import by_regression
 from identification.pipeline.evaluation import (
     evaluated,
     provenance_of,
-    scaled_covariance,
+    with_uncertainty,
 )
 from identification.regression.grey_box import explained_samples
 from identification.regression.preprocess import smoothed_channels
@@ -105,12 +105,7 @@ def by_kernel(
     named = replace(options, structure=beneath.structure)
     provenance = provenance_of(named, name_of(options.method), fit, problem)
     provenance["kernel"] = found.report
-    covariance, error = scaled_covariance(options.uncertainty, fit, None, problem)
-    if error:
-        provenance["model_error"] = error
-    model = replace(found.model, covariance=covariance)
-    call = whole_call(options, problem.trials)
-    return evaluated(model, fit, problem, provenance, call)
+    return with_uncertainty(fit, None, problem, provenance, options)
 
 
 def reference_options(options: Options) -> Options:
@@ -154,8 +149,7 @@ def by_simulation(trials: Sequence[Trial], options: Options) -> IdentificationRe
     fit = _unguarded(model, estimators, problem.used)
     provenance = provenance_of(options, MAP, fit, problem)
     provenance |= report
-    call = whole_call(options, problem.trials)
-    return evaluated(model, fit, problem, provenance, call)
+    return evaluated(model, fit, problem, provenance, options)
 
 
 def _unguarded(
