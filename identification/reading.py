@@ -48,11 +48,15 @@ def stage_settings() -> dict[str, list[str]]:
     """Names of the settings of each stage but for the one that its name stands for."""
     found = {}
     for stage, kind in STAGES.items():
-        found[stage] = [item.name for item in fields(kind)[1:]]
-    of_methods = dict[str, None]()
+        names = [item.name for item in fields(kind)]
+        found[stage] = names[1:]
+
+    of_methods = list[str]()
     for method in METHODS:
-        of_methods |= dict.fromkeys(method_options(method))
-    found["method"] = list(of_methods)
+        for option in method_options(method):
+            if option not in of_methods:
+                of_methods.append(option)
+    found["method"] = of_methods
     return found
 
 
@@ -200,17 +204,19 @@ def identify_arguments(values: Mapping[str, Any]) -> dict[str, Any]:
     for stage, kind in STAGES.items():
         settings = settings_of(values, stage)
         if stage == "kernel" and settings and "kernel" not in values:
+            names = ", ".join(settings)
             raise InputError(
-                f"{', '.join(settings)}: expected a kernel that this is a setting of,"
+                f"{names}: expected a kernel that this is a setting of,"
                 ' got none; give kernel = "rbf"'
             )
         if stage in values:
-            settings[WORDS[stage]] = values[stage]
+            word = WORDS[stage]
+            settings[word] = values[stage]
         if settings:
             arguments[stage] = kind(**settings)
 
-    settings = settings_of(values, "method")
     method = values.get("method", DEFAULT_METHOD)
+    settings = settings_of(values, "method")
     if settings:
         arguments["method"] = checked_method(method, settings)
     elif "method" in values:

@@ -237,8 +237,11 @@ def reference_coefficients(model: ShipModel) -> dict[str, float]:
     """Coefficients of a reference ship in the general form."""
     if model.structure == MMG:
         return dict(model.coefficients)
-    speed, shaft = model.particulars["speed"], model.service_shaft_speed
-    return standard_form(model.coefficients, speed, shaft)
+    return standard_form(
+        model.coefficients,
+        model.particulars["speed"],
+        model.service_shaft_speed,
+    )
 
 
 def _given_added_mass(p: Particulars) -> dict[str, float]:

@@ -64,10 +64,10 @@ class OutputError:
 
     def start_scales(self) -> Floats:
         """Scales of the residuals at the start; not finite where a ship runs away."""
-        units = self.shooter.units
+        shooter = self.shooter
         segments = [*self.fitted, *self.further]
-        shooting = self.shooter.shoot(self.start, segments, units)
-        return self.scales(shooting, units)
+        shooting = shooter.shoot(self.start, segments, shooter.units)
+        return self.scales(shooting, shooter.units)
 
     def scales(self, shooting: Shooting, scales: Floats) -> Floats:
         """Root mean square of the residuals by channel, per sample of trials to fit.
@@ -80,9 +80,9 @@ class OutputError:
         squares = np.sum(errors**2, axis=0)
         # a residual is a mean over a block, times the root of its samples
         n_samples = sum(len(segment.measured) for segment in self.fitted)
-        mean_squares = squares / n_samples
+        rms = np.sqrt(squares / n_samples)
         smallest = 1e-9 * self.shooter.units
-        return np.asarray(np.maximum(np.sqrt(mean_squares), smallest))
+        return np.asarray(np.maximum(rms, smallest))
 
     def pull_weights(self, pull: float) -> Floats:
         """Weight of each parameter's distance from the start, shape (n_parameters,).

@@ -62,20 +62,21 @@ def correlations(
     ships. Features that are nan for any ship are left out. Raises InputError if fewer
     than three features are known of all ships.
     """
-    rows = [target, *candidates.values()]
-    table = np.array([np.asarray(row, dtype=float) for row in rows])
-    known = np.all(np.isfinite(table), axis=0)
-    if known.sum() < 3:
+    table = np.array([target, *candidates.values()], dtype=float)
+    known = np.isfinite(table).all(axis=0)
+    n_known = int(known.sum())
+    if n_known < 3:
         raise InputError(
             "particulars: expected at least 3 of block coefficient, L/B, B/T, L/V0 and"
-            f" rudder area to find a reference ship, got {known.sum()}; give beam,"
+            f" rudder area to find a reference ship, got {n_known}; give beam,"
             " draught, block_coefficient and rudder_area in [ship], or name the"
             " reference_model"
         )
 
     features = table[:, known]
     scaled = features / np.linalg.norm(features, axis=0)
-    with_target = np.corrcoef(scaled)[0, 1:]
+    between_ships = np.corrcoef(scaled)
+    with_target = between_ships[0, 1:]
     return dict(zip(candidates, with_target.tolist(), strict=True))
 
 

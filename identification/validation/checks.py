@@ -55,11 +55,12 @@ def _check_channels(trial: Trial, structure: Structure) -> None:
 def _check_steps(trial: Trial) -> None:
     """Refuse a row that was written twice: a step of less than 1e-4 of the usual."""
     steps = np.diff(trial.t)
-    k = int(np.argmin(steps))
-    shortest = steps[k]
     usual = float(np.median(steps))
+    row = int(np.argmin(steps))
+    shortest = steps[row]
     if shortest < 1e-4 * usual:
-        begin, end = trial.t[k : k + 2]
+        begin = trial.t[row]
+        end = trial.t[row + 1]
         raise InputError(
             f"trial {trial.name!r}: expected samples about {usual:.3g} s apart, got"
             f" {shortest:.2g} s from {begin:.12g} to {end:.12g} s;"

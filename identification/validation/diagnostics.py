@@ -143,13 +143,13 @@ def cross_correlation(first: Floats, second: Floats, lags: Integers) -> Floats:
     a = first - first.mean()
     b = second - second.mean()
     powers = (a @ a) * (b @ b)
-    size = float(np.sqrt(powers)) or 1.0
+    size = float(np.sqrt(powers)) or 1.0  # 0 for a constant one
     products = correlate(a, b, method="fft")
     by_lag = products / size
 
     no_lag = len(a) - 1
     found = by_lag.take(no_lag + lags, mode="clip")
-    too_far = np.abs(lags) >= len(a)
+    too_far = np.abs(lags) > no_lag
     found[too_far] = 0.0
     return np.asarray(found)
 
