@@ -61,14 +61,16 @@ class Fit:
 
     @property
     def coefficients(self) -> dict[str, float]:
-        """Coefficients by name, as the structure normalises them; rudder to starboard."""
+        """Coefficients by name, in units of the structure; rudder to starboard."""
         return self.model.coefficients
 
     @property
     def standard_errors(self) -> dict[str, float]:
         """Standard error of each coefficient, in its units."""
+        names = self.coefficients
         covariance = self.model.covariance
         if covariance is None:
-            return dict.fromkeys(self.coefficients, float("nan"))
-        errors = np.sqrt(np.diag(covariance))
-        return dict(zip(self.coefficients, errors.tolist(), strict=True))
+            return dict.fromkeys(names, float("nan"))
+        variances = np.diag(covariance)
+        errors = np.sqrt(variances).tolist()
+        return dict(zip(names, errors, strict=True))

@@ -1,6 +1,6 @@
 """The options of `identify`, and how provenance and settings.json record them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, TypeVar
 
@@ -20,11 +20,10 @@ from identification.uncertainty.uncertainty import Uncertainty
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.checks import check_flag, check_number, check_text
 from shipgym.ships import Structure
-from shipgym.ships.mmg import MMG
+from shipgym.ships.structures import MMG
 
 Given = Particulars | Mapping[str, Any] | None  # particulars, as `identify` takes them
 DEFAULT_METHOD = "tls-svm"
-MAP = "map"  # the method of the MMG form
 MAP = "map"  # the method of the MMG form: maximum a posteriori
 AUTO = "auto"  # the structure that is chosen by trials held out
 
@@ -149,7 +148,7 @@ def stage(kind: Callable[[Any], Stage], value: Stage | Any) -> Stage:
 
 
 def name_of(value: Any) -> str:
-    """The name of a model, a structure or a method; of an estimator of others that of its class."""
+    """The name of a model, a structure or a method, or of an estimator's class."""
     if isinstance(value, str):
         return value
     if isinstance(value, LinearRegressor):
@@ -170,45 +169,54 @@ def provenance_settings(options: Options) -> dict[str, Any]:
 
 
 def changed_settings(method: Any) -> dict[str, Any]:
-    """Settings in which a method differs from the default of its name, as JSON knows them."""
+    """Settings in which a method differs from the default of its name."""
     if isinstance(method, str):
         return {}
     settings = method_settings(method)
-    if name_of(method) not in METHODS:
+    name = name_of(method)
+    if name not in METHODS:
         return settings
-    default = method_settings(make_method(name_of(method)))
-    return {name: value for name, value in settings.items() if value != default[name]}
+    default = method_settings(make_method(name))
+    return {
+        setting: value
+        for setting, value in settings.items()
+        if value != default[setting]
+    }
 
 
 def method_settings(method: Any) -> dict[str, Any]:
     """Settings of an estimator or a refinement, as JSON knows them."""
     if isinstance(method, LinearRegressor):
-        return {name: plain(getattr(method, name)) for name in method.options}
+        return _plain_attributes(method, method.options)
     if isinstance(method, Refinement):
-        own = {name: plain(getattr(method, name)) for name in method.options}
+        own = _plain_attributes(method, method.options)
         return own | method_settings(method.start)
     if hasattr(method, "get_params"):
-        return {
-            name: plain(value) for name, value in method.get_params(deep=False).items()
-        }
+        settings: dict[str, Any] = plain(method.get_params(deep=False))
+        return settings
     return {}
+
+
+def _plain_attributes(value: Any, names: Iterable[str]) -> dict[str, Any]:
+    return {name: plain(getattr(value, name)) for name in names}
 
 
 def whole_call(options: Options, trials: Sequence[Trial]) -> dict[str, Any]:
     """The whole call for settings.json, trials by name, use and hash."""
-    used = [
-        {"name": trial.name, "use": trial.use, "sha256": trial.raw.sha256}
-        for trial in trials
-    ]
+    used = []
+    for trial in trials:
+        record = {"name": trial.name, "use": trial.use, "sha256": trial.raw.sha256}
+        used.append(record)
+    arguments = [item.name for item in fields(options)]
     return {
         "software": f"shipgym {shipgym.__version__}",
-        **{item.name: plain(getattr(options, item.name)) for item in fields(options)},
+        **_plain_attributes(options, arguments),
         "trials": used,
     }
 
 
 def plain(value: Any) -> Any:
-    """A setting as JSON knows it: infinity as null, models and trials by their names."""
+    """A setting as JSON knows it: infinity as null, models and trials by name."""
     if isinstance(value, str | int | bool | None):
         return value
     if isinstance(value, float):
@@ -226,5 +234,6 @@ def plain(value: Any) -> Any:
     if hasattr(value, "fit") or isinstance(value, Refinement):
         return {"name": name_of(value), **method_settings(value)}
     if is_dataclass(value):
-        return {item.name: plain(getattr(value, item.name)) for item in fields(value)}
+        names = [item.name for item in fields(value)]
+        return _plain_attributes(value, names)
     return repr(value)

@@ -1,4 +1,6 @@
-"""Options of `identify` read from tables of names and values: a ship file's [identify], the command line.
+"""Options of `identify` read from tables of names and values.
+
+Such tables are a ship file's [identify] and the options of the command line.
 
 An option has the name of an argument of `identify`, such as `structure`, or that of a
 setting of a stage, such as `samples.window`. The stage may be left out (`window`), or
@@ -6,7 +8,7 @@ be written with an underscore (`prior_strength`). Of a setting that several stag
 `C` and `folds`, the name alone is the kernel's where there is one, else the method's.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -44,12 +46,18 @@ LISTS = ("hold_out", "method.extra_trials")
 
 def stage_settings() -> dict[str, list[str]]:
     """Names of the settings of each stage but for the one that its name stands for."""
-    found = {
-        stage: [item.name for item in fields(kind)[1:]]
-        for stage, kind in STAGES.items()
-    }
-    of_methods = [option for name in METHODS for option in method_options(name)]
-    return found | {"method": list(dict.fromkeys(of_methods))}
+    found = {}
+    for stage, kind in STAGES.items():
+        names = [item.name for item in fields(kind)]
+        found[stage] = names[1:]
+
+    of_methods = list[str]()
+    for method in METHODS:
+        for option in method_options(method):
+            if option not in of_methods:
+                of_methods.append(option)
+    found["method"] = of_methods
+    return found
 
 
 def read_table(
@@ -71,7 +79,7 @@ def read_table(
     InputError
         For an unknown option, or a value that it cannot have.
     """
-    options = dict(_flattened(check_table(table, where)))
+    options = _flattened(check_table(table, where))
     if with_kernel is None:
         with_kernel = "kernel" in options
     found: dict[str, Any] = {}
@@ -83,18 +91,25 @@ def read_table(
     return found
 
 
-def _flattened(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def _flattened(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The table with the settings of its stages beside its other options."""
+    options = {}
     for name, value in table.items():
-        if name in WORDS and isinstance(value, Mapping):
-            for setting, own in value.items():
-                word = setting == WORDS[name]
-                yield (name if word else f"{name}.{setting}"), own
-        else:
-            yield name, value
+        if name not in WORDS or not isinstance(value, Mapping):
+            options[name] = value
+            continue
+        for setting, own in value.items():
+            is_word = setting == WORDS[name]
+            option = name if is_word else f"{name}.{setting}"
+            options[option] = own
+    return options
 
 
 def full_name(name: str, where: str, with_kernel: bool = False) -> str:
-    """Full name of an option; InputError, which begins with `where`, for one that does not exist."""
+    """Full name of an option; InputError for one that does not exist.
+
+    The message begins with `where`.
+    """
     if name in ARGUMENTS or name in WORDS:
         return name
     known = stage_settings()
@@ -118,10 +133,12 @@ def full_name(name: str, where: str, with_kernel: bool = False) -> str:
         stage = "kernel" if with_kernel and "kernel" in owners else "method"
         return f"{stage}.{name}"
 
-    names = [*ARGUMENTS, *WORDS, *(one for own in known.values() for one in own)]
+    names = [*ARGUMENTS, *WORDS]
+    for settings in known.values():
+        names += settings
+    hint = did_you_mean(name, names)
     raise InputError(
-        f"{where} {name}: expected an option of identify, got an unknown one."
-        f"{did_you_mean(name, names)}"
+        f"{where} {name}: expected an option of identify, got an unknown one.{hint}"
     )
 
 
@@ -146,16 +163,20 @@ def check_value(name: str, value: Any, method: Any = None) -> None:
 
 
 def _check_setting(setting: str, value: Any, method: Any) -> None:
-    """Refuse a value of a setting that no method can have; the message is that of the method named."""
+    """Refuse a value of a setting that no method can have.
+
+    The message is that of the method named.
+    """
     refusals = []
     for name in sorted(METHODS, key=lambda name: name != method):
         if setting not in method_options(name):
             continue
         try:
             checked_method(name, {setting: value})
-            return
         except InputError as error:
             refusals.append(error)
+        else:
+            return
     raise refusals[0]
 
 
@@ -183,17 +204,19 @@ def identify_arguments(values: Mapping[str, Any]) -> dict[str, Any]:
     for stage, kind in STAGES.items():
         settings = settings_of(values, stage)
         if stage == "kernel" and settings and "kernel" not in values:
+            names = ", ".join(settings)
             raise InputError(
-                f"{', '.join(settings)}: expected a kernel that this is a setting of,"
+                f"{names}: expected a kernel that this is a setting of,"
                 ' got none; give kernel = "rbf"'
             )
         if stage in values:
-            settings[WORDS[stage]] = values[stage]
+            word = WORDS[stage]
+            settings[word] = values[stage]
         if settings:
             arguments[stage] = kind(**settings)
 
-    settings = settings_of(values, "method")
     method = values.get("method", DEFAULT_METHOD)
+    settings = settings_of(values, "method")
     if settings:
         arguments["method"] = checked_method(method, settings)
     elif "method" in values:
@@ -203,9 +226,9 @@ def identify_arguments(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def settings_of(values: Mapping[str, Any], stage: str) -> dict[str, Any]:
     """The settings of a stage among options by their full names."""
-    prefix = f"{stage}."
-    return {
-        name.removeprefix(prefix): value
-        for name, value in values.items()
-        if name.startswith(prefix)
-    }
+    settings = {}
+    for name, value in values.items():
+        owner, _, setting = name.partition(".")
+        if owner == stage and setting:
+            settings[setting] = value
+    return settings

@@ -42,7 +42,7 @@ class IdentificationResult(Fit):
         return all_figures(self)
 
     def save(self, folder: str | Path) -> None:
-        """Write `model.json`, `metrics.json`, `settings.json` and `report.html`, all or none.
+        """Write model.json, metrics.json, settings.json and report.html, all or none.
 
         The same call on the same data gives the same files, byte for byte. Without
         plotly there is no report, and a warning says so.

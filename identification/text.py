@@ -18,7 +18,7 @@ def as_text(*tables: RenderableType) -> str:
 
 
 def lined_table(title: str, *headings: str) -> Table:
-    """A table with its title to the left; a heading that begins with > is aligned right."""
+    """A table with its title to the left; a heading after a > is aligned right."""
     table = Table(title=title, title_justify="left")
     for heading in headings:
         is_right = heading.startswith(">")

@@ -73,14 +73,14 @@ class Advice:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON; of each trial's information the diagonal."""
-        trials = {
-            trial.name: {
+        trials = {}
+        for trial in self.trials:
+            diagonal = np.diag(trial.information)
+            trials[trial.name] = {
                 "condition_number": trial.condition_number,
                 "variance_inflation": trial.inflation,
-                "information": by_name(self.before, np.diag(trial.information)),
+                "information": by_name(self.before, diagonal),
             }
-            for trial in self.trials
-        }
         return {
             "criterion": self.criterion,
             "coefficient": self.coefficient,
@@ -95,45 +95,54 @@ class Advice:
 
     def _trials_so_far(self) -> Table:
         place = list(self.before).index(self.coefficient)
-        shares = np.array([trial.information[place, place] for trial in self.trials])
-        total = shares.sum()
-        if total > 0.0:
-            shares = shares / total
-
-        last = f"information on {self.coefficient}"
+        known = np.array([trial.information[place, place] for trial in self.trials])
+        shares = known / (known.sum() or 1.0)
         table = lined_table(
-            "Trials so far", "trial", "condition number", "largest inflation", last
+            "Trials so far",
+            "trial",
+            "condition number",
+            "largest inflation",
+            f"information on {self.coefficient}",
         )
         for trial, share in zip(self.trials, shares, strict=True):
             worst, inflation = _descending(trial.inflation)[0]
             conditions = [f"{q} {c:.0f}" for q, c in trial.condition_number.items()]
+            per_cent = 100.0 * share
             table.add_row(
                 trial.name,
                 ", ".join(conditions),
                 f"{inflation:.0f} ({worst})",
-                f"{100.0 * share:.0f} % of all",
+                f"{per_cent:.0f} % of all",
             )
         return table
 
     def _candidates(self) -> Table:
         shrunk = f" for {self.coefficient}" if self.criterion == "c" else ""
         title = f"Run next ({self.criterion}-optimal{shrunk})"
-        choices = range(1, len(self.chosen) + 1)
-        headings = [f">gain, choice {number}" for number in choices]
+        headings = []
+        for number, _ in enumerate(self.chosen, start=1):
+            headings.append(f">gain, choice {number}")
         table = lined_table(title, "candidate", *headings)
         for name, _ in _descending(self.steps[0]):
-            gains = []
+            cells = []
             for step, chosen in zip(self.steps, self.chosen, strict=True):
-                mark = " *" if name == chosen else ""
-                gains.append(f"{step[name]:.2f}{mark}")
-            table.add_row(name, *gains)
+                gain = f"{step[name]:.2f}"
+                if name == chosen:
+                    gain += " *"
+                cells.append(gain)
+            table.add_row(name, *cells)
         return table
 
     def _errors(self) -> Table:
-        headings = ("coefficient", "relative error now", "expected")
-        table = Table(*headings, title_justify="left")
+        table = Table(
+            "coefficient",
+            "relative error now",
+            "expected",
+            title_justify="left",
+        )
         for name, before in _descending(self.before):
-            table.add_row(name, f"{before:.2g}", f"{self.after[name]:.2g}")
+            after = self.after[name]
+            table.add_row(name, f"{before:.2g}", f"{after:.2g}")
         return table
 
 
@@ -143,10 +152,10 @@ def _descending(values: Mapping[str, float]) -> list[tuple[str, float]]:
 
 
 def standard_candidates(model: ShipModel) -> dict[str, Candidate]:
-    """Manoeuvres that trials usually consist of, each of 40 ship lengths at service speed.
+    """Manoeuvres that trials usually consist of, each of 40 ship lengths.
 
     Zigzags and turning circles of several angles, up to the rudder's limit, and a
-    pseudo-random binary rudder.
+    pseudo-random binary rudder; lengths at service speed.
     """
     travel = model.travel_time
     times: dict[str, Any] = {"duration": 40.0 * travel, "dt": travel / 60}
@@ -154,21 +163,31 @@ def standard_candidates(model: ShipModel) -> dict[str, Candidate]:
     usual = (5.0, 10.0, 20.0, min(35.0, limit))
 
     found: dict[str, Candidate] = {}
-    for angle in [angle for angle in usual if angle <= limit]:
+    for angle in usual:
+        if angle > limit:
+            continue
         found[f"zigzag {angle:g}/{angle:g}"] = partial(
-            zigzag, rudder_deg=angle, heading_deg=angle, must_reverse=False, **times
+            zigzag,
+            rudder_deg=angle,
+            heading_deg=angle,
+            must_reverse=False,
+            **times,
         )
         found[f"turning circle {angle:g}"] = partial(
-            turning_circle, rudder_deg=angle, **times
+            turning_circle,
+            rudder_deg=angle,
+            **times,
         )
         found[f"binary rudder {angle:g}"] = partial(
-            prbs_rudder, amplitude_deg=angle, **times
+            prbs_rudder,
+            amplitude_deg=angle,
+            **times,
         )
     return found
 
 
 def check_criterion(criterion: str, coefficient: str | None) -> None:
-    """Refuse an unknown criterion, and a coefficient for one that is of all coefficients."""
+    """Refuse an unknown criterion, and a coefficient for one of all coefficients."""
     check_choice(criterion, CRITERIA, "criterion")
     if coefficient is not None and criterion != "c":
         raise InputError(
@@ -222,13 +241,15 @@ def advise(
     total = np.sum([trial.information for trial in known], axis=0)
     size = _sizes(model, total)
     before = relative_errors(total, size)
-    names = list(model.coefficients)
     if coefficient is None:
         coefficient = most_felt(model, size * before)
 
-    steps, chosen = list[dict[str, float]](), list[str]()
+    names = list(model.coefficients)
+    place = names.index(coefficient)
+    steps = list[dict[str, float]]()
+    chosen = list[str]()
     for _ in range(number):
-        gains = gains_of(total, offers, size, criterion, names.index(coefficient))
+        gains = gains_of(total, offers, size, criterion, place)
         best, _ = _descending(gains)[0]
         steps.append(gains)
         chosen.append(best)
@@ -274,8 +295,9 @@ def most_felt(model: ShipModel, errors: Floats) -> str:
 
     `errors`: standard errors, shape (n_coefficients,).
     """
-    table, matrix = table_of(model), model.acceleration_matrix
+    table = table_of(model)
     sizes = hard_turn_features(table, model.particulars, model.service_shaft_speed)
+    matrix = model.acceleration_matrix
     terms = matrix @ coefficient_values(model)
 
     felt = np.zeros(len(errors))
@@ -285,7 +307,8 @@ def most_felt(model: ShipModel, errors: Floats) -> str:
         share = by_coefficient / whole
         felt = np.maximum(felt, share)
     worst = int(np.argmax(felt * errors))
-    return list(model.coefficients)[worst]
+    names = list(model.coefficients)
+    return names[worst]
 
 
 def gains_of(
@@ -303,7 +326,8 @@ def gains_of(
     now = uncertainty(total, size, criterion, place)
     gains = {}
     for name, offer in offers.items():
-        gains[name] = now / uncertainty(total + offer, size, criterion, place)
+        expected = uncertainty(total + offer, size, criterion, place)
+        gains[name] = now / expected
     return gains
 
 

@@ -58,6 +58,7 @@ def noise_variance(
 ) -> dict[str, float]:
     """Variance of what the model leaves of the targets, by equation."""
     accelerations = model.acceleration_matrix @ coefficient_values(model)
+    smallest = np.finfo(float).tiny
     noise = {}
     for q, rows in table_of(model).regression_rows.items():
         targets = np.concatenate([samples.targets[q] for samples in regressions])
@@ -65,37 +66,45 @@ def noise_variance(
         errors = targets - features @ accelerations[rows]
         # data without noise leave rounding errors only
         rounding = JITTER * mean_square(targets)
-        noise[q] = max(mean_square(errors), rounding, np.finfo(float).tiny)
+        noise[q] = max(mean_square(errors), rounding, smallest)
     return noise
 
 
 def fisher_information(
     model: ShipModel, samples: Samples, noise: Mapping[str, float]
 ) -> Floats:
-    """Information on the model's coefficients, for exact features and white errors; it adds up over samples.
+    """Information on the model's coefficients, which adds up over samples.
 
-    `noise` is the variance of the targets' errors, by equation. Shape (n_coefficients,
-    n_coefficients).
+    For exact features and white errors. `noise` is the variance of the targets' errors,
+    by equation. Shape (n_coefficients, n_coefficients).
     """
     matrix = model.acceleration_matrix
-    moments = np.zeros(matrix.shape)
+    of_terms = np.zeros(matrix.shape)
     for q, rows in table_of(model).regression_rows.items():
         X = samples.features[q]
-        moments[rows, rows] = X.T @ X / noise[q]
-    return np.asarray(matrix.T @ moments @ matrix)
+        moment = X.T @ X
+        of_terms[rows, rows] = moment / noise[q]
+    # the terms' accelerations are linear in the coefficients
+    information = matrix.T @ of_terms @ matrix
+    return np.asarray(information)
 
 
 def trial_information(
     model: ShipModel, name: str, samples: Samples, noise: Mapping[str, float]
 ) -> TrialInformation:
     """What a trial of a name and a regression says."""
-    condition, inflation = dict[str, float](), dict[str, float]()
+    condition = dict[str, float]()
+    inflation = dict[str, float]()
     for q, X in samples.features.items():
         scaled, condition[q] = scaled_features(X)
         terms = model.table.regression_names(q)
         inflation |= by_name(terms, variance_inflation(scaled))
-    information = fisher_information(model, samples, noise)
-    return TrialInformation(name, condition, inflation, information)
+    return TrialInformation(
+        name=name,
+        condition_number=condition,
+        inflation=inflation,
+        information=fisher_information(model, samples, noise),
+    )
 
 
 def coefficient_values(model: ShipModel) -> Floats:
@@ -108,15 +117,18 @@ def relative_covariance(information: Floats, size: Floats) -> Floats:
 
     What is not excited gets a large one instead of an infinite.
     """
-    values, vectors = np.linalg.eigh(information * np.outer(size, size))
-    least = 1e-14 * max(values[-1], np.finfo(float).tiny)
-    values = np.maximum(values, least)
-    return np.asarray((vectors / values) @ vectors.T)
+    relative = information * np.outer(size, size)
+    values, vectors = np.linalg.eigh(relative)
+    largest = max(values[-1], np.finfo(float).tiny)
+    regular = np.maximum(values, 1e-14 * largest)
+    inverse = (vectors / regular) @ vectors.T
+    return np.asarray(inverse)
 
 
 def relative_errors(information: Floats, size: Floats) -> Floats:
-    """Relative standard errors of coefficients of some sizes, shape (n_coefficients,)."""
-    return np.sqrt(np.diag(relative_covariance(information, size)))
+    """Relative standard errors of coefficients of some sizes."""
+    covariance = relative_covariance(information, size)
+    return np.sqrt(np.diag(covariance))
 
 
 def uncertainty(information: Floats, size: Floats, criterion: str, place: int) -> float:
@@ -127,9 +139,13 @@ def uncertainty(information: Floats, size: Floats, criterion: str, place: int) -
     """
     covariance = relative_covariance(information, size)
     if criterion == "c":
-        return float(np.sqrt(covariance[place, place]))
+        variance = covariance[place, place]
+        return float(np.sqrt(variance))
+
     variances = np.linalg.eigvalsh(covariance)
-    axes = np.sqrt(np.maximum(variances, np.finfo(float).tiny))
+    positive = np.maximum(variances, np.finfo(float).tiny)
+    axes = np.sqrt(positive)
     if criterion == "D":
-        return float(np.exp(np.mean(np.log(axes))))
+        mean_log = np.mean(np.log(axes))
+        return float(np.exp(mean_log))
     return float(axes[-1])

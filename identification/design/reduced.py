@@ -1,4 +1,4 @@
-"""Identify with the terms that are needed: reduce the full structure, then identify what is left."""
+"""Identify with the terms that are needed: a structure reduced on its samples."""
 
 import hashlib
 from collections.abc import Mapping, Sequence
@@ -43,6 +43,7 @@ class ReducedIdentification:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
+        full, reduced = self.full, self.reduced
         equations = {
             q: {"chosen": reduction.chosen, "path": _plain_path(reduction)}
             for q, reduction in self.reductions.items()
@@ -51,14 +52,14 @@ class ReducedIdentification:
             "structure": self.structure.name,
             "equations": equations,
             "terms": {
-                "full": len(self.full.coefficients),
-                "reduced": len(self.reduced.coefficients),
+                "full": len(full.coefficients),
+                "reduced": len(reduced.coefficients),
             },
             "trials": {
-                "full": self.full.metrics["trials"],
-                "reduced": self.reduced.metrics["trials"],
+                "full": full.metrics["trials"],
+                "reduced": reduced.metrics["trials"],
             },
-            "sensitivity": zigzag_sensitivity(self.reduced.model),
+            "sensitivity": zigzag_sensitivity(reduced.model),
         }
 
 
@@ -66,8 +67,10 @@ def _plain_path(reduction: Reduction) -> list[dict[str, Any]]:
     """The steps of a reduction, infinite errors as null."""
     path = []
     for step in reduction.path:
-        errors = {name: finite(error) for name, error in step.relative_errors.items()}
-        path.append({**asdict(step), "relative_errors": errors})
+        fields = asdict(step)
+        errors = step.relative_errors.items()
+        fields["relative_errors"] = {name: finite(error) for name, error in errors}
+        path.append(fields)
     return path
 
 
@@ -77,7 +80,7 @@ def identify_reduced(
     tolerance: float = 1e-3,
     **arguments: Any,
 ) -> ReducedIdentification:
-    """Identify a structure, reduce it on the same samples, and identify the smaller one.
+    """Identify a structure, reduce it on the same samples, and identify what is left.
 
     Raises InputError for a grey box, whose table is what its reference ship leaves, for
     a structure with a memory of yaw, and for fewer than five samples a term.
@@ -125,9 +128,10 @@ def _check_reducible(table: Structure) -> None:
 
 def _name_by_terms(structure: Structure) -> str:
     """The name of a reduced structure, its own among all reductions."""
-    terms = [
-        (q, [term.name for term in structure.terms(q)]) for q in structure.equations
-    ]
+    terms = []
+    for q in structure.equations:
+        names = [term.name for term in structure.terms(q)]
+        terms.append((q, names))
     digest = hashlib.sha256(repr(terms).encode()).hexdigest()
     return f"{structure.name}-{digest[:6]}"
 
@@ -138,7 +142,7 @@ def reduce(
     direction: str = "backward",
     tolerance: float = 1e-3,
 ) -> dict[str, Reduction]:
-    """Reduce each equation of a structure by elimination ("backward") or selection ("forward").
+    """Reduce each equation by elimination ("backward") or selection ("forward").
 
     Returns the reductions by equation, with the coefficients of the features in SI
     units; the tolerance is that of the held-out R2.
@@ -147,30 +151,41 @@ def reduce(
     run = backward_elimination if direction == "backward" else forward_selection
     reductions = {}
     for q in structure.equations:
-        X, y = samples.features[q], samples.targets[q]
-        reductions[q] = run(X, y, structure.names(q), tolerance=tolerance)
+        reductions[q] = run(
+            samples.features[q],
+            samples.targets[q],
+            structure.names(q),
+            tolerance=tolerance,
+        )
     return reductions
 
 
 def reduced_structure(
     structure: Structure, reductions: Mapping[str, Reduction], name: str
 ) -> Structure:
-    """The structure, by a name of its own, with the terms that were chosen; register it to identify it.
+    """The structure, by a name of its own, with the terms that were chosen.
 
-    Of forces, sway and yaw, which inertia couples, keep the terms that either needs.
+    Register it to identify it. Of forces, sway and yaw, which inertia couples, keep the
+    terms that either needs.
     """
     kept = dict[str, set[str]]()
     for q in structure.equations:
         chosen = reductions[q].terms
-        labels = zip(structure.terms(q), structure.names(q), strict=True)
-        kept[q] = {term.name for term, label in labels if label in chosen}
+        kept[q] = set()
+        for term, label in zip(structure.terms(q), structure.names(q), strict=True):
+            if label in chosen:
+                kept[q].add(term.name)
     if structure.quantity == "force" and {"v", "r"} <= kept.keys():
         either = kept["v"] | kept["r"]
         kept["v"] = kept["r"] = either
 
-    equations = {
-        q: tuple(term for term in structure.terms(q) if term.name in kept[q])
-        for q in structure.equations
-    }
-    source = f"{structure.source}; reduced"
-    return replace(structure, name=name, source=source, equations=equations)
+    equations = {}
+    for q, names in kept.items():
+        terms = [term for term in structure.terms(q) if term.name in names]
+        equations[q] = tuple(terms)
+    return replace(
+        structure,
+        name=name,
+        source=f"{structure.source}; reduced",
+        equations=equations,
+    )

@@ -105,7 +105,8 @@ class _Regression:
 
         X, y = self.features[:, kept], self.targets
         names = tuple(self.names[term] for term in kept)
-        estimator = TruncatedLSSVM(selection="full", fit_intercept=False).fit(X, y)
+        estimator = TruncatedLSSVM(selection="full", fit_intercept=False)
+        estimator.fit(X, y)
         predicted = cross_val_predict(estimator, X, y, cv=KFold(FOLDS))
 
         r_squared = self._explained(X @ estimator.coef_)
@@ -123,15 +124,21 @@ class _Regression:
         """Share of the targets that a prediction explains."""
         left = self.targets - predicted
         power = float(self.targets @ self.targets)
-        return 1.0 - float(left @ left) / power
+        unexplained = float(left @ left)
+        return 1.0 - unexplained / power
 
 
 def _relative_errors(estimator: TruncatedLSSVM) -> Floats:
     """Standard errors of the coefficients by their sizes, infinite for one of 0."""
-    deviation = np.sqrt(np.diag(estimator.covariance_))
+    variances = np.diag(estimator.covariance_)
     size = np.abs(estimator.coef_)
     errors = np.full(len(size), np.inf)
-    np.divide(deviation, size, out=errors, where=size > 0.0)
+    np.divide(
+        np.sqrt(variances),
+        size,
+        out=errors,
+        where=size > 0.0,
+    )
     return errors
 
 
@@ -173,14 +180,19 @@ def backward_elimination(
     best = path[0].held_out
     while len(kept) > 1:
         step = _without_one(
-            regression, kept, path[-1], threshold, prefer, best - tolerance
+            regression,
+            kept,
+            path[-1],
+            threshold=threshold,
+            prefer=prefer,
+            least=best - tolerance,
         )
         if step is None:
             break
         path.append(step)
         kept.remove(regression.names.index(step.changed))
         best = max(best, step.held_out)
-    return Reduction(tuple(path), len(path) - 1)
+    return Reduction(tuple(path), chosen=len(path) - 1)
 
 
 def _without_one(
@@ -191,15 +203,20 @@ def _without_one(
     prefer: Sequence[str],
     least: float,
 ) -> ReductionStep | None:
-    """The first model without one term that explains at least as much of what is held out; None without one."""
-    names, errors = regression.names, last.relative_errors
+    """The first model without one term that explains at least as much; None for none.
+
+    Compared is the share explained of what is held out, with the `least` one.
+    """
+    names = regression.names
+    errors = last.relative_errors
     uncertain = {term for term in kept if errors[names[term]] > threshold}
     candidates = uncertain | collinear_terms(regression.features, kept)
 
     def order(term: int) -> tuple[bool, float, int]:
+        name = names[term]
         # rounded, so that of two terms that say the same every computer drops the first
-        error = float(f"{errors[names[term]]:.6g}")
-        return names[term] in prefer, -error, term
+        error = float(f"{errors[name]:.6g}")
+        return name in prefer, -error, term
 
     for term in sorted(candidates, key=order):
         fewer = [other for other in kept if other != term]
@@ -213,10 +230,11 @@ def collinear_terms(features: Floats, kept: Sequence[int]) -> set[int]:
     """Terms that others nearly make up, by pair or by variance inflation."""
     own = features[:, kept]
     scaled = own / column_rms(own)
-    correlation = correlation_matrix(scaled)
+    correlation = np.abs(correlation_matrix(scaled))
     np.fill_diagonal(correlation, 0.0)
-    in_pair = (np.abs(correlation) > COLLINEAR).any(axis=0)
+    in_pair = np.any(correlation > COLLINEAR, axis=0)
 
+    # that of two terms whose correlation is at the limit
     largest_inflation = 1.0 / (1.0 - COLLINEAR**2)
     by_all = variance_inflation(scaled) > largest_inflation
     places = np.flatnonzero(in_pair | by_all).tolist()
@@ -230,7 +248,7 @@ def forward_selection(
     tolerance: float = 1e-3,
     most: int | None = None,
 ) -> Reduction:
-    """Add terms by error reduction ratio; choose the shortest model near the best on what is held out.
+    """Add terms by error reduction ratio, and choose the shortest model near the best.
 
     Returns a Reduction whose path goes on beyond the chosen model. Raises InputError
     for shapes that do not fit and fewer than five samples a term.
@@ -252,12 +270,13 @@ def forward_selection(
     explained = 0.0
     for count, term in enumerate(order[: most or None], start=1):
         name = regression.names[term]
-        path.append(regression.fitted(order[:count], name, explained))
-        explained = path[-1].r_squared
+        step = regression.fitted(order[:count], name, explained)
+        path.append(step)
+        explained = step.r_squared
 
     best = max(step.held_out for step in path)
     near_best = [k for k, step in enumerate(path) if step.held_out >= best - tolerance]
-    return Reduction(tuple(path), near_best[0])
+    return Reduction(tuple(path), chosen=near_best[0])
 
 
 def _by_error_reduction(regression: _Regression) -> list[int]:
@@ -288,8 +307,9 @@ def _by_error_reduction(regression: _Regression) -> list[int]:
 
 
 def _checked(X: ArrayLike, y: ArrayLike, names: Sequence[str]) -> _Regression:
-    """The regression; InputError for shapes that do not fit and samples that say nothing."""
-    features, targets = np.asarray(X, dtype=float), np.asarray(y, dtype=float)
+    """The regression; InputError for wrong shapes and samples that say nothing."""
+    features = np.asarray(X, dtype=float)
+    targets = np.asarray(y, dtype=float)
     labels = list(names)
     if features.ndim != 2 or (len(targets), len(labels)) != features.shape:
         raise InputError(
@@ -307,7 +327,8 @@ def _checked(X: ArrayLike, y: ArrayLike, names: Sequence[str]) -> _Regression:
             f"X: expected at least {FOLDS} times as many samples as terms, got"
             f" {len(targets)} samples for {len(labels)} terms"
         )
-    for name, values in (*zip(labels, features.T, strict=True), ("y", targets)):
-        if not values.any():
+    excited = np.append(features.any(axis=0), targets.any())
+    for name, moves in zip((*labels, "y"), excited, strict=True):
+        if not moves:
             raise InputError(f"X, y: expected {name} to be excited, got 0 throughout")
     return _Regression(features, targets, labels)

@@ -17,7 +17,7 @@ SENSED = ("u", "v", "r", "psi")
 
 
 def table_of(model: ShipModel) -> Structure:
-    """The table of terms of a model; InputError for a ship with equations written by hand."""
+    """The table of terms of a model; InputError for equations written by hand."""
     if not isinstance(model.dynamics, Structure):
         raise InputError(
             "structure: expected a table of terms, such as 'abkowitz', got"
@@ -52,18 +52,22 @@ def sensitivity(
     check_number(change, "change", above=0.0, below=1.0)
     table_of(model)
     base = manoeuvre(model)
-    spans = {name: float(np.ptp(base[name])) for name in SENSED}
-    moving = {name: span for name, span in spans.items() if span > 0.0}
+    spans = {}
+    for name in SENSED:
+        span = float(np.ptp(base[name]))
+        if span > 0.0:
+            spans[name] = span
 
     effects = {}
     for name in model.coefficients:
+        more = _scaled(model, name, 1.0 + change)
+        less = _scaled(model, name, 1.0 - change)
         try:
-            up = manoeuvre(_scaled(model, name, 1.0 + change))
-            down = manoeuvre(_scaled(model, name, 1.0 - change))
+            difference = _difference(manoeuvre(more), manoeuvre(less), spans)
         except UnstableModelError:
             effects[name] = np.inf
         else:
-            effects[name] = _difference(up, down, moving) / (2.0 * change)
+            effects[name] = difference / (2.0 * change)
     return dict(sorted(effects.items(), key=lambda effect: effect[1], reverse=True))
 
 
@@ -75,17 +79,27 @@ def _scaled(model: ShipModel, name: str, factor: float) -> ShipModel:
 
 def _difference(up: Trial, down: Trial, spans: dict[str, float]) -> float:
     """Root mean square difference of two runs over the channels, each by its span."""
-    common = slice(min(len(up), len(down)))
+    n_common = min(len(up), len(down))
     squares = []
     for name, span in spans.items():
-        apart = up[name][common] - down[name][common]
-        squares.append(mean_square(apart) / span**2)
-    return float(np.sqrt(np.mean(squares)))
+        apart = up[name][:n_common] - down[name][:n_common]
+        square = mean_square(apart)
+        squares.append(square / span**2)
+    mean = np.mean(squares)
+    return float(np.sqrt(mean))
 
 
 def zigzag_sensitivity(model: ShipModel) -> dict[str, float | None]:
-    """`sensitivity` of the 20/20 zigzag; None where the changed ship runs away; empty where the ship does."""
-    run = partial(zigzag, rudder_deg=20.0, heading_deg=20.0, must_reverse=False)
+    """`sensitivity` of the 20/20 zigzag.
+
+    None where the changed ship runs away; empty where the ship does.
+    """
+    run = partial(
+        zigzag,
+        rudder_deg=20.0,
+        heading_deg=20.0,
+        must_reverse=False,
+    )
     try:
         effects = sensitivity(model, run)
     except UnstableModelError:

@@ -14,7 +14,7 @@ from identification.simulation_error.prior_knowledge import PriorKnowledge
 from identification.uncertainty.uncertainty import Uncertainty
 from shipgym import ShipModel, SteeringGear, Trial
 from shipgym.ships import Structure
-from shipgym.ships.mmg import MMG
+from shipgym.ships.structures import MMG
 
 
 @single_threaded()

@@ -1,17 +1,15 @@
 """From trials to a ship model by the regression of each equation of motion."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 from identification.estimators.estimator import FitTask
 from identification.estimators.methods import get_method
-from identification.options import Options, name_of, whole_call
+from identification.options import Options, name_of
 from identification.pipeline.evaluation import (
     MEMORY,
-    evaluated,
     provenance_of,
-    scaled_covariance,
+    with_uncertainty,
 )
 from identification.regression.problem import pose
 from identification.result import IdentificationResult
@@ -20,10 +18,10 @@ from shipgym import Trial
 
 
 def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationResult:
-    """Fit the regression of each equation, guard the model, and refine it where asked."""
-    method = get_method(options.method)
+    """Fit the regression of each equation, guard the model, and refine it if asked."""
     problem = pose(trials, options)
     task = FitTask(problem.samples, problem.blank, problem.used)
+    method = get_method(options.method)
     if options.prior is not None:
         from identification.simulation_error.pulled import with_prior
 
@@ -39,17 +37,13 @@ def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationRe
 
     provenance = provenance_of(options, method.name, fit, problem)
     if options.prior is not None:
-        provenance |= {"prior": name_of(options.prior.source), **_prior_report(fit)}
+        provenance["prior"] = name_of(options.prior.source)
+        provenance |= _prior_report(fit)
     if refined is not None:
         provenance["refinement"] = refined.report
     if options.uncertainty.covariance != "analytic":
         provenance["uncertainty"] = options.uncertainty.covariance
-    covariance, error = scaled_covariance(options.uncertainty, fit, refined, problem)
-    if error:
-        provenance["model_error"] = error
-    model = replace(fit.model, covariance=covariance)
-    call = whole_call(options, problem.trials)
-    return evaluated(model, fit, problem, provenance, call)
+    return with_uncertainty(fit, refined, problem, provenance, options)
 
 
 def _prior_report(fit: GuardedFit) -> dict[str, Any]:

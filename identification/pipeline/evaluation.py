@@ -1,4 +1,4 @@
-"""An identified model: how it came about, how certain it is, and how well it predicts."""
+"""An identified model: how it came about, its uncertainty, and its predictions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import shipgym
-from identification.options import Options, name_of, provenance_settings
+from identification.options import (
+    Options,
+    name_of,
+    provenance_settings,
+    whole_call,
+)
 from identification.regression.grey_box import bare_metrics
 from identification.regression.problem import Problem
 from identification.regression.samples import Samples
@@ -52,14 +57,13 @@ def provenance_of(
             "similarity": problem.similarity,
             "shaft": problem.table.shaft,
         }
-    searched = {}
-    ranks = {}
-    for q, estimator in fit.estimators.items():
-        if hasattr(estimator, "chosen_"):
-            searched[q] = estimator.chosen_
-        ranks[q] = int(getattr(estimator, "rank_", len(estimator.coef_)))
+    searched = _attributes(fit, "chosen_")
     if searched:
         further["search"] = searched
+
+    ranks = {}
+    for q, estimator in fit.estimators.items():
+        ranks[q] = int(getattr(estimator, "rank_", len(estimator.coef_)))
     return {
         "structure": name_of(options.structure),
         "method": method,
@@ -75,6 +79,15 @@ def provenance_of(
     }
 
 
+def _attributes(fit: GuardedFit, name: str) -> dict[str, Any]:
+    """An attribute of the estimators that have it, by equation."""
+    return {
+        q: getattr(estimator, name)
+        for q, estimator in fit.estimators.items()
+        if hasattr(estimator, name)
+    }
+
+
 def _trial_record(trial: Trial) -> dict[str, Any]:
     """A fitted trial for the provenance."""
     record: dict[str, Any] = {
@@ -87,12 +100,31 @@ def _trial_record(trial: Trial) -> dict[str, Any]:
     return record
 
 
+def with_uncertainty(
+    fit: GuardedFit,
+    refined: Refined | None,
+    problem: Problem,
+    provenance: dict[str, Any],
+    options: Options,
+) -> IdentificationResult:
+    """The result of a fit, its covariance scaled by the model error."""
+    covariance, error = scaled_covariance(options.uncertainty, fit, refined, problem)
+    if error:
+        provenance = provenance | {"model_error": error}
+    model = replace(fit.model, covariance=covariance)
+    return evaluated(model, fit, problem, provenance, options)
+
+
 def scaled_covariance(
     asked: Uncertainty, fit: GuardedFit, refined: Refined | None, problem: Problem
 ) -> tuple[Floats, dict[str, Any]]:
-    """Covariance of the coefficients, scaled by the model error, and the report on that error."""
+    """Covariance of the coefficients, scaled by the model error, and a report on it."""
     covariance = unscaled_covariance(
-        asked.covariance, fit, refined, problem.samples, problem.blank
+        asked.covariance,
+        fit,
+        refined,
+        problem.samples,
+        problem.blank,
     )
     if not asked.model_error:
         return covariance, {}
@@ -110,7 +142,10 @@ def unscaled_covariance(
     samples: Samples,
     blank: ShipModel,
 ) -> Floats:
-    """Covariance of the coefficients, with errors correlated over the time to sail one ship length."""
+    """Covariance of the coefficients.
+
+    Errors are correlated over the time to sail one ship length.
+    """
     memory = MEMORY * blank.travel_time
     if refined is None or refined.covariance is None:
         if kind == "bootstrap":
@@ -128,19 +163,19 @@ def unscaled_covariance(
 def left_out_models(
     fit: GuardedFit, problem: Problem, refined: Refined | None, covariance: Floats
 ) -> list[ShipModel]:
-    """The models, with covariance, that the fit would have given without each of the trials."""
-    if len(problem.used) < FEWEST_TRIALS:
+    """The models, with covariance, of fits without each of the trials."""
+    n_trials = len(problem.used)
+    if n_trials < FEWEST_TRIALS:
         return []
     if refined is None or refined.covariance is None:
-        return [_without(k, fit, problem) for k in range(len(problem.used))]
+        return [_without(trial, fit, problem) for trial in range(n_trials)]
 
     # each trial moved the refined coefficients by its influence
-    n_trials = len(problem.used)
     inflation = n_trials / (n_trials - 1)
+    matrix = problem.blank.acceleration_matrix
     values = np.array(list(fit.model.coefficients.values()))
     models = []
     for influence in refined.influences:
-        matrix = problem.blank.acceleration_matrix
         change = np.linalg.solve(matrix, influence.sum(axis=0))
         model = fit.model.with_coefficients(values - inflation * change)
         models.append(replace(model, covariance=inflation * covariance))
@@ -150,8 +185,13 @@ def left_out_models(
 def _without(trial: int, fit: GuardedFit, problem: Problem) -> ShipModel:
     """The model, with covariance, of a regression without one of its trials."""
     estimators, rows = without_trial(fit.estimators, problem.samples, trial)
-    partial_fit = replace(fit, estimators=estimators)
-    covariance = unscaled_covariance("analytic", partial_fit, None, rows, problem.blank)
+    covariance = unscaled_covariance(
+        "analytic",
+        replace(fit, estimators=estimators),
+        None,
+        rows,
+        problem.blank,
+    )
     model = with_coefficients(fit.model, estimators)
     return replace(model, covariance=covariance)
 
@@ -161,22 +201,22 @@ def evaluated(
     fit: GuardedFit,
     problem: Problem,
     provenance: Mapping[str, Any],
-    call: dict[str, Any],
+    options: Options,
 ) -> IdentificationResult:
-    """The model with its provenance, its predictions of all trials that are not skipped, and diagnostics.
+    """The model with its provenance, diagnostics, and predictions of trials.
 
-    `call`: the arguments of `identify`, for settings.json.
+    Of all that are not skipped.
     """
     trials = tuple(trial for trial in problem.trials if trial.use != "skip")
     predictions = {trial.name: predict(model, trial) for trial in trials}
     lost = [name for name, predicted in predictions.items() if predicted is None]
 
     complete = {**provenance, **problem.sea}
-    complete["steering"] = "estimated" if call["steering"] is None else "given"
+    complete["steering"] = "estimated" if options.steering is None else "given"
     if lost:
         complete |= {"stable": False, "runs_away_on": lost}
-    model = replace(model, provenance=complete)
     stable = bool(complete["stable"])
+    model = replace(model, provenance=complete)
     metrics: dict[str, Any] = {
         "stable": stable,
         "instability": None if stable else _instability(complete, lost),
@@ -187,11 +227,6 @@ def evaluated(
     }
     if isinstance(problem.table, GreyBox):
         metrics["reference"] = bare_metrics(model, trials)
-    searches = {
-        q: estimator.search_
-        for q, estimator in fit.estimators.items()
-        if hasattr(estimator, "search_")
-    }
     return IdentificationResult(
         model=model,
         stable=stable,
@@ -201,13 +236,15 @@ def evaluated(
         diagnostics=diagnose(fit.estimators, problem.samples, problem.table),
         samples=problem.samples,
         estimators=fit.estimators,
-        settings=call,
-        searches=searches,
+        settings=whole_call(options, problem.trials),
+        searches=_attributes(fit, "search_"),
     )
 
 
 def _instability(provenance: Mapping[str, Any], lost: list[str]) -> str:
     """What an unstable model runs away in."""
     reasons = [f"trial {name!r}, open loop" for name in lost]
-    reasons = reasons or provenance["guard"].get("rejected", [])
-    return f"runs away: {'; '.join(reasons)}"
+    if not reasons:
+        reasons = provenance["guard"].get("rejected", [])
+    causes = "; ".join(reasons)
+    return f"runs away: {causes}"

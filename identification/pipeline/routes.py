@@ -1,4 +1,4 @@
-"""Routes from trials to a model other than one regression of a structure that is named."""
+"""Routes to a model other than the regression of a structure that is named."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,7 +18,7 @@ from identification.pipeline.by_regression import by_regression
 from identification.pipeline.evaluation import (
     evaluated,
     provenance_of,
-    scaled_covariance,
+    with_uncertainty,
 )
 from identification.regression.grey_box import explained_samples
 from identification.regression.preprocess import smoothed_channels
@@ -34,8 +34,7 @@ from shipgym import InputError, ShipModel, Trial
 from shipgym.checks import quoted
 from shipgym.ships import GreyBox
 from shipgym.ships.catalogue import fitted_box
-from shipgym.ships.grey_boxes import GREY_BOX
-from shipgym.ships.mmg import MMG
+from shipgym.ships.structures import GREY_BOX, MMG
 
 #: The structure beneath a kernel where none is named.
 BLACK_BOX = "linear"
@@ -60,11 +59,12 @@ def by_selection(trials: Sequence[Trial], options: Options) -> IdentificationRes
     to_fit = [trial for trial in marked if trial.use == "fit"]
     chosen, ranking = select(identified, to_fit, options)
     best = identified(trials, chosen)
-    provenance = {**(best.model.provenance or {}), "selection": ranking}
+    selection = {"selection": ranking}
+    provenance = best.model.provenance or {}
     return replace(
         best,
-        model=replace(best.model, provenance=provenance),
-        metrics=best.metrics | {"selection": ranking},
+        model=replace(best.model, provenance=provenance | selection),
+        metrics=best.metrics | selection,
         settings=whole_call(options, marked),
     )
 
@@ -72,7 +72,7 @@ def by_selection(trials: Sequence[Trial], options: Options) -> IdentificationRes
 def by_kernel(
     trials: Sequence[Trial], options: Options, kernel: KernelResidual
 ) -> IdentificationResult:
-    """A reference ship, fitted to the trials or named, and a kernel on what she leaves."""
+    """A reference ship, fitted or named, and a kernel on what she leaves."""
     beneath = reference_options(options)
     problem = pose(trials, beneath)
     blank, box = problem.blank, problem.table
@@ -82,9 +82,9 @@ def by_kernel(
             blank = stabilised(blank)
         box = fitted_box(blank)
 
+    smoothing = options.preprocessing.smoothing
     channels = [
-        smoothed_channels(trial, INPUT_CHANNELS, options.preprocessing.smoothing)
-        for trial in problem.used
+        smoothed_channels(trial, INPUT_CHANNELS, smoothing) for trial in problem.used
     ]
     found = fit_kernel(
         kernel,
@@ -95,18 +95,16 @@ def by_kernel(
         lambda table: problem.rows_of(table, blank),
     )
     problem = replace(
-        problem, blank=found.model, table=found.model.table, samples=found.samples
+        problem,
+        blank=found.model,
+        table=found.model.table,
+        samples=found.samples,
     )
     fit = _unguarded(found.model, found.estimators, problem.used)
     named = replace(options, structure=beneath.structure)
     provenance = provenance_of(named, name_of(options.method), fit, problem)
     provenance["kernel"] = found.report
-    covariance, error = scaled_covariance(options.uncertainty, fit, None, problem)
-    if error:
-        provenance["model_error"] = error
-    model = replace(found.model, covariance=covariance)
-    call = whole_call(options, problem.trials)
-    return evaluated(model, fit, problem, provenance, call)
+    return with_uncertainty(fit, None, problem, provenance, options)
 
 
 def reference_options(options: Options) -> Options:
@@ -138,16 +136,19 @@ def reference_options(options: Options) -> Options:
 
 
 def by_simulation(trials: Sequence[Trial], options: Options) -> IdentificationResult:
-    """The MMG form by its simulation error, whose regression is on its own accelerations."""
+    """The MMG form by its simulation error.
+
+    The regression of the result is on the model's own accelerations.
+    """
     options = checked_mmg(options)
     problem = pose(trials, options)
     model, report = fit_mmg(problem, options)
     samples, estimators = explained_samples(problem.used, model, **problem.sampling)
     problem = replace(problem, samples=samples, blank=model)
     fit = _unguarded(model, estimators, problem.used)
-    provenance = provenance_of(options, MAP, fit, problem) | report
-    call = whole_call(options, problem.trials)
-    return evaluated(model, fit, problem, provenance, call)
+    provenance = provenance_of(options, MAP, fit, problem)
+    provenance |= report
+    return evaluated(model, fit, problem, provenance, options)
 
 
 def _unguarded(

@@ -18,8 +18,7 @@ from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.checks import check_choice
 from shipgym.ships import Envelope, Structure, Term, get_structure
 from shipgym.ships.grey_boxes import GREY_BOX
-from shipgym.ships.mmg import MMG
-from shipgym.ships.structures import get_dynamics
+from shipgym.ships.structures import MMG, get_dynamics
 from shipgym.trials.scale import check_scale
 
 #: Stands for the MMG form where channels, excitation and particulars are checked.

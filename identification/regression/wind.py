@@ -13,8 +13,8 @@ from shipgym.checks import check_flag, check_keys, check_text
 from shipgym.sea.wind import AIR_DENSITY, WindCurves, wind_curves
 from shipgym.sea.wind_coefficients import WindTable
 from shipgym.ships.inertia import particulars_inertia
-from shipgym.ships.mmg import MMG
 from shipgym.ships.simulate import WIND
+from shipgym.ships.structures import MMG
 from shipgym.trials.navigation import rotate_to_body
 
 

@@ -1,4 +1,4 @@
-"""Figures of how a method chose its settings: the rank, the weight C or the insensitive band."""
+"""Figures of how a method chose its settings: rank, weight C or insensitive band."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,18 +11,21 @@ from identification.fit import Fit
 from identification.search import SearchResult
 from identification.search.search import BAND, LOG_C
 from identification.validation.warnings import EQUATIONS
+from shipgym.arrays import Floats
 from shipgym.plots import PALETTE, Panel, axis, compact, line, panels, points
 from shipgym.plots.style import LIMIT, MUTED, Figure
 
 
 def truncated(fit: Fit) -> dict[str, TruncatedLSSVM]:
     """The estimators, by equation, that chose or were given a rank."""
-    return {
-        q: estimator
-        for q, estimator in fit.estimators.items()
-        if isinstance(estimator, TruncatedLSSVM)
-        and (estimator.selection != "full" or estimator.rank is not None)
-    }
+    found = {}
+    for q, estimator in fit.estimators.items():
+        if not isinstance(estimator, TruncatedLSSVM):
+            continue
+        full = estimator.selection == "full" and estimator.rank is None
+        if not full:
+            found[q] = estimator
+    return found
 
 
 def l_curve_figure(estimators: Mapping[str, TruncatedLSSVM]) -> Figure:
@@ -41,7 +44,8 @@ def l_curve_figure(estimators: Mapping[str, TruncatedLSSVM]) -> Figure:
 
 def _l_curve_panel(q: str, estimator: TruncatedLSSVM) -> Panel:
     curve, rank = estimator.l_curve_, estimator.rank_
-    x, y = compact(curve.residual_norm), compact(curve.solution_norm)
+    x = compact(curve.residual_norm)
+    y = compact(curve.solution_norm)
     ranks = [str(k) for k in range(1, len(x) + 1)]
     all_ranks = line(
         x,
@@ -56,7 +60,13 @@ def _l_curve_panel(q: str, estimator: TruncatedLSSVM) -> Panel:
     )
     own = slice(rank - 1, rank)
     chosen = points(
-        x[own], y[own], "chosen", LIMIT, 9, hoverinfo="skip", cliponaxis=False
+        x[own],
+        y[own],
+        "chosen",
+        LIMIT,
+        9,
+        hoverinfo="skip",
+        cliponaxis=False,
     )
     return Panel(
         [all_ranks, chosen],
@@ -68,41 +78,68 @@ def _l_curve_panel(q: str, estimator: TruncatedLSSVM) -> Panel:
 
 def _logarithmic(title: str, values: NDArray[np.float32]) -> dict[str, Any]:
     """An axis in decades, or in steps of 1, 2, 5 where there are few."""
-    smallest = max(values.min(), np.finfo(np.float32).tiny)
+    positive = np.finfo(np.float32).tiny
+    smallest = max(values.min(), positive)
     few_decades = values.max() < 100.0 * smallest
-    step = "D2" if few_decades else 1
-    return axis(title, type="log", dtick=step, tickformat="~g")
+    return axis(
+        title,
+        type="log",
+        dtick="D2" if few_decades else 1,
+        tickformat="~g",
+    )
 
 
 def search_figure(searches: Mapping[str, SearchResult]) -> Figure:
-    """Objective, and weight C or insensitive band, that a search had found after each of its rounds.
+    """Objective, and weight C or insensitive band, by the rounds of a search.
 
-    By equation; relative to the final objective.
+    By equation; the objective relative to the final one.
     """
     histories = {id(search.history) for search in searches.values()}
     one_for_all = len(histories) == 1
-    weights = all(search.variable == LOG_C for search in searches.values())
 
     objectives, best = list[Any](), list[Any]()
     for (q, search), colour in zip(searches.items(), PALETTE, strict=False):
         name = EQUATIONS.get(q, q)
         rounds = np.arange(len(search.history))
-        relative = search.history
-        if search.value > 0.0:
-            relative = search.history / search.value
+        best.append(line(rounds, _best_settings(search), name, colour))
         if not objectives or not one_for_all:
-            objectives.append(line(rounds, relative, name, colour, showlegend=False))
-        values = search.course[:, 0]
-        if weights:
-            values = 10.0**values
-        best.append(line(rounds, values, name, colour))
+            relative = _relative_objective(search)
+            curve = line(rounds, relative, name, colour, showlegend=False)
+            objectives.append(curve)
 
     round_axis = axis("round", rangemode="tozero")
     title = "best objective, relative to the final one"
     left = Panel(objectives, round_axis, axis(), title)
-    right = Panel(best, round_axis, axis(range=[0.0, 1.0]), f"best {BAND}")
-    if weights:
-        log_axis = axis(type="log", tickformat=".0e")
-        right = Panel(best, round_axis, log_axis, "best C")
-    grid = {"horizontal_spacing": 0.1}
-    return panels([left, right], 340, 2, grid=grid, hovermode="closest")
+    right = Panel(best, round_axis, *_setting_axis(searches))
+    return panels(
+        [left, right],
+        height=340,
+        columns=2,
+        grid={"horizontal_spacing": 0.1},
+        hovermode="closest",
+    )
+
+
+def _setting_axis(searches: Mapping[str, SearchResult]) -> tuple[Any, str]:
+    """The axis of what was searched for, and the title above it."""
+    if all(_finds_weight(search) for search in searches.values()):
+        return axis(type="log", tickformat=".0e"), "best C"
+    return axis(range=[0.0, 1.0]), f"best {BAND}"
+
+
+def _finds_weight(search: SearchResult) -> bool:
+    return search.variable == LOG_C
+
+
+def _best_settings(search: SearchResult) -> Floats:
+    """Weight C or insensitive band that was best after each round."""
+    values = search.course[:, 0]
+    if _finds_weight(search):
+        return np.asarray(10.0**values)
+    return values
+
+
+def _relative_objective(search: SearchResult) -> Floats:
+    if search.value > 0.0:
+        return search.history / search.value
+    return search.history

@@ -45,11 +45,16 @@ def coefficients_figure(fit: Fit) -> Figure:
 
 
 def _bar(fit: Fit, name: str) -> _Bar:
-    value, error = fit.coefficients[name], fit.standard_errors[name]
-    half = 100.0 * NORMAL_95 * float(np.nan_to_num(error))
+    value = fit.coefficients[name]
+    error = float(np.nan_to_num(fit.standard_errors[name]))
+    half = 100.0 * NORMAL_95 * error
     if value == 0.0:
-        return _Bar(name, 0.0, half)
-    return _Bar(name, 100.0, half / abs(value))
+        return _Bar(name, centre=0.0, half=half)
+    return _Bar(
+        name,
+        centre=100.0,
+        half=half / abs(value),
+    )
 
 
 def _panel(bars: Sequence[_Bar], rows: int) -> Panel:
@@ -58,9 +63,10 @@ def _panel(bars: Sequence[_Bar], rows: int) -> Panel:
         _trace(bars, True, "significant", MODEL),
         _trace(bars, False, "not significant", PALE),
     ]
-    names = [bar.name for bar in bars]
     labels = axis(
-        tickvals=list(range(len(names))), ticktext=names, range=[rows - 0.5, -0.5]
+        tickvals=list(range(len(bars))),
+        ticktext=[bar.name for bar in bars],
+        range=[rows - 0.5, -0.5],
     )
     shares = axis(
         "per cent of the estimate",

@@ -1,11 +1,12 @@
-"""The page of a comparison of methods: ranking, errors of each trial, and the trials as predicted."""
+"""The page of a comparison of methods: ranking, errors, and the trials as predicted."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
 import numpy as np
 
+from identification.report.predictions import rows_of_two
 from identification.validation.ranking import RankedFit, Ranking
 from shipgym import Trial
 from shipgym.arrays import Floats
@@ -14,6 +15,7 @@ from shipgym.plots import PALETTE, Panel, axis, graph_objects, line, panels
 from shipgym.plots.style import Figure
 
 LARGEST = 2.0  # error that the figure shows; larger ones lie on its edge
+HOVER = "%{y}: %{x:.4f}<extra></extra>"  # plotly's, of an error
 
 
 def comparison_page(comparison: Ranking) -> str:
@@ -55,80 +57,97 @@ def _verdict(first: RankedFit) -> tuple[str, str]:
 
 def _errors_notes(ranked: tuple[RankedFit, ...], ran_away: list[str]) -> str:
     """What the figure of the errors does not show as it is."""
-    errors = [error for fit in ranked for error in fit.errors.values()]
-    beyond = any(error is not None and error > LARGEST for error in errors)
-    notes = f"; those beyond {LARGEST:g} are drawn there." if beyond else "."
+    notes = "."
+    for fit in ranked:
+        known = [error for error in fit.errors.values() if error is not None]
+        if max(known, default=0.0) > LARGEST:
+            notes = f"; those beyond {LARGEST:g} are drawn there."
     if ran_away:
-        notes += f" Ran away, and not drawn there: {', '.join(ran_away)}."
+        methods = ", ".join(ran_away)
+        notes += f" Ran away, and not drawn there: {methods}."
     return notes
 
 
 def errors_figure(comparison: Ranking) -> Figure:
     """Error of each trial held out, one row for each method."""
     names = list(comparison.results)
-    means = [
-        None if fit.error is None else min(fit.error, LARGEST)
-        for fit in comparison.ranked
-    ]
-    hover = "%{y}: %{x:.4f}<extra></extra>"
-    bars = graph_objects().Bar(
+    traces = [_mean_bars(comparison.ranked, names)]
+    for number, trial in enumerate(comparison.ranked[0].errors):
+        colour = PALETTE[number % len(PALETTE)]
+        dots = _trial_dots(comparison.ranked, names, trial, colour)
+        traces.append(dots)
+    panel = Panel(
+        traces,
+        x=axis("error, in standard deviations of the measurement", rangemode="tozero"),
+        y=axis(autorange="reversed"),
+    )
+    return panels([panel], 34 * len(names) + 130, left=96, hovermode="closest")
+
+
+def _mean_bars(ranked: Sequence[RankedFit], names: Sequence[str]) -> Any:
+    """Mean error of each method, as a bar; none where it ran away."""
+    means = [None if fit.error is None else min(fit.error, LARGEST) for fit in ranked]
+    return graph_objects().Bar(
         x=means,
         y=names,
         orientation="h",
         marker={"color": "#d5dde6"},
         name="mean",
         width=0.5,
-        hovertemplate=hover,
+        hovertemplate=HOVER,
     )
-    traces = [bars]
-    for number, trial in enumerate(comparison.ranked[0].errors):
-        known = dict[str, float]()
-        for name, fit in zip(names, comparison.ranked, strict=True):
-            error = fit.errors.get(trial)
-            if error is not None:
-                known[name] = min(error, LARGEST)
-        colour = PALETTE[number % len(PALETTE)]
-        dots = graph_objects().Scatter(
-            x=list(known.values()),
-            y=list(known),
-            name=PurePath(trial).name,
-            cliponaxis=False,
-            mode="markers",
-            marker={"color": colour, "size": 8},
-            hovertemplate=hover,
-        )
-        traces.append(dots)
-    title = "error, in standard deviations of the measurement"
-    panel = Panel(traces, axis(title, rangemode="tozero"), axis(autorange="reversed"))
-    return panels([panel], 34 * len(names) + 130, left=96, hovermode="closest")
+
+
+def _trial_dots(
+    ranked: Sequence[RankedFit], names: Sequence[str], trial: str, colour: str
+) -> Any:
+    """Errors of a trial by the methods that sail it, as dots."""
+    known = dict[str, float]()
+    for name, fit in zip(names, ranked, strict=True):
+        error = fit.errors.get(trial)
+        if error is not None:
+            known[name] = min(error, LARGEST)
+    return graph_objects().Scatter(
+        x=list(known.values()),
+        y=list(known),
+        name=PurePath(trial).name,
+        cliponaxis=False,
+        mode="markers",
+        marker={"color": colour, "size": 8},
+        hovertemplate=HOVER,
+    )
 
 
 def headings_figure(comparison: Ranking) -> Figure:
-    """Error of the predicted heading over time, of the trials held out by the best four methods."""
+    """Error of the heading over time, on trials held out, by the best four methods."""
     best = list(comparison.results)[:4]
     shown = []
     for trial in comparison.best.trials:
-        if trial.use == "validate" and "psi" in trial:
-            predictions = {
-                method: comparison.results[method].predictions[trial.name]
-                for method in best
-            }
-            shown.append(_heading_panel(trial, predictions))
-    rows = max(-(-len(shown) // 2), 1)  # rounded up
-    return panels(shown, 230 * rows + 80, 2, outer=True)
+        if trial.use != "validate" or "psi" not in trial:
+            continue
+        predictions = {}
+        for method in best:
+            result = comparison.results[method]
+            predictions[method] = result.predictions[trial.name]
+        shown.append(_heading_panel(trial, predictions))
+    rows = max(rows_of_two(shown), 1)
+    return panels(shown, 230 * rows + 80, columns=2, outer=True)
 
 
 def _heading_panel(trial: Trial, predictions: Mapping[str, Trial | None]) -> Panel:
     """Heading errors of the methods that sail a trial."""
     lines = list[Any]()
+    t = running_mean(trial.t)
     for (method, run), colour in zip(predictions.items(), PALETTE, strict=False):
-        if run is None:
-            continue
-        error = np.degrees(run["psi"] - trial["psi"])
-        t = running_mean(trial.t)
-        lines.append(line(t, running_mean(error), method, colour, 1.5))
-    name = PurePath(trial.name).name
-    return Panel(lines, "time, s", axis("deg", zero=True), name)
+        if run is not None:
+            error = np.degrees(run["psi"] - trial["psi"])
+            lines.append(line(t, running_mean(error), method, colour, 1.5))
+    return Panel(
+        lines,
+        x="time, s",
+        y=axis("deg", zero=True),
+        title=PurePath(trial.name).name,
+    )
 
 
 def running_mean(values: Floats) -> Floats:

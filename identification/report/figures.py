@@ -1,4 +1,4 @@
-"""Figures of a regression: accelerations as measured and explained, and what is left of them."""
+"""Figures of a regression: accelerations measured and explained, and the residuals."""
 
 from typing import NamedTuple
 
@@ -49,13 +49,17 @@ def all_figures(fit: Fit) -> dict[str, Figure]:
         found["trials"] = overview
     for trial in fit.trials:
         if trial.use == "validate":
-            figure = prediction_figure(trial, fit.predictions[trial.name])
-            found[f"prediction: {trial.name}"] = figure
+            predicted = fit.predictions[trial.name]
+            title = f"prediction: {trial.name}"
+            found[title] = prediction_figure(trial, predicted)
     return found
 
 
 def regression_figures(fit: Fit) -> dict[str, Figure]:
-    """Figures of the regression by name; "l-curve" and "search" only where a method has one."""
+    """Figures of the regression by name.
+
+    "l-curve" and "search" only where a method has one.
+    """
     found = {"fit": fit_figure(fit), "residuals": residual_figure(fit)}
     curves = truncated(fit)
     if curves:
@@ -73,10 +77,12 @@ class Accelerations(NamedTuple):
 
 
 def fit_figure(fit: Fit) -> Figure:
-    """Mean acceleration over each window, as the trials have it and as the regression explains it."""
+    """Mean acceleration over each window, as measured and as the regression has it."""
     samples = fit.samples
-    drawn = slice(None, None, max(len(samples) // MOST_ROWS, 1))
-    breaks = np.flatnonzero(np.diff(samples.trial[drawn])) + 1
+    every = max(len(samples) // MOST_ROWS, 1)
+    drawn = slice(None, None, every)
+    trial = samples.trial[drawn]
+    breaks = np.flatnonzero(np.diff(trial)) + 1
     shown = []
     for q in fit.estimators:
         accelerations = mean_accelerations(fit, q, drawn)
@@ -88,8 +94,14 @@ def fit_figure(fit: Fit) -> Figure:
         "horizontal_spacing": 0.1,
         "vertical_spacing": 0.48 / len(shown),
     }
-    height = 95 * len(shown) + 80
-    return panels(shown, height, 2, outer=True, grid=grid, hovermode="closest")
+    return panels(
+        shown,
+        height=95 * len(shown) + 80,
+        columns=2,
+        outer=True,
+        grid=grid,
+        hovermode="closest",
+    )
 
 
 def mean_accelerations(fit: Fit, q: str, rows: slice) -> Accelerations:
@@ -97,21 +109,28 @@ def mean_accelerations(fit: Fit, q: str, rows: slice) -> Accelerations:
     samples = fit.samples
     unit = np.degrees(1.0) if q in "rp" else 1.0
     factor = unit / samples.duration
-    measured = samples.targets[q] * factor
-    explained = fit.estimators[q].predict(samples.features[q]) * factor
-    return Accelerations(measured[rows], explained[rows])
+    explained = fit.estimators[q].predict(samples.features[q])
+    measured = samples.targets[q]
+    return Accelerations(
+        measured=(measured * factor)[rows],
+        explained=(explained * factor)[rows],
+    )
 
 
 def _history_panel(found: Accelerations, breaks: Integers, title: str) -> Panel:
     """Accelerations window after window, with gaps between the trials."""
-    windows = np.arange(len(found.measured) + len(breaks))
     measured = np.insert(found.measured, breaks, np.nan)
     explained = np.insert(found.explained, breaks, np.nan)
+    windows = np.arange(len(measured))
     lines = [
         line(windows, measured, "trials", MEASURED, 1.2),
         line(windows, explained, "regression", MODEL, 1.7),
     ]
-    return Panel(lines, "window, trial after trial", axis(title, nticks=5))
+    return Panel(
+        lines,
+        x="window, trial after trial",
+        y=axis(title, nticks=5),
+    )
 
 
 def _cloud_panel(found: Accelerations) -> Panel:
@@ -132,16 +151,20 @@ def _cloud_panel(found: Accelerations) -> Panel:
 
 
 def residual_figure(fit: Fit) -> Figure:
-    """Autocorrelation of the residuals and their cross-correlation with the rudder, with 95 % bounds."""
+    """Autocorrelation of the residuals and their cross-correlation with the rudder.
+
+    With 95 % bounds of white noise.
+    """
     errors = residuals(fit.estimators, fit.samples)
     rows = without_overlap(fit.samples)
     rudder = rudder_at_windows(fit)
     bound = NORMAL_95 / np.sqrt(len(rows))
+    lags = np.arange(-LAGS, LAGS + 1)
 
     shown = []
     titles = ("with themselves", "with the rudder")
     for q, error in errors.items():
-        own, lags = autocorrelation(error[rows], LAGS), np.arange(-LAGS, LAGS + 1)
+        own = autocorrelation(error[rows], LAGS)
         after = np.arange(1, len(own) + 1)
         shown.append(_bars_panel(after, own, bound, EQUATIONS[q], titles[0]))
         if rudder is not None:
@@ -150,13 +173,15 @@ def residual_figure(fit: Fit) -> Figure:
         titles = ("", "")  # above the first row only
 
     count = len(errors)
-    grid = {"horizontal_spacing": 0.1, "vertical_spacing": 0.24 / count}
     return panels(
         shown,
-        170 * count + 100,
+        height=170 * count + 100,
         columns=1 if rudder is None else 2,
         outer=True,
-        grid=grid,
+        grid={
+            "horizontal_spacing": 0.1,
+            "vertical_spacing": 0.24 / count,
+        },
         hovermode="closest",
         bargap=0.5,
     )
@@ -188,11 +213,12 @@ def rudder_at_windows(fit: Fit) -> Floats | None:
     """Rudder in the middle of each row's window, rad; None where a trial has none."""
     samples = fit.samples
     used = [trial for trial in fit.trials if trial.use == "fit"]
-    if not all("delta" in trial for trial in used):
-        return None
     middle = samples.start + 0.5 * samples.duration
     angles = np.empty(len(samples))
     for index, trial in enumerate(used):
+        if "delta" not in trial:
+            return None
         rows = samples.trial == index
-        angles[rows] = np.interp(middle[rows], trial.t, trial["delta"])
+        times = middle[rows]
+        angles[rows] = np.interp(times, trial.t, trial["delta"])
     return angles

@@ -38,8 +38,10 @@ def settings_rows(settings: Mapping[str, Any]) -> dict[str, str]:
     shown_elsewhere = ("trials", "particulars", "steering")
     rows = {}
     for name, value in settings.items():
-        if value is not None and name not in shown_elsewhere:
-            rows[name.replace("_", " ")] = setting_text(value)
+        if value is None or name in shown_elsewhere:
+            continue
+        words = name.replace("_", " ")
+        rows[words] = setting_text(value)
     return rows
 
 
@@ -51,8 +53,10 @@ def setting_text(value: Any) -> str:
         parts = []
         for name, item in value.items():
             if item is not None:
-                parts.append(f"{name.replace('_', ' ')} {setting_text(item)}")
+                words = name.replace("_", " ")
+                parts.append(f"{words} {setting_text(item)}")
         return ", ".join(parts)
     if isinstance(value, list | tuple):
-        return ", ".join(str(item) for item in value) or NONE
+        items = [str(item) for item in value]
+        return ", ".join(items) or NONE
     return str(value)

@@ -17,15 +17,22 @@ RUDDER = "#9aa5b1"
 def overview_figure(
     trials: Sequence[Trial], predictions: Mapping[str, Trial | None]
 ) -> Figure | None:
-    """Heading and rudder of the trials, one panel each, with the model's open-loop simulation.
+    """Heading and rudder of the trials, one panel each, with the open-loop simulation.
 
     None where a trial has no heading or no rudder.
     """
-    if not all("psi" in trial and "delta" in trial for trial in trials):
-        return None
-    shown = [_overview_panel(trial, predictions.get(trial.name)) for trial in trials]
-    rows = -(-len(shown) // 2)  # rounded up
-    return panels(shown, 230 * rows + 80, 2, outer=True)
+    shown = []
+    for trial in trials:
+        if "psi" not in trial or "delta" not in trial:
+            return None
+        predicted = predictions.get(trial.name)
+        shown.append(_overview_panel(trial, predicted))
+    return panels(shown, 230 * rows_of_two(shown) + 80, columns=2, outer=True)
+
+
+def rows_of_two(shown: Sequence[Panel]) -> int:
+    """Rows of a figure with two panels a row."""
+    return (len(shown) + 1) // 2
 
 
 def _overview_panel(trial: Trial, predicted: Trial | None) -> Panel:
@@ -39,23 +46,36 @@ def _overview_panel(trial: Trial, predicted: Trial | None) -> Panel:
     if predicted is not None:
         change = np.degrees(predicted["psi"] - first)
         lines.append(line(predicted.t, change, "heading change, model", MODEL))
-    return Panel(lines, "time, s", "deg", PurePath(trial.name).name)
+    return Panel(
+        lines,
+        x="time, s",
+        y="deg",
+        title=PurePath(trial.name).name,
+    )
 
 
 def prediction_figure(measured: Trial, predicted: Trial | None) -> Figure:
     """A recorded trial and its open-loop prediction: five channels and the path."""
+    times = "time, s"
+    last_row = ("v", "delta")  # below which the time stands
     shown = []
-    for channel in ("psi", "r", "u", "v"):
+    for channel in ("psi", "r", "u", "v", "delta"):
         title, factor = CHANNEL_AXES[channel]
-        lines = _channel_lines(measured, predicted, channel, factor)
-        shown.append(Panel(lines, "", title))
-    _, degrees = CHANNEL_AXES["delta"]
-    rudder = _channel_lines(measured, None, "delta", degrees)
-    shown.append(Panel(rudder, "time, s", "rudder (given), deg"))
-    shown[3] = shown[3]._replace(x="time, s")  # of what stands in the last rows
+        run = predicted
+        if channel == "delta":
+            title = "rudder (given), deg"
+            run = None
+        lines = _channel_lines(measured, run, channel, factor)
+        shown.append(Panel(lines, times if channel in last_row else "", title))
     if {"x", "y"} <= measured.channels.keys():
         shown.append(_path_panel(measured, predicted))
-    return panels(shown, 600, 2, grid={"vertical_spacing": 0.1}, hovermode="closest")
+    return panels(
+        shown,
+        600,
+        columns=2,
+        grid={"vertical_spacing": 0.1},
+        hovermode="closest",
+    )
 
 
 def _channel_lines(
@@ -64,9 +84,8 @@ def _channel_lines(
     """A channel over time, in the unit of its axis; none where it was not measured."""
     if channel not in measured.channels:
         return []
-    lines = [
-        line(measured.t, factor * measured[channel], "measured", MEASURED, 1.3),
-    ]
+    values = factor * measured[channel]
+    lines = [line(measured.t, values, "measured", MEASURED, 1.3)]
     if predicted is not None:
         values = factor * predicted[channel]
         lines.append(line(predicted.t, values, "predicted", MODEL, 2.0))
@@ -76,19 +95,33 @@ def _channel_lines(
 def _path_panel(measured: Trial, predicted: Trial | None) -> Panel:
     """The paths along and across the first course; a turning circle to one scale."""
     turning = measured.kind == "turning-circle"
-    runs = [(measured, "measured", MEASURED, 1.3)]
+    lines = [_path_line(measured, measured, turning, "measured", MEASURED, 1.3)]
     if predicted is not None:
-        runs.append((predicted, "predicted", MODEL, 2.0))
+        path = _path_line(predicted, measured, turning, "predicted", MODEL, 2.0)
+        lines.append(path)
 
-    lines = []
-    for run, name, colour, width in runs:
-        north = run["x"] - measured["x"][0]
-        east = run["y"] - measured["y"][0]
-        ahead, aside = rotate_to_body(north, east, measured["psi"][:1])
-        x, y = (aside, ahead) if turning else (ahead, aside)
-        lines.append(line(x, y, name, colour, width))
-
-    along, across = "along the first course, m", "to starboard, m"
+    along = "along the first course, m"
+    across = "to starboard, m"
     if turning:
-        return Panel(lines, across, axis(along, scaleanchor="x6", scaleratio=1))
-    return Panel(lines, along, axis(across, autorange="reversed"))
+        to_scale = axis(along, scaleanchor="x6", scaleratio=1)
+        return Panel(lines, x=across, y=to_scale)
+    downwards = axis(across, autorange="reversed")
+    return Panel(lines, x=along, y=downwards)
+
+
+def _path_line(
+    run: Trial,
+    measured: Trial,
+    turning: bool,
+    name: str,
+    colour: str,
+    width: float,
+) -> Any:
+    """The path of a run; ahead is upwards where the ship is turning."""
+    north = run["x"] - measured["x"][0]
+    east = run["y"] - measured["y"][0]
+    first_course = measured["psi"][:1]
+    ahead, aside = rotate_to_body(north, east, first_course)
+    if turning:
+        return line(aside, ahead, name, colour, width)
+    return line(ahead, aside, name, colour, width)

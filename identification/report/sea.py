@@ -1,4 +1,4 @@
-"""What was removed from the trials for current and wind: sentences, and tracks through the water."""
+"""Current and wind that were removed from trials: sentences, and tracks."""
 
 from collections import defaultdict
 from collections.abc import Mapping
@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.fit import Fit
 from identification.regression.velocities import SIGNIFICANT
+from identification.report.predictions import rows_of_two
 from shipgym import Trial
 from shipgym.manoeuvres.quantiles import NORMAL_95
 from shipgym.plots import LIMIT, MEASURED, MODEL, Panel, axis, line, panels
@@ -31,26 +32,34 @@ def _current_sentences(currents: Mapping[str, Any]) -> list[str]:
     trials_of = defaultdict[str, list[str]](list)
     for trial, row in currents.items():
         text = current_text(row)
-        trials_of[text].append(PurePath(trial).name)
-    return [f"{', '.join(names)}: {text}" for text, names in trials_of.items()]
+        name = PurePath(trial).name
+        trials_of[text].append(name)
+
+    sentences = []
+    for text, names in trials_of.items():
+        trials = ", ".join(names)
+        sentences.append(f"{trials}: {text}")
+    return sentences
 
 
 def _wind_sentences(wind: Mapping[str, Any]) -> list[str]:
     sentences = []
     if "mean_speeds" in wind:
         speeds = wind["mean_speeds"].values()
+        low, high = min(speeds), max(speeds)
         sentences.append(
-            f"wind of {min(speeds):.2g} to {max(speeds):.2g} m/s on average: its forces"
-            " are removed"
+            f"wind of {low:.2g} to {high:.2g} m/s on average: its forces are removed"
         )
+
     units = {"wind_vdot": "m/s²", "wind_rdot": "rad/s²"}
     for trial, row in wind.get("accelerations", {}).items():
-        parts = [
-            f"{channel.removeprefix('wind_')} {value:.2g} {units[channel]}"
-            for channel, value in row.items()
-        ]
+        parts = []
+        for channel, value in row.items():
+            motion = channel.removeprefix("wind_")
+            parts.append(f"{motion} {value:.2g} {units[channel]}")
         name = PurePath(trial).name
-        sentences.append(f"{name}: constant acceleration removed, {', '.join(parts)}")
+        removed = ", ".join(parts)
+        sentences.append(f"{name}: constant acceleration removed, {removed}")
     return sentences
 
 
@@ -62,56 +71,88 @@ def current_text(row: Mapping[str, Any]) -> str:
         "given": "as given",
         "columns": "from columns",
     }
-    parts = [f"current of {_set_and_drift(row)}", sources[row["source"]]]
+    set_and_drift = _set_and_drift(row["north"], row["east"])
+    source = row["source"]
+    parts = [f"current of {set_and_drift}", sources[source]]
     if "standard_errors" in row:
-        north, east = (NORMAL_95 * error for error in row["standard_errors"])
-        parts.append(f"north {row['north']:.3f} ± {north:.3f}")
-        parts.append(f"east {row['east']:.3f} ± {east:.3f} m/s (95 %)")
-        differs = row["probability"] < SIGNIFICANT
-        verb = "differs" if differs else "does not differ"
-        parts.append(f"which {verb} from zero")
-    elif row["source"] in ("trial", "all trials"):
+        parts += _current_interval(row)
+    elif source in ("trial", "all trials"):
         parts.append("a guess without an interval, as the trials keep to one heading")
+
+    text = ", ".join(parts)
     end = "removed" if row["taken_out"] else "left in"
-    return f"{', '.join(parts)}; {end}"
+    return f"{text}; {end}"
 
 
-def _set_and_drift(row: Mapping[str, Any]) -> str:
-    north, east = row["north"], row["east"]
+def _current_interval(row: Mapping[str, Any]) -> list[str]:
+    """95 % interval of a current, and whether it differs from zero."""
+    north_error, east_error = row["standard_errors"]
+    north = NORMAL_95 * north_error
+    east = NORMAL_95 * east_error
+    differs = row["probability"] < SIGNIFICANT
+    verb = "differs" if differs else "does not differ"
+    return [
+        f"north {row['north']:.3f} ± {north:.3f}",
+        f"east {row['east']:.3f} ± {east:.3f} m/s (95 %)",
+        f"which {verb} from zero",
+    ]
+
+
+def _set_and_drift(north: float, east: float) -> str:
     speed = np.hypot(north, east)
-    towards = np.degrees(np.arctan2(east, north)) % 360.0
-    return f"{speed:.2f} m/s ({speed / KNOT:.2f} knots) towards {towards:03.0f} deg"
+    bearing = np.degrees(np.arctan2(east, north))
+    towards = bearing % 360.0
+    knots = speed / KNOT
+    return f"{speed:.2f} m/s ({knots:.2f} knots) towards {towards:03.0f} deg"
 
 
 def track_figure(fit: Fit) -> Figure | None:
-    """Tracks over ground and through the water, and the way of the current; None where none was removed."""
-    currents = (fit.model.provenance or {}).get("currents", {})
-    removed = {name: row for name, row in currents.items() if row["taken_out"]}
-    if not removed:
-        return None
+    """Tracks over ground and through the water, and how the current moved the water.
+
+    None where no current was removed.
+    """
+    provenance = fit.model.provenance or {}
+    currents = provenance.get("currents", {})
     shown = list[Panel]()
     for trial in fit.trials:
-        if trial.name in removed and {"x", "y"} <= trial.channels.keys():
-            shown.append(_track_panel(trial, removed[trial.name], len(shown)))
+        current = currents.get(trial.name)
+        if current is None or not current["taken_out"]:
+            continue
+        if {"x", "y"} <= trial.channels.keys():
+            panel = _track_panel(trial, current, number=len(shown))
+            shown.append(panel)
     if not shown:
         return None
-    rows = -(-len(shown) // 2)  # rounded up
-    return panels(shown, 300 * rows + 80, 2, hovermode="closest")
+
+    return panels(
+        shown,
+        300 * rows_of_two(shown) + 80,
+        columns=2,
+        hovermode="closest",
+    )
 
 
-def _track_panel(trial: Trial, row: Mapping[str, Any], number: int) -> Panel:
+def _track_panel(trial: Trial, current: Mapping[str, Any], number: int) -> Panel:
     """Both tracks, and from their end how far the water moved in the meantime."""
     east, north = trial["y"], trial["x"]
-    drift_east = row["east"] * trial.duration
-    drift_north = row["north"] * trial.duration
+    raw = trial.raw
+    drift_east = current["east"] * trial.duration
+    drift_north = current["north"] * trial.duration
     water_east = [east[-1], east[-1] + drift_east]
     water_north = [north[-1], north[-1] + drift_north]
     tracks = [
-        line(trial.raw["y"], trial.raw["x"], "over ground", MEASURED, 1.7),
+        line(raw["y"], raw["x"], "over ground", MEASURED, 1.7),
         line(east, north, "through the water", MODEL, 1.7),
         line(water_east, water_north, "the water meanwhile", LIMIT, 1.7),
     ]
+
     own_x = f"x{number + 1}" if number else "x"
     north_axis = axis("north, m", scaleanchor=own_x, scaleratio=1)
-    title = f"{PurePath(trial.name).name}: {_set_and_drift(row)}"
-    return Panel(tracks, "east, m", north_axis, title)
+    name = PurePath(trial.name).name
+    set_and_drift = _set_and_drift(current["north"], current["east"])
+    return Panel(
+        tracks,
+        x="east, m",
+        y=north_axis,
+        title=f"{name}: {set_and_drift}",
+    )

@@ -21,7 +21,7 @@ PRIME = 1e-5
 
 
 def summary_table(fit: Fit) -> str:
-    """Coefficients with standard error and t, inertia with what was estimated, and the verdict."""
+    """Coefficients with standard errors and t, inertia, and the verdict."""
     provenance = fit.model.provenance or {}
     kernel = provenance.get("kernel")
     shown = [
@@ -36,7 +36,9 @@ def summary_table(fit: Fit) -> str:
             f"Standard errors are scaled by {error['factor']:.2g} for model error"
             f" ({error['how']})."
         )
-    shown += sea_sentences(provenance) + undetermined(fit) + exactly_collinear(fit)
+    shown += sea_sentences(provenance)
+    shown += undetermined(fit)
+    shown += exactly_collinear(fit)
     if "reference" in fit.metrics:
         shown.append(_against_reference(fit))
     return as_text(*shown)
@@ -44,13 +46,15 @@ def summary_table(fit: Fit) -> str:
 
 def _headline(fit: Fit) -> str:
     provenance = fit.model.provenance or {}
+    structure = provenance.get("structure")
+    method = provenance.get("method")
+    samples = provenance.get("samples")
+    decision = provenance.get("guard", {}).get("decision")
     verdict = "NOT STABLE: its predictions run away and are not to be used"
     if fit.stable:
         verdict = "stable"
-    decision = provenance.get("guard", {}).get("decision")
     return (
-        f"{fit.model.name}: {provenance.get('structure')} by"
-        f" {provenance.get('method')}, {provenance.get('samples')} samples;"
+        f"{fit.model.name}: {structure} by {method}, {samples} samples;"
         f" {verdict} ({decision})"
     )
 
@@ -59,23 +63,30 @@ def kernel_text(report: Mapping[str, Any]) -> str:
     """What was added to the reference ship, whose weights tell a reader nothing."""
     errors = []
     for name, error in report["heading_errors_held_out"].items():
-        errors.append(f"{name} {_heading_error(error, '.2g', ' deg')}")
+        angle = _heading_error(error, ".2g", " deg")
+        errors.append(f"{name} {angle}")
+    held_out = ", ".join(errors)
     return (
         f"Kernel: {report['centres']} radial basis functions of length"
         f" {report['length']:g} in {report['features']} features an equation, C"
-        f" {report['C']:g}; heading held out, rms: {', '.join(errors)}"
+        f" {report['C']:g}; heading held out, rms: {held_out}"
     )
 
 
 def _heading_error(error: float | None, digits: str, unit: str = "") -> str:
     """An error of the heading, rad, in degrees."""
-    return "ran away" if error is None else f"{degrees(error):{digits}}{unit}"
+    if error is None:
+        return "ran away"
+    return f"{degrees(error):{digits}}{unit}"
 
 
 def are_derivatives(model: ShipModel) -> bool:
-    """Whether coefficients are hydrodynamic derivatives in the prime system, printed times 1e-5."""
+    """Whether coefficients are hydrodynamic derivatives in the prime system.
+
+    Such are printed times 1e-5.
+    """
     dynamics = model.dynamics
-    return (dynamics.normalisation, dynamics.quantity) == ("prime", "force")
+    return dynamics.normalisation == "prime" and dynamics.quantity == "force"
 
 
 def coefficients_table(fit: Fit) -> Table:
@@ -88,19 +99,21 @@ def coefficients_table(fit: Fit) -> Table:
     table = lined_table(title, "name", ">value", ">standard error", ">t")
     for name, error in fit.standard_errors.items():
         value = fit.coefficients[name]
-        t = f"{value / error:.1f}" if error > 0.0 else "-"
+        t = "-"
+        if error > 0.0:
+            t = f"{value / error:.1f}"
+        shown = f"{value:.6g}", f"{error:.2g}"
         if derivatives:
-            table.add_row(name, f"{value / PRIME:.2f}", f"{error / PRIME:.2g}", t)
-        else:
-            table.add_row(name, f"{value:.6g}", f"{error:.2g}", t)
+            shown = f"{value / PRIME:.2f}", f"{error / PRIME:.2g}"
+        table.add_row(name, *shown, t)
     return table
 
 
 def _inertia(fit: Fit) -> Table:
-    ship, gear = fit.model.particulars, fit.model.steering
-    table = lined_table("Inertia and service speed", "name", ">value", "unit", "source")
+    ship = fit.model.particulars
     units = {"mass": "kg", "xg": "m", "yaw_gyradius": "m", "speed": "m/s"}
     units |= dict.fromkeys(ADDED_MASSES, "1e-5")
+    table = lined_table("Inertia and service speed", "name", ">value", "unit", "source")
     for name, unit in units.items():
         value = ship[name]
         if value is None:  # not needed by a structure of accelerations
@@ -109,12 +122,21 @@ def _inertia(fit: Fit) -> Table:
             value = value / PRIME
         source = "estimated" if name in ship.estimated else "given"
         table.add_row(name, f"{value:.6g}", unit, source)
-
-    source = (fit.model.provenance or {}).get("steering", "given")
-    table.add_row("rudder limit", f"{gear.rudder_limit_deg:.4g}", "deg", source)
-    table.add_row("rudder rate", f"{gear.rudder_rate_deg_s:.4g}", "deg/s", source)
-    table.add_row("rudder lag", f"{gear.time_constant:.4g}", "s", source)
+    _add_gear(table, fit.model)
     return table
+
+
+def _add_gear(table: Table, model: ShipModel) -> None:
+    gear = model.steering
+    provenance = model.provenance or {}
+    source = provenance.get("steering", "given")
+    rows = [
+        ("rudder limit", gear.rudder_limit_deg, "deg"),
+        ("rudder rate", gear.rudder_rate_deg_s, "deg/s"),
+        ("rudder lag", gear.time_constant, "s"),
+    ]
+    for name, value, unit in rows:
+        table.add_row(name, f"{value:.4g}", unit, source)
 
 
 def _equations(fit: Fit) -> Table:
@@ -142,7 +164,7 @@ def _equations(fit: Fit) -> Table:
 
 
 def _against_reference(fit: Fit) -> Table:
-    """The heading of each trial as predicted, and as the bare reference ship predicts it."""
+    """Predicted headings of the trials, compared with the bare reference ship's."""
     reference = fit.metrics["reference"]
     title = (
         "Open-loop heading, root mean square error, beside the bare reference ship"
@@ -150,8 +172,11 @@ def _against_reference(fit: Fit) -> Table:
     )
     table = lined_table(title, "trial", "use", ">model, deg", ">reference, deg")
     for name, metrics in fit.metrics["trials"].items():
-        own = metrics["rmse"]["psi"]
-        bare = reference["trials"][name]["rmse"]["psi"]
-        errors = [_heading_error(error, ".2f") for error in (own, bare)]
-        table.add_row(name, metrics["use"], *errors)
+        bare = reference["trials"][name]
+        table.add_row(
+            name,
+            metrics["use"],
+            _heading_error(metrics["rmse"]["psi"], ".2f"),
+            _heading_error(bare["rmse"]["psi"], ".2f"),
+        )
     return table

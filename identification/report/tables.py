@@ -1,4 +1,4 @@
-"""Rows of the tables that the templates show of a fit, as text where it is not a plain number."""
+"""Rows of the tables that reports show of a fit, as text where not a plain number."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ PARTICULARS = {
 
 @dataclass(frozen=True)
 class TrialRow:
-    """A recorded manoeuvre: seconds, degrees and knots; None for what it did not record."""
+    """A recorded manoeuvre: seconds, degrees, knots; None for what was not recorded."""
 
     name: str
     kind: str | None
@@ -90,20 +90,29 @@ class ErrorRow:
 
 def short_names(trials: Sequence[Trial]) -> dict[str, str]:
     """Names of trials without their folders, unless two would be the same."""
-    short = {trial.name: PurePath(trial.name).name for trial in trials}
-    if len(set(short.values())) < len(short):
+    short = {}
+    for trial in trials:
+        short[trial.name] = PurePath(trial.name).name
+    unique = set(short.values())
+    if len(unique) < len(short):
         return {name: name for name in short}
     return short
 
 
 def trial_row(trial: Trial, name: str) -> TrialRow:
     """The row of a trial under some name."""
-    rudder = speeds = None
+    rudder = None
     if "delta" in trial:
-        rudder = float(np.degrees(np.abs(trial["delta"]).max()))
+        largest = np.abs(trial["delta"]).max()
+        rudder = float(np.degrees(largest))
+
+    speeds = None
     if "u" in trial and "v" in trial:
-        speed = np.hypot(trial["u"], trial["v"]) / KNOT
-        speeds = f"{fixed(speed.min(), 1)} to {fixed(speed.max(), 1)}"
+        knots = np.hypot(trial["u"], trial["v"]) / KNOT
+        slowest = fixed(knots.min(), 1)
+        fastest = fixed(knots.max(), 1)
+        speeds = f"{slowest} to {fastest}"
+
     return TrialRow(
         name=name,
         kind=trial.kind and trial.kind.replace("-", " "),
@@ -122,9 +131,16 @@ def particulars(model: ShipModel) -> list[Quantity]:
     ship = model.particulars
     rows = []
     for name, (words, unit, factor) in PARTICULARS.items():
-        if ship[name] is not None:
-            value = f"{factor * ship[name]:.5g}".replace("-", MINUS)
-            rows.append(Quantity(words, name in ship.estimated, f"{value} {unit}"))
+        value = ship[name]
+        if value is None:
+            continue
+        digits = f"{factor * value:.5g}".replace("-", MINUS)
+        row = Quantity(
+            name=words,
+            estimated=name in ship.estimated,
+            value=f"{digits} {unit}",
+        )
+        rows.append(row)
     return rows
 
 
@@ -133,9 +149,15 @@ def added_masses(model: ShipModel) -> list[Quantity]:
     ship = model.particulars
     rows = []
     for name in ADDED_MASSES:
-        if ship[name] is not None:
-            value = fixed(ship[name] / PRIME, 1)
-            rows.append(Quantity(name, name in ship.estimated, value))
+        value = ship[name]
+        if value is None:
+            continue
+        row = Quantity(
+            name=name,
+            estimated=name in ship.estimated,
+            value=fixed(value / PRIME, 1),
+        )
+        rows.append(row)
     return rows
 
 
@@ -150,31 +172,42 @@ def steering_gear(model: ShipModel) -> dict[str, str]:
 
 
 def coefficient_tables(fit: Fit) -> dict[str, list[CoefficientRow]]:
-    """Rows of coefficients by the title of their table: one for each force, or one for all."""
+    """Rows of coefficients by the title of their table: one a force, or one for all."""
     derivatives = are_derivatives(fit.model)
     tables: dict[str, list[CoefficientRow]] = {}
-    for name in fit.coefficients:
+    for name, error in fit.standard_errors.items():
         title = "coefficient"
         if derivatives:
             force, _, _ = name.partition("_")
             title = FORCES.get(force, title)
-        row = _coefficient_row(fit, name, derivatives)
+        value = fit.coefficients[name]
+        row = _coefficient_row(name, value, error, derivatives)
         tables.setdefault(title, []).append(row)
     return tables
 
 
-def _coefficient_row(fit: Fit, name: str, derivative: bool) -> CoefficientRow:
-    """The row of a coefficient, derivatives times 1e5; significant from two standard errors on."""
-    value, error = fit.coefficients[name], fit.standard_errors[name]
+def _coefficient_row(
+    name: str, value: float, error: float, derivative: bool
+) -> CoefficientRow:
+    """The row of a coefficient, derivatives times 1e5.
+
+    It is significant from two standard errors on.
+    """
     t, significant = None, bool(value)
     if error > 0.0:
         t = value / error
         significant = abs(t) >= 2.0
+
+    shown = [number(value), number(error)]
     if derivative:
-        shown = fixed(value / PRIME, 1), fixed(error / PRIME, 1)
-    else:
-        shown = number(value), number(error)
-    return CoefficientRow(name, *shown, t, significant)
+        shown = [fixed(value / PRIME, 1), fixed(error / PRIME, 1)]
+    return CoefficientRow(
+        name=name,
+        value=shown[0],
+        error=shown[1],
+        t=t,
+        significant=significant,
+    )
 
 
 def error_rows(fit: Fit, short: Mapping[str, str]) -> list[ErrorRow]:
@@ -199,10 +232,13 @@ def index_lines(metrics: Mapping[str, Any]) -> list[str]:
         values = metrics.get(name)
         if values is None:
             continue
-        line = f"{words} {fixed(values['measured'])} → {fixed(values['predicted'])}"
-        again = values.get("closed_loop")
-        if again is not None:
-            line += f" ({fixed(again)})"
+        measured = fixed(values["measured"])
+        predicted = fixed(values["predicted"])
+        line = f"{words} {measured} → {predicted}"
+
+        closed_loop = values.get("closed_loop")
+        if closed_loop is not None:
+            line += f" ({fixed(closed_loop)})"
         lines.append(f"{line} {unit}")
     return lines or [NONE]
 
@@ -210,11 +246,14 @@ def index_lines(metrics: Mapping[str, Any]) -> list[str]:
 def reference_rows(
     fit: Fit, short: Mapping[str, str]
 ) -> list[tuple[str, float | None, float | None]]:
-    """Name of each trial, and heading errors, rad, of a grey box and of its bare reference ship."""
-    if "reference" not in fit.metrics:
+    """Trials, with heading errors, rad, of a grey box and of its bare reference."""
+    reference = fit.metrics.get("reference")
+    if reference is None:
         return []
-    bare = fit.metrics["reference"]["trials"]
+    bare = reference["trials"]
     rows = []
     for name, metrics in fit.metrics["trials"].items():
-        rows.append((short[name], metrics["rmse"]["psi"], bare[name]["rmse"]["psi"]))
+        own_error = metrics["rmse"]["psi"]
+        bare_error = bare[name]["rmse"]["psi"]
+        rows.append((short[name], own_error, bare_error))
     return rows

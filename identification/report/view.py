@@ -1,4 +1,4 @@
-"""What the templates of reports show of a fit: cards, sentences, rows of tables, figures of its trials."""
+"""What the templates of reports show of a fit: cards, sentences, rows and figures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -56,7 +56,7 @@ class TrialFigure(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FitView:
-    """Everything that the macros in `sections.html` show of a fit but for its figures."""
+    """What the macros in `sections.html` show of a fit but for its figures."""
 
     lead: str  # how the model was identified
     structure: str
@@ -84,10 +84,16 @@ class FitView:
 
 def fit_view(fit: Fit) -> FitView:
     """What the templates show of a fit."""
-    model, provenance = fit.model, fit.model.provenance or {}
+    model = fit.model
+    provenance = model.provenance or {}
     short = short_names(fit.trials)
     coefficients = coefficient_tables(fit)
     kernel = provenance.get("kernel")
+    reference = fit.metrics.get("reference", {})
+    equations = {
+        EQUATIONS.get(name, name): equation
+        for name, equation in fit.diagnostics.items()
+    }
     return FitView(
         lead=_lead(fit),
         structure=model.structure,
@@ -99,7 +105,7 @@ def fit_view(fit: Fit) -> FitView:
         sea=sea_sentences(provenance),
         undetermined=undetermined(fit),
         trials=[trial_row(trial, short[trial.name]) for trial in fit.trials],
-        equations={EQUATIONS.get(q, q): found for q, found in fit.diagnostics.items()},
+        equations=equations,
         particulars=particulars(model),
         added_masses=added_masses(model),
         gear=steering_gear(model),
@@ -109,20 +115,26 @@ def fit_view(fit: Fit) -> FitView:
         coefficient_notes=_coefficient_notes(fit, coefficients),
         kernel=kernel_text(kernel) if kernel else None,
         errors=error_rows(fit, short),
-        reference=fit.metrics.get("reference", {}).get("name"),
+        reference=reference.get("name"),
         reference_rows=reference_rows(fit, short),
     )
 
 
 def trial_figures(fit: Fit) -> dict[str, Any]:
-    """Figures of the trials: those fitted in one, and each of those that had no part in the fit."""
+    """Figures of the trials: of those fitted one, and of each that was held out."""
     short = short_names(fit.trials)
-    fitted = [trial for trial in fit.trials if trial.use == "fit"]
-    predictions = []
+    fitted, predictions = [], []
     for trial in fit.trials:
-        if trial.use == "validate":
+        if trial.use == "fit":
+            fitted.append(trial)
+        elif trial.use == "validate":
             figure = prediction_figure(trial, fit.predictions.get(trial.name))
-            predictions.append(TrialFigure(short[trial.name], "x" in trial, figure))
+            shown = TrialFigure(
+                name=short[trial.name],
+                located="x" in trial,
+                figure=figure,
+            )
+            predictions.append(shown)
     return {
         "tracks": track_figure(fit),
         "overview": overview_figure(fitted, fit.predictions),
@@ -132,10 +144,13 @@ def trial_figures(fit: Fit) -> dict[str, Any]:
 
 def _lead(fit: Fit) -> str:
     provenance = fit.model.provenance or {}
+    structure = provenance.get("structure")
+    method = provenance.get("method")
+    samples = provenance.get("samples")
     fitted = sum(trial.use == "fit" for trial in fit.trials)
+    manoeuvres = counted(fitted, "recorded manoeuvre")
     return (
-        f"Structure {provenance.get('structure')}, method {provenance.get('method')}, samples"
-        f" {provenance.get('samples')}, from {counted(fitted, 'recorded manoeuvre')}."
+        f"Structure {structure}, method {method}, samples {samples}, from {manoeuvres}."
     )
 
 
@@ -150,36 +165,47 @@ def _cards(fit: Fit) -> dict[str, Card]:
 
 def _ship_card(fit: Fit) -> Card:
     ship = fit.model.particulars
-    detail = f"service speed {number(ship.speed)} m/s"
+    speed = number(ship.speed)
+    detail = f"service speed {speed} m/s"
     if ship.mass is not None:
-        detail += f", mass {number(ship.mass / 1000)} t"
-    return Card("Ship", f"L = {ship.length:.4g} m", detail)
+        tonnes = number(ship.mass / 1000)
+        detail += f", mass {tonnes} t"
+    return Card(
+        label="Ship",
+        value=f"L = {ship.length:.4g} m",
+        detail=detail,
+    )
 
 
 def _data_card(fit: Fit) -> Card:
     uses = [trial.use for trial in fit.trials]
+    to_fit = uses.count("fit")
+    to_validate = uses.count("validate")
     samples = sum(len(trial) for trial in fit.trials)
     seconds = sum(trial.duration for trial in fit.trials)
-    detail = (
-        f"{uses.count('validate')} to validate; {samples} samples,"
-        f" {number(seconds / 60, 2)} min"
+    minutes = number(seconds / 60, 2)
+    return Card(
+        label="Data",
+        value=f"{counted(to_fit, 'trial')} to fit",
+        detail=f"{to_validate} to validate; {samples} samples, {minutes} min",
     )
-    return Card("Data", f"{counted(uses.count('fit'), 'trial')} to fit", detail)
 
 
 def _fit_card(fit: Fit) -> Card:
     equations = fit.diagnostics.values()
     rank = sum(equation.rank for equation in equations)
     terms = sum(equation.terms for equation in equations)
-    lowest = min(equation.r_squared for equation in equations)
-    detail = (
-        f"directions of the features kept; lowest R² of an equation {fixed(lowest, 3)}"
+    r_squared = min(equation.r_squared for equation in equations)
+    lowest = fixed(r_squared, 3)
+    return Card(
+        label="Fit",
+        value=f"{rank} of {terms}",
+        detail=f"directions of the features kept; lowest R² of an equation {lowest}",
     )
-    return Card("Fit", f"{rank} of {terms}", detail)
 
 
 def quality_card(fit: Fit) -> Card:
-    """Heading error on the trials that were not fitted, else on those that were, degrees."""
+    """Heading error of the trials held out, without any of those fitted, degrees."""
     uses = [metrics["use"] for metrics in fit.metrics["trials"].values()]
     unseen = "validate" in uses
     errors = heading_errors_deg(fit, "validate" if unseen else None)
@@ -187,37 +213,46 @@ def quality_card(fit: Fit) -> Card:
         return Card("Prediction", NONE, "no heading was measured")
 
     worst = max(errors, key=lambda name: errors[name])
+    worst_name = PurePath(worst).name
     median = float(np.median(list(errors.values())))
     of = "trials not fitted" if unseen else "fitted trials, none to validate"
-    detail = (
-        f"heading rmse, median of {of}; largest {errors[worst]:.1f}°"
-        f" ({PurePath(worst).name})"
+    return Card(
+        label="Prediction",
+        value=f"{median:.1f}°",
+        detail=(
+            f"heading rmse, median of {of}; largest {errors[worst]:.1f}° ({worst_name})"
+        ),
     )
-    return Card("Prediction", f"{median:.1f}°", detail)
 
 
 def _coefficient_notes(fit: Fit, tables: Mapping[str, list[CoefficientRow]]) -> str:
     """How the table of coefficients is to be read."""
-    dynamics, provenance = fit.model.dynamics, fit.model.provenance or {}
+    dynamics = fit.model.dynamics
     kind = f"Coefficients of {dynamics.quantity}s, {dynamics.normalisation} units"
     if are_derivatives(fit.model):
         kind = (
             "Hydrodynamic derivatives in the prime system with the instantaneous speed,"
             " times 10⁻⁵"
         )
+    source = _error_source(fit.model.provenance or {})
+    significant = [row.significant for rows in tables.values() for row in rows]
+    uncertain = significant.count(False)
+    return (
+        f"{kind}, rudder positive to starboard. The standard error comes from {source};"
+        " t is the value divided by its standard error."
+        f" {uncertain} of {len(significant)} coefficients do not differ"
+        " significantly from zero (|t| < 2) and are printed pale: the manoeuvres of the"
+        " fit hardly depend on them one by one."
+    )
+
+
+def _error_source(provenance: Mapping[str, Any]) -> str:
+    """Where the standard errors come from."""
     source = "the residuals of the fit, correlated in time and between the equations"
     if provenance.get("uncertainty") == "bootstrap":
         source = "refits to blocks of time drawn with replacement"
     error = provenance.get("model_error")
     if error:
-        source += f", times {number(error['factor'], 2)} for model error"
-        source += f" ({error['how']})"
-
-    significant = [row.significant for rows in tables.values() for row in rows]
-    return (
-        f"{kind}, rudder positive to starboard. The standard error comes from {source};"
-        " t is the value divided by its standard error."
-        f" {significant.count(False)} of {len(significant)} coefficients do not differ"
-        " significantly from zero (|t| < 2) and are printed pale: the manoeuvres of the"
-        " fit hardly depend on them one by one."
-    )
+        factor = number(error["factor"], 2)
+        source += f", times {factor} for model error ({error['how']})"
+    return source

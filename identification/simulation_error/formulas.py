@@ -1,4 +1,6 @@
-"""Linear hydrodynamic derivatives from main dimensions, for ships of which nothing was measured.
+"""Linear hydrodynamic derivatives from main dimensions.
+
+For ships of which nothing was measured.
 
 Sources: Clarke, Gedling & Hine 1983, The application of manoeuvring criteria in hull
 design using linear theory, Transactions of RINA 125 (hull and rudder); Kijima, Katsuno,
@@ -72,16 +74,18 @@ def clarke_derivatives(particulars: Particulars) -> dict[str, float]:
 
 
 def kijima_derivatives(particulars: Particulars) -> dict[str, float]:
-    """Sway force and yaw moment by sway speed and yaw rate, Kijima et al. 1990; the rudder by Clarke.
+    """Sway force and yaw moment by sway speed and yaw rate, Kijima et al. 1990.
 
-    Arguments and result as in `clarke_derivatives`. Kijima's beta is -v/U, and his Y_r
-    comes less the mass and added mass in surge, which is added here.
+    The rudder by Clarke. Arguments and result as in `clarke_derivatives`. Kijima's beta
+    is -v/U, and his Y_r comes less the mass and added mass in surge, which is added
+    here.
     """
     L, B, T, C_b = main_dimensions(particulars)
     B_L = B / L
     T_L = T / L  # from rho L T U^2 / 2 to rho L^2 U^2 / 2
     k = 2.0 * T_L
-    m, X_udot = particulars.mass_prime, particulars.require("X_udot")
+    m = particulars.mass_prime
+    X_udot = particulars.require("X_udot")
     hull = {
         "Y_v": -T_L * (0.5 * math.pi * k + 1.4 * C_b * B_L),
         "Y_r": -T_L * 1.5 * C_b * B_L + m - X_udot,
@@ -92,7 +96,10 @@ def kijima_derivatives(particulars: Particulars) -> dict[str, float]:
 
 
 def _rudder_derivatives(p: Particulars) -> dict[str, float]:
-    """Clarke et al. 1983: Y_delta of 3 A / L^2 half a length aft; starboard moves the stern to port."""
+    """Clarke et al. 1983: Y_delta of 3 A / L^2 half a length aft.
+
+    A rudder to starboard moves the stern to port.
+    """
     Y_delta = -3.0 * p.require("rudder_area") / p.length**2
     return {"Y_delta": Y_delta, "N_delta": -0.5 * Y_delta}
 
@@ -106,7 +113,7 @@ FORMULAS: dict[str, Callable[[Particulars], dict[str, float]]] = {
 def formula_coefficients(
     formula: str, structure: Structure, particulars: Particulars
 ) -> dict[str, FormulaCoefficients]:
-    """Coefficients of the SI features of a structure by equation, as far as formulas give them.
+    """Coefficients of the SI features of a structure by equation, from formulas.
 
     `formula`: which, one of `clarke`, `kijima`; `structure`: with sway and yaw, and
     terms in v, r and delta alone, or times powers of the speed; `particulars`: mass and
@@ -114,19 +121,16 @@ def formula_coefficients(
     formulas do not cover, and for particulars that do not suffice.
     """
     ship = particulars.completed()
-    symbols = {
-        q: [_linear_symbol(term) for term in terms]
-        for q, terms in structure.equations.items()
-    }
-    _check_covered(formula, structure, symbols)
+    _check_covered(formula, structure)
     accelerations = _linear_accelerations(FORMULAS[formula](ship), ship)
 
     coefficients = {}
     for q, terms in structure.equations.items():
         values = np.zeros(len(terms))
         known = np.zeros(len(terms), dtype=bool)
-        for i, (term, symbol) in enumerate(zip(terms, symbols[q], strict=True)):
-            if q in accelerations and symbol is not None:
+        for i, term in enumerate(terms):
+            symbol = _linear_symbol(term)
+            if symbol is not None and q in accelerations:
                 scale = _feature_scale(structure, q, term, symbol, ship)
                 values[i] = accelerations[q][symbol] * scale
                 known[i] = True
@@ -134,11 +138,13 @@ def formula_coefficients(
     return coefficients
 
 
-def _check_covered(
-    formula: str, structure: Structure, symbols: dict[str, list[str | None]]
-) -> None:
+def _check_covered(formula: str, structure: Structure) -> None:
     """Refuse a structure whose equations of sway and yaw lack a linear term."""
-    if all(set(LINEAR_POWERS) <= set(symbols.get(q, ())) for q in "vr"):
+    covered = True
+    for q in "vr":
+        symbols = {_linear_symbol(term) for term in structure.equations.get(q, ())}
+        covered = covered and symbols.issuperset(LINEAR_POWERS)
+    if covered:
         return
     raise InputError(
         f"prior: expected a structure with the terms v, r and delta in sway and yaw,"
@@ -185,18 +191,22 @@ def _feature_scale(
         if factor in ("U", "u"):
             speeds_in_feature += power
 
-    speed = ship.require("speed")
-    return float(
-        speed ** float(speeds - speeds_in_feature) * ship.length ** float(lengths)
-    )
+    missing = float(speeds - speeds_in_feature)
+    by_speed = ship.require("speed") ** missing
+    by_length = ship.length ** float(lengths)
+    return float(by_speed * by_length)
 
 
 def _linear_symbol(term: Term) -> str | None:
-    """The one of v, r and delta that a term is, times powers of the surge speed; None for other terms."""
-    others = [
-        (symbol, power) for symbol, power in term.powers if symbol not in ("u", "U")
-    ]
-    for symbol in LINEAR_POWERS:
-        if others == [(symbol, 1)]:
-            return symbol
-    return None
+    """The one of v, r and delta that a term is, times powers of the surge speed.
+
+    None for other terms.
+    """
+    others = []
+    for symbol, power in term.powers:
+        if symbol not in ("u", "U"):
+            others.append((symbol, power))
+    if len(others) != 1:
+        return None
+    symbol, power = others[0]
+    return symbol if symbol in LINEAR_POWERS and power == 1 else None

@@ -1,4 +1,6 @@
-"""Coefficients of the MMG form from main dimensions, where neither tank nor trial gave them.
+"""Coefficients of the MMG form from main dimensions.
+
+For ships that neither tank nor trial gave them of.
 
 Sources: Yoshimura & Masumoto 2012, Hydrodynamic database and manoeuvring prediction
 method with medium high-speed merchant ships and fishing vessels, MARSIM (hull, flow
@@ -25,24 +27,28 @@ HULL_FORMULAS = (YOSHIMURA, KIJIMA)
 
 
 def formula_coefficients(hull: str, ship: Particulars) -> dict[str, float]:
-    """Coefficients of the MMG form from main dimensions, without the speed of the shaft.
+    """Coefficients of the MMG form from main dimensions, without the shaft speed.
 
     `hull`: "yoshimura" or "kijima"; `ship`: as `mmg_prior.completed` gives it.
     """
     check_choice(hull, HULL_FORMULAS, "prior")
+    masses = added_mass(ship)
     coefficients = dict.fromkeys(SHIP.coefficients, 0.0)
-    coefficients |= added_mass(ship)
-    coefficients |= yoshimura_hull(ship, coefficients["mx"], coefficients["my"])
+    coefficients |= masses
+    coefficients |= yoshimura_hull(ship, masses["mx"], masses["my"])
     if hull == KIJIMA:
-        coefficients |= kijima_hull(ship, coefficients["mx"])
+        coefficients |= kijima_hull(ship, masses["mx"])
+    coefficients |= _propeller(ship)
+    coefficients |= _rudder(ship)
     coefficients["R_0"] = resistance(ship)
-    return coefficients | _propeller(ship) | _rudder(ship)
+    return coefficients
 
 
 def yoshimura_hull(ship: Particulars, mx: float, my: float) -> dict[str, float]:
-    """The hull by Yoshimura & Masumoto 2012, written there for the drift angle beta = -v'.
+    """The hull by Yoshimura & Masumoto 2012.
 
-    Added masses in surge and sway as `added_mass` gives them.
+    Written there for the drift angle beta = -v'. Added masses in surge and sway as
+    `added_mass` gives them.
     """
     L, B, d, C_b = main_dimensions(ship)
     k = 2.0 * d / L
@@ -106,7 +112,10 @@ def kijima_hull(ship: Particulars, mx: float) -> dict[str, float]:
 
 
 def added_mass(ship: Particulars) -> dict[str, float]:
-    """Added mass in surge and sway and moment in yaw, Zhou et al. 1983 after Motora's charts."""
+    """Added mass in surge and sway and moment in yaw.
+
+    Zhou et al. 1983 after Motora's charts.
+    """
     L, B, d, C_b = main_dimensions(ship)
     m = _mass(ship)
     l_b = L / B
@@ -153,7 +162,7 @@ def resistance(ship: Particulars) -> float:
 
 
 def _propeller(ship: Particulars) -> dict[str, float]:
-    """Wake by Taylor, and thrust k_0 + k_1 J + k_2 J^2 of Wageningen B4-50 by the pitch ratio."""
+    """Wake by Taylor; thrust k_0 + k_1 J + k_2 J^2 of Wageningen B4-50 by pitch."""
     C_b = main_dimensions(ship).C_b
     P = ship.propeller_pitch_ratio or 0.8  # the usual one
     several = ship.propellers is not None and ship.propellers > 1.0

@@ -1,4 +1,4 @@
-"""Nonlinear least squares of a function that gives its residuals and their slopes together."""
+"""Nonlinear least squares of a function that gives residuals and Jacobian together."""
 
 from collections.abc import Callable
 from functools import lru_cache

@@ -23,7 +23,10 @@ from shipgym.ships.mmg import IDENTIFIED
 
 
 def checked_mmg(options: Options) -> Options:
-    """The options of an identification of the MMG form; InputError for those that it does not have."""
+    """The options of an identification of the MMG form.
+
+    Raises InputError for those that it does not have.
+    """
     if not (options.method_is_default or options.method == MAP):
         raise InputError(
             "method: expected none with structure 'mmg', got"
@@ -49,19 +52,17 @@ def checked_mmg(options: Options) -> Options:
 
 
 def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, Any]]:
-    """The MMG form of greatest probability, with its covariance, and the report for the provenance.
+    """The MMG form of greatest probability, with its covariance, and a report.
 
     Options by `checked_mmg`. The prior is that of the `reference_model`, or of `prior`:
     a reference ship, or formulas, by default those of Yoshimura & Masumoto 2012. By its
     strength its standard deviations are divided; by default it is the strongest of 1,
     2, 3 whose error, each trial predicted from the others, is within a tenth of the
-    least.
+    least. The report is for the provenance.
     """
-    blank = problem.blank
     asked = options.prior or PriorKnowledge()
     source = options.reference_model or asked.source or YOSHIMURA
-    prior = mmg_prior(source, blank.particulars)
-    posterior = Posterior(replace(blank, particulars=prior.ship), problem.used, prior)
+    posterior = _posterior(problem, source)
     estimates = list[Estimate]()
     z = np.zeros(len(IDENTIFIED))
     for strength in _strengths(asked):
@@ -71,12 +72,22 @@ def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, An
 
     scales = estimates[0].scales
     held_out = [posterior.held_out(estimate, scales) for estimate in estimates]
-    chosen = strongest_as_good([one.error for one in held_out])
-    best, factor = estimates[chosen], held_out[chosen].factor
+    chosen = strongest_as_good([found.error for found in held_out])
 
-    covariance = _coefficient_covariance(prior, factor**2 * best.covariance)
+    best = estimates[chosen]
+    factor = held_out[chosen].factor
+    scaled = factor**2 * best.covariance
+    covariance = _coefficient_covariance(posterior.prior, scaled)
     model = replace(posterior.model(best.z), covariance=covariance)
     return model, _report(posterior, estimates, held_out, chosen)
+
+
+def _posterior(problem: Problem, source: str | ShipModel) -> Posterior:
+    """The trials to fit, and the prior of a reference ship or of formulas."""
+    blank = problem.blank
+    prior = mmg_prior(source, blank.particulars)
+    ship = replace(blank, particulars=prior.ship)
+    return Posterior(ship, problem.used, prior)
 
 
 def _strengths(asked: PriorKnowledge) -> tuple[float, ...]:
@@ -88,15 +99,16 @@ def _strengths(asked: PriorKnowledge) -> tuple[float, ...]:
 
 
 def strongest_as_good(errors: list[float]) -> int:
-    """The last of errors in the order of the strengths that is within a tenth of the least."""
+    """The last of errors by strength that is within a tenth of the least."""
     largest = 1.1 * min(errors)
     as_good = [k for k, error in enumerate(errors) if error <= largest]
     return as_good[-1]
 
 
 def _coefficient_covariance(prior: MMGPrior, covariance: Floats) -> Floats:
-    """Covariance of all coefficients from that of z; of those known beforehand it is 0."""
-    whole = np.zeros((len(prior.mean), len(prior.mean)))
+    """Covariance of all coefficients from that of z; 0 of those known beforehand."""
+    n_coefficients = len(prior.mean)
+    whole = np.zeros((n_coefficients, n_coefficients))
     identified = slice(len(IDENTIFIED))
     units = np.outer(prior.deviation, prior.deviation)
     whole[identified, identified] = covariance * units

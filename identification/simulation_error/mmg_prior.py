@@ -1,4 +1,7 @@
-"""What is known beforehand of the coefficients of the MMG form: a reference ship's, or by main dimensions."""
+"""What is known beforehand of the coefficients of the MMG form.
+
+Those of a reference ship, or from main dimensions.
+"""
 
 import math
 from collections.abc import Mapping
@@ -25,12 +28,13 @@ from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
 from shipgym.ships.catalogue import REFERENCE_SHIPS
-from shipgym.ships.mmg import IDENTIFIED, MMG, dimensions, standard_form
+from shipgym.ships.mmg import IDENTIFIED, dimensions, standard_form
 from shipgym.ships.particulars import ADDED_MASSES
+from shipgym.ships.structures import MMG
 
 
 class Deviation(NamedTuple):
-    """Standard deviation of a coefficient before any trial, about each kind of prior mean."""
+    """Standard deviation of a coefficient before any trial, about each kind of mean."""
 
     reference: float
     yoshimura: float
@@ -122,17 +126,20 @@ def mmg_prior(source: str | ShipModel, particulars: Particulars) -> MMGPrior:
 
 
 def completed(particulars: Particulars) -> Particulars:
-    """Particulars with rudder and propeller of usual size where absent, marked as estimated.
+    """Particulars with rudder and propeller of usual size where absent.
 
-    Added masses are coefficients of the MMG form and stand there alone. The rudder's
-    area is that of Det Norske Veritas, L T / 100 (1 + 25 (B / L)^2).
+    These are marked as estimated. Added masses are coefficients of the MMG form and
+    stand there alone. The rudder's area is that of Det Norske Veritas, L T / 100 (1 +
+    25 (B / L)^2).
     """
     ship = particulars.completed()
     no_added_masses: dict[str, Any] = dict.fromkeys(ADDED_MASSES)
     given = ship.estimated - no_added_masses.keys()
     ship = replace(ship, **no_added_masses, estimated=given)
 
-    L, B, T = ship.length, ship.require("beam"), ship.require("draught")
+    L = ship.length
+    B = ship.require("beam")
+    T = ship.require("draught")
     area = ship.rudder_area or L * T / 100.0 * (1.0 + 25.0 * (B / L) ** 2)
     span = 0.76 * T
     rudders = ship.rudders or 1.0
@@ -172,38 +179,31 @@ def _reference_prior(source: str | ShipModel, ship: Particulars) -> MMGPrior:
             f"reference ship {model.name!r} is not like this one: similarity"
             f" {like:.2f}; compare with prior = 'yoshimura'",
         )
-    mean = reference_coefficients(model)
-    deviation = np.array([DEVIATIONS[name].reference for name in IDENTIFIED])
-    return MMGPrior(model.name, ship, mean, deviation, remarks, similarity)
+    deviations = [DEVIATIONS[name].reference for name in IDENTIFIED]
+    return MMGPrior(
+        source=model.name,
+        ship=ship,
+        mean=reference_coefficients(model),
+        deviation=np.array(deviations),
+        remarks=remarks,
+        similarity=similarity,
+    )
 
 
 def _reference(
     source: str | ShipModel, ship: Particulars
 ) -> tuple[ShipModel, dict[str, float]]:
-    """The reference ship and the similarity of the candidates; refused where it has other equations.
+    """The reference ship and the similarity of the candidates.
 
-    So is the best of the candidates where none is like the ship.
+    Refused where it has other equations, and the best of the candidates where none is
+    like the ship.
     """
-    of_form = [
-        name
-        for name, make in REFERENCE_SHIPS.items()
-        if make().structure in ("kvlcc2", MMG)
-    ]
-    named = source
-    if source == AUTO:
-        named, _ = select_reference(ship, candidates=of_form)
-    model = named if isinstance(named, ShipModel) else load_model(named)
-    if model.structure not in ("kvlcc2", MMG):
-        raise InputError(
-            f"reference_model: expected a ship in the MMG form, one of"
-            f" {quoted(of_form)} or a model file of structure 'mmg', got"
-            f" {model.name!r}; or give prior = 'yoshimura' for formulas"
-        )
-
+    model = _in_mmg_form(source, ship)
     vectors = {model.name: similarity_vector(model.particulars)}
     for name, make in REFERENCE_SHIPS.items():
         if name != "mariner":
-            vectors[name] = similarity_vector(make().particulars.completed())
+            particulars = make().particulars.completed()
+            vectors[name] = similarity_vector(particulars)
     try:
         similarity = correlations(similarity_vector(ship), vectors)
     except InputError:  # too little is known to compare
@@ -214,16 +214,38 @@ def _reference(
     return model, similarity
 
 
+def _in_mmg_form(source: str | ShipModel, ship: Particulars) -> ShipModel:
+    """The reference ship named, or the one most like a ship; of the MMG form."""
+    forms = ("kvlcc2", MMG)
+    of_form = [
+        name for name, make in REFERENCE_SHIPS.items() if make().structure in forms
+    ]
+    named = source
+    if source == AUTO:
+        named, _ = select_reference(ship, candidates=of_form)
+    model = named if isinstance(named, ShipModel) else load_model(named)
+    if model.structure not in forms:
+        raise InputError(
+            f"reference_model: expected a ship in the MMG form, one of"
+            f" {quoted(of_form)} or a model file of structure 'mmg', got"
+            f" {model.name!r}; or give prior = 'yoshimura' for formulas"
+        )
+    return model
+
+
 def reference_coefficients(model: ShipModel) -> dict[str, float]:
     """Coefficients of a reference ship in the general form."""
     if model.structure == MMG:
         return dict(model.coefficients)
-    speed, shaft = model.particulars["speed"], model.service_shaft_speed
-    return standard_form(model.coefficients, speed, shaft)
+    return standard_form(
+        model.coefficients,
+        model.particulars["speed"],
+        model.service_shaft_speed,
+    )
 
 
 def _given_added_mass(p: Particulars) -> dict[str, float]:
-    """Added masses that the particulars give, not those they estimated, by rho L^2 d / 2."""
+    """Added masses that were given, not estimated, by rho L^2 d / 2."""
     symbols = {"mx": "X_udot", "my": "Y_vdot", "Jz": "N_rdot"}
     given = {}
     for symbol, name in symbols.items():
@@ -238,28 +260,29 @@ def _given_added_mass(p: Particulars) -> dict[str, float]:
 def _self_propulsion(c: Mapping[str, float], ship: Particulars) -> float:
     """Speed n D_P / U0 at which thrust balances resistance at service speed.
 
-    With x = n D_P / U0 and J = (1 - w) / x, thrust is that of K_T = k_0 + k_1 J + k_2 J^2
-    times x^2, so the balance is a quadratic in x.
+    With x = n D_P / U0 and J = (1 - w) / x, thrust is that of K_T = k_0 + k_1 J + k_2
+    J^2 times x^2, so the balance is a quadratic in x.
     """
     hull = dimensions(ship)
-    propellers, D_P = hull["propellers"], hull["D_P"]
-    L, d = ship.length, ship.require("draught")
-    k_0, k_1, k_2 = c["k_0"], c["k_1"], c["k_2"]
-    w, t = c["w_P0"], c["t_P"]
+    propellers = hull["propellers"]
+    D_P = hull["D_P"]
+    L = ship.length
+    d = ship.require("draught")
+    slip = 1.0 - c["w_P0"]
 
     # both by rho U0^2 D_P^2
-    thrust = (1.0 - t) * propellers * D_P**2 * c["thrust"]
+    thrust = (1.0 - c["t_P"]) * propellers * D_P**2 * c["thrust"]
     resistance = c["R_0"] * 0.5 * L * d
     balance = resistance / thrust
 
     # k_0 x^2 + k_1 (1 - w) x + k_2 (1 - w)^2 = balance
-    half_slope = 0.5 * k_1 * (1.0 - w) / k_0
-    constant = (k_2 * (1.0 - w) ** 2 - balance) / k_0
+    half_slope = 0.5 * c["k_1"] * slip / c["k_0"]
+    constant = (c["k_2"] * slip**2 - balance) / c["k_0"]
     return -half_slope + math.sqrt(half_slope**2 - constant)
 
 
 def _out_of_range(ship: Particulars) -> tuple[str, ...]:
-    """Remarks on main dimensions outside those of the ships that the formulas were made for.
+    """Remarks on main dimensions outside those that the formulas were made for.
 
     To be read with caution: the databases behind them are not published whole.
     """

@@ -1,4 +1,4 @@
-"""Coefficients by the errors of what the model simulates in segments, pulled toward a start.
+"""Coefficients by the errors of simulated segments, pulled toward a start.
 
 The output-error method of Maine & Iliff 1985, NASA RP-1138: noise is only in what is
 compared, while equation-error methods regress on noisy velocities, which biases them.
@@ -53,29 +53,32 @@ class OutputError:
 
     @property
     def bin_width(self) -> float:
-        """Bins of time in which residuals are added up, s: a block, or a sampling step."""
-        steps = [
-            float(np.median(np.diff(segment.times)))
-            for segment in self.fitted
-            if len(segment.times) > 1
-        ]
-        block = float(BLOCK * self.shooter.model.travel_time)
-        return max([block, *steps])
+        """Bins of time in which residuals are added up, s: blocks or sampling steps."""
+        travel_time = self.shooter.model.travel_time
+        width = float(BLOCK * travel_time)
+        for segment in self.fitted:
+            if len(segment.times) > 1:
+                step = np.median(np.diff(segment.times))
+                width = max(width, float(step))
+        return width
 
     def start_scales(self) -> Floats:
         """Scales of the residuals at the start; not finite where a ship runs away."""
-        units = self.shooter.units
+        shooter = self.shooter
         segments = [*self.fitted, *self.further]
-        return self.scales(self.shooter.shoot(self.start, segments, units), units)
+        shooting = shooter.shoot(self.start, segments, shooter.units)
+        return self.scales(shooting, shooter.units)
 
     def scales(self, shooting: Shooting, scales: Floats) -> Floats:
-        """Root mean square of the residuals of each channel in the trials to fit, per sample.
+        """Root mean square of the residuals by channel, per sample of trials to fit.
 
         `scales`: those in which the residuals are given.
         """
         fitted = shooting.residuals[: self.n_rows]
-        errors = fitted.reshape(-1, len(scales)) * scales
+        by_channel = fitted.reshape(-1, len(scales))
+        errors = by_channel * scales
         squares = np.sum(errors**2, axis=0)
+        # a residual is a mean over a block, times the root of its samples
         n_samples = sum(len(segment.measured) for segment in self.fitted)
         rms = np.sqrt(squares / n_samples)
         smallest = 1e-9 * self.shooter.units
@@ -88,12 +91,19 @@ class OutputError:
         The zero of a rudder is known to a degree.
         """
         compared = sum(segment.measured.size for segment in self.fitted)
-        weights = np.full(len(self.start), np.sqrt(pull * compared))
-        weights[len(self.shooter.term_sizes) :] = 1.0 / np.radians(1.0)
+        of_coefficient = np.sqrt(pull * compared)
+        of_rudder_offset = 1.0 / np.radians(1.0)
+
+        n_terms = len(self.shooter.term_sizes)
+        weights = np.full(len(self.start), of_coefficient)
+        weights[n_terms:] = of_rudder_offset
         return weights
 
     def solve(self, scales: Floats, pull: float) -> Solution:
-        """Fit, renew scales and starts of the segments, and fit again; `scales`: to begin with."""
+        """Fit, renew scales and starts of the segments, and fit again.
+
+        `scales`: to begin with.
+        """
         weights = self.pull_weights(pull)
         parameters = self.start
         segments = [*self.fitted, *self.further]
@@ -109,9 +119,9 @@ class OutputError:
 
         before = self.shooter.shoot(self.start, last_segments, last_scales)
         return Solution(
-            parameters,
-            last_scales,
-            shooting,
+            parameters=parameters,
+            scales=last_scales,
+            shooting=shooting,
             cost_before=self._mean_square(before),
             cost_after=self._mean_square(shooting),
             evaluations=evaluations,
@@ -130,16 +140,22 @@ class OutputError:
             shooting = self.shooter.shoot(parameters, segments, scales)
             pulled = weights * (parameters - self.start)
             return Linearised(
-                np.concatenate([shooting.residuals, pulled]),
-                np.vstack([shooting.jacobian, np.diag(weights)]),
+                residuals=np.concatenate([shooting.residuals, pulled]),
+                jacobian=np.vstack([shooting.jacobian, np.diag(weights)]),
             )
 
         return fit_least_squares(
-            linearised, start, x_scale="jac", ftol=1e-6, xtol=1e-6, max_nfev=30
+            linearised,
+            start,
+            x_scale="jac",
+            ftol=1e-6,
+            xtol=1e-6,
+            max_nfev=30,
         )
 
     def _mean_square(self, shooting: Shooting) -> float:
-        return float(np.mean(shooting.residuals[: self.n_rows] ** 2))
+        fitted = shooting.residuals[: self.n_rows]
+        return float(np.mean(fitted**2))
 
     def covariance(
         self, solution: Solution, pull: float, memory: float
@@ -151,58 +167,79 @@ class OutputError:
         count as known. The influences, by trial, are what each bin of time added to the
         coefficients, shape (n_bins, n_coefficients).
         """
-        jacobian = solution.shooting.jacobian
-        precision = np.diag(self.pull_weights(pull) ** 2)
-        information = jacobian.T @ jacobian + precision
-        inverse = np.asarray(
-            np.linalg.pinv(information, rcond=1e-14, hermitian=True), dtype=float
-        )
-
+        inverse = self._inverse_information(solution, pull)
         scores = self._scores(solution.shooting)
+        lags = round(memory / self.bin_width)
         total = np.zeros_like(inverse)
         for trial_scores in scores:
-            total += newey_west(trial_scores, round(memory / self.bin_width))
+            total += newey_west(trial_scores, lags)
 
-        sizes = self.shooter.term_sizes
-        terms = slice(len(sizes))
+        # of the parameters, then of the coefficients in SI units
         factor = self._freedom_factor(solution.shooting, inverse)
         sandwich = factor * inverse @ total @ inverse
-        covariance = sandwich[terms, terms] * np.outer(sizes, sizes)
-        influences = [
-            -np.sqrt(factor) * (trial_scores @ inverse)[:, terms] * sizes
-            for trial_scores in scores
-        ]
+        sizes = self.shooter.term_sizes
+        terms = slice(len(sizes))
+        units = np.outer(sizes, sizes)
+        covariance = sandwich[terms, terms] * units
+
+        influences = []
+        for trial_scores in scores:
+            moves = trial_scores @ inverse
+            influence = -np.sqrt(factor) * moves[:, terms] * sizes
+            influences.append(influence)
         return 0.5 * (covariance + covariance.T), influences
 
+    def _inverse_information(self, solution: Solution, pull: float) -> Floats:
+        """Inverse of the information of the samples and the pull."""
+        weights = self.pull_weights(pull)
+        jacobian = solution.shooting.jacobian
+        of_samples = jacobian.T @ jacobian
+        of_pull = np.diag(weights**2)
+        inverse = np.linalg.pinv(
+            of_samples + of_pull,
+            rcond=1e-14,
+            hermitian=True,
+        )
+        return np.asarray(inverse, dtype=float)
+
     def _scores(self, shooting: Shooting) -> list[Floats]:
-        """Slopes times residuals, by trial in bins of time, shape (n_bins, n_parameters)."""
-        residuals = shooting.residuals[: self.n_rows]
-        jacobian = shooting.jacobian[: self.n_rows]
+        """Slopes times residuals, by trial in bins of time.
+
+        Shape (n_bins, n_parameters).
+        """
+        fitted = slice(self.n_rows)
+        residuals = shooting.residuals[fitted]
+        jacobian = shooting.jacobian[fitted]
         rows = jacobian * residuals[:, None]
 
         # the channels of a block stand together
         n_channels = len(self.shooter.channels)
-        blocks = rows.reshape(-1, n_channels, rows.shape[1])
-        return in_bins(blocks.sum(axis=1), self.fitted, self.bin_width)
+        n_parameters = rows.shape[1]
+        blocks = rows.reshape(-1, n_channels, n_parameters)
+        scores = blocks.sum(axis=1)
+        return in_bins(scores, self.fitted, self.bin_width)
 
     def _freedom_factor(self, shooting: Shooting, inverse: Floats) -> float:
-        """Samples by samples less the parameters and starts that were fitted to them."""
+        """Samples by samples less the parameters and starts fitted to them."""
         repeats = 2.0 if self.staggered else 1.0
         n_samples = self.n_rows / repeats
 
+        # parameters count by their leverage, as the pull gives some of them
         jacobian = shooting.jacobian[: self.n_rows]
         leverage = (jacobian @ inverse) * jacobian
         parameters = float(leverage.sum())
+
         moves = shooting.moves[: len(self.fitted)]
         starts = sum(len(move) for move in moves) / repeats
-        return n_samples / max(n_samples - parameters - starts, 1.0)
+        left = n_samples - parameters - starts
+        return n_samples / max(left, 1.0)
 
 
 def in_bins(scores: Floats, segments: Sequence[Segment], width: float) -> list[Floats]:
-    """Scores of blocks, shape (n_blocks, n_parameters), added up by trial in bins of time.
+    """Scores of blocks, shape (n_blocks, n_parameters), added up by trial and time.
 
-    Bins are `width` wide, s, from the first block of each trial on. Shapes (n_bins,
-    n_parameters).
+    Bins of time are `width` wide, s, from the first block of each trial on. Shapes
+    (n_bins, n_parameters).
     """
     counts = [len(segment.times) for segment in segments]
     trial = np.repeat([segment.trial for segment in segments], counts)
@@ -212,10 +249,8 @@ def in_bins(scores: Floats, segments: Sequence[Segment], width: float) -> list[F
     found = []
     for index in np.unique(trial):
         rows = trial == index
-        own_bins = bins[rows]
-        own_bins -= own_bins.min()
-        n_bins = own_bins.max() + 1
-        sums = np.zeros((n_bins, scores.shape[1]))
+        own_bins = bins[rows] - bins[rows].min()
+        sums = np.zeros((own_bins.max() + 1, scores.shape[1]))
         np.add.at(sums, own_bins, scores[rows])
         found.append(sums)
     return found

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from identification.arrays import by_name
 from identification.simulation_error.least_squares import (
     Linearised,
     fit_least_squares,
@@ -27,8 +28,8 @@ from shipgym.ships.mmg import IDENTIFIED
 SEGMENT_LENGTHS = 1.7  # of a segment, ship lengths at service speed
 SAMPLE_LENGTHS = 0.067  # between the samples that are compared
 CORRELATED_LENGTHS = 1.0  # over which errors are one error
-#: Least scales of the errors: velocities by service speed U0, yaw rate by U0 / L, heading
-#: in rad.
+#: Least scales of the errors: velocities by service speed U0, yaw rate by U0 / L,
+#: heading in rad.
 FLOORS = {"u": 0.0017, "v": 0.0017, "r": 0.0021, "psi": np.radians(0.1)}
 LARGEST = 1e3  # residual of a ship that runs away, in scales
 
@@ -55,8 +56,8 @@ class HeldOutError(NamedTuple):
 class Posterior:
     """Segments of trials and a prior, and the errors of ships of given coefficients.
 
-    Coefficients are `z`, in standard deviations of the prior from its mean, shape (41,).
-    `which` are indices of segments.
+    Coefficients are `z`, in standard deviations of the prior from its mean, shape
+    (41,). `which` are indices of segments.
     """
 
     def __init__(
@@ -85,9 +86,9 @@ class Posterior:
 
     def model(self, z: Floats) -> ShipModel:
         """The model of some coefficients."""
-        values = (self.mean + z * self.prior.deviation).tolist()
-        identified = dict(zip(IDENTIFIED, values, strict=True))
-        return replace(self.blank, coefficients=self.prior.mean | identified)
+        values = self.mean + z * self.prior.deviation
+        coefficients = self.prior.mean | by_name(IDENTIFIED, values)
+        return replace(self.blank, coefficients=coefficients)
 
     def errors(self, z: Floats, which: Integers) -> tuple[Floats, Floats]:
         """Errors of the simulated channels, and their slopes by z, of some segments.
@@ -104,48 +105,60 @@ class Posterior:
         """Errors and their slopes by forward differences."""
         step = 1e-4  # standard deviations of the prior
         ships = self._lanes(z, step)
-        blank = self.blank
-        columns = [blank.state_names.index(name) for name in self.channels]
-        used = 1 + len(IDENTIFIED)
-        no_offset = np.zeros(LANES)
         parts = []
         for index in which:
             segment = self.segments[index]
-            starts = np.repeat(segment.start, LANES)
-            states = sail_lanes(blank, segment, ships, starts, no_offset)
-            # at the first sample the ships have not moved yet
-            off = states[1:, columns, :used] - segment.measured[1:, :, None]
-            share = self.independent_errors(segment) / len(off)
-            parts.append(off * np.sqrt(share))
+            parts.append(self._weighted_errors(segment, ships))
         lanes = np.concatenate(parts)
 
         errors = lanes[:, :, 0]
         with np.errstate(invalid="ignore", over="ignore"):  # of ships that run away
-            slopes = (lanes[:, :, 1:] - errors[:, :, None]) / step
+            changes = lanes[:, :, 1:] - errors[:, :, None]
+            slopes = changes / step
         return errors, slopes
 
+    def _weighted_errors(self, segment: Segment, ships: Floats) -> Floats:
+        """Errors of ships in a segment, by the root of their share."""
+        blank = self.blank
+        columns = [blank.state_names.index(name) for name in self.channels]
+        used = 1 + len(IDENTIFIED)
+        states = sail_lanes(
+            blank,
+            segment,
+            ships=ships,
+            starts=np.repeat(segment.start, LANES),
+            offsets=np.zeros(LANES),
+        )
+        # at the first sample the ships have not moved yet
+        off = states[1:, columns, :used] - segment.measured[1:, :, None]
+        share = self.independent_errors(segment) / len(off)
+        return np.asarray(off * np.sqrt(share))
+
     def _lanes(self, z: Floats, step: float) -> Floats:
-        """Numbers of ships; in each but the first one coefficient is larger by a step."""
-        varied = np.arange(len(IDENTIFIED))
-        coefficients = len(Ship._fields) + varied  # their rows
+        """Numbers of ships; in each but the first a coefficient is larger by a step."""
         deviation = self.prior.deviation
         values = self.mean + z * deviation
+        varied = np.arange(len(IDENTIFIED))
+        lane = 1 + varied
+        row = len(Ship._fields) + varied
 
-        ships = np.repeat(self.blank.ship_numbers(), LANES).reshape(-1, LANES)
-        ships[coefficients] = values[:, None]
-        ships[coefficients, 1 + varied] += step * deviation
+        nominal = self.blank.ship_numbers()
+        ships = np.repeat(nominal, LANES).reshape(-1, LANES)
+        ships[row] = values[:, None]
+        ships[row, lane] += step * deviation
         return ships
 
     def independent_errors(self, segment: Segment) -> float:
         """Times over which errors are one error that a segment has."""
-        return segment.duration / (CORRELATED_LENGTHS * self.blank.travel_time)
+        correlated = CORRELATED_LENGTHS * self.blank.travel_time
+        return segment.duration / correlated
 
     def scales(self, errors: Floats, which: Integers) -> Floats:
         """Root mean square of the errors by channel, not below the floors."""
-        count = self.count_errors(which)
+        n_errors = self.count_errors(which)
         with np.errstate(invalid="ignore", over="ignore"):
             squares = np.sum(errors**2, axis=0)
-            rms = np.sqrt(squares / count)
+            rms = np.sqrt(squares / n_errors)
 
         ran_away = ~np.isfinite(rms)
         rms[ran_away] = 1e2 * self.floors[ran_away]
@@ -166,9 +179,12 @@ class Posterior:
             slopes = slopes / scales[:, None]
 
         errors = np.nan_to_num(errors, nan=LARGEST)
-        residuals = np.clip(errors, -LARGEST, LARGEST).ravel()
+        errors = np.clip(errors, -LARGEST, LARGEST)
         slopes = np.nan_to_num(slopes, posinf=0.0, neginf=0.0)
-        return Linearised(residuals, slopes.reshape(len(residuals), -1))
+        return Linearised(
+            residuals=errors.ravel(),
+            jacobian=slopes.reshape(errors.size, -1),
+        )
 
     def residuals(
         self, z: Floats, which: Integers, scales: Floats, strength: float
@@ -180,8 +196,8 @@ class Posterior:
         data = self.scaled_errors(z, which, scales)
         prior_slopes = strength * np.eye(len(z))
         return Linearised(
-            np.append(data.residuals, strength * z),
-            np.vstack([data.jacobian, prior_slopes]),
+            residuals=np.append(data.residuals, strength * z),
+            jacobian=np.vstack([data.jacobian, prior_slopes]),
         )
 
     def most_probable(self, start: Floats, strength: float) -> Estimate:
@@ -193,19 +209,30 @@ class Posterior:
         which = self.all_segments
         z, evaluations = start, 0
         for tolerance in tolerances:
-            scales = self.scales(self.errors(z, which)[0], which)
+            errors, _ = self.errors(z, which)
+            scales = self.scales(errors, which)
 
             def cost(point: Floats, scales: Floats = scales) -> Linearised:
                 return self.residuals(point, which, scales, strength)
 
             fit = fit_least_squares(
-                cost, z, ftol=tolerance, xtol=tolerance, max_nfev=30
+                cost,
+                z,
+                ftol=tolerance,
+                xtol=tolerance,
+                max_nfev=30,
             )
             z = fit.x
             evaluations += fit.nfev
 
         slopes = self.scaled_errors(z, which, scales).jacobian
-        return Estimate(z, scales, strength, covariance_of(slopes), evaluations)
+        return Estimate(
+            z=z,
+            scales=scales,
+            strength=strength,
+            covariance=covariance_of(slopes),
+            evaluations=evaluations,
+        )
 
     def held_out(self, whole: Estimate, scales: Floats) -> HeldOutError:
         """Error of each group of segments by a fit of the others.
@@ -221,20 +248,25 @@ class Posterior:
             others = np.flatnonzero(groups != group)
             held = np.flatnonzero(groups == group)
             z, covariance = self._without(others, whole)
-
             errors, slopes = self.scaled_errors(z, held, whole.scales)
-            count = self.count_errors(held) * len(scales)
+            n_errors = self.count_errors(held) * len(scales)
+
             by_channel = errors.reshape(-1, len(scales))
             in_scales = by_channel * (whole.scales / scales)
-            mean_squares.append(np.sum(in_scales**2) / count)
+            square = np.sum(in_scales**2)
+            mean_squares.append(square / n_errors)
 
-            excess += float(errors @ errors) - count
+            # beyond the scatter, whose errors have a size of one
+            excess += float(errors @ errors) - n_errors
             variances = (slopes @ covariance) * slopes
             expected += float(variances.sum())
 
-        error = np.sqrt(np.mean(mean_squares))
-        factor = np.sqrt(max(excess / expected, 1.0))
-        return HeldOutError(float(error), float(factor))
+        mean_square = np.mean(mean_squares)
+        variance_ratio = max(excess / expected, 1.0)
+        return HeldOutError(
+            error=float(np.sqrt(mean_square)),
+            factor=float(np.sqrt(variance_ratio)),
+        )
 
     def _without(self, others: Integers, whole: Estimate) -> tuple[Floats, Floats]:
         """Coefficients fitted to some segments, and their covariance.
@@ -242,20 +274,27 @@ class Posterior:
         From those of all segments two Gauss-Newton steps come near enough.
         """
         z = whole.z
-        scales, strength = whole.scales, whole.strength
         for _ in range(2):
-            residuals, jacobian = self.residuals(z, others, scales, strength)
+            residuals, jacobian = self.residuals(
+                z, others, whole.scales, whole.strength
+            )
             moment = jacobian.T @ jacobian
             gradient = jacobian.T @ residuals
-            z = z - np.linalg.solve(moment, gradient)
+            step = np.linalg.solve(moment, gradient)
+            z = z - step
 
-        data = jacobian[: -len(z)]  # the rows of the prior come last
-        return z, covariance_of(data)
+        of_data = slice(-len(z))  # the rows of the prior come last
+        return z, covariance_of(jacobian[of_data])
 
 
 def covariance_of(slopes: Floats) -> Floats:
-    """Gauss-Newton covariance with the prior as it is: a stronger one chosen for the fit is no knowledge."""
-    inverse = np.linalg.inv(slopes.T @ slopes + np.eye(slopes.shape[1]))
+    """Gauss-Newton covariance with the prior as it is.
+
+    A stronger one chosen for the fit is no knowledge.
+    """
+    n_parameters = slopes.shape[1]
+    information = slopes.T @ slopes + np.eye(n_parameters)
+    inverse = np.linalg.inv(information)
     return 0.5 * (inverse + inverse.T)
 
 
@@ -265,6 +304,8 @@ def held_out_groups(segments: Sequence[Segment]) -> Integers:
     Of a single trial a third.
     """
     trial = np.array([segment.trial for segment in segments])
-    if trial.max() == trial.min():
-        return np.arange(len(trial)) * 3 // len(trial)
-    return trial % 5
+    several = trial.max() > trial.min()
+    if several:
+        return trial % 5
+    place = np.arange(len(segments))
+    return place * 3 // len(segments)

@@ -36,26 +36,31 @@ class Prior:
 
 
 def formula_prior(formula: str, blank: ShipModel) -> Prior:
-    """The prior of the formulas of Clarke 1983 or Kijima 1990; arguments as in `formula_coefficients`."""
+    """The prior of the formulas of Clarke 1983 or Kijima 1990.
+
+    Arguments as in `formula_coefficients`.
+    """
     ship, table = blank.particulars, blank.table
-    coefficients = formula_coefficients(formula, table, ship)
     sizes = hard_turn_features(table, ship, blank.service_shaft_speed)
-    return Prior(
-        name=formula,
-        centre={q: found.values for q, found in coefficients.items()},
-        roots={q: np.diag(sizes[q])[found.known] for q, found in coefficients.items()},
-        known={q: found.known for q, found in coefficients.items()},
-    )
+    prior = Prior(formula, centre={}, roots={}, known={})
+    for q, found in formula_coefficients(formula, table, ship).items():
+        weights = np.diag(sizes[q])
+        prior.centre[q] = found.values
+        prior.known[q] = found.known
+        prior.roots[q] = weights[found.known]
+    return prior
 
 
 def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
-    """The prior of a reference ship: its virtual trials at the target's scale, in the target's structure.
+    """The prior of a reference ship, from its virtual trials at the target's scale.
 
-    A model, its name or file, or "auto" for the shipped one most like the target, which
-    is complete but for its coefficients. Raises InputError for a reference that does
-    not exist, or too little known to choose one.
+    In the target's structure. A model, its name or file, or "auto" for the shipped one
+    most like the target, which is complete but for its coefficients. Raises InputError
+    for a reference that does not exist, or too little known to choose one.
     """
     model = _at_target(reference, blank)
+    box = model.table
+    assert isinstance(box, GreyBox)
     samples = build_samples(
         virtual_trials(model),
         blank.table,
@@ -65,19 +70,17 @@ def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
         window=1,
         shaft_speed=blank.service_shaft_speed,
     )
-    box = model.table
-    assert isinstance(box, GreyBox)
-    fitted = fit_all(get_method("ls").make, samples)
+    least_squares = get_method("ls")
+    fitted = fit_all(least_squares.make, samples)
     weight = 1.0 / (samples.duration[:, None] * np.sqrt(len(samples)))
-    return Prior(
-        name=box.ship.name,
-        centre={q: estimator.coef_ for q, estimator in fitted.items()},
-        roots={
-            q: np.asarray(np.linalg.qr(X * weight, mode="r"))
-            for q, X in samples.features.items()
-        },
-        known={q: np.ones(X.shape[1], dtype=bool) for q, X in samples.features.items()},
-    )
+
+    prior = Prior(box.ship.name, centre={}, roots={}, known={})
+    for q, X in samples.features.items():
+        root = np.linalg.qr(X * weight, mode="r")
+        prior.centre[q] = fitted[q].coef_
+        prior.known[q] = np.ones(X.shape[1], dtype=bool)
+        prior.roots[q] = np.asarray(root)
+    return prior
 
 
 def _at_target(reference: str | ShipModel, blank: ShipModel) -> ShipModel:
@@ -89,38 +92,47 @@ def _at_target(reference: str | ShipModel, blank: ShipModel) -> ShipModel:
 
 
 def reference_turns(reference: str | ShipModel, blank: ShipModel) -> list[Trial]:
-    """A reference ship's turning circles at the target's scale; arguments as in `reference_prior`."""
-    turns = [
-        trial
-        for trial in virtual_trials(_at_target(reference, blank))
-        if trial.kind == "turning-circle"
-    ]
+    """A reference ship's turning circles at the target's scale.
+
+    Arguments as in `reference_prior`.
+    """
     every_second = slice(None, None, 2)
-    return [turn.part(every_second) for turn in turns]
+    turns = []
+    for trial in virtual_trials(_at_target(reference, blank)):
+        if trial.kind == "turning-circle":
+            turns.append(trial.part(every_second))
+    return turns
 
 
 def virtual_trials(model: ShipModel) -> list[Trial]:
-    """Zigzags and turning circles to both sides, up to the rudder's limit, with the channel n."""
-    travel = model.travel_time
-    duration, dt = 20.0 * travel, 0.05 * travel
+    """Zigzags and turning circles to both sides, with the channel n.
+
+    Up to the rudder's limit.
+    """
+    duration = 20.0 * model.travel_time
+    dt = 0.05 * model.travel_time
     limit = model.steering.rudder_limit_deg
+    zigzags = [(10.0, 10.0, False), (20.0, 20.0, True), (35.0, 20.0, False)]
 
     runs = []
-    for rudder, heading, port_first in (
-        (10.0, 10.0, False),
-        (20.0, 20.0, True),
-        (35.0, 20.0, False),
-    ):
+    for rudder, heading, port_first in zigzags:
         angle = min(rudder, limit)
-        runs.append(zigzag(model, angle, heading, port_first, duration, dt))
+        run = zigzag(model, angle, heading, port_first, duration, dt)
+        runs.append(run)
     for rudder in (35.0, -35.0, 15.0, -15.0):
         angle = float(np.clip(rudder, -limit, limit))
-        runs.append(turning_circle(model, angle, duration, dt))
+        run = turning_circle(model, angle, duration, dt)
+        runs.append(run)
+    return [_virtual(model, run, index) for index, run in enumerate(runs)]
 
-    trials = []
-    for index, run in enumerate(runs):
-        channels = {name: run[name] for name in model.state_names}
-        channels["n"] = np.full(len(run), model.service_shaft_speed)
-        name = f"virtual-{index}"
-        trials.append(Trial(run.t, channels, name=name, kind=run.kind))
-    return trials
+
+def _virtual(model: ShipModel, run: Trial, index: int) -> Trial:
+    """A run as a trial that records the state, and a shaft at service speed."""
+    channels = {name: run[name] for name in model.state_names}
+    channels["n"] = np.full(len(run), model.service_shaft_speed)
+    return Trial(
+        run.t,
+        channels,
+        name=f"virtual-{index}",
+        kind=run.kind,
+    )

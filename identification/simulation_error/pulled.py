@@ -67,17 +67,19 @@ class Pulled:
     task: FitTask  # with the regression
 
     def at(self, strength: float, samples: Samples | None = None) -> Estimators:
-        """Estimators fitted with a strength: 0 is the method as it is, infinity the prior."""
-        samples = self.task.samples if samples is None else samples
+        """Fit with a strength: 0 is the method as it is, infinity the prior."""
+        if samples is None:
+            samples = self.task.samples
         if strength == 0.0:
-            return self.method.fit(self.make, replace(self.task, samples=samples))
+            task = replace(self.task, samples=samples)
+            return self.method.fit(self.make, task)
         return {
             q: pulled_estimator(self.make(), samples, q, self.prior, strength)
             for q in samples.features
         }
 
     def fitted(self, strength: float | None, folds: str) -> Estimators:
-        """Estimators fitted with the strength given, or chosen, with a report as `prior_`."""
+        """Fit with the strength given, or chosen; `prior_` of each reports on it."""
         report: dict[str, Any] = {"prior_source": self.prior.name}
         if strength is None:
             best, report["prior_scores"] = self.chosen_strength(folds)
@@ -93,10 +95,15 @@ class Pulled:
         return estimators
 
     def steady_strength(self, least: float) -> float:
-        """The least strength, from a given one on, with which the model does not run away, else that one."""
-        for strength in STRENGTHS[STRENGTHS.index(least) :]:
-            model = with_coefficients(self.task.blank, self.at(strength))
-            if not reasons_unstable(model, self.task.trials):
+        """The least strength, from a given one on, with which no model runs away.
+
+        The given one where there is none.
+        """
+        task = self.task
+        first = STRENGTHS.index(least)
+        for strength in STRENGTHS[first:]:
+            model = with_coefficients(task.blank, self.at(strength))
+            if not reasons_unstable(model, task.trials):
                 return float(strength)
         return least
 
@@ -108,11 +115,15 @@ class Pulled:
         error of each strength too, a mean square by that of no change at all.
         """
         splits = sample_folds(self.task.trials, self.task.samples, folds)
-        errors = np.empty((len(STRENGTHS), len(splits)))
-        for row, strength in enumerate(STRENGTHS):
-            for column, split in enumerate(splits):
+        rows = []
+        for strength in STRENGTHS:
+            row = []
+            for split in splits:
                 estimators = self.at(strength, split.fit)
-                errors[row, column] = relative_error(estimators, split.held)
+                row.append(relative_error(estimators, split.held))
+            rows.append(row)
+        errors = np.array(rows)
+
         names = [f"{strength:.3g}" for strength in STRENGTHS]
         scores = by_name(names, errors.mean(axis=1))
         chosen = strongest_as_good(errors)
@@ -120,36 +131,44 @@ class Pulled:
 
 
 def strongest_as_good(errors: Floats) -> int:
-    """The last row of errors, shape (n_strengths, n_folds), that is as good as the best.
+    """The last row of errors that is as good as the best.
 
     Within one standard error of the best (Breiman et al. 1984), because what the prior
-    is for, hard turns, is in none of the folds.
+    is for, hard turns, is in none of the folds. `errors` have the shape (n_strengths,
+    n_folds).
     """
     mean = errors.mean(axis=1)
     best = int(np.argmin(mean))
     excess = errors - errors[best]
+    deviation = excess.std(axis=1)
 
     n_folds = errors.shape[1]
-    deviation = excess.std(axis=1)
-    standard_error = deviation / np.sqrt(max(n_folds - 1, 1))
+    freedom = max(n_folds - 1, 1)
+    standard_error = deviation / np.sqrt(freedom)
     as_good = excess.mean(axis=1) <= standard_error
-    return int(np.flatnonzero(as_good)[-1])
+    places = np.flatnonzero(as_good)
+    return int(places[-1])
 
 
 def pulled_estimator(
     estimator: Estimator, samples: Samples, q: str, prior: Prior, strength: float
 ) -> Estimator:
-    """An estimator fitted to the samples of an equation, and to the prior as further ones."""
-    X, centre = samples.features[q], prior.centre[q]
+    """Fit the samples of an equation, and the prior as further ones."""
+    X = samples.features[q]
+    centre = prior.centre[q]
     rest = samples.targets[q] - X @ centre
     if np.isinf(strength):
         return _prior_itself(estimator, X, rest, centre, prior.known[q])
 
+    # so that the prior counts as the samples do, whatever their number
     window = float(np.mean(samples.duration))
-    pull = strength * np.sqrt(len(X)) * window * prior.roots[q]
-    rows = np.vstack([X, pull])
-    targets = np.concatenate([rest, np.zeros(len(pull))])
-    estimator.fit(rows, targets)
+    weight = strength * np.sqrt(len(X)) * window
+    pull = weight * prior.roots[q]
+    no_change = np.zeros(len(pull))
+    estimator.fit(
+        np.vstack([X, pull]),
+        np.concatenate([rest, no_change]),
+    )
     estimator.coef_ = estimator.coef_ + centre
     if hasattr(estimator, "weights_"):
         estimator.weights_ = estimator.weights_[: len(X)]
@@ -182,12 +201,13 @@ def _prior_itself(
 
 
 def relative_error(estimators: Mapping[str, Estimator], held: Samples) -> float:
-    """Mean square error of the targets by their mean square, mean over the equations."""
+    """Mean square error of the targets by their mean square, mean over equations."""
     smallest = np.finfo(float).tiny
     ratios = []
     for q, targets in held.targets.items():
-        predicted = held.features[q] @ estimators[q].coef_
-        errors = targets - predicted
+        features = held.features[q]
+        predicted = features @ estimators[q].coef_
+        error = mean_square(targets - predicted)
         size = max(mean_square(targets), smallest)
-        ratios.append(mean_square(errors) / size)
+        ratios.append(error / size)
     return float(np.mean(ratios))

@@ -1,4 +1,4 @@
-"""Refinement: a model fitted to what it simulates, from where another method left off."""
+"""Refinement: a model fitted to what it simulates, from where a method left off."""
 
 import copy
 from collections.abc import Sequence
@@ -61,18 +61,18 @@ def refine(
         model = _model(start.model, problem, solution.parameters)
         reasons = reasons_unstable(model, task.trials)
         if not reasons:
-            report = {**_report(problem, solution, task.trials), "pull": pull}
-            report["decision"] = "refined"
+            report = _report(problem, solution, task.trials)
+            report |= {"pull": pull, "decision": "refined"}
             if rejected:
                 report["rejected"] = rejected
             estimators = _estimators(start, problem, solution.parameters)
             covariance, influences = problem.covariance(solution, pull, memory)
             return Refined(
-                replace(start, model=model, estimators=estimators),
-                covariance,
-                influences,
-                settings.plain() | report,
-                problem.bin_width,
+                fit=replace(start, model=model, estimators=estimators),
+                covariance=covariance,
+                influences=influences,
+                report=settings.plain() | report,
+                width=problem.bin_width,
             )
         rejected.append({"pull": pull, "reasons": reasons})
         pull = max(10.0 * pull, 1e-9)
@@ -83,11 +83,16 @@ def refine(
 
 def _kept(start: GuardedFit, settings: Refinement, report: dict[str, Any]) -> Refined:
     """The start itself, with what was decided."""
-    return Refined(start, None, [], settings.plain() | report)
+    return Refined(
+        fit=start,
+        covariance=None,
+        influences=[],
+        report=settings.plain() | report,
+    )
 
 
 def _check_refinable(blank: ShipModel, extra_trials: Sequence[Trial]) -> None:
-    """Refuse a structure whose state is not recorded, and extra trials that lack channels."""
+    """Refuse a state that is not recorded, and extra trials that lack channels."""
     if "q" in blank.table.equations:
         raise InputError(
             "method 'output-error': expected a structure without a memory of yaw,"
@@ -110,48 +115,69 @@ def _posed(start: GuardedFit, task: FitTask, settings: Refinement) -> OutputErro
     channels = compared_channels(blank, [*task.trials, *settings.extra_trials])
     equations = blank.table.equations
     sizes = np.concatenate([term_sizes(task.samples, q) for q in equations])
-    free = settings.segment_start == "free"
-    shooter = Shooter(blank, channels, sizes, free)
+    values = np.concatenate([start.estimators[q].coef_ for q in equations])
+    n_offsets = len(task.trials) if settings.rudder_offsets else 0
+    return OutputError(
+        shooter=Shooter(
+            blank,
+            channels,
+            sizes,
+            free=settings.segment_start == "free",
+        ),
+        fitted=_segments(task.trials, blank, channels, settings),
+        further=_further(blank, channels, settings, len(task.trials)),
+        start=np.concatenate([values / sizes, np.zeros(n_offsets)]),
+        staggered=settings.staggered,
+    )
 
-    def segments(trials: Sequence[Trial]) -> list[Segment]:
-        length = settings.segment_lengths
-        return cut(trials, blank, channels, length, settings.staggered)
 
+def _segments(
+    trials: Sequence[Trial],
+    blank: ShipModel,
+    channels: Sequence[str],
+    settings: Refinement,
+) -> list[Segment]:
+    length = settings.segment_lengths
+    return cut(trials, blank, channels, length, settings.staggered)
+
+
+def _further(
+    blank: ShipModel, channels: Sequence[str], settings: Refinement, n_fitted: int
+) -> list[Segment]:
+    """Weighted segments of extra trials and an anchor's turns."""
     extra = list(settings.extra_trials)
     weights = [settings.extra_weight] * len(extra)
     if settings.anchor is not None:
         turns = reference_turns(settings.anchor, blank)
         extra += turns
         weights += [settings.anchor_weight] * len(turns)
-    further = [
-        replace(
-            segment,
-            trial=len(task.trials) + segment.trial,
-            weight=weights[segment.trial],
-        )
-        for segment in segments(extra)
-    ]
 
-    values = np.concatenate([start.estimators[q].coef_ for q in equations])
-    n_offsets = len(task.trials) if settings.rudder_offsets else 0
-    parameters = np.concatenate([values / sizes, np.zeros(n_offsets)])
-    return OutputError(
-        shooter, segments(task.trials), further, parameters, settings.staggered
-    )
+    further = []
+    for segment in _segments(extra, blank, channels, settings):
+        index = segment.trial
+        weighted = replace(segment, trial=n_fitted + index, weight=weights[index])
+        further.append(weighted)
+    return further
 
 
 def term_sizes(samples: Samples, equation: str) -> Floats:
-    """Coefficients whose terms would make up the whole change of a velocity, shape (n_terms,)."""
+    """Coefficients whose terms would make up the whole change of a velocity.
+
+    Shape (n_terms,).
+    """
     change = root_mean_square(samples.targets[equation])
     terms = column_rms(samples.features[equation])
-    terms[terms == 0.0] = np.inf
+    unseen = terms == 0.0
+    terms[unseen] = np.inf
     # never 0: coefficients are divided by the size of a term that is not seen, too
-    return change / terms + np.finfo(float).tiny
+    smallest = np.finfo(float).tiny
+    return change / terms + smallest
 
 
 def _model(blank: ShipModel, problem: OutputError, parameters: Floats) -> ShipModel:
     sizes = problem.shooter.term_sizes
-    accelerations = parameters[: len(sizes)] * sizes
+    n_terms = len(sizes)
+    accelerations = parameters[:n_terms] * sizes
     values = np.linalg.solve(blank.acceleration_matrix, accelerations)
     return blank.with_coefficients(np.asarray(values, dtype=float))
 
@@ -159,11 +185,13 @@ def _model(blank: ShipModel, problem: OutputError, parameters: Floats) -> ShipMo
 def _estimators(
     start: GuardedFit, problem: OutputError, parameters: Floats
 ) -> Estimators:
-    """Copies of the start's estimators with the refined coefficients, for the diagnostics."""
+    """The start's estimators with the refined coefficients, for the diagnostics."""
     sizes = problem.shooter.term_sizes
-    estimators = {q: copy.copy(estimator) for q, estimator in start.estimators.items()}
+    estimators = {}
     for q, rows in start.model.table.regression_rows.items():
-        estimators[q].coef_ = parameters[rows] * sizes[rows]
+        refined = copy.copy(start.estimators[q])
+        refined.coef_ = parameters[rows] * sizes[rows]
+        estimators[q] = refined
     return estimators
 
 
@@ -172,16 +200,14 @@ def _report(
 ) -> dict[str, Any]:
     """For the provenance."""
     shooter = problem.shooter
-    offsets_deg = dict[str, float]()
-    offsets = solution.parameters[len(shooter.term_sizes) :]
-    if len(offsets):
-        names = [trial.name for trial in trials]
-        offsets_deg = by_name(names, np.degrees(about_mean(offsets)))
+    n_terms = len(shooter.term_sizes)
+    offsets = about_mean(solution.parameters[n_terms:])
+    names = [trial.name for trial in trials[: len(offsets)]]
     return {
         "segments": len(problem.fitted),
         "cost_before": solution.cost_before,
         "cost_after": solution.cost_after,
         "evaluations": solution.evaluations,
         "residual_rms": by_name(shooter.channels, solution.scales),
-        "rudder_offsets_deg": offsets_deg,
+        "rudder_offsets_deg": by_name(names, np.degrees(offsets)),
     }

@@ -1,7 +1,7 @@
 """The settings of a refinement by simulation error (`refine`)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from identification.estimators.lssvm import TruncatedLSSVM
@@ -70,8 +70,13 @@ class Refinement:
     start: Any = field(default_factory=TruncatedLSSVM)
 
     def __post_init__(self) -> None:
-        lengths, hint = self.segment_lengths, "in ship lengths"
-        check_number(lengths, "segment_lengths", at_least=0.1, at_most=1e6, hint=hint)
+        check_number(
+            self.segment_lengths,
+            "segment_lengths",
+            at_least=0.1,
+            at_most=1e6,
+            hint="in ship lengths",
+        )
         check_flag(self.staggered, "staggered")
         check_choice(self.segment_start, STARTS, "segment_start")
         check_number(self.pull, "pull", at_least=0.0)
@@ -81,15 +86,10 @@ class Refinement:
 
     def plain(self) -> dict[str, Any]:
         """The settings for the provenance, extra trials by name and hash."""
-        extra = [
+        settings = {name: getattr(self, name) for name in self.options}
+        if isinstance(self.anchor, ShipModel):
+            settings["anchor"] = self.anchor.name
+        settings["extra_trials"] = [
             {"name": trial.name, "sha256": trial.sha256} for trial in self.extra_trials
         ]
-        anchor = self.anchor
-        if isinstance(anchor, ShipModel):
-            anchor = anchor.name
-        own = {
-            item.name: getattr(self, item.name)
-            for item in fields(self)
-            if item.name != "start"
-        }
-        return own | {"extra_trials": extra, "anchor": anchor}
+        return settings

@@ -1,6 +1,6 @@
 """Stretches of trials, each of which a model sails from a start of its own."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -53,7 +53,7 @@ class Segment:
 
 
 def compared_channels(model: ShipModel, trials: Sequence[Trial]) -> tuple[str, ...]:
-    """Channels whose residuals count: velocities that the model has equations of, and heading."""
+    """Channels whose residuals count: velocities with equations, and heading."""
     velocities = _velocities(model)
     heading = "r" in velocities and all("psi" in trial for trial in trials)
     return (*velocities, "psi") if heading else velocities
@@ -62,7 +62,9 @@ def compared_channels(model: ShipModel, trials: Sequence[Trial]) -> tuple[str, .
 def _velocities(model: ShipModel) -> tuple[str, ...]:
     """Velocities that the model has equations of."""
     table = model.dynamics
-    return tuple(table.equations) if isinstance(table, Structure) else ("u", "v", "r")
+    if isinstance(table, Structure):
+        return tuple(table.equations)
+    return ("u", "v", "r")
 
 
 def cut(
@@ -73,32 +75,42 @@ def cut(
     staggered: bool,
     interval: float = 0.0,
 ) -> list[Segment]:
-    """Cut trials into segments, and, staggered, again into a set that begins half a segment later.
+    """Cut trials into segments; staggered, again from half a segment later on.
 
     A gap in time ends a segment. A segment is the time to sail so many ship `lengths`
     at service speed; it starts from the smoothed state. Compared are samples at least
     an `interval` apart, in ship lengths; where it is 0, all.
     """
     duration = lengths * model.travel_time
+    least_step = interval * model.travel_time
     shifts = (0.0, 0.5) if staggered else (0.0,)
     segments = []
     for index, trial in enumerate(trials):
         for piece in between_gaps(trial, model.particulars):
             recorded = _recorded(index, piece, model)
-            sampling = float(np.median(np.diff(piece.t)))
-            every = max(int(interval * model.travel_time / sampling + 1e-9), 1)
-            for shift in shifts:
-                for first, last in pairwise(segment_edges(piece.t, duration, shift)):
-                    rows = slice(first, last + 1, every)
-                    segments.append(_segment(recorded, rows, channels, model))
+            for rows in _segment_rows(piece.t, duration, shifts, least_step):
+                segment = _segment(recorded, rows, channels, model)
+                segments.append(segment)
     return segments
 
 
+def _segment_rows(
+    t: Floats, duration: float, shifts: Sequence[float], least_step: float
+) -> Iterator[slice]:
+    """Samples of each segment of a record, a least step apart, s."""
+    sampling = float(np.median(np.diff(t)))
+    every = max(int(least_step / sampling + 1e-9), 1)
+    for shift in shifts:
+        edges = segment_edges(t, duration, shift)
+        for first, last in pairwise(edges):
+            yield slice(first, last + 1, every)
+
+
 def segment_edges(t: Floats, duration: float, shift: float) -> Integers:
-    """First samples of the segments of a record, and its last sample; none where nothing is left.
+    """First samples of the segments of a record, and its last sample.
 
     As many equal segments as come nearest to a duration, s, from a `shift` in durations
-    on. Segments of fewer than five samples are joined.
+    on. Segments of fewer than five samples are joined. None where nothing is left.
     """
     fewest = 5
     span = t[-1] - t[0]
@@ -107,7 +119,8 @@ def segment_edges(t: Floats, duration: float, shift: float) -> Integers:
         return np.zeros(0, dtype=np.int64)
 
     count = max(round(span / duration - shift), 1)
-    begins = t[0] + skipped + np.arange(count) * (span - skipped) / count
+    parts = np.arange(count) * (span - skipped) / count
+    begins = t[0] + skipped + parts
     firsts = np.searchsorted(t, begins)
     last = len(t) - 1
     if last < fewest:
@@ -135,22 +148,27 @@ def _recorded(index: int, trial: Trial, model: ShipModel) -> _Recorded:
         rudder = straight(trial.t, trial["delta"])
     else:
         rudder = rebuild(trial.t, trial["delta"], model.steering)
-    return _Recorded(index, trial, smoothed_states(trial, model), rudder)
+    return _Recorded(
+        index=index,
+        trial=trial,
+        states=smoothed_states(trial, model),
+        rudder=rudder,
+    )
 
 
 def smoothed_states(trial: Trial, model: ShipModel) -> Floats:
-    """States along a trial, shape (n_samples, n_state): smoothed, but for rudder and shaft.
+    """States along a trial, smoothed but for rudder and shaft.
 
-    The position, and what was not recorded, is 0.
+    The position, and what was not recorded, is 0. Shape (n_samples, n_state).
     """
     states = np.zeros((len(trial), len(model.state_names)))
     for column, name in enumerate(model.state_names):
         if name not in trial or name in ("x", "y"):
             continue
-        if name in ("delta", "n"):
-            states[:, column] = trial[name]
-        else:
-            states[:, column] = preprocess.smooth(trial.t, trial[name])
+        values = trial[name]
+        if name not in ("delta", "n"):
+            values = preprocess.smooth(trial.t, values)
+        states[:, column] = values
     return states
 
 
@@ -159,24 +177,17 @@ def _segment(
 ) -> Segment:
     trial = recorded.trial
     t = trial.t[rows]
-    grid = _grid(t, LONGEST_STEP * model.travel_time, recorded.rudder.corners)
+    longest_step = LONGEST_STEP * model.travel_time
+    grid = _grid(t, longest_step, recorded.rudder.corners)
     samples = np.full(len(grid), -1)
     samples[np.searchsorted(grid, t)] = np.arange(len(t))
-
-    shaft = np.zeros(len(grid))
-    if "n" in trial:
-        shaft = np.interp(grid, trial.t, trial["n"])
-    wind = [
-        np.interp(grid, trial.t, acceleration)
-        for acceleration in wind_accelerations(trial, model.dynamics).T
-    ]
 
     sampling = float(np.median(np.diff(t)))
     per_block = max(int(BLOCK * model.travel_time / sampling), 1)
     blocks = np.arange(0, len(t), per_block)
     return Segment(
         trial=recorded.index,
-        inputs=np.column_stack([grid, recorded.rudder(grid), shaft, *wind]),
+        inputs=_inputs(recorded, grid, model),
         samples=samples,
         measured=np.column_stack([trial[name][rows] for name in channels]),
         blocks=blocks,
@@ -185,8 +196,22 @@ def _segment(
     )
 
 
+def _inputs(recorded: _Recorded, grid: Floats, model: ShipModel) -> Floats:
+    """What drives a ship at times of a grid, as in `Segment.inputs`."""
+    trial = recorded.trial
+    rudder = recorded.rudder(grid)
+    shaft = np.zeros(len(grid))
+    if "n" in trial:
+        shaft = np.interp(grid, trial.t, trial["n"])
+    columns = [grid, rudder, shaft]
+    wind = wind_accelerations(trial, model.dynamics)
+    for acceleration in wind.T:
+        columns.append(np.interp(grid, trial.t, acceleration))
+    return np.column_stack(columns)
+
+
 def _grid(t: Floats, longest_step: float, corners: Floats) -> Floats:
-    """Times of integration, s: samples, points between them, and corners of the rudder."""
+    """Times of integration, s: samples, points between, and corners of the rudder."""
     first, last = t[0], t[-1]
     steps = np.ceil(np.diff(t) / longest_step - 1e-9)
     counts = np.maximum(steps, 1).astype(int)
@@ -194,8 +219,10 @@ def _grid(t: Floats, longest_step: float, corners: Floats) -> Floats:
     points = [last]
     for (begin, end), count in zip(pairwise(t), counts, strict=True):
         parts = np.arange(count)
-        points.extend(begin + (end - begin) * parts / count)
+        between = begin + (end - begin) * parts / count
+        points.extend(between)
 
-    inside = corners[corners > first]
-    inside = inside[inside < last]
+    after_first = corners > first
+    before_last = corners < last
+    inside = corners[after_first & before_last]
     return np.union1d(points, inside)

@@ -1,4 +1,4 @@
-"""Errors of what a model simulates in segments of trials, and how they depend on its coefficients.
+"""Errors of what a model simulates in segments of trials, and their slopes.
 
 Multiple shooting (Bock 1983): whole trials would let a drift of heading leak into the
 coefficients.
@@ -48,10 +48,15 @@ class Shooter:
         self.numbers = model.ship_numbers()
         self.units = channel_units(model, channels)
 
+    @property
+    def start_units(self) -> Floats:
+        """Units in which the starts of segments move, shape (n_free,)."""
+        return self.units[: len(self.free)]
+
     def shoot(
         self, parameters: Floats, segments: Sequence[Segment], scales: Floats
     ) -> Shooting:
-        """Residuals and Jacobian at some parameters, the starts of the segments projected out.
+        """Residuals and Jacobian at some parameters, without what the starts explain.
 
         The residual of a segment that may choose its start is what a linear step of the
         start leaves (variable projection, Golub & Pereyra 1973, SIAM J. Numer. Anal.
@@ -68,22 +73,25 @@ class Shooter:
 
         residuals, jacobians, moves = [], [], []
         for segment in segments:
-            has_offset = segment.trial < len(offsets)
-            offset = float(offsets[segment.trial]) if has_offset else 0.0
-            residual, slopes = self._block_errors(coefficients, offset, segment, scales)
-            residual, slopes, move = without_start(residual, slopes, len(self.free))
+            trial = segment.trial
+            has_offset = trial < len(offsets)
+            offset = float(offsets[trial]) if has_offset else 0.0
+            errors, slopes = self._block_errors(coefficients, offset, segment, scales)
+            residual, slopes, move = without_start(errors, slopes, len(self.free))
 
             jacobian = np.zeros((len(residual), len(parameters)))
             jacobian[:, :n_terms] = slopes[:, :n_terms]
             if has_offset:
                 by_offset = slopes[:, n_terms]
-                jacobian[:, n_terms:] = np.outer(
-                    by_offset, offset_slopes[segment.trial]
-                )
+                jacobian[:, n_terms:] = np.outer(by_offset, offset_slopes[trial])
             residuals.append(residual)
             jacobians.append(jacobian)
             moves.append(move)
-        return Shooting(np.concatenate(residuals), np.concatenate(jacobians), moves)
+        return Shooting(
+            residuals=np.concatenate(residuals),
+            jacobian=np.concatenate(jacobians),
+            moves=moves,
+        )
 
     def moved(
         self, segments: Sequence[Segment], moves: Sequence[Floats]
@@ -92,7 +100,7 @@ class Shooter:
         found = []
         for segment, move in zip(segments, moves, strict=True):
             start = segment.start.copy()
-            start[self.free] += move * self.units[: len(self.free)]
+            start[self.free] += move * self.start_units
             found.append(replace(segment, start=start))
         return found
 
@@ -103,7 +111,8 @@ class Shooter:
 
         Shapes (n_rows,) and (n_rows, n_coefficients + 1 + n_free).
         """
-        blocks, counts = segment.blocks, segment.block_sizes
+        blocks = segment.blocks
+        counts = segment.block_sizes
         weights = np.sqrt(segment.weight * counts)
         factors = weights[:, None] / scales
 
@@ -122,39 +131,44 @@ class Shooter:
         Forward differences of parameters that are about 1: in each lane but the first
         one number of the ship, the offset or the start is larger by a step.
         """
-        step = 1e-5
         n_numbers = len(self.numbers)
         first_term = n_numbers - len(coefficients)  # the terms' numbers come last
         nominal = np.concatenate([self.numbers, [offset], segment.start])
         nominal[first_term:n_numbers] = coefficients
-
         starts = [n_numbers + 1 + column for column in self.free]
         varied = [*range(first_term, n_numbers + 1), *starts]
-        start_units = self.units[: len(self.free)]
-        steps = step * np.concatenate([self.term_sizes, [1.0], start_units])
+        units = np.concatenate([self.term_sizes, [1.0], self.start_units])
 
-        shape = (len(segment.measured), len(self.channels))
-        channels = np.empty(shape)
-        slopes = np.empty((*shape, len(varied)))
+        step = 1e-5
+        parts = []
         for begin in range(0, len(varied), LANES - 1):
             batch = slice(begin, begin + LANES - 1)
             rows = varied[batch]
             lane = 1 + np.arange(len(rows))
             lanes = np.repeat(nominal, LANES).reshape(-1, LANES)
-            lanes[rows, lane] += steps[batch]
+            lanes[rows, lane] += step * units[batch]
 
-            states = sail_lanes(
-                self.model,
-                segment,
-                ships=lanes[:n_numbers],
-                starts=lanes[n_numbers + 1 :],
-                offsets=lanes[n_numbers],
-            )
-            sailed = states[:, self.columns]
+            sailed = self._sailed(segment, lanes)
             channels = sailed[:, :, 0]
             with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
-                slopes[:, :, batch] = (sailed[:, :, lane] - channels[:, :, None]) / step
-        return channels, slopes
+                changes = sailed[:, :, lane] - channels[:, :, None]
+                parts.append(changes / step)
+        return channels, np.concatenate(parts, axis=2)
+
+    def _sailed(self, segment: Segment, lanes: Floats) -> Floats:
+        """Compared channels of all lanes, shape (n_samples, n_channels, LANES).
+
+        `lanes`: numbers of the ships, offset and start, a column for each lane.
+        """
+        n_numbers = len(self.numbers)
+        states = sail_lanes(
+            self.model,
+            segment,
+            ships=lanes[:n_numbers],
+            starts=lanes[n_numbers + 1 :],
+            offsets=lanes[n_numbers],
+        )
+        return np.asarray(states[:, self.columns])
 
 
 def channel_units(model: ShipModel, channels: Sequence[str]) -> Floats:
@@ -171,35 +185,43 @@ def channel_units(model: ShipModel, channels: Sequence[str]) -> Floats:
 def sail_lanes(
     model: ShipModel, segment: Segment, ships: Floats, starts: Floats, offsets: Floats
 ) -> Floats:
-    """States of the ships of all lanes at the samples of a segment, shape (n_samples, n_state, LANES).
+    """States of the ships of all lanes at the samples of a segment.
 
     Numbers of the ships and states at the start, a column for each lane, and offsets of
-    their rudders, rad.
+    their rudders, rad. Shape (n_samples, n_state, LANES).
     """
     loop = ship_loop(model.compiled, "segments", segment.has_wind)
-    states = np.empty((len(segment.measured), starts.size))
+    n_samples = len(segment.measured)
+    states = np.empty((n_samples, starts.size))
     loop(
-        starts.ravel(), ships.ravel(), offsets, segment.inputs, segment.samples, states
+        starts.ravel(),
+        ships.ravel(),
+        offsets,
+        segment.inputs,
+        segment.samples,
+        states,
     )
-    return states.reshape(len(states), -1, LANES)
+    return states.reshape(n_samples, -1, LANES)
 
 
 def about_mean(values: Floats) -> Floats:
     """Values less their mean along the first axis."""
-    return values - values.mean(axis=0) if len(values) else values
+    if not len(values):
+        return values
+    return np.asarray(values - values.mean(axis=0))
 
 
 def averaged(values: Floats, blocks: Integers, counts: Integers) -> Floats:
-    """Means over blocks along the first axis, from their first samples and their sizes."""
+    """Means over blocks along the first axis, from their first samples and sizes."""
     sums = np.add.reduceat(values, blocks)
-    others = (1,) * (values.ndim - 1)
-    return np.asarray(sums / counts.reshape(-1, *others))
+    sizes = np.expand_dims(counts, tuple(range(1, values.ndim)))
+    return np.asarray(sums / sizes)
 
 
 def without_start(
     residual: Floats, slopes: Floats, n_free: int
 ) -> tuple[Floats, Floats, Floats]:
-    """Residuals and slopes without what a move of the start accounts for, and that move.
+    """Residuals and slopes without what a move of the start explains, and that move.
 
     The last `n_free` columns of the slopes are those by the start. Of a ship that ran
     away nothing is taken out.

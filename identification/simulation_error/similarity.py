@@ -1,4 +1,4 @@
-"""Which ship is most like another, by its main dimensions (Mei 2019, equations 3 to 6)."""
+"""The ship most like another, by its main dimensions (Mei 2019, equations 3 to 6)."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
@@ -38,7 +38,9 @@ def similarity_vector(particulars: Particulars, printed: bool = False) -> Floats
         value = particulars[name]
         return np.nan if value is None else float(value)
 
-    L, B, T = particulars.length, known("beam"), known("draught")
+    L = particulars.length
+    B = known("beam")
+    T = known("draught")
     V = known("speed")
     gravity = 9.81
     features = Features(
@@ -54,25 +56,27 @@ def similarity_vector(particulars: Particulars, printed: bool = False) -> Floats
 def correlations(
     target: ArrayLike, candidates: Mapping[str, ArrayLike]
 ) -> dict[str, float]:
-    """Pearson correlation of each candidate's features with the target's, of shape (n_features,).
+    """Pearson correlation of each candidate's features with the target's.
 
-    Each feature is first divided by its 2-norm over all ships. Features that are nan
-    for any ship are left out. Raises InputError if fewer than three features are known
-    of all ships.
+    Features have the shape (n_features,). Each is first divided by its 2-norm over all
+    ships. Features that are nan for any ship are left out. Raises InputError if fewer
+    than three features are known of all ships.
     """
-    rows = [np.asarray(row, dtype=float) for row in (target, *candidates.values())]
-    table = np.array(rows)
-    known = np.all(np.isfinite(table), axis=0)
-    if known.sum() < 3:
+    table = np.array([target, *candidates.values()], dtype=float)
+    known = np.isfinite(table).all(axis=0)
+    n_known = int(known.sum())
+    if n_known < 3:
         raise InputError(
             "particulars: expected at least 3 of block coefficient, L/B, B/T, L/V0 and"
-            f" rudder area to find a reference ship, got {known.sum()}; give beam,"
+            f" rudder area to find a reference ship, got {n_known}; give beam,"
             " draught, block_coefficient and rudder_area in [ship], or name the"
             " reference_model"
         )
 
-    scaled = table[:, known] / np.linalg.norm(table[:, known], axis=0)
-    with_target = np.corrcoef(scaled)[0, 1:]
+    features = table[:, known]
+    scaled = features / np.linalg.norm(features, axis=0)
+    between_ships = np.corrcoef(scaled)
+    with_target = between_ships[0, 1:]
     return dict(zip(candidates, with_target.tolist(), strict=True))
 
 
@@ -89,22 +93,10 @@ def select_reference(
     in length, and the correlations of all candidates. Raises InputError if too little
     is known of the target.
     """
-    ships = {name: load_model(name) for name in candidates}
-    if channels is not None and not {"p", "phi"} <= set(channels):
-        ships = {
-            name: ship for name, ship in ships.items() if "phi" not in ship.state_names
-        }
-    if not ships:
-        raise InputError(
-            "reference_model: expected a ship that can be evaluated at"
-            f" {quoted(channels or ())}, got {quoted(candidates)}, all of which roll;"
-            " record p and phi, or allow other candidates"
-        )
-
-    vectors = {
-        name: similarity_vector(_with_rudder_area(name, ship))
-        for name, ship in ships.items()
-    }
+    ships = _evaluable(candidates, channels)
+    vectors = {}
+    for name, ship in ships.items():
+        vectors[name] = similarity_vector(_with_rudder_area(name, ship))
     similarity = correlations(similarity_vector(particulars), vectors)
 
     same_hull = 0.01  # correlations so close are those of one hull form
@@ -112,15 +104,37 @@ def select_reference(
     alike = [name for name in similarity if similarity[name] > least]
 
     def distance(name: str) -> tuple[float, float]:
-        """How far apart the lengths are; of ships of one length the most similar comes first."""
+        """How far apart the lengths are; of one length the most similar comes first."""
         scale = ships[name].particulars.length / particulars.length
         return abs(float(np.log(scale))), -similarity[name]
 
     return min(alike, key=distance), similarity
 
 
+def _evaluable(
+    candidates: Collection[str], channels: Collection[str] | None
+) -> dict[str, ShipModel]:
+    """The candidates that can be evaluated at some channels, if these are known."""
+    with_roll = channels is None or {"p", "phi"} <= set(channels)
+    ships = {}
+    for name in candidates:
+        ship = load_model(name)
+        if with_roll or "phi" not in ship.state_names:
+            ships[name] = ship
+    if not ships:
+        raise InputError(
+            "reference_model: expected a ship that can be evaluated at"
+            f" {quoted(channels or ())}, got {quoted(candidates)}, all of which roll;"
+            " record p and phi, or allow other candidates"
+        )
+    return ships
+
+
 def check_alike(name: str, similarity: float, otherwise: str) -> None:
-    """Refuse the most similar reference ship where she is unlike the target; `otherwise`: what else to do."""
+    """Refuse the most similar reference ship where she is unlike the target.
+
+    `otherwise`: what else to do.
+    """
     if similarity < LEAST_SIMILARITY:
         raise InputError(
             "reference_model: 'auto' expected a ship like this one, with a similarity"
@@ -131,7 +145,7 @@ def check_alike(name: str, similarity: float, otherwise: str) -> None:
 
 
 def _with_rudder_area(name: str, ship: ShipModel) -> Particulars:
-    """Particulars of a reference ship with block coefficient and, by Mei 2019, Table 4, rudder area."""
+    """Particulars of a reference ship, completed; rudder area by Mei 2019, Table 4."""
     by_length_and_draught = {"mariner": 1.0 / 83.1, "tanker": 1.0 / 61.0}
 
     p = ship.particulars.completed()

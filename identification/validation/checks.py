@@ -1,8 +1,9 @@
-"""Refusals of trials that cannot identify a structure: channels, samples, excitation."""
+"""Refusals of trials that cannot identify a structure: channels, samples, motion."""
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from identification.regression import preprocess
 from identification.regression.samples import Samples
@@ -13,7 +14,11 @@ MOTIONS = {"u": "surge speed", "v": "sway speed", "r": "yaw rate", "p": "roll ra
 
 
 def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
-    """Refuse no trial, a missing channel, times that nearly coincide, and rudders that never move."""
+    """Refuse trials from which a structure cannot be identified.
+
+    There are none, one lacks a channel or has times that nearly coincide, or no rudder
+    ever moves.
+    """
     if structure.captive:
         raise InputError(
             "structure: expected one for free-running trials, got"
@@ -35,26 +40,30 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
 def _check_channels(trial: Trial, structure: Structure) -> None:
     needed = structure.required_channels
     for channel in needed:
-        if channel not in trial:
-            hint = ""
-            if channel == "u":
-                hint = "; nomoto, norrbin and nomoto2 take the speed of [ship]"
-            raise InputError(
-                f"trial {trial.name!r}: channel {channel!r} is missing, structure"
-                f" {structure.name!r} needs {', '.join(needed)}; name its column, or"
-                f' leave the trial out (use = "skip"){hint}'
-            )
+        if channel in trial:
+            continue
+        hint = ""
+        if channel == "u":
+            hint = "; nomoto, norrbin and nomoto2 take the speed of [ship]"
+        raise InputError(
+            f"trial {trial.name!r}: channel {channel!r} is missing, structure"
+            f" {structure.name!r} needs {', '.join(needed)}; name its column, or"
+            f' leave the trial out (use = "skip"){hint}'
+        )
 
 
 def _check_steps(trial: Trial) -> None:
-    """Refuse a row that was written twice: a step of less than 1e-4 of the usual one."""
+    """Refuse a row that was written twice: a step of less than 1e-4 of the usual."""
     steps = np.diff(trial.t)
-    k = int(np.argmin(steps))
     usual = float(np.median(steps))
-    if steps[k] < 1e-4 * usual:
+    row = int(np.argmin(steps))
+    shortest = steps[row]
+    if shortest < 1e-4 * usual:
+        begin = trial.t[row]
+        end = trial.t[row + 1]
         raise InputError(
             f"trial {trial.name!r}: expected samples about {usual:.3g} s apart, got"
-            f" {steps[k]:.2g} s from {trial.t[k]:.12g} to {trial.t[k + 1]:.12g} s;"
+            f" {shortest:.2g} s from {begin:.12g} to {end:.12g} s;"
             " remove the repeated row"
         )
 
@@ -67,12 +76,15 @@ def is_still(trial: Trial) -> bool:
     """
     delta = trial["delta"]
     width = min(5, len(delta))
-    windows = np.lib.stride_tricks.sliding_window_view(delta, width)
-    moves = np.ptp(np.median(windows, axis=1))
+    windows = sliding_window_view(delta, width)
+    medians = np.median(windows, axis=1)
+    moved = np.ptp(medians)
 
     noise = preprocess.noise_level(trial.t, delta)
-    scatter = min(6.0 * noise, np.radians(3.0))
-    return bool(moves < max(np.radians(0.5), scatter))
+    most_scatter = np.radians(3.0)
+    scatter = min(6.0 * noise, most_scatter)
+    least_move = np.radians(0.5)
+    return bool(moved < max(least_move, scatter))
 
 
 def _refuse_still(trial: Trial) -> None:
@@ -87,11 +99,12 @@ def _refuse_still(trial: Trial) -> None:
 def check_samples(
     samples: Samples, trials: Sequence[Trial], structure: Structure
 ) -> None:
-    """Refuse a regression with fewer rows than terms, or of a motion that never changes."""
+    """Refuse too few rows for the terms, and a motion that never changes."""
     for q, change in samples.targets.items():
         if not np.any(change):
+            motion = MOTIONS.get(q, q)
             raise InputError(
-                f"trial {trials[0].name!r}: expected the {MOTIONS.get(q, q)} to be"
+                f"trial {trials[0].name!r}: expected the {motion} to be"
                 f" excited and measured, got a channel {q!r} that never changes, in"
                 f" none of the {len(trials)} trials to fit; leave the column out if it"
                 " was not measured, or choose a structure without that equation"

@@ -1,4 +1,4 @@
-"""A measured zigzag sailed again by a model, its rudder reversed at the headings at which it was reversed.
+"""A measured zigzag sailed again, the rudder reversed at the measured headings.
 
 Open loop, a tenth of a degree of neutral helm moves the second overshoot of a 10/10
 zigzag by two degrees, because the rudder is reversed when the measured ship got there,
@@ -42,24 +42,26 @@ class _Sailed(NamedTuple):
 
 
 def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
-    """A zigzag with the measured rudder angles, reversed at the measured headings by the model's gear.
+    """A zigzag with the measured rudder angles, reversed at the measured headings.
 
-    None where the model runs away or a heading is never reached, without a reversal,
-    and for a model whose state is not recorded.
+    The model's gear moves the rudder. None where the model runs away or a heading is
+    never reached, without a reversal, and for a model whose state is not recorded.
     """
+    names = model.state_names
     recorded = {*trial.channels, "x", "y"}
-    if not set(model.state_names) <= recorded:
+    if not recorded.issuperset(names):
         return None
 
     begun = with_start(model, trial)
-    start = [begun[name][0] if name in begun else 0.0 for name in model.state_names]
+    start = [begun[name][0] if name in begun else 0.0 for name in names]
     passage = Passage(model, Conditions(), STEP * model.travel_time)
     times = [trial.t[:1]]
     states = [np.array([start])]
     orders = list[float]()
     for leg in legs(trial):
+        begin, state = times[-1][-1], states[-1][-1]
         try:
-            sailed = _sail(passage, trial, leg, times[-1][-1], states[-1][-1])
+            sailed = _sail(passage, trial, leg, begin, state)
         except UnstableModelError:
             return None
         if sailed is None:
@@ -69,7 +71,7 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
         orders += [leg.order] * len(sailed.t)
 
     columns = np.vstack(states).T
-    channels = dict(zip(model.state_names, columns, strict=True))
+    channels = dict(zip(names, columns, strict=True))
     channels["delta_command"] = np.array([*orders, orders[-1]])
     return Trial(
         np.concatenate(times),
@@ -88,15 +90,21 @@ def legs(trial: Trial) -> tuple[ZigzagLeg, ...]:
     edges = [float(t[0]), start, *turns, float(t[-1])]
     found = list[ZigzagLeg]()
     for number, (begin, end) in enumerate(pairwise(edges)):
-        last_quarter = t >= 0.25 * begin + 0.75 * end
-        held = last_quarter & (t <= end)
+        last_quarter = 0.25 * begin + 0.75 * end
+        held = (t >= last_quarter) & (t <= end)
         if end <= begin or not held.any():
             continue
+
         target = None
         if 1 <= number <= len(turns):
             target = float(np.interp(end, t, trial["psi"]))
-        order = float(np.median(delta[held]))
-        found.append(ZigzagLeg(order, end - begin, target, approach=not found))
+        leg = ZigzagLeg(
+            order=float(np.median(delta[held])),
+            duration=end - begin,
+            target=target,
+            approach=not found,
+        )
+        found.append(leg)
     return tuple(found)
 
 
@@ -108,16 +116,19 @@ def _sail(
     longest = leg.duration
     if leg.target is not None:
         longest *= LONGEST_LEG
-    count = max(int(np.ceil(longest / dt)), 2)
-    t = begin + dt * np.arange(count + 1, dtype=float)
+    n_steps = max(int(np.ceil(longest / dt)), 2)
+    steps = np.arange(n_steps + 1, dtype=float)
+    t = begin + dt * steps
 
     commands = _commands(model, trial, leg, t[:-1])
     orders = two_commands(checked_orders(model, commands))
-    states = passage.states(state, count)
+    states = passage.states(state, n_steps)
     passage.run("simulate", states, orders, dt)
     if leg.target is None:
         return _Sailed(t[1:], states[1:])
-    psi = states[:, model.state_names.index("psi")]
+
+    heading = model.state_names.index("psi")
+    psi = states[:, heading]
     return _until(leg.target, psi, t, states)
 
 
@@ -125,32 +136,36 @@ def _commands(
     model: ManoeuvringModel, trial: Trial, leg: ZigzagLeg, t: Floats
 ) -> Floats:
     """Rudder of the leg and shaft as measured, shape (n_steps, n_commands)."""
-    commands = np.tile(model.service_command, (len(t), 1))
     ordered, shaft = 0, 1
+    commands = np.tile(model.service_command, (len(t), 1))
     commands[:, ordered] = leg.order
     if leg.approach and leg.target is None:
-        commands[:, ordered] = np.interp(t, trial.t, rudder(trial))
+        measured = rudder(trial)
+        commands[:, ordered] = np.interp(t, trial.t, measured)
     if "n" in model.command_names and "n" in trial:
         commands[:, shaft] = np.interp(t, trial.t, trial["n"])
     return commands
 
 
 def _until(target: float, psi: Floats, t: Floats, states: Floats) -> _Sailed | None:
-    """Samples up to the heading of the target; None where it is not reached, or passed already.
+    """Samples up to the heading of the target; None where the leg never gets there.
 
-    The state between two steps is straight enough: a step is a fiftieth of a length.
+    Also None where it is passed already.
     """
-    side = np.sign(target - psi[0])
-    beyond = (psi - target) * side >= 0.0
+    left = target - psi
+    side = np.sign(left[0])
+    beyond = left * side <= 0.0
     last = int(np.argmax(beyond))
     if last == 0:
         return None
 
+    # a step is a fiftieth of a length: between two the state is straight enough
     before = last - 1
     gained = psi[last] - psi[before]
-    part = float((target - psi[before]) / gained)
+    part = float(left[before] / gained)
     step = t[last] - t[before]
     t[last] = t[before] + part * step
-    states[last] = (1.0 - part) * states[before] + part * states[last]
+    begin, end = states[before], states[last]
+    states[last] = (1.0 - part) * begin + part * end
     sailed = slice(1, last + 1)
     return _Sailed(t[sailed], states[sailed])

@@ -1,4 +1,4 @@
-"""Structures and methods on the same trials, ranked by what they predict of trials not seen."""
+"""Structures and methods on the same trials, ranked by what they predict."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -30,12 +30,11 @@ from identification.validation.selection import (
     methods_of,
     reference_of,
 )
-from shipgym import InputError, Trial, list_structures
+from shipgym import InputError, ShipModel, Trial, list_structures
 from shipgym.checks import check_number
 from shipgym.files import write_json, write_text
 from shipgym.ships import Structure
-from shipgym.ships.grey_boxes import GREY_BOX
-from shipgym.ships.mmg import MMG
+from shipgym.ships.structures import GREY_BOX, MMG
 
 #: Compared where none are named; for a grey box also RM-SVM.
 USUAL = (
@@ -58,30 +57,35 @@ COMPARISON_FILES = (
 
 
 class Comparison(Ranking):
-    """Structures and methods on the same trials, ranked; `Ranking` lists its attributes."""
+    """Structures and methods, ranked; `Ranking` lists its attributes."""
 
     def save(self, folder: str | Path) -> None:
-        """Write `comparison.json`, `comparison.html` and each method's `model-METHOD.json`.
+        """Write `comparison.json`, `comparison.html` and models.
 
-        Of several structures these are the best model of each, `model-STRUCTURE.json`.
-        Raises InputError if plotly is not installed.
+        Of one structure the model of each method, `model-METHOD.json`; of several the
+        best model of each, `model-STRUCTURE.json`. Raises InputError if plotly is not
+        installed.
         """
+        page = comparison_page(self)
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        page = comparison_page(self)
-        for name, result in self._models().items():
-            result.model.save(folder / f"model-{name}.json")
+        for name, model in self._models().items():
+            path = folder / f"model-{name}.json"
+            model.save(path)
         write_json(self.to_dict(), folder / "comparison.json")
         write_text(page, folder / "comparison.html")
 
-    def _models(self) -> dict[str, IdentificationResult]:
-        """Results to save by name: of each method, of several structures the best of each."""
-        if self.ranked[0].method in self.results:
-            return self.results
-        best = dict[str, IdentificationResult]()
-        for fit, result in zip(self.ranked, self.results.values(), strict=True):
-            best.setdefault(fit.structure, result)
-        return best
+    def _models(self) -> dict[str, ShipModel]:
+        """Models to save: of each method, or the best of each structure."""
+        one_structure = self.ranked[0].method in self.results
+        results = self.results.values()
+        models = dict[str, ShipModel]()
+        for fit, result in zip(self.ranked, results, strict=True):
+            name = fit.structure
+            if one_structure:
+                name = fit.method
+            models.setdefault(name, result.model)
+        return models
 
 
 def compare_methods(
@@ -91,7 +95,7 @@ def compare_methods(
     settings: Mapping[str, Any] | None = None,
     **arguments: Any,
 ) -> Comparison:
-    """Identify by several methods, or structures and methods, and rank them on held-out trials.
+    """Identify by several methods, or structures too, and rank them on held-out trials.
 
     These are marked `validate` or named by `hold_out`; where there are none, each trial
     to fit in turn.
@@ -119,39 +123,60 @@ def compare_methods(
     fitted, held = _by_use(held_out(trials, arguments.get("hold_out", ())))
     settings = settings or {}
     left_out = _left_out([method for _, method in pairs], settings)
+
     found = list[tuple[RankedFit, IdentificationResult]]()
     refused = dict[str, str]()
     for structure, method in counted("structures and methods", pairs):
         own = dict(arguments)
         name = get_method(method).name
-        unknown = left_out.get(name, ())
-        known = {key: settings[key] for key in settings if key not in unknown}
-        if isinstance(method, str) and known:
-            method = make_method(method, known)
+        method = _with_settings(method, settings, left_out.get(name, ()))
         if several:
             name = fit_name(name_of(structure), name)
-            own["reference_model"] = reference_of(structure, own.get("reference_model"))
+            reference = own.get("reference_model")
+            own["reference_model"] = reference_of(structure, reference)
         try:
             result = identify(trials, structure, method, **own)
+            seen = result.metrics["trials"]
             if held:
-                of_trials = result.metrics["trials"]
-                seen = {trial.name: of_trials[trial.name] for trial in held}
+                seen = {trial.name: seen[trial.name] for trial in held}
             else:
                 seen = _each_in_turn(fitted, structure, method, own)
         except InputError as error:
             refused[name] = str(error)
-        else:
-            found.append((ranked_fit([result], seen, trials), result))
-    if not found:
-        raise InputError(next(iter(refused.values())))
+            continue
+        fit = ranked_fit([result], seen, trials)
+        found.append((fit, result))
 
+    if not found:
+        first_reason = next(iter(refused.values()))
+        raise InputError(first_reason)
+    ranked, results = _sorted(found, several)
+    return Comparison(ranked, results, refused, left_out, in_turn=not held)
+
+
+def _with_settings(
+    method: Any, settings: Mapping[str, Any], left_out: Sequence[str]
+) -> Any:
+    """A method given by name with those of the settings that it has."""
+    known = {name: settings[name] for name in settings if name not in left_out}
+    if isinstance(method, str) and known:
+        return make_method(method, known)
+    return method
+
+
+def _sorted(
+    found: list[tuple[RankedFit, IdentificationResult]], several: bool
+) -> tuple[tuple[RankedFit, ...], dict[str, IdentificationResult]]:
+    """Fits, the best first, and their results by method, or structure and method."""
     found.sort(key=lambda entry: entry[0].rank)
     results = dict[str, IdentificationResult]()
     for fit, result in found:
-        name = fit_name(fit.structure, fit.method) if several else fit.method
+        name = fit.method
+        if several:
+            name = fit_name(fit.structure, fit.method)
         results[name] = result
     ranked = tuple(fit for fit, _ in found)
-    return Comparison(ranked, results, refused, left_out, in_turn=not held)
+    return ranked, results
 
 
 def _by_use(trials: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
@@ -250,7 +275,10 @@ def _asked(
 def fit_pairs(
     structures: Sequence[Any], methods: Sequence[Any] | None, several: bool
 ) -> list[tuple[Any, Any]]:
-    """Structures, each with the methods that it is fitted by: those given, of the MMG form the first."""
+    """Structures, each with the methods that it is fitted by.
+
+    These are the `methods` given; of several structures the MMG form takes the first.
+    """
     by_name = {name_of(structure): structure for structure in structures}
     pairs: list[tuple[Any, Any]] = []
     for structure in by_name.values():
@@ -260,7 +288,8 @@ def fit_pairs(
         elif several and structure == MMG:
             own = own[:1]
         named = {get_method(method).name: method for method in own}
-        pairs += [(structure, method) for method in named.values()]
+        for method in named.values():
+            pairs.append((structure, method))
     return pairs
 
 
@@ -283,8 +312,9 @@ def _left_out(
 
     for setting in settings:
         if all(setting in unknown for unknown in left.values()):
+            names = ", ".join(left)
             raise InputError(
                 f"{setting}: expected a setting of one of the methods"
-                f" {', '.join(left)}, got one that none of them knows"
+                f" {names}, got one that none of them knows"
             )
     return {name: unknown for name, unknown in left.items() if unknown}

@@ -1,4 +1,4 @@
-"""What the data can determine and what the fit left over: excitation, collinearity, residuals."""
+"""What the data can determine and what a fit left over: collinearity and residuals."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -54,76 +54,111 @@ def diagnose(
     apart = without_overlap(samples)
     found = {}
     for q, estimator in estimators.items():
-        names = structure.regression_names(q)
-        features, target, error = samples.features[q], samples.targets[q], errors[q]
-        scaled, condition = scaled_features(features)
-        power = max(float(target @ target), np.finfo(float).tiny)
-        found[q] = EquationDiagnostics(
-            samples=len(target),
-            terms=len(names),
-            rank=int(getattr(estimator, "rank_", min(features.shape))),
-            condition_number=condition,
-            r_squared=1.0 - float(error @ error) / power,
-            residual_rms=root_mean_square(error),
-            residual_autocorrelation=autocorrelation(error[apart], 10),
-            variance_inflation=by_name(names, variance_inflation(scaled)),
-            collinear_pairs=collinear_pairs(scaled, names),
-            dropped=_dropped(estimator, names),
+        found[q] = _of_equation(
+            estimator,
+            names=structure.regression_names(q),
+            features=samples.features[q],
+            target=samples.targets[q],
+            error=errors[q],
+            apart=apart,
         )
     return found
 
 
+def _of_equation(
+    estimator: Estimator,
+    names: Sequence[str],
+    features: Floats,
+    target: Floats,
+    error: Floats,
+    apart: Integers,
+) -> EquationDiagnostics:
+    """Diagnostics of an equation; `apart`: rows whose windows do not overlap."""
+    scaled, condition = scaled_features(features)
+    smallest = np.finfo(float).tiny
+    power = max(float(target @ target), smallest)
+    unexplained = float(error @ error) / power
+    rank = getattr(estimator, "rank_", min(features.shape))
+    return EquationDiagnostics(
+        samples=len(target),
+        terms=len(names),
+        rank=int(rank),
+        condition_number=condition,
+        r_squared=1.0 - unexplained,
+        residual_rms=root_mean_square(error),
+        residual_autocorrelation=autocorrelation(error[apart], 10),
+        variance_inflation=by_name(names, variance_inflation(scaled)),
+        collinear_pairs=collinear_pairs(scaled, names),
+        dropped=_dropped(estimator, names),
+    )
+
+
 def _dropped(estimator: Estimator, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
     """Terms that make up each direction that an estimator dropped."""
-    groups = getattr(estimator, "collinear_groups_", ())
-    return tuple(tuple(names[term] for term in group) for group in groups)
+    groups = []
+    for group in getattr(estimator, "collinear_groups_", ()):
+        terms = tuple(names[term] for term in group)
+        groups.append(terms)
+    return tuple(groups)
 
 
 def scaled_features(features: Floats) -> tuple[Floats, float]:
-    """Features divided by their root mean squares, of the same shape, and their condition number."""
+    """Features divided by their root mean squares, and their condition number."""
     size = column_rms(features)
     size[size == 0.0] = 1.0
     scaled = features / size
 
     singular = np.linalg.svd(scaled, compute_uv=False)
-    largest, smallest = singular[0], singular[-1]
+    largest = singular[0]
+    smallest = singular[-1]
     rounding = np.finfo(float).eps * largest
     condition = largest / max(smallest, rounding)
     return scaled, float(condition)
 
 
 def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
-    """Autocorrelation of a series at lags of 1, 2, ... samples; fewer lags for a short series."""
+    """Autocorrelation of a series at lags of 1, 2, ... samples.
+
+    Fewer lags for a short series, none for a constant one.
+    """
     centred = values - values.mean()
     power = float(centred @ centred)
     if power == 0.0:
         return ()
+
     most = min(lags, len(values) - 1)
-    return tuple(
-        float(centred[lag:] @ centred[:-lag]) / power for lag in range(1, most + 1)
-    )
+    correlations = []
+    for lag in range(1, most + 1):
+        product = float(centred[lag:] @ centred[:-lag])
+        correlations.append(product / power)
+    return tuple(correlations)
 
 
 def cross_correlation(first: Floats, second: Floats, lags: Integers) -> Floats:
-    """Correlation, shape (n_lags,), of one series with another at the same times that is shifted.
+    """Correlation of one series with another at the same times that is shifted.
 
     Lags are samples by which the first comes after the second. 0 for a constant or
-    shorter series.
+    shorter series. Shape (n_lags,).
     """
     a = first - first.mean()
     b = second - second.mean()
     powers = (a @ a) * (b @ b)
-    size = float(np.sqrt(powers)) or 1.0
+    size = float(np.sqrt(powers)) or 1.0  # 0 for a constant one
+    products = correlate(a, b, method="fft")
+    by_lag = products / size
 
-    by_lag = correlate(a, b, method="fft") / size
     no_lag = len(a) - 1
     found = by_lag.take(no_lag + lags, mode="clip")
-    found[np.abs(lags) >= len(a)] = 0.0
+    too_far = np.abs(lags) > no_lag
+    found[too_far] = 0.0
     return np.asarray(found)
 
 
 def correlation_matrix(scaled: Floats) -> Floats:
-    """Correlation of features about zero, each of a root mean square of 1, shape (n_terms, n_terms)."""
+    """Correlation about zero of features of a root mean square of 1.
+
+    Shape (n_terms, n_terms).
+    """
     return np.asarray(scaled.T @ scaled / len(scaled))
 
 
@@ -150,8 +185,10 @@ def collinear_pairs(
 ) -> tuple[tuple[str, str, float], ...]:
     """Pairs of terms whose correlation is beyond the limit, and the correlation."""
     moment = correlation_matrix(scaled)
-    beyond = np.triu(np.abs(moment) > COLLINEAR, k=1)
+    beyond = np.abs(moment) > COLLINEAR
+    places = np.argwhere(np.triu(beyond, k=1))
     pairs = []
-    for i, j in np.argwhere(beyond).tolist():
-        pairs.append((names[i], names[j], float(moment[i, j])))
+    for i, j in places.tolist():
+        correlation = float(moment[i, j])
+        pairs.append((names[i], names[j], correlation))
     return tuple(pairs)

@@ -1,4 +1,4 @@
-"""What a choice is validated on: each trial held out in turn, or those of the largest rudder."""
+"""What a choice is validated on: each trial in turn, or those of the largest rudder."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -24,19 +24,21 @@ class Fold(NamedTuple):
 
 
 def of_largest_rudder(trials: Sequence[Trial], where: str) -> Flags:
-    """The trials with the largest rudder: what is learnt from the others is extrapolated to them.
+    """The trials with the largest rudder, to which the others are extrapolated.
 
     The hard turn is in no zigzag. How well small rudders predict larger ones is the
     closest substitute in the data. `where`: the argument that asks for it. Raises
     InputError if all of them have the same rudder, to a tenth.
     """
     rudders = np.array([np.abs(trial["delta"]).max() for trial in trials], dtype=float)
-    largest: Flags = rudders > 0.9 * rudders.max()
+    hardest = rudders.max()
+    largest: Flags = rudders > 0.9 * hardest
     if largest.all():
+        angle = np.degrees(hardest)
         raise InputError(
             f"{where}: expected some trials with less rudder than others for"
             f" {LARGEST_RUDDER!r}, got {len(trials)} trials that all reach"
-            f" {np.degrees(rudders.max()):.3g} deg; take {TRIALS!r}, or add trials of"
+            f" {angle:.3g} deg; take {TRIALS!r}, or add trials of"
             " another rudder angle"
         )
     return largest
@@ -49,19 +51,21 @@ def held_out_rows(
 
     `folds`: one of `FOLDS`.
     """
-    if check_choice(folds, FOLDS, "folds") == LARGEST_RUDDER:
+    check_choice(folds, FOLDS, "folds")
+    if folds == LARGEST_RUDDER:
         largest = of_largest_rudder(trials, "folds")
         rows = ~largest[samples.trial]
-        for trial, held in zip(trials, largest, strict=True):
-            if held:
-                yield rows, trial
+        for index in np.flatnonzero(largest).tolist():
+            yield rows, trials[index]
     elif len(trials) > 1:
         for index, trial in enumerate(trials):
             yield samples.trial != index, trial
     else:
         end = samples.start + samples.duration
         for piece in pieces(trials[0]):
-            yield (end <= piece.t[0]) | (samples.start >= piece.t[-1]), piece
+            before = end <= piece.t[0]
+            after = samples.start >= piece.t[-1]
+            yield before | after, piece
 
 
 def sample_folds(trials: Sequence[Trial], samples: Samples, folds: str) -> list[Fold]:
@@ -73,23 +77,31 @@ def sample_folds(trials: Sequence[Trial], samples: Samples, folds: str) -> list[
     if folds == LARGEST_RUDDER:
         largest = of_largest_rudder(trials, "prior_folds")
         smaller = samples.select(~largest[samples.trial])
-        return [
-            Fold(smaller, samples.select(samples.trial == index))
-            for index in np.flatnonzero(largest)
-        ]
+        found = []
+        for index in np.flatnonzero(largest):
+            held = samples.select(samples.trial == index)
+            found.append(Fold(fit=smaller, held=held))
+        return found
+
     groups = samples.trial
     if groups.max() == groups.min():
         groups = np.arange(len(samples)) * 5 // len(samples)
-    return [
-        Fold(samples.select(groups != group), samples.select(groups == group))
-        for group in np.unique(groups)
-    ]
+    found = []
+    for group in np.unique(groups):
+        fold = Fold(
+            fit=samples.select(groups != group),
+            held=samples.select(groups == group),
+        )
+        found.append(fold)
+    return found
 
 
 def pieces(trial: Trial) -> list[Trial]:
     """Thirds of a trial, which are no manoeuvres."""
-    edges = np.linspace(0, len(trial), 4).astype(int).tolist()
-    return [
-        trial.part(slice(*ends), f"{trial.name}, part {n}")
-        for n, ends in enumerate(pairwise(edges), 1)
-    ]
+    edges = np.linspace(0, len(trial), 4).astype(int)
+    found = []
+    for number, (begin, end) in enumerate(pairwise(edges.tolist()), start=1):
+        name = f"{trial.name}, part {number}"
+        samples = slice(begin, end)
+        found.append(trial.part(samples, name))
+    return found

@@ -52,28 +52,34 @@ def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
 
 def _recorded(model: ShipModel, trials: Sequence[Trial]) -> Iterator[Simulation]:
     for trial in trials:
-        name = f"trial {trial.name!r}, open loop"
-        least = float(trial["u"].min())
-        yield Simulation(name, partial(open_loop, model, trial), least)
+        yield Simulation(
+            name=f"trial {trial.name!r}, open loop",
+            sail=partial(open_loop, model, trial),
+            least_surge=float(trial["u"].min()),
+        )
 
 
 def _turns(model: ShipModel) -> Iterator[Simulation]:
     duration = DURATION_LENGTHS * model.travel_time
     dt = STEP * model.travel_time
     for angle in _angles_deg(model):
-        name = f"turning circle, {angle:+.0f} deg"
-        yield Simulation(name, partial(turning_circle, model, angle, duration, dt))
+        yield Simulation(
+            name=f"turning circle, {angle:+.0f} deg",
+            sail=partial(turning_circle, model, angle, duration, dt),
+        )
 
 
 def _reversals(model: ShipModel) -> Iterator[Simulation]:
     for angle in _angles_deg(model):
         for lengths in (2.5, 5.0, 10.0, 20.0):
-            name = f"rudder {angle:+.0f} deg reversed every {lengths:g} L/U"
-            yield Simulation(name, partial(reversed_rudder, model, angle, lengths))
+            yield Simulation(
+                name=f"rudder {angle:+.0f} deg reversed every {lengths:g} L/U",
+                sail=partial(reversed_rudder, model, angle, lengths),
+            )
 
 
 def _angles_deg(model: ShipModel) -> list[float]:
-    """Rudder angles of the manoeuvres to both sides, the hard turn within the rudder's limit."""
+    """Rudder angles of the manoeuvres, to both sides and within the rudder's limit."""
     limit = model.steering.rudder_limit_deg
     hard = min(RUDDER_DEG, limit)
     small = min(10.0, limit)
@@ -84,14 +90,18 @@ def _angles_deg(model: ShipModel) -> list[float]:
 
 
 def reversed_rudder(model: ShipModel, rudder_deg: float, lengths: float) -> Trial:
-    """Simulate a rudder put hard over from side to side, at intervals in ship lengths."""
-    step = np.arange(round(DURATION_LENGTHS / STEP))
-    side = step // round(lengths / STEP)
-    order = np.radians(rudder_deg) * np.where(side % 2 == 0, 1.0, -1.0)
+    """Simulate a rudder put over from side to side, at intervals in ship lengths."""
+    n_steps = round(DURATION_LENGTHS / STEP)
+    interval = round(lengths / STEP)
+    n_reversals = np.arange(n_steps) // interval
+    to_port = n_reversals % 2 == 1
+    rudder = np.full(n_steps, np.radians(rudder_deg))
+    rudder[to_port] *= -1.0
 
-    commands = np.tile(model.service_command, (len(step), 1))
-    commands[:, 0] = order
-    return model.simulate(commands, STEP * model.travel_time)
+    commands = np.tile(model.service_command, (n_steps, 1))
+    commands[:, 0] = rudder
+    dt = STEP * model.travel_time
+    return model.simulate(commands, dt)
 
 
 def why_unphysical(model: ShipModel, simulation: Simulation) -> str | None:
@@ -101,15 +111,22 @@ def why_unphysical(model: ShipModel, simulation: Simulation) -> str | None:
     except UnstableModelError as error:
         return f"ran away after {error.time_s:.0f} s"
 
-    length, speed = model.particulars["length"], model.particulars["speed"]
-    slowest, fastest = trial["u"].min(), trial["u"].max()
-    sway, yaw = np.abs(trial["v"]).max(), np.abs(trial["r"]).max()
-    if slowest < min(simulation.least_surge, 0.0) or fastest > FASTEST * speed:
+    length = model.particulars["length"]
+    speed = model.particulars["speed"]
+    slowest = trial["u"].min()
+    fastest = trial["u"].max()
+    least_surge = min(simulation.least_surge, 0.0)
+    if slowest < least_surge or fastest > FASTEST * speed:
         return f"surge speed from {slowest:.3g} to {fastest:.3g} m/s"
+
+    sway = np.abs(trial["v"]).max()
     if sway > speed:
         return f"sway speed of {sway:.3g} m/s"
+
+    yaw = np.abs(trial["r"]).max()
     if yaw * length > QUICKEST_TURN * speed:
-        return f"yaw rate of {np.degrees(yaw):.3g} deg/s"
+        yaw_deg = np.degrees(yaw)
+        return f"yaw rate of {yaw_deg:.3g} deg/s"
     return None
 
 
@@ -126,15 +143,17 @@ class GuardedFit:
 
 
 def guarded_fit(method: Method, task: FitTask, guarded: bool = True) -> GuardedFit:
-    """Fit by a method; if the model runs away, with the weakest penalty under which it does not.
+    """Fit by a method; if the model runs away, with a penalty.
 
-    Not stable, and without a penalty, where none helped or it is not `guarded`.
+    The penalty is the weakest under which the model does not run away. Not stable, and
+    without a penalty, where none helped or it is not `guarded`.
     """
     estimators = method.fitted(task)
     model = with_coefficients(task.blank, estimators)
     reasons = reasons_unstable(model, task.trials)
     if not reasons:
-        return GuardedFit(model, estimators, True, {"decision": "stable as fitted"})
+        report: dict[str, Any] = {"decision": "stable as fitted"}
+        return GuardedFit(model, estimators, stable=True, report=report)
 
     decision = "runs away, not guarded"
     if guarded and method.regularised:
@@ -143,7 +162,7 @@ def guarded_fit(method: Method, task: FitTask, guarded: bool = True) -> GuardedF
             return penalised
         decision = "runs away under every penalty"
     report = {"decision": decision, "rejected": reasons}
-    return GuardedFit(model, estimators, False, report)
+    return GuardedFit(model, estimators, stable=False, report=report)
 
 
 def penalised_fit(task: FitTask, reasons: list[str]) -> GuardedFit | None:
@@ -153,8 +172,11 @@ def penalised_fit(task: FitTask, reasons: list[str]) -> GuardedFit | None:
     relative to what the terms contribute in a hard turn.
     """
     blank = task.blank
-    shaft_speed = blank.service_shaft_speed
-    sizes = hard_turn_features(blank.table, blank.particulars, shaft_speed)
+    sizes = hard_turn_features(
+        blank.table,
+        blank.particulars,
+        blank.service_shaft_speed,
+    )
     for strength in np.geomspace(1e-3, 1.0, 19).tolist():
         estimators = fit_held(task.samples, sizes, strength)
         model = with_coefficients(blank, estimators)
@@ -164,12 +186,11 @@ def penalised_fit(task: FitTask, reasons: list[str]) -> GuardedFit | None:
                 "strength": strength,
                 "rejected": reasons,
             }
-            return GuardedFit(model, estimators, True, report)
+            return GuardedFit(model, estimators, stable=True, report=report)
     return None
 
 
 def with_coefficients(blank: ShipModel, estimators: Estimators) -> ShipModel:
-    """The model with the hydrodynamic derivatives that follow from the fitted accelerations."""
-    return blank.with_accelerations(
-        {q: estimator.coef_ for q, estimator in estimators.items()}
-    )
+    """The model whose derivatives follow from the fitted accelerations."""
+    accelerations = {q: estimator.coef_ for q, estimator in estimators.items()}
+    return blank.with_accelerations(accelerations)

@@ -1,4 +1,4 @@
-"""The steady hard turn of a full ship, and what each term of a structure contributes in it."""
+"""The steady hard turn of a full ship, and the contribution of each term in it."""
 
 import numpy as np
 
@@ -19,15 +19,16 @@ SHAFT_RATIO = 0.9
 def hard_turn_features(
     structure: Structure, particulars: Particulars, shaft_speed: float
 ) -> dict[str, Floats]:
-    """Size of each term in a hard turn, by equation, arrays of shape (n_terms,), SI units."""
-    length, service_speed = particulars["length"], particulars["speed"]
-    speed = SPEED_RATIO * service_speed
-    drift, heel = np.radians(DRIFT_DEG), np.radians(HEEL_DEG)
+    """Size of each term in a hard turn, by equation, SI units, shape (n_terms,)."""
+    length = particulars["length"]
+    speed = SPEED_RATIO * particulars["speed"]
+    drift = np.radians(DRIFT_DEG)
+    heel = np.radians(HEEL_DEG)
     state = {
         "u": speed * np.cos(drift),
         "v": -speed * np.sin(drift),
         "r": YAW_RATE * speed / length,
-        "p": heel * SPEED_RATIO * service_speed / length,
+        "p": heel * SPEED_RATIO * particulars["speed"] / length,
         "phi": heel,
         "delta": np.radians(RUDDER_DEG),
         "n": SHAFT_RATIO * shaft_speed,

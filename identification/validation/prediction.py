@@ -15,14 +15,15 @@ COMPARED = ("u", "v", "r", "psi")
 ZIGZAG = ("overshoot_1_deg", "overshoot_2_deg")
 TURNING = ("advance_lengths", "transfer_lengths", "tactical_diameter_lengths")
 
-#: From a run of a trial's manoeuvre, None for one that ran away, to its indices or None.
+#: From a run of a trial's manoeuvre, or None for one that ran away, to its indices.
 IndexReader = Callable[[Trial | None], Any]
 
 
 def predict(model: ShipModel, trial: Trial) -> Trial | None:
-    """Simulate a trial from its initial state and measured rudder; None if the model runs away.
+    """Simulate a trial from its initial state and measured rudder.
 
-    Initial velocities that were derived are estimated (`with_start`).
+    Initial velocities that were derived are estimated (`with_start`). None if the model
+    runs away.
     """
     try:
         return open_loop(model, with_start(model, trial))
@@ -33,11 +34,12 @@ def predict(model: ShipModel, trial: Trial) -> Trial | None:
 def trial_metrics(
     model: ShipModel, trial: Trial, prediction: Trial | None
 ) -> dict[str, Any]:
-    """Errors of a prediction and the indices of measurement and prediction by the same function.
+    """Errors of a prediction, and indices of measurement and prediction.
 
-    Returns `use`, `diverged`, `rmse` (SI; by channel) and for each index `measured` and
-    `predicted`, of overshoots also `closed_loop` (the rudder reversed at the measured
-    headings), None where the manoeuvre has no such index or never got there.
+    Returns `use`, `diverged`, `rmse` (SI; by channel) and for each index, by the same
+    function, `measured` and `predicted`, of overshoots also `closed_loop` (the rudder
+    reversed at the measured headings), None where the manoeuvre has no such index or
+    never got there.
     """
     metrics: dict[str, Any] = {
         "use": trial.use,
@@ -46,8 +48,10 @@ def trial_metrics(
         **dict.fromkeys((*ZIGZAG, *TURNING)),
     }
     read = index_reader(model, trial)
-    measured = None if read is None else read(trial)
-    if read is None or measured is None:
+    if read is None:
+        return metrics
+    measured = read(trial)
+    if measured is None:
         return metrics
 
     runs = {"measured": measured, "predicted": read(prediction)}
@@ -66,17 +70,20 @@ def trial_metrics(
 def _errors(trial: Trial, prediction: Trial | None) -> dict[str, float | None]:
     """Root mean square errors by channel; None for one that is not known."""
     errors: dict[str, float | None] = dict.fromkeys(COMPARED)
-    if prediction is not None:
-        for name in COMPARED:
-            if name in trial:
-                errors[name] = root_mean_square(prediction[name] - trial[name])
+    if prediction is None:
+        return errors
+    for name in COMPARED:
+        if name in trial:
+            error = prediction[name] - trial[name]
+            errors[name] = root_mean_square(error)
     return errors
 
 
 def index_reader(model: ShipModel, trial: Trial) -> IndexReader | None:
-    """From a run of the trial's manoeuvre to its indices, or None; None for other manoeuvres.
+    """From a run of the trial's manoeuvre to its indices; None for other manoeuvres.
 
-    Runs have none where a channel such as the position is missing.
+    The reader gives None for a run without a channel that it needs, such as the
+    position.
     """
     length = model.particulars["length"]
     indices: Callable[[Trial], Any]

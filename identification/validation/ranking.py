@@ -1,4 +1,4 @@
-"""Structures and methods on the same trials, ranked by how well they predict trials held out."""
+"""Structures and methods ranked by how well they predict trials held out."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -33,7 +33,7 @@ class RankedFit:
 
     @property
     def rank(self) -> tuple[Any, ...]:
-        """By which fits are sorted: first those that never run away, then by the error."""
+        """Sort key: first those that never run away, then by the error."""
         return self.ran_away, not self.stable, self.error is None, self.error or 0.0
 
 
@@ -61,15 +61,17 @@ class Ranking:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
-        in_turn = "each trial in turn"
+        held_out = "trials marked validate"
+        if self.in_turn:
+            held_out = "each trial in turn"
+        left_out = {name: list(left) for name, left in self.left_out.items()}
+        methods = {"method": list(self.results)}
         return {
-            "held_out": in_turn if self.in_turn else "trials marked validate",
+            "held_out": held_out,
             "ranking": [asdict(fit) for fit in self.ranked],
             "refused": self.refused,
-            "settings_left_out": {
-                name: list(left) for name, left in self.left_out.items()
-            },
-            "settings": self.best.settings | {"method": list(self.results)},
+            "settings_left_out": left_out,
+            "settings": self.best.settings | methods,
         }
 
 
@@ -78,24 +80,24 @@ def in_turn(
     trials: Sequence[Trial],
     groups: int,
 ) -> tuple[dict[str, Any], list[IdentificationResult]]:
-    """Metrics of each trial by its name, predicted by what was identified with its group held out.
+    """Metrics of each trial by its name, predicted with its group held out.
 
     `identify`: from the names held out; `groups`: at most one per trial, in their
-    order.
+    order. Returns what was identified, too.
     """
-    metrics, results = dict[str, Any](), list[IdentificationResult]()
-    groups = max(1, min(groups, len(trials)))
-    group_of = np.arange(len(trials)) * groups // len(trials)
+    names = [trial.name for trial in trials]
+    groups = max(1, min(groups, len(names)))
+    group_of = np.arange(len(names)) * groups // len(names)
+    metrics = dict[str, Any]()
+    results = list[IdentificationResult]()
     for group in range(groups):
-        held = [
-            trial.name
-            for trial, own in zip(trials, group_of, strict=True)
-            if own == group
-        ]
+        members = np.flatnonzero(group_of == group)
+        held = [names[index] for index in members]
         result = identify(held)
         results.append(result)
+        of_trials = result.metrics["trials"]
         for name in held:
-            metrics[name] = result.metrics["trials"][name]
+            metrics[name] = of_trials[name]
     return metrics, results
 
 
@@ -107,20 +109,28 @@ def fit_name(structure: str, method: str) -> str:
 def ranked_fit(
     results: Sequence[IdentificationResult], seen: Metrics, trials: Sequence[Trial]
 ) -> RankedFit:
-    """How well a method that gave `results` predicts trials; `seen`: metrics of those held out, by name."""
-    measured = {trial.name: trial for trial in trials}
-    errors = {
-        name: _relative_error(metrics, measured[name]) for name, metrics in seen.items()
-    }
+    """How well a method that gave `results` predicts trials.
+
+    `seen`: metrics of those held out, by name.
+    """
+    errors = {}
+    for trial in trials:
+        if trial.name in seen:
+            errors[trial.name] = _relative_error(seen[trial.name], trial)
     known = [error for error in errors.values() if error is not None]
-    provenance = results[0].model.provenance or {}
+    mean_error = None
+    if len(known) == len(errors):
+        mean_error = float(np.mean(known))
+
+    first = results[0]
+    provenance = first.model.provenance or {}
     return RankedFit(
         structure=provenance["structure"],
         method=provenance["method"],
-        coefficients=len(results[0].coefficients),
+        coefficients=len(first.coefficients),
         stable=all(result.stable for result in results),
         ran_away=sum(metrics["diverged"] for metrics in seen.values()),
-        error=float(np.mean(known)) if len(known) == len(errors) else None,
+        error=mean_error,
         heading_deg=_mean_degrees(seen, "psi"),
         yaw_rate_deg_s=_mean_degrees(seen, "r"),
         errors=errors,
@@ -128,7 +138,10 @@ def ranked_fit(
 
 
 def _relative_error(metrics: Mapping[str, Any], trial: Trial) -> float | None:
-    """Errors of the channels by their standard deviation; None where the simulation ran away."""
+    """Mean error of the channels by their standard deviation.
+
+    None where the simulation ran away.
+    """
     ratios = []
     for name, error in metrics["rmse"].items():
         if error is None:
@@ -136,11 +149,18 @@ def _relative_error(metrics: Mapping[str, Any], trial: Trial) -> float | None:
         deviation = float(np.std(trial[name]))
         if deviation > 0.0:
             ratios.append(error / deviation)
-    return float(np.mean(ratios)) if ratios else None
+    if not ratios:
+        return None
+    return float(np.mean(ratios))
 
 
 def _mean_degrees(seen: Metrics, channel: str) -> float | None:
-    """Mean over the trials of the error of an angle, degrees; None where none is known."""
-    errors = [metrics["rmse"][channel] for metrics in seen.values()]
-    known = [error for error in errors if error is not None]
-    return float(np.degrees(np.mean(known))) if known else None
+    """Mean over the trials of the error of an angle, degrees; None for none known."""
+    known = []
+    for metrics in seen.values():
+        error = metrics["rmse"][channel]
+        if error is not None:
+            known.append(error)
+    if not known:
+        return None
+    return float(np.degrees(np.mean(known)))

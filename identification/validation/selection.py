@@ -1,4 +1,4 @@
-"""Which structure and which method predict trials held out best, for `structure = "auto"`."""
+"""Which structure and method predict held-out trials best, for `structure = "auto"`."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -19,8 +19,7 @@ from identification.validation.ranking import (
     ranked_fit,
 )
 from shipgym import InputError, Trial
-from shipgym.ships.grey_boxes import GREY_BOX
-from shipgym.ships.mmg import MMG
+from shipgym.ships.structures import GREY_BOX, MMG
 
 TABLES = (
     "nomoto",
@@ -46,9 +45,9 @@ def select(
     identify: Identify,
     trials: Sequence[Trial],
     options: Options,
-    structures: Sequence[str] | None = None,
+    structures: Sequence[str] = STRUCTURES,
 ) -> tuple[Options, dict[str, Any]]:
-    """The options with the structure and method that predict best, and the ranking, for the provenance.
+    """The options with the structure and method that predict best, and the ranking.
 
     Every structure that trials and particulars allow is fitted by its usual method, a
     table that comes first by others too, and each trial (each third of a single one)
@@ -56,19 +55,23 @@ def select(
     whose error exceeds the least by no more than one standard error of their difference
     over the trials, or by 2 %. A method other than the default is the only one, and
     what does not know a setting is refused; InputError where nothing can be fitted,
-    with the first reason. `structures`: to try, by default `STRUCTURES`.
+    with the first reason. The ranking is for the provenance.
     """
-    single = len(trials) == 1
-    parts = pieces(trials[0]) if single else trials
+    parts = trials
+    held_out = "each trial in turn"
+    if len(trials) == 1:
+        parts = pieces(trials[0])
+        held_out = "each third of the only trial"
     attempts = _Attempts(identify, [part.with_(kind=None) for part in parts], options)
     free = options.method_is_default
-    for structure in counted("structures", structures or STRUCTURES):
+    for structure in counted("structures", structures):
         method = options.method
         if free:
             method = methods_of(structure, options.method)[0]
         attempts.add(structure, method)
     if not attempts.ranked:
-        raise InputError(next(iter(attempts.refused.values())))
+        first_reason = next(iter(attempts.refused.values()))
+        raise InputError(first_reason)
 
     first = attempts.by_rank()[0].structure
     if free and first in TABLES:
@@ -77,10 +80,10 @@ def select(
 
     ranked = attempts.by_rank()
     best = simplest(ranked)
-    in_order = [best, *(fit for fit in ranked if fit is not best)]
+    others = [fit for fit in ranked if fit is not best]
     report = {
-        "held_out": "each third of the only trial" if single else "each trial in turn",
-        "ranking": [asdict(fit) for fit in in_order],
+        "held_out": held_out,
+        "ranking": [asdict(fit) for fit in (best, *others)],
         "refused": attempts.refused,
     }
     return _chosen(options, best, free), report
@@ -145,7 +148,7 @@ def _chosen(options: Options, best: RankedFit, free: bool) -> Options:
 
 
 def methods_of(structure: str, usual: str) -> tuple[str, ...]:
-    """Methods that a structure is fitted by where none are named, the first before others are tried."""
+    """Methods that a structure is fitted by where none are named, the usual first."""
     if structure == GREY_BOX:
         return (RM_SVM,)
     if structure == MMG:
@@ -154,7 +157,7 @@ def methods_of(structure: str, usual: str) -> tuple[str, ...]:
 
 
 def reference_of(structure: str, named: Any) -> Any:
-    """The reference ship of a structure that knows one, as it was named; None for others."""
+    """The reference ship of a structure that knows one, as named; None for others."""
     if structure == GREY_BOX:
         return named or AUTO
     if structure == MMG:
@@ -163,15 +166,15 @@ def reference_of(structure: str, named: Any) -> Any:
 
 
 def simplest(ranked: Sequence[RankedFit]) -> RankedFit:
-    """Of those whose errors differ from the first's by chance the one with the fewest coefficients."""
+    """The fit of fewest coefficients whose errors differ from the first's by chance."""
     first = ranked[0]
     if first.error is None:
         return first
-    as_good = [
-        fit
-        for fit in ranked
-        if fit.stable and not fit.ran_away and _differs_by_chance(fit, first)
-    ]
+    as_good = []
+    for fit in ranked:
+        sails = fit.stable and not fit.ran_away
+        if sails and _differs_by_chance(fit, first):
+            as_good.append(fit)
     return min(
         as_good,
         key=lambda fit: (fit.coefficients, fit.method in OTHERS),
@@ -180,13 +183,13 @@ def simplest(ranked: Sequence[RankedFit]) -> RankedFit:
 
 
 def _differs_by_chance(fit: RankedFit, first: RankedFit) -> bool:
-    """Whether errors exceed those of the first by one standard error at most, or by 2 %."""
-    excess = np.array(
-        [
-            (fit.errors[name] or 0.0) - (error or 0.0)
-            for name, error in first.errors.items()
-        ]
-    )
-    standard_error = float(np.std(excess, ddof=1)) / np.sqrt(len(excess))
+    """Whether errors exceed the first's by one standard error at most, or by 2 %."""
+    differences = []
+    for name, error in first.errors.items():
+        own = fit.errors[name] or 0.0
+        differences.append(own - (error or 0.0))
+    excess = np.mean(differences)
+    deviation = float(np.std(differences, ddof=1))
+    standard_error = deviation / np.sqrt(len(differences))
     nothing = 0.02 * (first.error or 0.0)
-    return bool(excess.mean() <= max(standard_error, nothing))
+    return bool(excess <= max(standard_error, nothing))

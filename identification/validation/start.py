@@ -1,4 +1,4 @@
-"""The state at which a prediction starts, where the record has velocities only as derivatives."""
+"""The state at which a prediction starts where the record derived its velocities."""
 
 from dataclasses import dataclass
 
@@ -21,17 +21,20 @@ def with_start(model: ShipModel, trial: Trial) -> Trial:
     the unknowns, Maine & Iliff 1985, NASA RP-1138). A trial whose velocities were
     measured stays as it is.
     """
-    names = [
-        name for name in "uvr" if name in trial.derived and name in model.state_names
-    ]
+    derived = [name for name in "uvr" if name in trial.derived]
+    names = [name for name in derived if name in model.state_names]
     if not names or "psi" not in trial:
         return trial
+
     length, speed = model.particulars["length"], model.particulars["speed"]
-    window = trial.t <= trial.t[0] + WINDOW * length / speed
+    end = trial.t[0] + WINDOW * length / speed
+    window = trial.t <= end
     if np.sum(window) < 3:
         return trial
+
+    opening = _opening(model, trial, window)
     try:
-        start = _estimated(model, _opening(model, trial, window), names)
+        start = _estimated(model, opening, names)
     except UnstableModelError:
         return trial
     return _begun(trial, names, start)
@@ -49,18 +52,22 @@ class _Opening:
 
 def _opening(model: ShipModel, trial: Trial, window: Floats) -> _Opening:
     """Heading, and track or velocities, in the first part of a trial."""
-    length, speed = model.particulars["length"], model.particulars["speed"]
     measured = trial.channels.keys() - trial.derived
     if {"x", "y"} <= measured:
         channels = ("psi", "x", "y")
-        floor = 0.005 * length
+        floor = 0.005 * model.particulars["length"]
     else:
         channels = ("psi", "u", "v")
-        floor = 0.02 * speed
-    floors = np.array([[np.radians(0.1)], [floor], [floor]])
+        floor = 0.02 * model.particulars["speed"]
+    heading = np.radians(0.1)
+    floors = np.array([[heading], [floor], [floor]])
 
     samples = {name: values[window] for name, values in trial.channels.items()}
-    return _Opening(Trial(trial.t[window], samples), channels, floors)
+    return _Opening(
+        trial=Trial(trial.t[window], samples),
+        channels=channels,
+        floors=floors,
+    )
 
 
 def _estimated(model: ShipModel, opening: _Opening, names: list[str]) -> Floats:
@@ -70,43 +77,64 @@ def _estimated(model: ShipModel, opening: _Opening, names: list[str]) -> Floats:
     scales are renewed between them, which `scipy.optimize.least_squares` would take for
     fits of their own, of more simulations each and other last digits.
     """
-    length, speed = model.particulars["length"], model.particulars["speed"]
-    units = np.array([speed / length if name == "r" else speed for name in names])
-    step = 1e-4
     start = np.array([opening.trial[name][0] for name in names])
     scales = opening.floors
-
     for _ in range(3):
-        errors = _errors(model, opening, names, start)
-        slopes = []
-        for move in np.diag(step * units):
-            moved = _errors(model, opening, names, start + move)
-            change = (moved - errors) / scales
-            slopes.append(change.ravel())
-        jacobian = np.array(slopes).T / step
-        residuals = (errors / scales).ravel()
-
-        correction, *_ = np.linalg.lstsq(jacobian, residuals, rcond=1e-6)
-        start = start - units * correction
+        correction = _correction(model, opening, names, start, scales)
+        start = start + correction
         left = _errors(model, opening, names, start)
-        rms = np.sqrt(np.mean(left**2, axis=1, keepdims=True))
-        scales = np.maximum(rms, opening.floors)
+        mean_squares = np.mean(left**2, axis=1, keepdims=True)
+        scales = np.maximum(np.sqrt(mean_squares), opening.floors)
     return start
+
+
+def _correction(
+    model: ShipModel,
+    opening: _Opening,
+    names: list[str],
+    start: Floats,
+    scales: Floats,
+) -> Floats:
+    """Step of Gauss-Newton from a start, by forward differences, shape (n_names,)."""
+    speed = model.particulars["speed"]
+    rate = speed / model.particulars["length"]
+    units = np.array([rate if name == "r" else speed for name in names])
+    step = 1e-4
+
+    errors = _errors(model, opening, names, start)
+    slopes = []
+    for move in np.diag(step * units):
+        moved = _errors(model, opening, names, start + move)
+        change = (moved - errors) / scales
+        slopes.append(change.ravel())
+    jacobian = np.array(slopes).T / step
+    residuals = (errors / scales).ravel()
+
+    excess, *_ = np.linalg.lstsq(jacobian, residuals, rcond=1e-6)
+    return np.asarray(-units * excess)
 
 
 def _errors(
     model: ShipModel, opening: _Opening, names: list[str], start: Floats
 ) -> Floats:
-    """Simulated less measured channels after the first sample, shape (n_channels, n_samples - 1)."""
+    """Simulated less measured channels after the first sample.
+
+    Shape (n_channels, n_samples - 1).
+    """
     trial = opening.trial
     run = open_loop(model, _begun(trial, names, start))
-    errors = [run[name] - trial[name] for name in opening.channels]
-    return np.array(errors)[:, 1:]
+    errors = []
+    for name in opening.channels:
+        error = run[name] - trial[name]
+        errors.append(error[1:])
+    return np.array(errors)
 
 
 def _begun(trial: Trial, names: list[str], start: Floats) -> Trial:
     """The trial with other first samples of some channels."""
     channels = {}
     for name, first in zip(names, start, strict=True):
-        channels[name] = np.append(first, trial[name][1:])
+        values = trial[name].copy()
+        values[0] = first
+        channels[name] = values
     return trial.with_channels(channels)

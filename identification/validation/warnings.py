@@ -1,4 +1,4 @@
-"""What speaks against an identified model: why it must not be used, and what to know before using it."""
+"""Why an identified model must not be used, and what to know before using it."""
 
 from collections.abc import Mapping
 from pathlib import PurePath
@@ -15,7 +15,7 @@ EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw", "p": "roll"}
 
 
 def why_unstable(fit: Fit) -> str | None:
-    """Why an identified model must not be used, in one sentence; None where it is stable."""
+    """Why an identified model must not be used; None where it is stable."""
     ran_away = [name for name, run in fit.predictions.items() if run is None]
     if ran_away:
         first = PurePath(ran_away[0]).name
@@ -31,7 +31,7 @@ def why_unstable(fit: Fit) -> str | None:
 
 
 def model_warnings(fit: Fit) -> list[str]:
-    """Warnings before a stable model is used, a sentence each without capital and stop."""
+    """Warnings before a stable model is used, sentences without capital and stop."""
     provenance = _provenance(fit)
     return [
         *_steers_to_port(fit.model),
@@ -51,17 +51,22 @@ def model_warnings(fit: Fit) -> list[str]:
 
 
 def heading_errors_deg(fit: Fit, use: str | None = None) -> dict[str, float]:
-    """Root mean square error of the predicted heading by trial, of all or of one use, where known."""
+    """Root mean square error of the predicted heading by trial, where known.
+
+    Of all trials, or of one use.
+    """
     errors = {}
     for name, metrics in fit.metrics["trials"].items():
+        if use is not None and metrics["use"] != use:
+            continue
         error = metrics["rmse"]["psi"]
-        if error is not None and use in (None, metrics["use"]):
+        if error is not None:
             errors[name] = float(np.degrees(error))
     return errors
 
 
 def held_out_error(fit: Fit) -> str:
-    """The worst errors on the trials held out, of heading and of an index, in one sentence."""
+    """The worst errors on the trials held out, of heading and of an index."""
     unseen = {
         name: metrics
         for name, metrics in fit.metrics["trials"].items()
@@ -77,15 +82,17 @@ def held_out_error(fit: Fit) -> str:
     headings = heading_errors_deg(fit, "validate")
     if headings:
         worst = max(headings, key=lambda name: headings[name])
-        errors.append(f"heading {headings[worst]:.2g} deg rms ({PurePath(worst).name})")
+        trial = PurePath(worst).name
+        errors.append(f"heading {headings[worst]:.2g} deg rms ({trial})")
     errors += _worst_index(unseen)
     if not errors:
         return "No held-out trial has a heading."
-    return f"Worst errors on held-out trials: {', '.join(errors)}."
+    found = ", ".join(errors)
+    return f"Worst errors on held-out trials: {found}."
 
 
 def _worst_index(unseen: Mapping[str, Any]) -> list[str]:
-    """The index with the largest relative error over some trials, in words; none without any."""
+    """The index with the largest relative error, in words; none without any."""
     words = {
         "overshoot_1_deg": "first overshoot",
         "overshoot_2_deg": "second overshoot",
@@ -101,37 +108,50 @@ def _worst_index(unseen: Mapping[str, Any]) -> list[str]:
                 continue
             measured, predicted = values["measured"], values["predicted"]
             if measured and predicted is not None:
-                errors.append((abs(predicted / measured - 1.0), name, index))
+                error = abs(predicted / measured - 1.0)
+                errors.append((error, name, index))
     if not errors:
         return []
+
     error, name, index = max(errors)
-    return [f"{words[index]} {100.0 * error:.2g} % ({PurePath(name).name})"]
+    per_cent = 100.0 * error
+    trial = PurePath(name).name
+    return [f"{words[index]} {per_cent:.2g} % ({trial})"]
 
 
 def undetermined(fit: Fit) -> list[str]:
-    """For each equation the terms that the data cannot separate, of directions that the fit left out."""
+    """For each equation the terms that the data cannot separate.
+
+    They make up the directions that the fit left out.
+    """
     sentences = []
     for name, equation in fit.diagnostics.items():
-        if equation.dropped:
-            groups = "; ".join(", ".join(group) for group in equation.dropped)
-            sentences.append(
-                f"{EQUATIONS.get(name, name)}: the data cannot separate these terms,"
-                f" their combination was left out: {groups}"
-            )
+        if not equation.dropped:
+            continue
+        groups = [", ".join(group) for group in equation.dropped]
+        left_out = "; ".join(groups)
+        sentences.append(
+            f"{EQUATIONS.get(name, name)}: the data cannot separate these terms,"
+            f" their combination was left out: {left_out}"
+        )
     return sentences
 
 
 def exactly_collinear(fit: Fit) -> list[str]:
-    """For each equation of which no direction was left out the terms that are in proportion in the data."""
+    """For each equation the terms that are in proportion in the data.
+
+    Of equations of which no direction was left out.
+    """
     but_for_rounding = 1e8  # condition number of terms in proportion
     sentences = []
     for name, equation in fit.diagnostics.items():
         if equation.condition_number <= but_for_rounding or equation.dropped:
             continue
         pairs = [f"{one} and {other}" for one, other, _ in equation.collinear_pairs]
+        collinear = "; ".join(pairs)
         sentences.append(
             f"{EQUATIONS.get(name, name)}: exactly collinear in the data:"
-            f" {'; '.join(pairs)}; only combinations are determined, their shares are"
+            f" {collinear}; only combinations are determined, their shares are"
             " the method's choice"
         )
     return sentences
@@ -142,7 +162,7 @@ def _provenance(fit: Fit) -> dict[str, Any]:
 
 
 def _steers_to_port(model: ShipModel) -> list[str]:
-    """A ship whose initial yaw acceleration by rudder to starboard, which every ship has, is to port."""
+    """A ship that a rudder to starboard turns to port at first, as it turns no ship."""
     try:
         _, B = steering_state_space(model)
     except InputError:  # no straight course to linearise about
@@ -198,7 +218,7 @@ def _not_refined(provenance: Mapping[str, Any]) -> list[str]:
 
 
 def _shaft_ignored(fit: Fit) -> list[str]:
-    """Trials of different shaft speed, or from rest, under a structure that knows no shaft."""
+    """Trials of different shaft speed, or from rest, for a structure without shaft."""
     model = fit.model
     trials = [trial for trial in fit.trials if trial.use == "fit" and "n" in trial]
     has_shaft = "n" in model.command_names
@@ -207,17 +227,18 @@ def _shaft_ignored(fit: Fit) -> list[str]:
 
     spread = _shaft_spread(trials)
     way = 0.5 * model.particulars["speed"]  # below which a trial starts from rest
-    at_rest = [trial for trial in trials if _first_speed(trial) < way]
+    at_rest = [trial.name for trial in trials if _first_speed(trial) < way]
     if spread <= 0.02 and not at_rest:
         return []
 
     rest = ""
     if at_rest:
-        names = ", ".join(PurePath(trial.name).name for trial in at_rest)
+        names = ", ".join(PurePath(name).name for name in at_rest)
         verb = "starts" if len(at_rest) == 1 else "start"
         rest = f", and {names} {verb} from rest"
+    per_cent = 100.0 * spread
     return [
-        f"the shaft speed varies by {100.0 * spread:.0f} % in the trials{rest}, which"
+        f"the shaft speed varies by {per_cent:.0f} % in the trials{rest}, which"
         f" structure {model.structure!r} does not know; choose one that does, such as"
         " cubic, or leave these trials out"
     ]
@@ -244,16 +265,21 @@ def _lost_headings(fit: Fit) -> list[str]:
     if not lost:
         return []
     named = [f"{PurePath(name).name} ({error:.0f} deg)" for name, error in lost.items()]
-    fitted = not lost.keys() <= heading_errors_deg(fit, "validate").keys()
+    trials = ", ".join(named)
+    held_out = heading_errors_deg(fit, "validate")
+    fitted = not lost.keys() <= held_out.keys()
+    cause = why_lost(fit.model, fitted)
     return [
         "the predicted heading drifts from the measured one by more than"
-        f" {LOST_HEADING_DEG:.0f} deg rms on {', '.join(named)}:"
-        f" {why_lost(fit.model, fitted)}"
+        f" {LOST_HEADING_DEG:.0f} deg rms on {trials}: {cause}"
     ]
 
 
 def why_lost(model: ShipModel, fitted: bool) -> str:
-    """The likely cause of a prediction that lost the heading, of trials that were fitted or of others."""
+    """The likely cause of a prediction that lost the heading.
+
+    `fitted`: whether it was of trials that were fitted.
+    """
     models = [model]
     if model.covariance is not None:
         models += model.sample(40, 0)

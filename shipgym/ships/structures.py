@@ -16,10 +16,10 @@ from shipgym.ships.terms import Term, read_terms, short_terms
 if TYPE_CHECKING:  # few models have equations
     from shipgym.ships.equations import ShipEquations
 
-#: Files of this package that define a ship with equations of her own, by her name.
-SHIPPED_EQUATIONS = ("container", "tanker", "kvlcc2", "mmg")
 GREY_BOX = "grey-box"
-MMG = "mmg"
+MMG = "mmg"  # the MMG method in its general form
+#: Files of this package that define a ship with equations of her own, by her name.
+SHIPPED_EQUATIONS = ("container", "tanker", "kvlcc2", MMG)
 #: The grey box stands on a reference ship, which only a user can name; the MMG form is
 #: no table.
 NO_TABLES = {

@@ -40,7 +40,7 @@ def test_their_way_fails_where_and_as_much_as_printed(samples):
 
 
 def test_what_the_columns_hold_decides_the_errors(rows):
-    """With r in place of r L the penalty drives X_rr away; without the constant Y_0, N_0 are as printed."""
+    """With r for r L the penalty drives X_rr away; the printed Y_0, N_0 need none."""
     found = {
         row.quantity: row
         for row in rows

@@ -85,7 +85,7 @@ def test_information_is_the_inverse_of_the_covariance_of_least_squares(
 def test_the_advised_manoeuvre_really_shrinks_the_error_in_a_refit(
     ship: ShipModel,
 ) -> None:
-    """A gentle zigzag hardly tells the cubic term; refits with each candidate show which one helps most."""
+    """A gentle zigzag hardly shows the cubic term; refits show which trial helps."""
     first = gentle(ship)
     times = {"duration": 600.0, "dt": 0.5}
     candidates = {
@@ -131,7 +131,7 @@ def test_every_choice_gains_and_none_loses(ship: ShipModel, criterion: str) -> N
 
 
 def test_criteria_ask_for_volume_longest_axis_or_one_coefficient() -> None:
-    """Relative errors 0.1, 0.01 and 1: to narrow a narrow axis shrinks the volume, not the longest axis."""
+    """Relative errors 0.1, 0.01, 1: a narrow axis counts in the volume alone."""
     known, size = np.diag([1e2, 1e4, 1.0]), np.ones(3)
     offers = {"first": np.diag([1e8, 0.0, 0.0]), "longest": np.diag([0.0, 0.0, 15.0])}
 
@@ -220,7 +220,7 @@ def test_candidates_that_no_ship_survives_are_refused(ship: ShipModel) -> None:
 
 
 def test_the_condition_of_a_trial_does_not_depend_on_units(ship: ShipModel) -> None:
-    """That of the features by their root mean squares, though those of yaw rates are tiny."""
+    """That of the features by their root mean squares, however tiny."""
     trial = gentle(ship)
     (known,) = advise(ship, [trial], {"same": gentle}).trials
     X = trial_regression(ship, trial).features["r"]
@@ -242,7 +242,7 @@ def test_the_condition_of_a_trial_does_not_depend_on_units(ship: ShipModel) -> N
 def test_windows_last_a_fifth_of_a_ship_length_but_a_tenth_of_a_short_trial(
     ship: ShipModel, samples: int, dt: float, window: int
 ) -> None:
-    """A ship length takes 20.85 s, a fifth of it 4.17 s; a window has a step at least."""
+    """A ship length takes 20.85 s, a fifth 4.17 s; windows are at least a step."""
     t = dt * np.arange(samples)
     swing = np.sin(2.0 * np.pi * t / t[-1])
     trial = Trial(
@@ -270,7 +270,7 @@ def test_noise_is_what_the_model_leaves_over_all_trials_and_of_exact_data_the_ro
 
 
 def test_an_error_is_felt_by_the_acceleration_that_it_is_a_part_of() -> None:
-    """A tenth of the sway by the rudder is more in m/s^2, a third of the yaw more of its equation."""
+    """A tenth of the sway by the rudder is more in m/s^2 than a third of the yaw."""
     given = {
         "b_v": -1.0,
         "b_r": -0.3,

@@ -49,7 +49,7 @@ def test_a_ship_that_runs_away_is_found_with_the_reason(
 def test_a_ship_that_resonates_is_found_by_reversing_the_rudder(
     mariner: ShipModel,
 ) -> None:
-    """A restoring moment and hardly any damping: she turns steadily, but swings up where the rudder does."""
+    """Restored and hardly damped: she turns steadily, but swings up with the rudder."""
     c = mariner.coefficients
     swinging = replace(
         mariner, coefficients=c | {"N_v": -c["N_v"], "N_r": -0.3 * c["N_r"]}
@@ -72,7 +72,7 @@ def test_size_of_a_term_in_the_hard_turn(mariner: ShipModel) -> None:
 
 
 def test_sizes_of_shaft_heel_and_memory_in_the_hard_turn(mariner: ShipModel) -> None:
-    """At 0.47 of the speed and 0.9 of the shaft's, r L / U = 0.8, 20.5 deg of drift, 5 deg of heel."""
+    """0.47 of the speed, 0.9 of the shaft's, r L / U = 0.8, drift 20.5, heel 5 deg."""
     p, speed = mariner.particulars, 0.47 * 7.7175
     u, v = speed * np.cos(np.radians(20.5)), speed * np.sin(np.radians(20.5))
     r, d, heel = 0.8 * speed / 160.93, np.radians(35.0), np.radians(5.0)
@@ -98,7 +98,7 @@ def test_sizes_of_shaft_heel_and_memory_in_the_hard_turn(mariner: ShipModel) -> 
     ],
 )
 def test_what_no_ship_does(channel: str, value: float, said: str) -> None:
-    """Of 100 m and 10 m/s: half as fast again, as fast sideways, turning at 3 U / L, astern if never seen."""
+    """A ship of 100 m and 10 m/s; limits of surge, sway and yaw, and none astern."""
     model: Any = SimpleNamespace(particulars={"length": 100.0, "speed": 10.0})
 
     def found(least: float = 3.0, **changed: float) -> str | None:
@@ -161,7 +161,7 @@ def test_least_squares_is_never_penalised_but_marked(
 def test_a_model_that_runs_away_on_a_trial_held_out_is_marked(
     cao_fit: IdentificationResult, cao_zigzag: Trial, mariner: ShipModel
 ) -> None:
-    """Stable in every turn of the guard, and but not under a rudder twenty times too large."""
+    """Stable in every turn of the guard, but not under a rudder 20 times too large."""
     hard = Trial(
         cao_zigzag.t,
         {**cao_zigzag.channels, "delta": 20.0 * cao_zigzag["delta"]},
@@ -189,7 +189,7 @@ def test_a_stable_fit_is_left_alone(cao_fit: IdentificationResult) -> None:
 
 
 def test_the_penalty_of_a_held_fit_is_relative_to_the_terms_of_a_hard_turn() -> None:
-    """Ridge of strength^2 times the number of samples on each term by its size over the mean window."""
+    """Ridge of strength^2 n on each term by its size over the mean window."""
     rng = np.random.default_rng(0)
     X, sizes, duration = (
         rng.standard_normal((50, 3)),
@@ -233,7 +233,7 @@ def test_the_rudder_is_reversed_at_intervals_by_the_ship_s_length(
 def test_a_fit_that_no_penalty_holds_is_marked(
     mariner: ShipModel, cao_zigzag: Trial, cao_fit: IdentificationResult
 ) -> None:
-    """A trial that begins at more than half as fast again as at service is that of no ship."""
+    """No ship begins a trial at more than half as fast again as at service."""
     fast = cao_zigzag.with_channels({"u": 1.6 * cao_zigzag["u"]})
     task = FitTask(cao_fit.samples, mariner, [fast])
     fit = guarded_fit(get_method("tls-svm"), task)

@@ -1,4 +1,4 @@
-"""KVLCC2, 7 m model, zigzags measured by HSVA: data that nobody wrote to please a program."""
+"""KVLCC2, 7 m model, zigzags measured by HSVA: data not written for a program."""
 
 from __future__ import annotations
 

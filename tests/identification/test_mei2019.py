@@ -1,4 +1,4 @@
-"""Mei 2019 run again: KVLCC2 from small zigzags, and the hard turns that none of them shows."""
+"""Mei 2019 again: KVLCC2 from small zigzags, and hard turns that none shows."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_table_4_gives_its_correlations_and_the_tanker() -> None:
 def test_the_turns_of_the_virtual_ship_come_within_one_per_cent(
     turns: dict[str, Row],
 ) -> None:
-    """From zigzags of 10 and 20 degrees; the same hull at another scale is 3 per cent off by itself."""
+    """From zigzags of 10 and 20 degrees; the hull at another scale is 3 % off."""
     aimed = [row for row in turns.values() if row.met is not None]
     assert len(aimed) == 4
     assert all(row.met for row in aimed)

@@ -1,4 +1,4 @@
-"""The MMG form: its equations, what is known of it beforehand, and what trials tell of it."""
+"""The MMG form: its equations, its priors, and what trials tell of it."""
 
 from __future__ import annotations
 
@@ -204,7 +204,7 @@ def test_a_model_of_the_form_scales_and_its_file_is_checked(tmp_path: Path) -> N
 
 
 def test_formulas_give_about_what_was_measured_of_kvlcc2() -> None:
-    """Zhou's added mass is that of the published set; the hull's derivatives are near her measured ones."""
+    """Zhou's added mass is the published one; the hull's derivatives are near."""
     estimated = frozenset(ADDED_MASSES)
     prior = mmg_prior(
         "yoshimura",
@@ -248,7 +248,7 @@ def test_formulas_give_about_what_was_measured_of_kvlcc2() -> None:
 
 @pytest.mark.parametrize("hull", HULL_FORMULAS)
 def test_formulas_claim_no_more_than_published_ships_bear_out(hull: str) -> None:
-    """The prior's deviation is at least the root mean square of published coefficients less the formula's."""
+    """Deviations are at least the rms of published coefficients less the formula's."""
     ships = [load_model("kvlcc2-l7"), *map(mmg_ship, MMG_SHIPS)]
     forms = [(ship.particulars, reference_coefficients(ship)) for ship in ships]
     s175 = load_model(
@@ -286,9 +286,7 @@ def test_formulas_claim_no_more_than_published_ships_bear_out(hull: str) -> None
         assert np.sqrt(np.mean(np.square(apart))) <= priors[0].deviation[k], name
 
 
-def test_main_dimensions_outside_the_range_are_said_and_an_unlike_reference_refused() -> (
-    None
-):
+def test_what_lies_outside_the_formulas_is_said_or_refused() -> None:
     slim = Particulars(
         length=100.0,
         beam=10.0,
@@ -514,7 +512,7 @@ def exact() -> Posterior:
 def test_errors_are_those_of_the_segments_and_their_slopes_are_derivatives(
     exact: Posterior,
 ) -> None:
-    """Segments of 1.7 ship lengths, samples 0.067 ship lengths apart at least: here 3 steps."""
+    """Segments of 1.7 ship lengths, samples at least 0.067 apart: here 3 steps."""
     everything, zero = np.arange(len(exact.segments)), np.zeros(len(mmg.IDENTIFIED))
     travel = 7.0 / 1.179
     assert len(exact.segments) == round(100.0 / (1.7 * travel))
@@ -593,7 +591,7 @@ def test_the_strongest_prior_within_a_tenth_of_the_least_error_is_taken(
 
 
 class Constant(Posterior):
-    """Measured numbers of one channel, each a ship length of one segment, all to be met by one."""
+    """Measured numbers of a channel, each a segment of a length, to be met by one."""
 
     def __init__(
         self, measured: list[float], trials: Sequence[int] = (), floor: float = 1e-3
@@ -611,10 +609,11 @@ class Constant(Posterior):
 
 
 def test_standard_errors_grow_by_what_is_held_out_beyond_what_is_expected() -> None:
-    """Of 9, 9 from 0, 0 and the reverse: (9 + 9) / 2^2 / (2 / 2^2 + 2^2) = 1 from the former, 0.
+    """Of 9, 9 from 0, 0 and the reverse: (9 + 9) / 2^2 / (2 / 2^2 + 2^2) = 1.
 
-    In scales of 2 their squares are 2 (9 / 2)^2 and 2 (1 / 2)^2, one each but for the
-    variance of the fit, of 1 / (2 / 2^2 + 1) with the prior as it is.
+    The reverse gives 0. In scales of 2 their squares are 2 (9 / 2)^2 and 2 (1 / 2)^2,
+    one each but for the variance of the fit, of 1 / (2 / 2^2 + 1) with the prior as it
+    is.
     """
     fit = Estimate(np.array([3.0]), np.array([2.0]), 2.0, np.eye(1), 1)
     far = Constant([9.0, 9.0, 0.0, 0.0], [0, 0, 1, 1])
@@ -625,9 +624,7 @@ def test_standard_errors_grow_by_what_is_held_out_beyond_what_is_expected() -> N
     assert near.held_out(fit, np.array([1.0])).factor == 1.0
 
 
-def test_the_most_probable_number_is_that_of_the_data_and_the_prior_by_their_scatter() -> (
-    None
-):
+def test_data_and_prior_count_by_their_scatter() -> None:
     """The prior counts by its strength squared, for the uncertainty by one."""
     problem = Constant([3.0, 5.0, 4.0])
     found = problem.most_probable(np.zeros(1), 2.0)

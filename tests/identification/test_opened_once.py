@@ -55,7 +55,7 @@ def test_strips_make_up_the_integral_of_the_cross_flow() -> None:
     ("v", "delta"), [(-1.2, 0.6), (1.2, 0.6), (-0.5, 0.1), (1.2, -0.3)]
 )
 def test_lift_is_at_right_angles_to_the_inflow(v: float, delta: float) -> None:
-    """So that a fixed rudder takes out as much power as its drag in an inflow straight from ahead does."""
+    """So that a fixed rudder takes out the power of its drag straight from ahead."""
     rudder = SimpleNamespace(aspect=1.5, rudder=12.0)
     ahead, aside = rudder_force(5.0, v, delta, rudder)
     straight, _ = rudder_force(hypot(5.0, v), 0.0, delta + atan2(v, 5.0), rudder)

@@ -379,7 +379,7 @@ def test_service_speeds_that_are_not_given_are_the_median_of_those_at_the_start(
         pose(idle, Options(structure="surge", particulars=known))
 
 
-def test_a_trial_of_heading_and_rudder_alone_is_one_at_service_speed_for_a_form_of_the_yaw_rate(
+def test_for_a_form_of_the_yaw_rate_heading_and_rudder_suffice(
     cao_zigzag: Trial,
 ) -> None:
     channels = {name: cao_zigzag[name] for name in ("psi", "r", "delta")}
@@ -422,7 +422,7 @@ def test_least_squares_and_ls_svm_agree_where_there_is_no_noise(
 
 
 def test_settings_are_recorded_as_json_knows_them(mariner: ShipModel) -> None:
-    """Infinity as null, arrays as lists, models by name, objects with their settings."""
+    """Infinity as null, arrays as lists, models by name, objects with settings."""
     gear = SteeringGear(30.0, 2.0, 1.0)
     found = plain(
         {

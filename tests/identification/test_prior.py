@@ -1,4 +1,4 @@
-"""Priors: coefficients pulled toward a reference ship's or toward regression formulas."""
+"""Priors: coefficients pulled toward a reference ship's or toward formulas."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def test_an_infinite_strength_of_formulas_is_what_they_say(
 def test_formulas_mean_the_same_ship_in_every_structure(
     target: ShipModel, structure: str
 ) -> None:
-    """Linearised about service speed, whatever the units and the powers of the speed."""
+    """Linearised about service speed, whatever units and powers of the speed."""
     table, ship = get_structure(structure), target.particulars.completed()
     found = formula_coefficients("clarke", table, ship)
     theta = np.concatenate([coefficients for coefficients, _ in found.values()])
@@ -162,7 +162,7 @@ def test_formulas_mean_the_same_ship_in_every_structure(
 
 
 def test_formulas_are_near_the_mmg_model_of_kvlcc2(target: ShipModel) -> None:
-    """To a third, which is what such regressions are worth; signs and units follow from it."""
+    """To a third, which is what regressions are worth; signs and units follow."""
     A, _ = steering_state_space(target)
     for formula in ("clarke", "kijima"):
         found = formula_coefficients(
@@ -182,7 +182,7 @@ def test_clarke_and_kijima_agree_in_sign_and_size(target: ShipModel) -> None:
 def test_the_prior_holds_the_hard_turn_that_no_zigzag_has(
     target: ShipModel, short_trials: list[Trial]
 ) -> None:
-    """Plain least squares runs away there; toward the full-scale ship it is within 8 per cent."""
+    """Least squares runs away; pulled to the full-scale ship it is within 8 %."""
     truth = turning_indices(turning_circle(target, 35, duration=140, dt=0.05), 7.0)
     assert not fit(target, short_trials).stable
     result = fit(target, short_trials, prior="kvlcc2")
@@ -195,7 +195,7 @@ def test_the_prior_holds_the_hard_turn_that_no_zigzag_has(
 
 
 def test_noise_calls_for_the_prior_and_the_true_ship_as_prior_recovers_it() -> None:
-    """The Mariner from one short zigzag: with noise, the coefficients come from the prior, and are right."""
+    """The Mariner from one short noisy zigzag: its prior makes the fit right."""
     ship = shipgym.load_model("mariner")
     truth = np.array(list(ship.coefficients.values()))
     run = zigzag(ship, 10, 10, duration=150, dt=0.1)
@@ -216,7 +216,7 @@ def test_noise_calls_for_the_prior_and_the_true_ship_as_prior_recovers_it() -> N
 
 
 def test_the_strength_may_be_judged_by_the_largest_rudder(target: ShipModel) -> None:
-    """The score of the prior by itself is its error on the 20/20 alone, whatever the 10/10 shows."""
+    """The prior's own score is its error on the 20/20, whatever the 10/10 shows."""
     small, large = (
         recorded(
             zigzag(target, angle, angle, duration=50, dt=0.05),
@@ -247,7 +247,7 @@ def test_the_strength_may_be_judged_by_the_largest_rudder(target: ShipModel) -> 
 
 
 def test_a_pull_is_that_of_generalised_ridge_regression() -> None:
-    """(X'X + S) w = X'y + S w0 with S = strength^2 n duration^2 R'R (Hoerl & Kennard 1970)."""
+    """(X'X + S) w = X'y + S w0, S = strength^2 n duration^2 R'R (Hoerl & Kennard)."""
     random = np.random.default_rng(0)
     X, y, root = (
         random.standard_normal((30, 2)),
@@ -353,7 +353,7 @@ def test_formulas_need_the_rudder_area(
 
 
 def test_formulas_are_those_printed() -> None:
-    """B/L 0.15, B/T 3, CB 0.7, T/L 0.05: Clarke et al. 1983 and Kijima et al. 1990, worked out."""
+    """B/L 0.15, B/T 3, CB 0.7, T/L 0.05 by Clarke 1983 and Kijima 1990, worked out."""
     ship = Particulars(
         length=100.0,
         beam=15.0,
@@ -383,7 +383,7 @@ def test_formulas_are_those_printed() -> None:
 
 
 def test_the_prior_itself_leaves_only_what_it_does_not_know_to_the_data() -> None:
-    """Known: 2 of the first term. The second is fitted to what it leaves, and alone is uncertain."""
+    """Known: 2 of the first term. The second is fitted to the rest, alone uncertain."""
     X = np.array([[1.0, 1.0], [2.0, 0.0], [0.0, 1.0], [1.0, -1.0]])
     y = X @ [2.0, 3.0] + [0.1, 9.0, -0.1, 0.0]
     pull = Prior(
@@ -407,7 +407,7 @@ def test_the_prior_itself_leaves_only_what_it_does_not_know_to_the_data() -> Non
 
 
 def test_the_strongest_pull_within_a_standard_error_of_the_best_is_chosen() -> None:
-    """Worse by 0.10 and 0.12 on average, where the standard error of both is 0.2 / root(4 - 1) = 0.115."""
+    """Worse by 0.10 and 0.12; the standard error is 0.2 / root(4 - 1) = 0.115."""
     errors = [[2.0] * 4, [1.0] * 4, [1.3, 0.9, 1.3, 0.9], [1.32, 0.92, 1.32, 0.92]]
     assert strongest_as_good(np.array(errors)) == 2
     assert strongest_as_good(np.array([[1.0], [1.0], [1.1]])) == 1

@@ -1,4 +1,4 @@
-"""Options by name, as a ship file and the command line have them, become the objects of `identify`."""
+"""Options by name, as in a ship file or command line, become objects of `identify`."""
 
 from __future__ import annotations
 

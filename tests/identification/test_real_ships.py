@@ -1,4 +1,4 @@
-"""The study of measured ships: quick facts of its data and of how its page is written."""
+"""The study of measured ships: facts of its data and of how its page is written."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def test_a_model_keeps_its_turn_when_it_is_taken_to_full_scale(data: Data) -> No
 def test_the_mmg_form_of_three_zigzags_predicts_the_others_and_the_circle(
     data: Data,
 ) -> None:
-    """Aims of 0.095 deg/s, 4.3 deg of heading, 4 % of tactical diameter and 1.5 deg of drift to starboard."""
+    """Aims: 0.095 deg/s, 4.3 deg of heading, 4 % of diameter, 1.5 deg of drift."""
     hsva = data.ship(SHIP, 4)
     model = fitted(hsva, prior=PriorKnowledge("kvlcc2-l7", 2.0))
     yaw_rate, heading, *_ = mean_errors(
@@ -142,7 +142,7 @@ def test_missing_captive_tests_are_told(tmp_path: Path) -> None:
 
 
 def test_what_is_held_out_is_not_fitted() -> None:
-    """Points on a line but for one far off it: nothing can tell that one from the others."""
+    """Points on a line but for one far off, which nothing can tell from the others."""
     x = np.linspace(1.0, 2.0, 10)
     y = 3.0 * x
     y[-1] += 5.0

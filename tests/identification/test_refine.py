@@ -97,7 +97,7 @@ def test_segments_cover_a_trial_and_the_second_set_begins_half_a_segment_later(
 
 
 def test_edges_divide_a_trial_alike() -> None:
-    """As many as come nearest to the duration; the second set begins half of it later."""
+    """As many as come nearest to the duration; the second set begins half of it on."""
     t = np.arange(100.0)
     assert segment_edges(t, 33.0, 0.0).tolist() == [0, 33, 66, 99]
     assert segment_edges(t, 38.0, 0.0).tolist() == [0, 33, 66, 99]  # 2.6 of them
@@ -356,7 +356,7 @@ def test_a_term_of_size_one_makes_up_the_whole_change() -> None:
 
 
 def test_scores_of_the_same_time_are_added_up_by_trial() -> None:
-    """In bins of 2 s from the first of each trial; the staggered set has the same times once more."""
+    """Bins of 2 s from the first of each trial; the staggered set has them twice."""
     segments: Any = [
         SimpleNamespace(trial=0, times=np.array([0.0, 1.0, 2.0, 3.9])),
         SimpleNamespace(trial=0, times=np.array([2.5, 7.0])),
@@ -415,10 +415,10 @@ def test_states_are_smoothed_but_for_the_rudder_and_begin_at_the_origin(
         assert np.std(np.diff(found[name], 2)) < 0.5 * np.std(np.diff(trial[name], 2))
 
 
-def test_compared_samples_are_an_interval_apart_and_the_grid_no_coarser_than_the_longest_step(
+def test_samples_are_an_interval_apart_on_a_fine_enough_grid(
     mariner: ShipModel,
 ) -> None:
-    """Steps of twice the longest are halved, and an interval of three of them is met to rounding."""
+    """Steps of twice the longest are halved; intervals of three are met to rounding."""
     longest = LONGEST_STEP * mariner.travel_time
     t = 2.0 * longest * np.arange(61.0)
     channels = {
@@ -475,7 +475,7 @@ def test_a_pull_counts_by_all_that_is_compared_and_an_offset_by_a_degree() -> No
 
 
 def test_scales_are_root_mean_squares_by_sample_of_the_trials_to_fit() -> None:
-    """Blocks stand for more samples than one, here two for eight; extra trials do not count."""
+    """Blocks stand for several samples, here two for eight; extra trials for none."""
     segment = SimpleNamespace(measured=np.zeros((8, 2)), blocks=[0, 4])
     shooting: Any = SimpleNamespace(
         residuals=np.array([1.0, 0.0, 3.0, 0.0, 99.0, 99.0])

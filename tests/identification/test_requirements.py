@@ -45,7 +45,7 @@ def test_every_term_of_the_chosen_models_has_a_meaning(rows):
 
 
 def test_thrust_that_falls_with_the_advance_is_the_container_ship_s_surge(rows):
-    """Resistance goes by u^2 and K_T falls linearly with J: nothing is left for a third order."""
+    """Resistance goes by u^2 and K_T falls with J: nothing is left for third order."""
     surge = next(
         row for row in rows if row.case == "R4" and "predicted u" in row.quantity
     )
@@ -55,7 +55,7 @@ def test_thrust_that_falls_with_the_advance_is_the_container_ship_s_surge(rows):
 @settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 1000), weight=st.floats(1e-3, 1e6), copied=st.booleans())
 def test_the_second_derivative_is_positive_in_every_direction(seed, weight, copied):
-    """Of J(w, b), also where two features are the same: with it the global minimum is the only one."""
+    """Of J(w, b), even where features are the same: its minimum is the only one."""
     random = np.random.default_rng(seed)
     X, y = random.standard_normal((30, 3)), random.standard_normal(30)
     if copied:

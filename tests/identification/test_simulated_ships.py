@@ -1,4 +1,4 @@
-"""Ships that coverage is counted on, `tests/ships/square_drag.py` and `inoue.py`: what is known of them."""
+"""Ships that coverage is counted on: `square_drag.py` and `inoue.py` of tests/ships."""
 
 from dataclasses import replace
 
@@ -103,7 +103,7 @@ def test_hull_coefficients_are_those_of_the_formulas_by_hand() -> None:
 
 
 def test_hull_forces_in_a_turn_are_the_sum_of_their_terms_in_si_units() -> None:
-    """Without rudder: what accelerates the ferry's mass and added mass is the hull's force and moment."""
+    """Without rudder the hull's force accelerates the ferry's mass and added mass."""
     ship = INOUE_SHIPS["ferry"]()
     bare = replace(ship, coefficients={**ship.coefficients, "A_R": 0.0})
     p, c, L, m = FERRY, hull(FERRY), 150.0, 1025.0 * 150.0 * 25.0 * 6.2 * 0.58
@@ -131,7 +131,7 @@ def test_hull_forces_in_a_turn_are_the_sum_of_their_terms_in_si_units() -> None:
 
 @pytest.mark.parametrize("name", INOUE_SHIPS)
 def test_thrust_falls_with_the_advance_ratio(name: str) -> None:
-    """Its coefficient, from the acceleration and the resistance: at rest, and along its slope at speed."""
+    """From the acceleration and the resistance: at rest, and by its slope at speed."""
     ship = INOUE_SHIPS[name]()
     c, L, n = ship.coefficients, ship.particulars["length"], ship.service_shaft_speed
     by_thrust = 0.5 * L * c["d"] / (c["screws"] * (1.0 - c["t_P"]) * n**2 * c["D"] ** 4)

@@ -76,7 +76,7 @@ def test_the_printed_gradient_is_the_one_of_the_package_on_scaled_columns():
 
 
 def test_the_printed_innovation_only_shortens_the_steps():
-    """tanh(omega e) of a yaw acceleration is omega e: the same path as SG with steps omega times as long."""
+    """tanh(omega e) of an acceleration is omega e: the path of SG with longer steps."""
     X, y = song2020.regression("nomoto")
     bent, largest = song2020.gradient(X[:2000], y[:2000], omega=0.5)
     short, _ = song2020.gradient(X[:2000], y[:2000], gain=0.5)
@@ -85,7 +85,7 @@ def test_the_printed_innovation_only_shortens_the_steps():
 
 
 def test_the_regressors_are_those_of_the_structure_of_the_package():
-    """But for thrust and rudder, and for what the structure has to find that is known here."""
+    """But for thrust and rudder, and what the structure has to find."""
     known = {"u": set(), "v": {"ur"}, "r": set(), "p": {"f"}}
     for equation, text in HULL.items():
         theirs = {term.powers for term in song2020_container.read_terms(text)}

@@ -1,4 +1,4 @@
-"""Each structure finds itself back: a virtual ship of it, its trials without noise, the fit."""
+"""Each structure finds itself back from trials of its own virtual ship."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def ship_of(name: str, coefficients: dict[str, float]) -> ShipModel:
 
 
 def recorded(run: Trial, name: str, every: int = 5, use: str = "fit") -> Trial:
-    """What sensors without noise record of a run: the shaft speed that was held, no orders."""
+    """What noiseless sensors record of a run: the shaft speed held, no orders."""
     names = {
         "n_command" if c == "n" else c: c
         for c in ("x", "y", "psi", "u", "v", "r", "delta", "n")
@@ -145,7 +145,7 @@ def zigzags(ship: ShipModel) -> list[Trial]:
 
 
 def weaves(ship: ShipModel) -> list[Trial]:
-    """The rudder to both sides in turn, twenty seconds on each: no loop of its own to compile."""
+    """The rudder to both sides in turn, twenty seconds on each: no loop to compile."""
     sides = np.repeat([1.0, -1.0] * 15, 200)
     runs = {}
     for angle, first in ((10, 1.0), (20, -1.0), (35, 1.0)):
@@ -204,7 +204,7 @@ def test_surge_is_recovered_from_accelerations_and_a_crash_stop(
 
 
 def test_the_container_ship_is_predicted_by_four_terms_as_well_as_zhu_printed() -> None:
-    """10/10 to fit, 20/20 predicted: Zhu 2018 prints 0.0472 m2/s2 of sway and 0.0162 deg2/s2 of yaw rate."""
+    """10/10 predicts 20/20; Zhu 2018 prints 0.0472 m2/s2 of sway, 0.0162 deg2/s2."""
     ship = shipgym.load_model("container")
     fit_to, predicted = (
         recorded(zigzag(ship, a, a, duration=600, dt=0.1), f"{a}", every=10)
@@ -235,7 +235,7 @@ def test_cubic_follows_the_speed_loss_of_the_container_ship() -> None:
 
 
 def test_nomoto2_is_the_exact_form_of_a_linear_ship() -> None:
-    """Sway taken out of linear steering leaves K, T1, T2, T3 of her transfer function."""
+    """Sway taken out of linear steering leaves K, T1, T2, T3."""
     ship = ship_of("linear-steering", PRIME)
     small = (
         zigzag(ship, 1.0, 1.0, port, duration=600, dt=0.1) for port in (False, True)
@@ -280,7 +280,7 @@ def test_time_constants_survive_the_noise_of_a_rate_gyro() -> None:
 
 
 def test_song_s_regressors_predict_the_rolling_container_ship() -> None:
-    """10/10 zigzags and random rudder to fit, 20/20 predicted open loop, roll and the loss of speed too."""
+    """10/10 and random rudder predict 20/20 open loop, roll and loss of speed too."""
     ship = shipgym.load_model("container")
     angles = np.random.default_rng(0).uniform(-25.0, 25.0, 40)
     commands = np.tile(ship.service_command, (8000, 1))
@@ -364,10 +364,8 @@ def test_a_missing_shaft_speed_is_named() -> None:
         identify([stopped], "cubic", particulars=PARTICULARS, service_shaft_speed=-1.0)
 
 
-def test_full_third_order_has_every_product_that_symmetry_allows_and_holds_an_unstable_ships_turn() -> (
-    None
-):
-    """The tanker, of other equations and unstable on course: 0.3 deg of heading, 11 by the Mariner form."""
+def test_full_third_order_holds_the_turn_of_an_unstable_ship() -> None:
+    """The tanker, unstable on course: 0.3 deg of heading, 11 by the Mariner form."""
     table = get_structure("abkowitz-full")
     odd = {"v", "r", "delta"}
     for q, parity in (("u", 0), ("v", 1), ("r", 1)):

@@ -244,7 +244,7 @@ def test_shaft_speeds_that_a_structure_ignores_are_said(mariner: ShipModel) -> N
 def test_only_a_ship_that_is_unstable_for_sure_is_said_to_be(
     noisy_fit: IdentificationResult,
 ) -> None:
-    """Of a stable ship whose model is uncertain nothing is said about her course stability."""
+    """Nothing is said about a stable ship whose model is uncertain."""
     model = noisy_fit.model
     assert why_lost(model, False).startswith("likely the model is taken beyond")
     assert why_lost(model, True).startswith("it was fitted to such, so its structure")

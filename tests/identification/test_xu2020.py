@@ -36,7 +36,7 @@ def test_each_step_keeps_what_the_paper_keeps(fitted, step):
 
 
 def test_what_is_dropped_explains_nothing(fitted):
-    """Less than the paper's own loss of R2, at most 0.005: its ship has the terms a little."""
+    """Less than the paper's loss of R2, at most 0.005: its ship has these terms."""
     for table, (old, revised) in xu2020.R_SQUARED.items():
         path = fitted.reductions[table].path
         assert 0.0 <= path[0].r_squared - path[-1].r_squared < max(old - revised, 1e-3)
@@ -68,7 +68,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
 
 
 def test_the_dense_dual_fits_by_its_own_multipliers_and_predicts_nothing(moments):
-    """What it predicts is rounding, another number in each run; its coefficients are never the ship's.
+    """What it predicts is rounding; its coefficients are never the ship's.
 
     y - alpha/C is y itself where C is huge; the fit w x + b fails on its own training
     set too.
@@ -100,7 +100,7 @@ def test_no_weight_fits_the_training_set_and_fails_in_validation(monkeypatch):
 
 
 def test_truncation_matters_on_38_collinear_terms():
-    """1.5 % of noise: all directions leave coefficients 90 times their size, the best rank a quarter."""
+    """1.5 % of noise: all directions leave errors of 90 sizes, the best rank 1/4."""
     found = xu2020_rank.errors(0.015)
     assert found.coefficients[-1] > 50.0
     assert found.coefficients.min() < 0.3

@@ -51,7 +51,7 @@ def test_one_of_sixteen_errors_is_larger_than_printed_and_its_note_tells_the_lim
     assert "the limit" in missed[0].note
 
 
-def test_the_chosen_pair_reaches_its_aims_with_another_term_or_rudder_limit_and_not_in_yaw_by_its_own():
+def test_the_chosen_pair_reaches_its_aims_but_not_in_yaw_by_its_own():
     """|v| r reaches 0.0173 and 0.0101, v^2 r/U 0.0054 and 0.0042."""
     rows = list(steering_forms.chosen_rows())
     assert [row.aim for row in rows] == ["below 0.02", "below 0.005"] * 3
@@ -62,7 +62,7 @@ def test_the_chosen_pair_reaches_its_aims_with_another_term_or_rudder_limit_and_
     assert all(row.as_paper > row.best for row in rows[:2])
 
 
-def test_the_thesis_order_of_the_recursions_is_that_of_a_ship_integrated_by_euler_s_rule():
+def test_the_order_of_the_recursions_is_that_of_euler_s_rule():
     a22 = recursive_start.NAMES.index("a22")
     plain, started = (
         recursive_start.errors(recursive_start.history(method, euler=True)[-1])
@@ -126,7 +126,7 @@ def test_a_clean_log_gives_the_stand_in_back():
     )
 
 
-def test_all_six_of_the_mariner_come_within_five_per_cent_and_the_printed_way_fails_where_printed():
+def test_all_six_of_the_mariner_come_within_five_per_cent():
     assert np.abs(recursive_start.errors(recursive_start.at_best())).max() < 1.0
     for method, printed in recursive_start.PRINTED.items():
         ours = recursive_start.errors(recursive_start.as_printed(method))
