@@ -58,14 +58,15 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
 
 
 def list_pretrained() -> list[str]:
-    """Names of the agents that come with the package: task of the suite and algorithm."""
+    """Names of the agents that come with the package, each TASK-ALGORITHM."""
     return sorted(file.stem for file in PRETRAINED.glob("*.json"))
 
 
 def find_agent(name: str | Path) -> Path:
-    """File of an agent: as given, in the folder of a run, or of the pretrained agent of that name.
+    """Return the file of an agent.
 
-    Raises InputError if it is neither, with the nearest pretrained name.
+    `name` is a file, the folder of a run, or the name of a pretrained agent. Raises
+    InputError if it is none of them, with the nearest pretrained name.
     """
     given = Path(name)
     if given.suffix == ".json" or given.is_file():

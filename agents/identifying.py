@@ -1,4 +1,4 @@
-"""Identification of a ship file: its options, those of the command line, and its trials."""
+"""Identification of a ship file: its options, the user's, and its trials."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EXTRA_TRIALS = "method.extra_trials"
 def identification_settings(
     ship: ShipFile, given: Mapping[str, Any], unnamed: str = AUTO
 ) -> dict[str, Any]:
-    """Options of an identification by their full names: those given, else the ship file's.
+    """Options of an identification by full name: those given, else the ship file's.
 
     Parameters
     ----------

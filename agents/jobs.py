@@ -1,4 +1,4 @@
-"""Many independent jobs: in this process, in several of this computer, or on a Ray cluster.
+"""Many independent jobs: in this process, in several, or on a Ray cluster.
 
 Results do not depend, bit for bit, on where jobs run or how many run at once: each job
 has one thread, and jobs and results pass through JSON in every case.
@@ -47,7 +47,7 @@ Finished = Iterator[tuple[str, str]]
 
 
 class JobError(RuntimeError):
-    """A job that failed for another reason than wrong input, or whose worker was killed."""
+    """A job failed, not by wrong input, or its worker was killed."""
 
 
 class EngineError(InputError):
@@ -234,7 +234,7 @@ def _in_processes(function: JobFunction, texts: list[str], workers: int) -> Fini
 
 
 def _on_ray(function: JobFunction, texts: list[str], where: JobEngine) -> Finished:
-    """Do jobs by joblib's Ray backend, in rounds, since it returns a round as a whole."""
+    """Do jobs by joblib's Ray backend, in rounds, each of which returns as a whole."""
     with _connected_ray(where) as ray, parallel_config("ray"):
         cores = int(ray.cluster_resources().get("CPU", 1))
         workers = min(where.workers or cores, cores)
@@ -286,7 +286,7 @@ def _connected_ray(where: JobEngine) -> Iterator[Any]:
 
 
 def _check_address(address: str) -> None:
-    """Refuse an address at which nothing listens, for which Ray would wait for minutes."""
+    """Refuse an address at which nothing listens; Ray would wait for minutes."""
     if address == "auto":
         return
     host, _, port = address.removeprefix("ray://").rpartition(":")

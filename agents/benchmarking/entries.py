@@ -3,9 +3,9 @@
 A controller is named, on the command line and in Python, as
 
     pid                   a classical controller, designed for the model of each task
-    tuned-pid             the same with the settings that direct search found for the task
+    tuned-pid             the same with the settings of direct search for the task
     tuned-best            of these, the one with the lowest cost in each task
-    best-known            the lowest cost ever reached in each episode, kept with the suite
+    best-known            the lowest known cost of each episode, kept with the suite
     ppo                   the pretrained agents of agents/pretrained
     runs/agent.json       a file of an agent or controller
     runs/model.zip        an agent as stable-baselines3 saves it

@@ -102,8 +102,8 @@ def read_episodes(path: Path, rows: int) -> Columns:
         raise
     except malformed as error:
         raise InputError(
-            f"{path}: expected a Parquet file, got one that cannot be read ({error}); it"
-            " may be cut short"
+            f"{path}: expected a Parquet file, got one that cannot be read ({error});"
+            " it may be cut short"
         ) from None
 
 

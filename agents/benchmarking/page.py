@@ -97,8 +97,8 @@ def _page(result: BenchmarkResult, again: Rerun, count: int) -> str:
     profile = None
     if summary["profile"]["shares"]:
         profile_caption = (
-            "Share of all episodes that score more than the threshold; higher is better."
-            " Dotted: wheel-over from the model, and the best known."
+            "Share of all episodes that score more than the threshold; higher is"
+            " better. Dotted: wheel-over from the model, and the best known."
         )
         profile = _figure("profile-figure", profile_figure(result), profile_caption)
     failures_title = (

@@ -119,9 +119,9 @@ def ranking_table(result: BenchmarkResult) -> SortableTable:
             " interval."
         )
     caption += (
-        " Relative cost: geometric mean over tasks of the cost over the lowest one. Best"
-        " in tasks: has the lowest cost, or the same. Lost: episodes in which control"
-        " was lost. Failed: the controller gave no command."
+        " Relative cost: geometric mean over tasks of the cost over the lowest one."
+        " Best in tasks: has the lowest cost, or the same. Lost: episodes in which"
+        " control was lost. Failed: the controller gave no command."
     )
     heads = [
         TableHead("controller", kind=""),

@@ -1,4 +1,4 @@
-"""The benchmark: every controller steers every task of a suite, in the same episodes."""
+"""The benchmark: every controller in every task of a suite, the same episodes."""
 
 import shutil
 from collections.abc import Sequence

@@ -46,7 +46,10 @@ def names_code(text: str) -> bool:
 
 
 def import_code(text: str) -> Any:
-    """Import the function that a text names, or make one of a subclass of Controller."""
+    """Import the function that a text names.
+
+    A subclass of Controller is registered, and becomes a function that designs it.
+    """
     module, _, name = text.rpartition(":")
     try:
         with working_folder():

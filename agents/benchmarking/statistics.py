@@ -1,4 +1,4 @@
-"""Statistics of costs and scores: rliable's, with episodes as a second source of chance.
+"""Statistics of costs and scores, as in rliable, with episodes drawn as well.
 
 A score is the share of the way from the cost of wheel-over designed on the model (0) to
 the best known cost (1). Costs have the shape (n_runs, n_episodes), runs being training
@@ -151,7 +151,7 @@ def weighted_interquartile_mean(values: Floats, weights: Integers) -> Floats:
 
 
 def score(cost: ArrayLike, zero: ArrayLike, best: ArrayLike) -> Floats:
-    """Share of the way from the cost `zero` to the cost `best`; NaN if there is none."""
+    """Share of the way from the cost `zero` to `best`; NaN if there is no way."""
     start = np.asarray(zero, dtype=np.float64)
     whole_way = start - np.asarray(best, dtype=np.float64)
     way = start - np.asarray(cost, dtype=np.float64)
@@ -249,7 +249,7 @@ def _drawn_wins(
 
 
 def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Floats:
-    """Share of the scores, of any shape, above each threshold, shape (n_thresholds,)."""
+    """Share of scores above each threshold, shape (n_thresholds,)."""
     ordered = np.sort(np.ravel(scores))
     n_below = np.searchsorted(ordered, np.asarray(thresholds), side="right")
     return np.asarray(1.0 - n_below / len(ordered))

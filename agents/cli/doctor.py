@@ -1,4 +1,4 @@
-"""What `shipgym doctor` checks: versions, the cache of compiled ships, optional packages, names."""
+"""Checks of `shipgym doctor`: versions, compiled ships, optional packages, names."""
 
 import importlib.metadata
 import importlib.util
@@ -76,7 +76,7 @@ def examine_installation() -> list[Finding]:
 
 
 def declared_packages() -> dict[str, list[str]]:
-    """Packages that shipgym declares to need, by extra, those of no extra by an empty text."""
+    """Packages that shipgym needs, by extra; those of no extra under an empty name."""
     try:
         requirements = importlib.metadata.requires("shipgym") or []
     except importlib.metadata.PackageNotFoundError:  # run from a checkout
@@ -93,7 +93,7 @@ def declared_packages() -> dict[str, list[str]]:
 def package_finding(
     what: str, names: list[str], otherwise: str, remedy: str
 ) -> Finding:
-    """Versions of packages, or which of them are missing, with the state `otherwise`."""
+    """Versions of packages; `otherwise` is the state if one is missing."""
     versions = []
     missing = []
     for name in names:
@@ -147,7 +147,10 @@ def cache_finding() -> Finding:
 
 
 def left_findings() -> list[Finding]:
-    """Folders in use, and what dead processes left: here, one level below, and in the cache."""
+    """Folders in use, and what dead processes left behind.
+
+    Looks here, one level below, and in the cache.
+    """
     here = Path.cwd()
     below = sorted(path for path in here.iterdir() if path.is_dir())
     findings = []
@@ -161,7 +164,10 @@ def left_findings() -> list[Finding]:
 
 
 def name_finding(name: str) -> Finding:
-    """Check that an import name is this project's alone; `agents` is also that of other packages."""
+    """Check that no other package has an import name.
+
+    `agents` is also the import name of other packages.
+    """
     what = f"import {name}"
     packages = importlib.metadata.packages_distributions().get(name, ())
     others = sorted(set(packages) - {"shipgym"})

@@ -90,7 +90,7 @@ def identify_options(
 
 
 def with_identify_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the parameters of `identify_options`, whose result it takes as `options`."""
+    """Give a command the parameters of `identify_options`, as one `options`."""
     own = typed_parameters(identify_options)
 
     @functools.wraps(command)

@@ -33,7 +33,10 @@ def new_ship_command(
         ),
     ] = None,
 ) -> None:
-    """Write a ship file for recorded trials. Guesses columns, units and signs, and reports the guesses."""
+    """Write a ship file for recorded trials.
+
+    Guesses columns, units and signs, and reports the guesses.
+    """
     from agents.cli.terminal import answer, say, warn
     from shipgym.checks import shown
     from shipgym.errors import InputError
@@ -87,7 +90,7 @@ def new_ship_command(
 
 
 def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
-    """Logs read with guessed columns; the first has to be readable, others may not be."""
+    """Logs read with guessed columns; only the first has to be readable."""
     from agents.cli.terminal import warn
     from shipgym.errors import InputError
     from shipgym.trials.guesses import guess_trial
@@ -139,7 +142,10 @@ def look_command(
         "look.html"
     ),
 ) -> None:
-    """Draw the trials of a ship file, or a log. Shows track, channels, repairs and problems found."""
+    """Draw the trials of a ship file, or a log.
+
+    Shows track, channels, repairs and the problems that were found.
+    """
     from agents.cli.terminal import answer, say, warn
     from agents.output import check_page
     from shipgym.files import write_text

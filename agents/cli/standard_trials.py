@@ -1,4 +1,4 @@
-"""Standard manoeuvres of one model, for `shipgym trials`: runs, indices and criteria."""
+"""Standard manoeuvres of a model for `shipgym trials`: runs, indices, criteria."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -75,7 +75,7 @@ def standard_trials(
     progress: Callable[[int], None] | None = None,
     water_depth: float = np.inf,
 ) -> StandardTrials:
-    """Simulate every standard manoeuvre that suits a ship, with the model and with models drawn from it.
+    """Simulate the standard manoeuvres of a ship, with its model and with draws of it.
 
     A manoeuvre that cannot be simulated, or has no indices, is in `refused`. Raises
     InputError for water too shallow, or for a ship without shallow-water equations;

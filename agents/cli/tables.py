@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def plain_table(title: str, *headings: str) -> Table:
-    """A table without lines, its title to the left; headings that begin with > are aligned right."""
+    """A table without lines; columns whose heading begins with > align right."""
     table = Table(
         title=title,
         title_style="bold",
@@ -100,7 +100,7 @@ def _indices(metrics: Mapping[str, Any]) -> str:
 
 
 def selection_table(ranking: Mapping[str, Any]) -> Table:
-    """Structures and methods by how well they predict the held-out trials, the best first."""
+    """Structures and methods, those that predict held-out trials best first."""
     table = plain_table(
         f"Structures and methods by how they predict {ranking['held_out']}",
         "method",
@@ -194,7 +194,7 @@ def _verdict(criterion: Criterion) -> str | Text:
 
 
 def criteria_notes(criteria: Mapping[str, Criterion]) -> list[str]:
-    """Notes below the table of criteria: why one is not decided, and draws without a value."""
+    """Notes on undecided criteria, and on draws without a value."""
     notes = [f"{name}: {one.note}" for name, one in criteria.items() if one.note]
     for name, criterion in criteria.items():
         lost = "" if criterion.drawn is None else criterion.drawn.lost_in_words

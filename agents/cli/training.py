@@ -114,7 +114,9 @@ def train_command(
         bool, Option("--resume", help="Continue the run in the folder.")
     ] = False,
 ) -> None:
-    """Train an autopilot by reinforcement learning. Writes policy, learning curve and checkpoints.
+    """Train an autopilot by reinforcement learning.
+
+    Writes policy, learning curve and checkpoints.
 
     A run killed at any moment resumes with --resume from its last checkpoint, at most a
     minute old, and ends as if it had never stopped. With --resume, options not request
@@ -155,7 +157,7 @@ def _named(texts: list[str] | None, option: str) -> dict[str, Any]:
 def _train(
     request: TrainingRequest, out: Path, resume: bool, max_seconds: float | None
 ) -> TrainingResult:
-    """Check what is request before torch is imported or anything is written, then train."""
+    """Check the request before torch is imported or anything is written; train."""
     from agents.cli.terminal import training_bar
 
     plan = _checked_plan(request, out, resume)
@@ -181,7 +183,7 @@ def _train(
 
 
 def _checked_plan(request: TrainingRequest, out: Path, resume: bool) -> TrainingPlan:
-    """The plan of a new run, or of one that is resumed, with warnings of what differs."""
+    """Plan of a new or a resumed run, with warnings of what differs."""
     from agents.cli.terminal import warn
     from agents.training import run_folder
     from agents.training.request import make_plan
@@ -263,7 +265,9 @@ def tune_command(
     workers: Workers = 1,
     address: Address = None,
 ) -> None:
-    """Search the settings with which an agent learns best. Uses Optuna; writes them for `train --settings`.
+    """Search the settings with which an agent learns best.
+
+    Uses Optuna; writes them for `train --settings`.
 
     Four trials are proposed at a time, so more than four workers are of no use. If it
     is killed, the same command continues with the trials that are not done.

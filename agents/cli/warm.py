@@ -1,4 +1,4 @@
-"""`shipgym warm`: compile beforehand what environments and models need, so that no run waits for it."""
+"""`shipgym warm`: compile beforehand, so that no run waits for it."""
 
 import time
 import warnings
@@ -80,7 +80,7 @@ def warm_names(wanted: list[str] | None, everything: bool) -> list[str]:
 
 
 def warm_jobs(name: str, ship: str | None = None) -> dict[str, Callable[[], Any]]:
-    """Functions that compile what an environment's id, a model or a file needs, by a description.
+    """Functions that compile what an id, a model or a file needs, by a description.
 
     Raises InputError for what is none of these.
     """

@@ -1,4 +1,4 @@
-"""A policy's network in NumPy: dense layers in single precision, as they were learned."""
+"""A policy's network in NumPy: dense layers in single precision."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -63,7 +63,7 @@ class Network:
         return (n_inputs, *(len(layer.bias) for layer in self.layers))
 
     def __call__(self, inputs: Numbers) -> Numbers:
-        """Outputs of shape (n, n_out) for inputs of shape (n, n_in), which stay as they are."""
+        """Outputs of shape (n, n_out) for inputs of shape (n, n_in)."""
         *hidden, last = self.layers
         activate = ACTIVATIONS[self.activation]
 

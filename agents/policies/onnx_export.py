@@ -72,7 +72,7 @@ def onnx_model(policy: Any) -> Any:
 
 
 def _graph(policy: LearnedPolicy, onnx: Any) -> Any:
-    """Graph from the observations, and the base's action if there is a base, to the action."""
+    """Graph from the observations, and from a base's action, to the action."""
     inputs = {"observations": policy.frame_stack * len(policy.observation_names)}
     outputs = {"action": 2 if policy.action == "rudder-shaft" else 1}
     if policy.base is not None:

@@ -52,7 +52,7 @@ SHOWING = ("action", "roll", "corridor", "ground")
 
 
 class Memory(NamedTuple):
-    """What a policy remembers of ships; for a single observation without the first axis."""
+    """Memory of a policy of n ships; for a single ship without the first axis."""
 
     seen: (
         Numbers  # past observations, oldest first, (n, frame_stack - 1, n_observations)
@@ -65,7 +65,7 @@ class Memory(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LearnedPolicy:
-    """A learned autopilot in the signature of `Controller.predict`; steers without torch.
+    """A learned autopilot with `predict` as in `Controller`; steers without torch.
 
     Raises InputError naming the field whose value does not fit.
 
@@ -191,7 +191,7 @@ class LearnedPolicy:
         episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[Action, Any]:
-        """See `Policy.predict`: the mean of what was learned, or the most likely discrete order.
+        """Commands as in `Policy.predict`: the mean, or the most likely discrete order.
 
         Of discrete orders the order itself is returned, not its number (`order_numbers`
         gives it). The state is a `Memory` if the policy `remembers` anything, else as
@@ -244,7 +244,7 @@ class LearnedPolicy:
         return memory._replace(left=left - 1.0, output=output, in_force=in_force)
 
     def commands(self, output: Numbers, proposed: Numbers | None = None) -> Action:
-        """Commands for outputs of the network and a base's action, each of shape (n, ...)."""
+        """Commands for outputs of the network and a base's action, both (n, ...)."""
         if self.action == "rudder-discrete":
             likeliest = output.argmax(axis=1, keepdims=True)
             return np.asarray(ORDERS[likeliest])
@@ -290,7 +290,7 @@ class LearnedPolicy:
     def check_fits(
         self, names: Sequence[str], scales: Sequence[float], where: str = "observations"
     ) -> None:
-        """Refuse what shows other quantities first, or in other scales, than those it learned with.
+        """Refuse observations that do not begin as those it learned with.
 
         Arguments and errors as in `Controller.check_fits`.
         """
@@ -306,7 +306,7 @@ class LearnedPolicy:
         )
 
     def check_fits_model(self, model: ShipModel) -> None:
-        """Refuse a ship with other observation scales in the environment that it learned in.
+        """Refuse a ship with other observation scales in its environment.
 
         One that learned a task of a user's own is checked where it meets the task.
         """
@@ -328,7 +328,7 @@ class LearnedPolicy:
         self.check_fits(names, scales, f"model '{model.name}'")
 
     def save(self, path: str | Path) -> None:
-        """Write NAME.json and, beside it, NAME.safetensors (fields in docs/policies.md)."""
+        """Write NAME.json and NAME.safetensors (fields in docs/policies.md)."""
         content, tensors = self.file_fields()
         write_policy(content, tensors, Path(path))
 
@@ -383,7 +383,7 @@ def combined(proposed: Any, part: Any, authority: float) -> Any:
 
 
 def _shaped(memory: Memory, shape: tuple[int, ...]) -> Memory:
-    """Memory of ships whose arrays begin with other axes: (n,), or () for a single one."""
+    """Memory with other first axes: (n,) ships, or () for a single one."""
     return Memory(
         seen=memory.seen.reshape(*shape, *memory.seen.shape[-2:]),
         base=memory.base,
@@ -409,7 +409,7 @@ def network_fields(network: Network) -> tuple[dict[str, Any], Tensors]:
 
 
 def order_numbers(action: ArrayLike) -> NDArray[np.int64]:
-    """Numbers of discrete rudder orders, for environments with the action "rudder-discrete".
+    """Numbers of discrete rudder orders, for the action "rudder-discrete".
 
     `action`: as `LearnedPolicy.predict` hands them back, shape (..., 1). Returns the
     index of the nearest order, shape (...).

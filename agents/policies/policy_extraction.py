@@ -1,4 +1,4 @@
-"""The network of a trained agent of stable-baselines3, and what it observed, as fields of a `LearnedPolicy`.
+"""Fields of a `LearnedPolicy` from a trained agent of stable-baselines3.
 
 PPO and A2C have the mean of their action, SAC and TQC the hyperbolic tangent of it, TD3
 and DDPG a network that ends so. Whatever else is found (other extractors of features,
@@ -124,7 +124,7 @@ def _check_wrapper(wrapper: Any) -> None:
 
 
 def _residual(stack: Sequence[Any]) -> dict[str, Any]:
-    """Base and other settings of the wrapper that adds to a controller, if there is one."""
+    """Base and other settings of the wrapper that adds to a controller, if any."""
     for wrapper in stack:
         if not vars(wrapper).keys() >= {"base", *RESIDUAL}:
             continue
@@ -243,7 +243,7 @@ def actor_network(
 
 
 def _dense_layers(actor: Actor, weights: Mapping[str, Any]) -> list[str]:
-    """Names of the layers from observation to command; activations stand between them."""
+    """Names of the layers from observation to command, without activations."""
     layers = []
     for number in count(step=2):
         layer = f"{actor.body}.{number}"
@@ -261,7 +261,7 @@ def _array(parameter: Any) -> NDArray[np.float32]:
 
 
 def _check_extraction(network: Network, agent: Any, action: str) -> None:
-    """Refuse a network that commands otherwise than its agent, on observations at random."""
+    """Refuse a network that differs from its agent at random observations."""
     n_inputs = network.sizes[0]
     shape = agent.observation_space.shape
     if shape != (n_inputs,):

@@ -133,7 +133,10 @@ def _tensor(tensors: Tensors, name: str, shape: tuple[int, ...]) -> NDArray[np.f
 
 
 def _names(value: Any, own_task: bool) -> tuple[str, ...]:
-    """Names of observations; except in a user's own task the first are those of course keeping."""
+    """Read the names of observations.
+
+    Except in a user's own task the first are those of course keeping.
+    """
     where = "observation_names"
     if not isinstance(value, list):
         raise unexpected(where, "a list of names", value)

@@ -1,4 +1,4 @@
-"""The zip in which stable-baselines3 saves an agent, read without running anything that is in it.
+"""Agents saved by stable-baselines3, read without running anything in the zip.
 
 Two of its members are read: `data`, JSON whose pickles (in base64) stay closed, and
 `policy.pth`, by torch's reader of weights alone. One pickle, that of the last
@@ -127,7 +127,7 @@ def _members(path: Path) -> tuple[str, dict[str, Any]]:
 
 
 def _opened(content: bytes) -> ZipFile:
-    """Open a zip of uncompressed members, all of them together no larger than the whole."""
+    """Open a zip of uncompressed members, together no larger than the whole."""
     file = ZipFile(BytesIO(content))
     members = file.infolist()
     stored = all(member.compress_type == ZIP_STORED for member in members)
@@ -153,7 +153,7 @@ def _weights(content: bytes) -> dict[str, Any]:
 
 
 def _activation(about: Mapping[str, Any]) -> str | None:
-    """Name of what is between the layers, None for the usual; refuses policies of one's own."""
+    """Name of the activation, None for the usual; refuses a user's own policy."""
     policy_class = check_table(about.get("policy_class"), "data: policy_class")
     module = policy_class.get("__module__")
     if not POLICIES.fullmatch(str(module)):
@@ -187,7 +187,10 @@ def _bounds(about: Mapping[str, Any]) -> Floats:
 
 
 def _check_not_scaled(about: Mapping[str, Any], n: int) -> None:
-    """Refuse what saw scaled observations: the first two are the sine and cosine of one angle."""
+    """Refuse an agent that saw scaled observations.
+
+    Without scaling the first two are the sine and cosine of one angle.
+    """
     if about.get("_last_obs") is None:  # has not learned
         return
     try:

@@ -1,4 +1,4 @@
-"""Tasks of a suite: what a controller is made for, and the episodes it is evaluated in."""
+"""Tasks of a suite: what a controller is made for and what it is evaluated in."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace

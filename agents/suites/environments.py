@@ -1,4 +1,4 @@
-"""Environments as users name them: by a short name, by an id, or by the file of a task."""
+"""Environments as users name them: by short name, by id, or by a task's file."""
 
 from importlib import import_module
 from pathlib import Path
