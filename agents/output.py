@@ -127,7 +127,7 @@ def in_use(folder: Path) -> Iterator[Path]:
 
 
 def _acquired(lock_path: Path, folder: Path) -> FileLock:
-    """Take the lock of a folder; None where the disk has no locks.
+    """Take the lock of a folder; it stays open where the disk has no locks.
 
     Raises InputError if another process has it.
     """
