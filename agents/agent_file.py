@@ -68,11 +68,13 @@ def find_agent(name: str | Path) -> Path:
     `name` is a file, the folder of a run, or the name of a pretrained agent. Raises
     InputError if it is none of them, with the nearest pretrained name.
     """
-    given = Path(name)
-    if given.suffix == ".json" or given.is_file():
-        return given
-    if (given / RUN_AGENT).is_file():
-        return given / RUN_AGENT
+    path = Path(name)
+    if path.suffix == ".json" or path.is_file():
+        return path
+    of_run = path / RUN_AGENT
+    if of_run.is_file():
+        return of_run
+
     known = list_pretrained()
     if str(name) not in known:
         raise InputError(

@@ -59,7 +59,8 @@ def check_writable(folder: Path) -> None:
     if target.is_dir() and not _stands_alone(target):
         needed = existing[:2]  # it is emptied, and renamed within the folder above
     for path in needed:
-        if not path.is_dir() or not os.access(path, os.W_OK | os.X_OK):
+        is_writable = os.access(path, os.W_OK | os.X_OK)
+        if not path.is_dir() or not is_writable:
             raise InputError(
                 f"{folder}: {path} cannot be written to; choose another folder"
             )
@@ -168,14 +169,13 @@ def _lock_path(folder: Path) -> Path:
 
 def process_description() -> str:
     """Describe this process, with its command, for a lock."""
-    longest = 200  # characters of the command
-    program = Path(sys.argv[0]).name
-    command = shlex.join([program, *sys.argv[1:]])
+    path, *arguments = sys.argv
+    command = shlex.join([Path(path).name, *arguments])
+    beginning = command[:200]
     now = datetime.now().astimezone()
     since = now.isoformat(" ", "seconds")
     host = socket.gethostname()
-    pid = os.getpid()
-    return f"{PROCESS} {pid} on {host} since {since} ({command[:longest]})"
+    return f"{PROCESS} {os.getpid()} on {host} since {since} ({beginning})"
 
 
 def holder(lock: Path) -> str:

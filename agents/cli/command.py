@@ -70,7 +70,10 @@ def shared_options(command: Callable[..., None]) -> Callable[..., None]:
     parameters = typed_parameters(command)
     for name, annotation in {"as_json": Json, "quiet": Quiet}.items():
         parameters[name] = inspect.Parameter(
-            name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=annotation
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=False,
+            annotation=annotation,
         )
     return take_parameters(wrapped, parameters)
 
@@ -127,12 +130,15 @@ class Commands(TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
         """Refuse arguments that are empty or have a null byte."""
-        for position, text in enumerate(args):
-            name, value = "argument", text
+        before = ""
+        for text in args:
+            name = "argument"
+            value = text
             if text.startswith("--") and "=" in text:
                 name, _, value = text.partition("=")
-            elif position > 0 and args[position - 1].startswith("-"):
-                name = args[position - 1]
+            elif before.startswith("-"):
+                name = before
             if not value or "\0" in text:
                 ctx.fail(f"{name}: expected a non-empty string, got {value!r}")
+            before = text
         return super().parse_args(ctx, args)
