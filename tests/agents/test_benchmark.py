@@ -853,7 +853,7 @@ def test_the_command_goes_on_where_it_was_interrupted(suite, tmp_path, monkeypat
     assert answer.exit_code == 130
     assert "what was done is kept in r: continue with --resume" in answer.stderr
 
-    monkeypatch.setitem(sys.modules, "plotly", None)
+    monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
     sys.modules["interrupted_pilot"].INTERRUPTED = False
     answer = shipgym(*words, "--resume")
     assert answer.exit_code == 0
