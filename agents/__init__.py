@@ -1,4 +1,4 @@
-"""Autopilots for the ships of shipgym: classical designs, learned policies, and the command line.
+"""Autopilots for the ships of shipgym: classical, learned, and the command line.
 
 The public names stand in `__init__.pyi`; each is imported when it is first used.
 """

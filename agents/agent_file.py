@@ -58,20 +58,23 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
 
 
 def list_pretrained() -> list[str]:
-    """Names of the agents that come with the package: task of the suite and algorithm."""
+    """Names of the agents that come with the package, each TASK-ALGORITHM."""
     return sorted(file.stem for file in PRETRAINED.glob("*.json"))
 
 
 def find_agent(name: str | Path) -> Path:
-    """File of an agent: as given, in the folder of a run, or of the pretrained agent of that name.
+    """Return the file of an agent.
 
-    Raises InputError if it is neither, with the nearest pretrained name.
+    `name` is a file, the folder of a run, or the name of a pretrained agent. Raises
+    InputError if it is none of them, with the nearest pretrained name.
     """
-    given = Path(name)
-    if given.suffix == ".json" or given.is_file():
-        return given
-    if (given / RUN_AGENT).is_file():
-        return given / RUN_AGENT
+    path = Path(name)
+    if path.suffix == ".json" or path.is_file():
+        return path
+    of_run = path / RUN_AGENT
+    if of_run.is_file():
+        return of_run
+
     known = list_pretrained()
     if str(name) not in known:
         raise InputError(

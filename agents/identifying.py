@@ -1,8 +1,8 @@
-"""Identification of a ship file: its options, those of the command line, and its trials."""
+"""Identification of a ship file: its options, the user's, and its trials."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import identification
@@ -21,7 +21,7 @@ EXTRA_TRIALS = "method.extra_trials"
 def identification_settings(
     ship: ShipFile, given: Mapping[str, Any], unnamed: str = AUTO
 ) -> dict[str, Any]:
-    """Options of an identification by their full names: those given, else the ship file's.
+    """Options of an identification by full name: those given, else the ship file's.
 
     Parameters
     ----------
@@ -39,13 +39,16 @@ def identification_settings(
         For an option that does not exist, or a value that it cannot have.
     """
     given = {name: value for name, value in given.items() if value is not None}
-    with_kernel = "kernel" in ship.identify or "kernel" in given
-    of_file = read_table(ship.identify, f"{ship.path}: [identify]", with_kernel)
+    table = ship.identify
+    with_kernel = "kernel" in table or "kernel" in given
+    of_file = read_table(table, f"{ship.path}: [identify]", with_kernel)
     for option in MODELS:
-        if str(of_file.get(option, "")).endswith(".json"):
-            of_file[option] = str(ship.path.parent / of_file[option])
-    asked = read_table(given, "options", with_kernel)
+        model = str(of_file.get(option, ""))
+        if model.endswith(".json"):
+            path = ship.path.parent / model
+            of_file[option] = str(path)
 
+    asked = read_table(given, "options", with_kernel)
     chosen = of_file | asked
     _choose_structure(chosen, asked, unnamed, ship)
     return chosen
@@ -55,7 +58,6 @@ def _choose_structure(
     chosen: dict[str, Any], asked: Mapping[str, Any], unnamed: str, ship: ShipFile
 ) -> None:
     """Complete the structure and its reference ship, which the options may imply."""
-    own = ship.structure
     if chosen.get("method") == "rm-svm" and "reference_model" in chosen:
         # it needs a grey box, so a reference ship implies the structure
         named = asked if asked.get("method") == "rm-svm" else chosen
@@ -67,6 +69,7 @@ def _choose_structure(
         # one in the ship file belongs to the structure that is named there
         chosen.pop("reference_model", None)
 
+    own = ship.structure
     if "kernel" not in chosen:
         chosen.setdefault("structure", unnamed if own is None else own.name)
     if own is not None and chosen.get("structure") == own.name:
@@ -82,17 +85,17 @@ def trials_of(
     steering gear of the ship file, and the extra trials read, which are left out of the
     others.
     """
+    settings = dict(settings)
     extra = settings.get(EXTRA_TRIALS, [])
     trials = [trial for trial in ship.trials() if trial.name not in extra]
     if extra:
-        settings = {**settings, EXTRA_TRIALS: [ship.trial(file) for file in extra]}
+        settings[EXTRA_TRIALS] = [ship.trial(file) for file in extra]
+
     with placed(str(ship.path)):
         arguments = identify_arguments(settings)
-    return trials, {
-        "particulars": ship.particulars,
-        "steering": ship.steering,
-        **arguments,
-    }
+    arguments.setdefault("particulars", ship.particulars)
+    arguments.setdefault("steering", ship.steering)
+    return trials, arguments
 
 
 def identify_ship(
@@ -127,34 +130,41 @@ def compare_ship(
         ones.
     """
     of_methods = settings_of(settings, "method")
-    others = {
-        name: value
-        for name, value in settings.items()
-        if name.partition(".")[0] != "method"
-    }
+    others = {}
+    for name, value in settings.items():
+        stage, _, _ = name.partition(".")
+        if stage != "method":
+            others[name] = value
     trials, arguments = trials_of(ship, others)
     if EXTRA_TRIALS in settings:
-        names = settings[EXTRA_TRIALS]
-        of_methods["extra_trials"] = [ship.trial(file) for file in names]
-        trials = [trial for trial in trials if trial.name not in names]
+        extra = settings[EXTRA_TRIALS]
+        of_methods["extra_trials"] = [ship.trial(file) for file in extra]
+        trials = [trial for trial in trials if trial.name not in extra]
 
-    wanted: list[Any] | None = None
     if structures:
-        wanted = _names(structures)
-        own = ship.structure
-        if own is not None:
-            wanted = [own if name == own.name else name for name in wanted]
         arguments.pop("structure", None)
-    chosen: Sequence[str] | None = None
-    if methods:
-        chosen = list(METHODS) if methods == "all" else _names(methods)
     with placed(str(ship.path)):
         return identification.compare_methods(
-            trials, chosen, wanted, settings=of_methods, **arguments
+            trials,
+            methods=list(METHODS) if methods == "all" else _names(methods),
+            structures=_structures(structures, ship),
+            settings=of_methods,
+            **arguments,
         )
 
 
-def _names(text: str) -> list[str]:
+def _structures(text: str | None, ship: ShipFile) -> list[Any] | None:
+    """Structures by name, the ship file's own among them."""
+    names = _names(text)
+    own = ship.structure
+    if names is None or own is None:
+        return names
+    return [own if name == own.name else name for name in names]
+
+
+def _names(text: str | None) -> list[str] | None:
+    if not text:
+        return None
     return [name.strip() for name in text.split(",")]
 
 

@@ -36,7 +36,8 @@ def result_to_json(result: Any) -> str:
         if isinstance(item, np.generic):
             return item.item()
         if isinstance(item, np.ndarray) and item.dtype.kind in "biufU":
-            dtype = "str" if item.dtype.kind == "U" else item.dtype.name
+            is_text = item.dtype.kind == "U"
+            dtype = "str" if is_text else item.dtype.name
             return {"__array__": item.tolist(), "dtype": dtype}
         raise TypeError(
             "result: expected numbers, strings, lists, dicts and arrays of numbers or"
@@ -81,8 +82,12 @@ class KeptResults:
 
     def load_all(self, jobs: Iterable[str]) -> dict[str, str]:
         """Results by job, of those jobs that are finished."""
-        results = {job: self.load(job) for job in jobs}
-        return {job: result for job, result in results.items() if result is not None}
+        results = {}
+        for job in jobs:
+            result = self.load(job)
+            if result is not None:
+                results[job] = result
+        return results
 
     def load(self, job: str) -> str | None:
         """Result of a job, None if there is none or its file is broken."""
@@ -109,5 +114,6 @@ class KeptResults:
             "job": json.loads(job),
         }
         text = json.dumps(key, sort_keys=True)
-        name = hashlib.sha256(text.encode()).hexdigest()[:24]
+        digest = hashlib.sha256(text.encode())
+        name = digest.hexdigest()[:24]
         return key, self.folder / f"{name}.json"

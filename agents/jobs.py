@@ -1,4 +1,4 @@
-"""Many independent jobs: in this process, in several of this computer, or on a Ray cluster.
+"""Many independent jobs: in this process, in several, or on a Ray cluster.
 
 Results do not depend, bit for bit, on where jobs run or how many run at once: each job
 has one thread, and jobs and results pass through JSON in every case.
@@ -47,7 +47,7 @@ Finished = Iterator[tuple[str, str]]
 
 
 class JobError(RuntimeError):
-    """A job that failed for another reason than wrong input, or whose worker was killed."""
+    """A job failed, not by wrong input, or its worker was killed."""
 
 
 class EngineError(InputError):
@@ -134,7 +134,8 @@ def run_jobs(
 
     def report() -> None:
         if progress is not None:
-            progress(sum(text in results for text in texts), len(texts))
+            n_done = sum(text in results for text in texts)
+            progress(n_done, len(texts))
 
     report()
     for text, result in _finished(function, pending, where):
@@ -160,15 +161,23 @@ def _do_job(function: JobFunction, text: str) -> tuple[str, str]:
     """Do a job on one thread; errors become some that have the job in their message."""
     variables = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     one_thread = dict.fromkeys(variables, "1")  # for libraries loaded by the job
-    longest = 200  # characters of a job in a message
-    name = f"job {text[:longest]}" + " ..." * (len(text) > longest)
+    name = f"job {_shortened(text)}"
     try:
         with _environment(one_thread), threadpool_limits(1):
-            return text, result_to_json(function(json.loads(text)))
+            result = function(json.loads(text))
+            return text, result_to_json(result)
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
     except Exception as error:
         raise JobError(f"{name}: {type(error).__name__}: {error}") from error
+
+
+def _shortened(text: str) -> str:
+    """Beginning of a text, for a message."""
+    longest = 200  # characters
+    if len(text) <= longest:
+        return text
+    return f"{text[:longest]} ..."
 
 
 def _do_in_worker(
@@ -234,16 +243,16 @@ def _in_processes(function: JobFunction, texts: list[str], workers: int) -> Fini
 
 
 def _on_ray(function: JobFunction, texts: list[str], where: JobEngine) -> Finished:
-    """Do jobs by joblib's Ray backend, in rounds, since it returns a round as a whole."""
+    """Do jobs by joblib's Ray backend, in rounds, each of which returns as a whole."""
     with _connected_ray(where) as ray, parallel_config("ray"):
         cores = int(ray.cluster_resources().get("CPU", 1))
         workers = min(where.workers or cores, cores)
         jobs_a_round = 2 * workers
         with Parallel(workers, batch_size=1) as run:
             for first in range(0, len(texts), jobs_a_round):
-                jobs = texts[first : first + jobs_a_round]
+                calls = _calls(function, texts[first : first + jobs_a_round])
                 try:
-                    yield from run(_calls(function, jobs))
+                    yield from run(calls)
                 except ray.exceptions.RayError:
                     raise _killed_worker() from None
 
@@ -286,7 +295,7 @@ def _connected_ray(where: JobEngine) -> Iterator[Any]:
 
 
 def _check_address(address: str) -> None:
-    """Refuse an address at which nothing listens, for which Ray would wait for minutes."""
+    """Refuse an address at which nothing listens; Ray would wait for minutes."""
     if address == "auto":
         return
     host, _, port = address.removeprefix("ray://").rpartition(":")

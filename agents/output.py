@@ -1,4 +1,4 @@
-"""Folders of results: one process at a time, written whole or not at all, never over other files."""
+"""Folders of results: one process at a time, whole or not at all, no other files."""
 
 import os
 import shlex
@@ -28,7 +28,7 @@ PROCESS = "process"  # the first word of a lock of ours
 
 
 def check_folder(folder: Path, names: Collection[str]) -> None:
-    """Refuse a folder that results cannot be written to, or that holds anything but the files `names`.
+    """Refuse a folder that cannot take results, or holds other files than `names`.
 
     A folder with only these is replaced as a whole; it need not exist. Raises
     InputError if it is a file, holds anything else, or cannot be written.
@@ -52,14 +52,15 @@ def check_folder(folder: Path, names: Collection[str]) -> None:
 
 
 def check_writable(folder: Path) -> None:
-    """Refuse a folder that can neither be made nor written; InputError names what is in the way."""
+    """Refuse a folder that cannot be written; InputError names what is in the way."""
     target = folder.absolute()
     existing = [path for path in (target, *target.parents) if path.exists()]
     needed = existing[:1]
     if target.is_dir() and not _stands_alone(target):
         needed = existing[:2]  # it is emptied, and renamed within the folder above
     for path in needed:
-        if not path.is_dir() or not os.access(path, os.W_OK | os.X_OK):
+        is_writable = os.access(path, os.W_OK | os.X_OK)
+        if not path.is_dir() or not is_writable:
             raise InputError(
                 f"{folder}: {path} cannot be written to; choose another folder"
             )
@@ -86,7 +87,7 @@ def check_page(path: Path, plots: bool = False) -> None:
 
 
 def check_file(path: Path) -> None:
-    """Refuse a file that cannot be written, before the work for it; InputError names it."""
+    """Refuse a file that cannot be written; InputError names it."""
     if path.is_dir():
         raise InputError(f"{path}: expected a file to write to, got a folder")
     folder = path.absolute().parent
@@ -127,7 +128,10 @@ def in_use(folder: Path) -> Iterator[Path]:
 
 
 def _acquired(lock_path: Path, folder: Path) -> FileLock:
-    """The lock of a folder, taken, or not where a disk has no locks; InputError if another has it."""
+    """Take the lock of a folder; it stays open where the disk has no locks.
+
+    Raises InputError if another process has it.
+    """
     lock = FileLock(lock_path)
     user = holder(lock_path)
     try:
@@ -151,7 +155,7 @@ def _acquired(lock_path: Path, folder: Path) -> FileLock:
 
 
 def _stands_alone(target: Path) -> bool:
-    """True if nothing can be beside a folder: a mount point, or below a folder that is read-only."""
+    """True if nothing can stand beside a folder: a mount, or a read-only parent."""
     if not target.is_dir():
         return False
     return os.path.ismount(target) or not os.access(target.parent, os.W_OK | os.X_OK)
@@ -165,14 +169,13 @@ def _lock_path(folder: Path) -> Path:
 
 def process_description() -> str:
     """Describe this process, with its command, for a lock."""
-    longest = 200  # characters of the command
-    program = Path(sys.argv[0]).name
-    command = shlex.join([program, *sys.argv[1:]])
+    path, *arguments = sys.argv
+    command = shlex.join([Path(path).name, *arguments])
+    beginning = command[:200]
     now = datetime.now().astimezone()
     since = now.isoformat(" ", "seconds")
     host = socket.gethostname()
-    pid = os.getpid()
-    return f"{PROCESS} {pid} on {host} since {since} ({command[:longest]})"
+    return f"{PROCESS} {os.getpid()} on {host} since {since} ({beginning})"
 
 
 def holder(lock: Path) -> str:
@@ -185,10 +188,11 @@ def holder(lock: Path) -> str:
 
 
 def locks_and_drafts(folder: Path) -> Iterator[tuple[str, bool]]:
-    """Descriptions of what processes have in a folder beside results, and True if the process is dead."""
+    """Describe what processes keep in a folder; True if the process is dead."""
     for draft in abandoned_drafts(folder):
         yield (
-            f"{draft}: left by a process that was killed; the next run there removes it",
+            f"{draft}: left by a process that was killed; the next run there removes"
+            " it",
             True,
         )
     for path in sorted(folder.glob(".*.lock")):
@@ -210,7 +214,7 @@ def locks_and_drafts(folder: Path) -> Iterator[tuple[str, bool]]:
 
 @contextmanager
 def whole_folder(folder: Path, names: Collection[str]) -> Iterator[Path]:
-    """A temporary folder that takes the place of `folder` when the block ends without an error.
+    """A draft that takes the place of `folder` when the block ends without an error.
 
     Yields the folder to write to. `folder` is locked meanwhile (`in_use`), `names` are
     those of `check_folder`. After an error or an interruption nothing of it is left.
@@ -230,9 +234,10 @@ def whole_folder(folder: Path, names: Collection[str]) -> Iterator[Path]:
 
 
 def _take_place(draft: Path, target: Path, names: Collection[str]) -> None:
-    """Rename the draft to the target; a folder in its place is set aside first and then removed.
+    """Rename the draft to the target.
 
-    Onto a mount point no folder can be renamed: its files are replaced one by one.
+    A folder in its place is set aside first and then removed. Onto a mount point no
+    folder can be renamed: its files are replaced one by one.
     """
     aside = draft.with_suffix(ASIDE)
     try:

@@ -1,1 +1,1 @@
-"""The benchmark: controllers in the tasks of a suite, statistics, result files and their page."""
+"""Benchmark: run controllers in the tasks of a suite, rank them, report."""

@@ -89,15 +89,21 @@ class Cell:
         runs = [TrainingRun(**run) for run in content["runs"]]
         for run in runs:
             same_figures = run.figures.keys() == runs[0].figures.keys()
-            are_figures = all(
-                figure.dtype.kind in "bif" and figure.shape == (n_episodes,)
-                for figure in run.figures.values()
-            )
-            if "cost" not in run.figures or not (same_figures and are_figures):
+            if not same_figures or not _has_figures(run, n_episodes):
                 raise InputError(
                     f"{where}: expected cost and other figures of {n_episodes} episodes"
                 )
         return cls(runs, content["refused"])
+
+
+def _has_figures(run: TrainingRun, n_episodes: int) -> bool:
+    """Tell whether a run has costs, and only numbers of so many episodes."""
+    if "cost" not in run.figures:
+        return False
+    for figure in run.figures.values():
+        if figure.dtype.kind not in "bif" or figure.shape != (n_episodes,):
+            return False
+    return True
 
 
 def run_cell(entry: Entry, task: BenchmarkTask, n_episodes: int) -> Cell:

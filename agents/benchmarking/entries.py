@@ -3,9 +3,9 @@
 A controller is named, on the command line and in Python, as
 
     pid                   a classical controller, designed for the model of each task
-    tuned-pid             the same with the settings that direct search found for the task
+    tuned-pid             the same with the settings of direct search for the task
     tuned-best            of these, the one with the lowest cost in each task
-    best-known            the lowest cost ever reached in each episode, kept with the suite
+    best-known            the lowest known cost of each episode, kept with the suite
     ppo                   the pretrained agents of agents/pretrained
     runs/agent.json       a file of an agent or controller
     runs/model.zip        an agent as stable-baselines3 saves it
@@ -16,7 +16,7 @@ A controller is named, on the command line and in Python, as
     name=...              any of these under another name
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -74,10 +74,10 @@ class Entry:
         or was designed on the ship that it should not know.
         """
         where = f"'{self.name}' on task '{task.name}'"
-        design_task = task.design_task
-        policies = make_policies(self.source, design_task)
+        design = task.design_task
+        policies = make_policies(self.source, design)
         for policy in policies:
-            check_fits(policy, design_task.task, design_task.ship, where)
+            check_fits(policy, design.task, design.ship, where)
             if task.true_ship:
                 _check_design(policy, task, where)
         return tuple(policies)
@@ -101,20 +101,24 @@ def _check_design(policy: Policy, task: BenchmarkTask, where: str) -> None:
 
 def _design_hashes(policy: Policy) -> set[str]:
     """Hashes of the models that a policy and the policies within it were made for."""
-    found: dict[int, Any] = {}
+    hashes = set()
+    visited: set[int] = set()
     waiting: list[Any] = [policy]
     while waiting:
         part = waiting.pop()
-        if part is None or id(part) in found:
+        if part is None or id(part) in visited:
             continue
-        found[id(part)] = part
-        if len(found) > MOST_INNER_POLICIES:
+        visited.add(id(part))
+        if len(visited) > MOST_INNER_POLICIES:
             raise InputError(
                 f"{type(policy).__name__}: expected a policy made of at most"
                 f" {MOST_INNER_POLICIES} policies, got more"
             )
-        waiting += [getattr(part, name, None) for name in INNER_POLICIES]
-    return {getattr(part, "model_sha256", "") for part in found.values()}
+
+        hashes.add(getattr(part, "model_sha256", ""))
+        for name in INNER_POLICIES:
+            waiting.append(getattr(part, name, None))
+    return hashes
 
 
 def read_entries(controllers: Any) -> tuple[Entry, ...]:
@@ -128,21 +132,27 @@ def read_entries(controllers: Any) -> tuple[Entry, ...]:
         Texts, several in one separated by commas; entries; controllers; functions; or
         any of these by name.
     """
-    if isinstance(controllers, Mapping):
-        entries = [_named(str(name), source) for name, source in controllers.items()]
-    else:
-        entries = [_read_entry(given) for given in _as_list(controllers)]
-    if not entries:
-        raise InputError("controllers: expected at least one, got none")
-
-    names = [entry.name for entry in entries]
-    for name in names:
-        if names.count(name) > 1:
+    entries: dict[str, Entry] = {}
+    for entry in _each_entry(controllers):
+        name = entry.name
+        if name in entries:
             raise InputError(
                 f"controllers: expected different names, got '{name}' twice; name one"
                 f" of them: other={name}"
             )
-    return tuple(entries)
+        entries[name] = entry
+    if not entries:
+        raise InputError("controllers: expected at least one, got none")
+    return tuple(entries.values())
+
+
+def _each_entry(controllers: Any) -> Iterator[Entry]:
+    if isinstance(controllers, Mapping):
+        for name, source in controllers.items():
+            yield _named(str(name), source)
+    else:
+        for given in _as_list(controllers):
+            yield _read_entry(given)
 
 
 def _as_list(controllers: Any) -> list[Any]:
@@ -163,8 +173,11 @@ def _read_entry(given: Any) -> Entry:
             return _named(name.strip(), source.strip())
         text = given.strip()
         return Entry(_short_name(text), _checked_text(text))
-    kind = type(given).__name__
-    own_name = getattr(given, "name", None) or getattr(given, "__name__", kind)
+
+    # an object is known by its name, a function by its own, others by their class
+    own_name: Any = getattr(given, "name", None)
+    if not own_name:
+        own_name = getattr(given, "__name__", type(given).__name__)
     return _named(str(own_name), given)
 
 
@@ -186,7 +199,8 @@ def _named(name: str, source: Any) -> Entry:
 def _short_name(text: str) -> str:
     """Name of an entry that was given without one."""
     if names_code(text):
-        return text.rpartition(":")[2]
+        _, _, function = text.rpartition(":")
+        return function
     if not text.endswith((".json", ".zip")):
         return text
     first_file, _, _ = text.partition("+")
@@ -220,20 +234,21 @@ def check_agents(entry: Entry, tasks: Sequence[BenchmarkTask]) -> None:
     if not entry.is_text or names_code(entry.source):
         return
     sources: dict[Path, Source] = {}
-    refusals: list[str] = []
-    n_fitting = 0
+    refusals: list[InputError] = []
+    fits_one = False
     for task in tasks:
         for path in source_files(entry.source, task):
             if path not in sources:
                 sources[path] = load_source(path)
-            where = f"'{path}' on task '{task.name}'"
             try:
                 policy = make_policy(sources[path], task)
+                where = f"'{path}' on task '{task.name}'"
                 check_fits(policy, task.task, task.ship, where)
-                n_fitting += 1
+                fits_one = True
             except InputError as error:
-                refusals.append(str(error))
-    if refusals and not n_fitting:
+                refusals.append(error)
+
+    if refusals and not fits_one:
         raise InputError(
             f"controllers: '{entry.name}' fits none of the tasks: {refusals[0]}"
         )

@@ -1,6 +1,7 @@
 """Figures of what controllers do in one episode: their paths, and histories."""
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -35,19 +36,19 @@ def tracks_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figu
         All controllers of the page, which gives each its colour.
     """
     look = looks(names)
-    first = next(iter(episodes.values()))
+    first, *_ = episodes.values()
     traces = _path_traces(first)
     for name, episode in episodes.items():
         kept = _thinned(episode.n_steps)
         north = episode.states["x"][kept]
         east = episode.states["y"][kept]
-        traces.append(controller_line(east, north, name, look[name], 1.8))
+        track = controller_line(east, north, name, look[name], width=1.8)
+        traces.append(track)
 
-    return page_panels(
-        [Panel(traces, "east, m", axis("north, m", scaleanchor="x", scaleratio=1))],
-        height=480,
-        hovermode="closest",
-    )
+    # one metre is as long in both directions
+    y_axis = axis("north, m", scaleanchor="x", scaleratio=1)
+    panel = Panel(traces, "east, m", y_axis)
+    return page_panels([panel], height=480, hovermode="closest")
 
 
 def _path_traces(episode: Episode) -> list[Any]:
@@ -92,18 +93,16 @@ def _corridor(path: Floats, half_width: float) -> Floats:
 
     Returns north and east, m, shape (2, n); NaN parts one outline from the next.
     """
-    begins, ends = path[:-1], path[1:]
-    ahead = ends - begins
-    lengths = np.hypot(*ahead.T)
-    ahead /= np.maximum(lengths, np.finfo(float).tiny)[:, None]
-    north, east = ahead.T
-    aside = half_width * np.column_stack([-east, north])
+    outlines = []
+    for begin, end in pairwise(path):
+        north, east = end - begin
+        length = np.hypot(north, east)
+        if length > 0.0:
+            side = half_width / length * np.array([-east, north])
+            outlines += [begin + side, end + side, end - side, begin - side, GAP]
 
     angles = np.linspace(0.0, 2.0 * np.pi, 25)
     circle = half_width * np.column_stack([np.cos(angles), np.sin(angles)])
-    outlines = []
-    for begin, end, side in zip(begins, ends, aside, strict=True):
-        outlines += [begin + side, end + side, end - side, begin - side, GAP]
     for point in path[1:-1]:
         outlines += [*(point + circle), GAP]
     return np.array(outlines).T
@@ -117,28 +116,32 @@ def histories_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> F
     longest = max(episodes.values(), key=lambda episode: episode.n_steps)
     has_path = longest.waypoints is not None
     look = looks(names)
-    courses, rudders = [], []
+    courses = []
+    rudders = []
     for name, episode in episodes.items():
         kept = _thinned(episode.n_steps)
         time = episode.dt * kept
-        course = _cross_track(episode) if has_path else _heading_deg(episode)
-        rudder = np.degrees(episode.states["delta"])
-        courses.append(controller_line(time, course[kept], name, look[name], 1.7))
-        rudders.append(controller_line(time, rudder[kept], name, look[name], 1.2))
+        course = _course(episode, has_path)[kept]
+        rudder = np.degrees(episode.states["delta"])[kept]
+        courses.append(controller_line(time, course, name, look[name], width=1.7))
+        rudders.append(controller_line(time, rudder, name, look[name], width=1.2))
     if not has_path:
         courses.append(_ordered_course(longest))
 
-    figure = page_panels(
-        [
-            Panel(courses, "", "cross-track error, m" if has_path else "heading, deg"),
-            Panel(rudders, "time, s", axis("rudder, deg", zero=True)),
-        ],
-        height=480,
-        grid=HISTORIES_GRID,
-    )
+    quantity = "cross-track error, m" if has_path else "heading, deg"
+    upper = Panel(courses, "", quantity)
+    lower = Panel(rudders, "time, s", axis("rudder, deg", zero=True))
+    figure = page_panels([upper, lower], height=480, grid=HISTORIES_GRID)
     if has_path and longest.corridor:
         _add_bounds(figure, longest.corridor)
     return figure
+
+
+def _course(episode: Episode, has_path: bool) -> Floats:
+    """Cross-track error, m, of an episode with a path, otherwise heading, deg."""
+    if has_path:
+        return episode.info["cross_track"]
+    return np.degrees(np.unwrap(episode.states["psi"]))
 
 
 def _add_bounds(figure: Figure, corridor: float) -> None:
@@ -146,14 +149,6 @@ def _add_bounds(figure: Figure, corridor: float) -> None:
     bound = {"color": GREEN, "width": 1.2, "dash": "dash"}
     for y in (-corridor, corridor):
         figure.add_hline(y=y, line=bound, row=1, col=1)
-
-
-def _cross_track(episode: Episode) -> Floats:
-    return episode.info["cross_track"]
-
-
-def _heading_deg(episode: Episode) -> Floats:
-    return np.degrees(np.unwrap(episode.states["psi"]))
 
 
 def _ordered_course(episode: Episode) -> Any:

@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from agents.benchmarking.cells import Cell, TrainingRun
+from agents.benchmarking.cells import Cell
 from shipgym.arrays import Integers
 from shipgym.checks import quoted
 from shipgym.drafts import atomic_path
@@ -29,24 +30,25 @@ def episode_table(cells: Mapping[tuple[str, str], Cell], seeds: Integers) -> Col
 
     Figures that a cell lacks are NaN.
     """
-    keys: dict[str, list[str | int]] = {"controller": [], "task": [], "run": []}
-    runs: list[TrainingRun] = []
-    figures: dict[str, None] = {}
+    blocks = []
     for (name, task), cell in cells.items():
         for number, run in enumerate(cell.runs):
-            keys["controller"].append(name)
-            keys["task"].append(task)
-            keys["run"].append(number)
-            runs.append(run)
-            figures |= dict.fromkeys(run.figures)
+            content = {
+                "controller": name,
+                "task": task,
+                "run": number,
+                "seed": seeds,
+                **run.figures,
+            }
+            blocks.append(pd.DataFrame(content))
+    table = pd.concat(blocks, ignore_index=True)
 
-    n_episodes = len(seeds)
-    columns: Columns = {key: np.repeat(of, n_episodes) for key, of in keys.items()}
-    columns["seed"] = np.tile(seeds, len(runs))
-    missing = np.full(n_episodes, np.nan)
-    for figure in figures:
-        parts = [run.figures.get(figure, missing) for run in runs]
-        columns[figure] = np.concatenate(parts, dtype=np.float64)
+    columns: Columns = {}
+    for name in table:
+        kind: Any = np.float64
+        if name in KEYS:
+            kind = np.str_ if name in TEXT_KEYS else np.int64
+        columns[name] = table[name].to_numpy().astype(kind)
     return columns
 
 
@@ -65,7 +67,9 @@ def write_episodes(columns: Columns, path: Path) -> None:
     Raises InputError if it cannot be written.
     """
     arrow, parquet = pyarrow()
-    arrays = {name: _to_arrow(arrow, name, one) for name, one in columns.items()}
+    arrays = {}
+    for name, values in columns.items():
+        arrays[name] = _to_arrow(arrow, name, values)
     with atomic_path(path) as draft:
         parquet.write_table(arrow.table(arrays), draft, compression="zstd")
 
@@ -75,6 +79,7 @@ def _to_arrow(arrow: Any, name: str, values: NDArray[Any]) -> Any:
         return arrow.array(values.tolist())
     if name in KEYS:
         return arrow.array(values)
+
     missing = np.isnan(values)
     known = np.where(missing, 0.0, values)
     if name in FLAGS:
@@ -94,28 +99,31 @@ def read_episodes(path: Path, rows: int) -> Columns:
         file = parquet.ParquetFile(arrow.BufferReader(content))
         names = file.schema_arrow.names
         _check_table(names, file.metadata.num_rows, rows, path)
-        return {
-            name: _from_arrow(arrow, name, file.read([name]).column(0))
-            for name in names
-        }
+        columns: Columns = {}
+        for name in names:
+            values = file.read([name]).column(0)
+            columns[name] = _from_arrow(arrow, name, values)
+        return columns
     except InputError:
         raise
     except malformed as error:
         raise InputError(
-            f"{path}: expected a Parquet file, got one that cannot be read ({error}); it"
-            " may be cut short"
+            f"{path}: expected a Parquet file, got one that cannot be read ({error});"
+            " it may be cut short"
         ) from None
 
 
 def _check_table(names: list[str], n_rows: int, expected: int, path: Path) -> None:
     """Refuse a table of another size, or without its keys, before it is read."""
     n_columns = len(names)
-    if n_rows != expected or expected * n_columns > MOST_NUMBERS:
+    n_numbers = expected * n_columns
+    if n_rows != expected or n_numbers > MOST_NUMBERS:
         raise InputError(
             f"{path}: expected {expected} rows, got {n_rows} of {n_columns} columns"
         )
     different = set(names)
-    if len(different) < n_columns or not different.issuperset(KEYS):
+    has_keys = different.issuperset(KEYS)
+    if len(different) < n_columns or not has_keys:
         raise InputError(
             f"{path}: expected columns {quoted(KEYS)} and figures, got {quoted(names)}"
         )
@@ -127,9 +135,11 @@ def _from_arrow(arrow: Any, name: str, values: Any) -> NDArray[Any]:
         return _from_texts(name, values.cast(arrow.string()).to_pylist())
 
     kind = values.type
-    is_number = arrow.types.is_integer(kind) or arrow.types.is_floating(kind)
-    if not is_number and name not in FLAGS:
+    is_integer = arrow.types.is_integer(kind)
+    is_floating = arrow.types.is_floating(kind)
+    if not is_integer and not is_floating and name not in FLAGS:
         raise TypeError(f"column '{name}' of {kind}")
+
     wanted = arrow.int64() if name in KEYS else arrow.float64()
     numbers: NDArray[Any] = values.cast(wanted).to_numpy(zero_copy_only=False)
     if name in KEYS and numbers.dtype != np.int64:
@@ -138,8 +148,8 @@ def _from_arrow(arrow: Any, name: str, values: Any) -> NDArray[Any]:
 
 
 def _from_texts(name: str, texts: list[str]) -> NDArray[np.str_]:
-    longest = max(map(len, texts), default=0)
-    n_characters = longest * len(texts)  # of the array
+    lengths = [len(text) for text in texts]
+    n_characters = max(lengths, default=0) * len(texts)  # of the array
     if n_characters > MOST_NUMBERS:
         raise ValueError(f"column '{name}' of long texts")
     return np.array(texts, dtype=np.str_)

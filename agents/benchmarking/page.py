@@ -97,8 +97,8 @@ def _page(result: BenchmarkResult, again: Rerun, count: int) -> str:
     profile = None
     if summary["profile"]["shares"]:
         profile_caption = (
-            "Share of all episodes that score more than the threshold; higher is better."
-            " Dotted: wheel-over from the model, and the best known."
+            "Share of all episodes that score more than the threshold; higher is"
+            " better. Dotted: wheel-over from the model, and the best known."
         )
         profile = _figure("profile-figure", profile_figure(result), profile_caption)
     failures_title = (
@@ -139,10 +139,9 @@ def _figure(name: str, figure: Figure, caption: str) -> PageFigure:
 
 
 def _lead(result: BenchmarkResult) -> str:
-    summary = result.summary
-    controllers = counted(len(summary["controllers"]), "controller")
-    tasks = counted(len(summary["tasks"]), "task")
-    episodes = counted(summary["seeds"]["count"], "episode")
+    controllers = counted(len(result.ranking), "controller")
+    tasks = counted(len(result.tasks), "task")
+    episodes = counted(len(result.seeds), "episode")
     return (
         f"{controllers} in {tasks}, {episodes} each, the same for all. Tables sort by a"
         " click on a head; figures may be zoomed."
@@ -154,13 +153,14 @@ def _task(
 ) -> dict[str, Any]:
     """Return what the page shows of a task."""
     about = result.summary["suite"]["tasks"][task]
+    costs = costs_figure(result, task)
     costs_caption = (
         "Cost of each episode, with the box of the middle half and the median."
     )
     return {
         "name": task,
         "about": f"{about['environment']}, {about['model']}: {about['why']}.",
-        "costs": _figure(f"costs-{number}", costs_figure(result, task), costs_caption),
+        "costs": _figure(f"costs-{number}", costs, costs_caption),
         "metrics": metrics_table(result, task, f"metrics-{number}"),
         "seed": hardest_seed(result, task),
         "hardest": _hardest(result, again, task, number),
@@ -180,19 +180,22 @@ def _hardest(
     if not episodes:
         return []
 
-    figures = []
-    has_path = any(episode.waypoints is not None for episode in episodes.values())
-    shown = "Heading, with the ordered course"
-    if has_path:
-        shown = "Cross-track error, with the bounds of the corridor"
-        tracks = tracks_figure(episodes, result.ranking)
-        caption = "Paths over ground; dashed the path to follow, shaded its corridor."
-        figures.append(_figure(f"tracks-{number}", tracks, caption))
     histories = histories_figure(episodes, result.ranking)
-    figures.append(
-        _figure(f"histories-{number}", histories, f"{shown}, and the rudder.")
+    about = f"histories-{number}"
+    first, *_ = episodes.values()
+    if first.waypoints is None:
+        caption = "Heading, with the ordered course, and the rudder."
+        return [_figure(about, histories, caption)]
+
+    tracks = tracks_figure(episodes, result.ranking)
+    tracks_caption = (
+        "Paths over ground; dashed the path to follow, shaded its corridor."
     )
-    return figures
+    caption = "Cross-track error, with the bounds of the corridor, and the rudder."
+    return [
+        _figure(f"tracks-{number}", tracks, tracks_caption),
+        _figure(about, histories, caption),
+    ]
 
 
 def _about_replays(again: Rerun, count: int) -> str:
@@ -215,20 +218,22 @@ def _about_replays(again: Rerun, count: int) -> str:
 
 def _not_replayed(again: Rerun) -> list[str]:
     """Return why controllers cannot be replayed, each reason once."""
-    reasons: dict[str, None] = {}
+    reasons = []
     for (name, _), why in again.refused.items():
-        reasons[f"{name}: {why}"] = None
-    return list(reasons)
+        reason = f"{name}: {why}"
+        if reason not in reasons:
+            reasons.append(reason)
+    return reasons
 
 
 def _origin(result: BenchmarkResult) -> dict[str, Any]:
     """Return how the results were made."""
     summary = result.summary
-    seeds = summary["seeds"]
+    seeds = result.seeds
     return {
         "command": command(result),
         "suite": summary["suite"],
-        "seeds": f"{seeds['first']} to {seeds['first'] + seeds['count'] - 1}",
+        "seeds": f"{seeds[0]} to {seeds[-1]}",
         "versions": summary["versions"],
         "episodes": summary["episodes"],
         "results": RESULTS,
@@ -241,10 +246,12 @@ def _files_and_hashes(result: BenchmarkResult) -> list[tuple[str, str, str]]:
     for name, about in result.summary["controllers"].items():
         for path, sha256 in about["files"].items():
             rows.append((name, path, sha256))
-        for task, cells in result.summary["tasks"].items():
-            hashes = cells[name]["policy_sha256"] if name in cells else []
-            for sha256 in filter(None, hashes):
-                rows.append((name, f"controller for {task}", sha256))
+
+        for task in result.tasks:
+            cell = result.cells(task).get(name, {"policy_sha256": []})
+            for sha256 in cell["policy_sha256"]:
+                if sha256:
+                    rows.append((name, f"controller for {task}", sha256))
     return rows
 
 
@@ -257,18 +264,12 @@ def command(result: BenchmarkResult) -> str:
         controllers.append(source if source == name else f"{name}={source}")
 
     suite = summary["suite"]
-    options = {
-        "--controllers": ",".join(controllers),
-        "--suite": suite["file"] or suite["name"],
-    }
+    words = ["shipgym", "benchmark", "--controllers", ",".join(controllers)]
+    words += ["--suite", suite["file"] or suite["name"]]
     if not suite["complete"]:
-        options["--tasks"] = ",".join(summary["tasks"])
-    count = summary["seeds"]["count"]
-    if count != N_EPISODES:
-        options["--episodes"] = str(count)
-    options["--out"] = "results"
-
-    words = ["shipgym", "benchmark"]
-    for option, value in options.items():
-        words += [option, value]
+        words += ["--tasks", ",".join(result.tasks)]
+    n_episodes = len(result.seeds)
+    if n_episodes != N_EPISODES:
+        words += ["--episodes", str(n_episodes)]
+    words += ["--out", "results"]
     return shlex.join(words)

@@ -92,19 +92,21 @@ def scores_figure(result: BenchmarkResult) -> Figure:
     limits = SCORE_RANGE if has_scores else RELATIVE_RANGE
     traces = []
     for total in result.summary["ranking"]:
+        name = total["name"]
+        cost = total["relative_cost"]
         interval = total["score"]
         if not has_scores:
-            interval = dict.fromkeys(("low", "value", "high"), total["relative_cost"])
+            interval = {"value": cost, "low": cost, "high": cost}
         if interval["value"] is not None:
-            name = total["name"]
             trace = _interval_trace(name, interval, limits, look[name].colour)
             traces.append(trace)
 
-    if not has_scores:
-        title = "cost relative to the lowest, geometric mean over tasks"
-        return row_panel(traces, title, row_height=30)
-    figure = row_panel(traces, f"score: {SCORE}", row_height=30)
-    _add_score_lines(figure)
+    title = "cost relative to the lowest, geometric mean over tasks"
+    if has_scores:
+        title = f"score: {SCORE}"
+    figure = row_panel(traces, title, row_height=30)
+    if has_scores:
+        _add_score_lines(figure)
     return figure
 
 
@@ -152,32 +154,37 @@ def profile_figure(result: BenchmarkResult) -> Figure:
     for name in result.ranking:
         shares = profile["shares"].get(name)
         if shares is not None:
-            percent = 100.0 * np.asarray(shares)
-            thresholds = profile["thresholds"]
-            lines.append(controller_line(thresholds, percent, name, look[name], 2.0))
+            curve = controller_line(
+                x=profile["thresholds"],
+                y=100.0 * np.asarray(shares),
+                name=name,
+                look=look[name],
+                width=2.0,
+            )
+            lines.append(curve)
 
     y_axis = axis("episodes that score more, %", range=[-2, 102])
-    figure = page_panels(
-        [Panel(lines, f"score of an episode: {SCORE}", y_axis)],
-        height=380,
-    )
+    panel = Panel(lines, f"score of an episode: {SCORE}", y_axis)
+    figure = page_panels([panel], height=380)
     _add_score_lines(figure)
     return figure
 
 
 def costs_figure(result: BenchmarkResult, task: str) -> Figure:
     """Return a box of the episodes' costs in a task for each controller."""
+    cells = result.cells(task)
     boxes = []
     all_costs = [np.zeros(0)]
     for name, look in looks(result.ranking).items():
-        if name in result.summary["tasks"][task]:
+        if name in cells:
             costs = result.figures(name, task).ravel()
             boxes.append(_box(name, costs, look.colour))
             all_costs.append(costs)
 
-    costs_axis = axis("cost of an episode", type="linear")
+    title = "cost of an episode"
+    costs_axis = axis(title, type="linear")
     if _is_wide(np.concatenate(all_costs)):
-        costs_axis = axis("cost of an episode", type="log", dtick="D2")
+        costs_axis = axis(title, type="log", dtick="D2")
     return row_panel(boxes, costs_axis, row_height=34)
 
 

@@ -1,6 +1,6 @@
 """The worst episodes of a benchmark, ready for the replay player of its page."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,6 +36,8 @@ DECIMALS = {
     "current_towards": 0,
 }
 REWARD_DECIMALS = 4
+#: Runs of the replay player, whole, by episode.
+Histories = dict[EpisodeId, dict[str, Any]]
 
 
 class Choice(NamedTuple):
@@ -50,13 +52,13 @@ class Choice(NamedTuple):
 
 def usable_controllers(result: BenchmarkResult, task: str) -> list[str]:
     """Return the controllers that could run a task and are usable at sea, as ranked."""
-    cells = result.summary["tasks"][task]
+    cells = result.cells(task)
     return [name for name in result.ranking if name in cells and name != BEST_KNOWN]
 
 
 def best_controllers(result: BenchmarkResult, task: str) -> list[str]:
     """Return those of the lowest mean cost in a task, several if equal to rounding."""
-    cells = result.summary["tasks"][task]
+    cells = result.cells(task)
     costs = {}
     for name in usable_controllers(result, task):
         cost = cells[name]["cost"]["value"]
@@ -75,29 +77,29 @@ def worst_episodes(
     result: BenchmarkResult, controller: str, task: str, count: int
 ) -> list[EpisodeId]:
     """Return the episodes with the highest costs, over all training runs."""
-    first = result.summary["seeds"]["first"]
     costs = result.figures(controller, task)
     known = np.nan_to_num(costs, nan=np.inf)
     order = np.argsort(-known, axis=None, kind="stable")
-    worst = np.column_stack(np.unravel_index(order[:count], costs.shape))
+
     episodes = []
-    for training_run, number in worst.tolist():
-        episodes.append(EpisodeId(controller, task, training_run, first + number))
+    for place in order[:count].tolist():
+        training_run, number = divmod(place, len(result.seeds))
+        seed = result.seeds[number]
+        episodes.append(EpisodeId(controller, task, training_run, seed))
     return episodes
 
 
 def hardest_seed(result: BenchmarkResult, task: str) -> int:
     """Return the seed of the episode with the highest median cost over controllers."""
-    first = int(result.summary["seeds"]["first"])
-    costs = []
+    mean_costs = []
     for name in usable_controllers(result, task):
-        mean_over_runs = result.figures(name, task).mean(axis=0)
-        costs.append(mean_over_runs)
-    if not costs:
-        return first
-    known = np.nan_to_num(costs, nan=np.inf)
+        costs = result.figures(name, task)
+        mean_costs.append(costs.mean(axis=0))  # over training runs
+    if not mean_costs:
+        return result.seeds[0]
+    known = np.nan_to_num(mean_costs, nan=np.inf)
     medians = np.median(known, axis=0)
-    return first + int(np.argmax(medians))
+    return result.seeds[np.argmax(medians)]
 
 
 def choices(result: BenchmarkResult, task: str, count: int) -> list[Choice]:
@@ -110,12 +112,14 @@ def choices(result: BenchmarkResult, task: str, count: int) -> list[Choice]:
     seed = hardest_seed(result, task)
     hardest = [EpisodeId(name, task, 0, seed) for name in names]
     choices = [Choice("", hardest)]
-    best, *_ = [*best_controllers(result, task), ""]
+
+    best = best_controllers(result, task)[:1]
     for name in names:
-        for episode in worst_episodes(result, name, task, count):
-            together = [episode]
-            if best not in ("", name):
-                together.append(EpisodeId(best, task, 0, episode.seed))
+        compared = [other for other in best if other != name]
+        for worst in worst_episodes(result, name, task, count):
+            together = [worst]
+            for other in compared:
+                together.append(EpisodeId(other, task, 0, worst.seed))
             choices.append(Choice(name, together))
     return choices
 
@@ -126,7 +130,7 @@ def replayable(result: BenchmarkResult, wanted: int) -> tuple[int, list[EpisodeI
     At most `wanted` of each controller and task; at least one.
     """
     for count in range(wanted, 0, -1):
-        shown: dict[EpisodeId, None] = {}
+        shown: dict[EpisodeId, None] = {}  # in order, each once
         for task in result.tasks:
             for choice in choices(result, task, count):
                 shown |= dict.fromkeys(choice.episodes)
@@ -141,59 +145,80 @@ def replay_data(result: BenchmarkResult, again: Rerun, count: int) -> dict[str, 
     `page` is the player, with a mark where its runs go; `quantities` what it shows over
     time; `runs` in their short form; `entries` what may be chosen, by task.
     """
-    whole: dict[EpisodeId, dict[str, Any]] = {}
+    histories: Histories = {}
     entries: dict[str, list[dict[str, Any]]] = {}
     for task in result.tasks:
         entries[task] = []
         for choice in choices(result, task, count):
-            there = [
-                episode for episode in choice.episodes if episode in again.episodes
-            ]
-            if not there or choice.controller not in ("", there[0].controller):
+            episodes = _available(choice, again)
+            if not episodes:
                 continue
-            for episode in there:
-                if episode not in whole:
-                    title = _title(result, episode)
-                    whole[episode] = run(title, again.episodes[episode])
-            entries[task].append(_entry(result, choice.controller, there, whole))
+            _add_histories(histories, result, again, episodes)
+            entry = _entry(result, choice.controller, episodes, histories)
+            entries[task].append(entry)
 
-    look = looks(result.ranking)
-    runs = []
-    for episode, history in whole.items():
-        colour = look[episode.controller].colour
-        runs.append({**short(history), "colour": colour})
     return {
         "page": render(PLAYER, title="Replay", data=PLACEHOLDER),
         "mark": f'"{PLACEHOLDER}"',
-        "quantities": quantities(list(whole.values())),
-        "runs": runs,
+        "quantities": quantities(list(histories.values())),
+        "runs": _short_runs(result, histories),
         "entries": entries,
     }
+
+
+def _add_histories(
+    histories: Histories,
+    result: BenchmarkResult,
+    again: Rerun,
+    episodes: Sequence[EpisodeId],
+) -> None:
+    for episode in episodes:
+        if episode not in histories:
+            title = _title(result, episode)
+            histories[episode] = run(title, again.episodes[episode])
+
+
+def _available(choice: Choice, again: Rerun) -> list[EpisodeId]:
+    """Episodes of a choice that were run again; none without that of its controller."""
+    episodes = [episode for episode in choice.episodes if episode in again.episodes]
+    if episodes and choice.controller not in ("", episodes[0].controller):
+        return []
+    return episodes
+
+
+def _short_runs(result: BenchmarkResult, histories: Histories) -> list[dict[str, Any]]:
+    look = looks(result.ranking)
+    runs = []
+    for episode, history in histories.items():
+        colour = look[episode.controller].colour
+        runs.append({**short(history), "colour": colour})
+    return runs
 
 
 def _entry(
     result: BenchmarkResult,
     controller: str,
     episodes: Sequence[EpisodeId],
-    whole: Mapping[EpisodeId, Mapping[str, Any]],
+    histories: Histories,
 ) -> dict[str, Any]:
     """Return what may be chosen: whose episode it is, and which runs are replayed."""
     first = episodes[0]
-    runs = list(whole)
+    runs = list(histories)
     return {
         "who": controller,
         "seed": first.seed,
         "cost": round(cost_of(result, first), 2),
-        "outcome": whole[first]["outcome"],
+        "outcome": histories[first]["outcome"],
         "runs": [runs.index(episode) for episode in episodes],
     }
 
 
 def _title(result: BenchmarkResult, episode: EpisodeId) -> str:
-    cell = result.summary["tasks"][episode.task][episode.controller]
+    name = episode.controller
+    cell = result.cells(episode.task)[name]
     if cell["runs"] == 1:
-        return episode.controller
-    return f"{episode.controller}, run {episode.run + 1}"
+        return name
+    return f"{name}, run {episode.run + 1}"
 
 
 def short(whole: dict[str, Any]) -> dict[str, Any]:

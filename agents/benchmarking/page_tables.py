@@ -119,9 +119,9 @@ def ranking_table(result: BenchmarkResult) -> SortableTable:
             " interval."
         )
     caption += (
-        " Relative cost: geometric mean over tasks of the cost over the lowest one. Best"
-        " in tasks: has the lowest cost, or the same. Lost: episodes in which control"
-        " was lost. Failed: the controller gave no command."
+        " Relative cost: geometric mean over tasks of the cost over the lowest one."
+        " Best in tasks: has the lowest cost, or the same. Lost: episodes in which"
+        " control was lost. Failed: the controller gave no command."
     )
     heads = [
         TableHead("controller", kind=""),
@@ -133,16 +133,22 @@ def ranking_table(result: BenchmarkResult) -> SortableTable:
         TableHead("lost"),
         TableHead("failed"),
     ]
-    best = [name for task in result.tasks for name in best_controllers(result, task)]
+    best: list[str] = []
+    for task in result.tasks:
+        best += best_controllers(result, task)
+
     rows = []
     for place, ranked in enumerate(result.summary["ranking"], start=1):
-        name, relative = ranked["name"], ranked["relative_cost"]
+        name = ranked["name"]
+        relative_cost = ranked["relative_cost"]
         wins = _count_cell(best.count(name))
+        if name == BEST_KNOWN:
+            wins = TableCell(key=0)
         cells = [
             _count_cell(place),
             _interval_cell(ranked["score"], fixed),
-            TableCell(fixed(relative), relative),
-            TableCell(key=0) if name == BEST_KNOWN else wins,
+            TableCell(fixed(relative_cost), relative_cost),
+            wins,
             _count_cell(ranked["tasks"]),
             _failure_cell(ranked["lost"]),
             _failure_cell(ranked["failed"]),
@@ -160,12 +166,14 @@ def costs_table(result: BenchmarkResult) -> SortableTable:
     names = result.ranking
     heads = [TableHead("task", kind=""), *(TableHead(name) for name in names)]
     rows = []
-    for task, cells in result.summary["tasks"].items():
+    for task in result.tasks:
+        cells = result.cells(task)
         best = best_controllers(result, task)
         row = []
         for name in names:
             cost = cells[name]["cost"] if name in cells else None
-            row.append(_interval_cell(cost, number, star=name in best))
+            is_best = name in best
+            row.append(_interval_cell(cost, number, star=is_best))
         rows.append(_task_row(task, row))
     return SortableTable("costs-table", caption, heads, rows)
 
@@ -185,11 +193,10 @@ def scores_table(result: BenchmarkResult) -> SortableTable:
     ]
     rows = []
     for task, reference in result.summary["reference"].items():
-        cells = result.summary["tasks"][task]
-        row = [
-            TableCell(number(reference["zero"]), reference["zero"]),
-            TableCell(number(reference["best"]), reference["best"]),
-        ]
+        cells = result.cells(task)
+        zero = reference["zero"]
+        best = reference["best"]
+        row = [TableCell(number(zero), zero), TableCell(number(best), best)]
         for name in names:
             score = cells[name]["score"] if name in cells else None
             row.append(_interval_cell(score, fixed))
@@ -221,16 +228,15 @@ def _improvement_cell(interval: Mapping[str, Any] | None) -> TableCell:
     if interval is None or interval["value"] is None:
         return TableCell()
     value = interval["value"]
-    percent, low, high = (
-        f"{100.0 * interval[name]:.0f}" for name in ("value", "low", "high")
-    )
+    low = 100.0 * interval["low"]
+    high = 100.0 * interval["high"]
     colour = BETTER if value >= 0.5 else WORSE
     share = MOST_TINT * abs(2.0 * value - 1.0)
     return TableCell(
-        text=percent,
+        text=f"{100.0 * value:.0f}",
         key=value,
         kind="tinted",
-        below=f"{low} to {high}",
+        below=f"{low:.0f} to {high:.0f}",
         tint=f"color-mix(in srgb,{colour} {share:.0f}%,white)",
     )
 
@@ -241,11 +247,14 @@ def metrics_table(result: BenchmarkResult, task: str, name: str) -> SortableTabl
         "Means over the episodes, and below them the 95th percentile. Time per action:"
         " in a batch."
     )
-    cells = result.summary["tasks"][task]
+    cells = result.cells(task)
     metrics = [metric for metric in METRICS if _is_shown(metric.name, cells)]
     titles = ["cost", *(metric.title for metric in metrics)]
     titles += ["lost", "failed", "µs per action"]
-    heads = [TableHead("controller", kind=""), *(TableHead(title) for title in titles)]
+    heads = [TableHead("controller", kind="")]
+    for title in titles:
+        heads.append(TableHead(title))
+
     rows = []
     for controller in result.ranking:
         if controller in cells:
@@ -271,12 +280,11 @@ def _metrics_row(cell: Mapping[str, Any], metrics: Sequence[Metric]) -> list[Tab
     for metric in metrics:
         figures = cell["metrics"].get(metric.name)
         row.append(_metric_cell(metric, figures))
+
     time = cell["microseconds_per_action"]
-    row += [
-        _failure_cell(cell["lost"]),
-        _failure_cell(cell["failed"]),
-        TableCell(number(time, 2), time),
-    ]
+    row.append(_failure_cell(cell["lost"]))
+    row.append(_failure_cell(cell["failed"]))
+    row.append(TableCell(number(time, 2), time))
     return row
 
 
@@ -284,10 +292,10 @@ def _metric_cell(metric: Metric, figures: Mapping[str, Any] | None) -> TableCell
     if figures is None or figures["mean"] is None:
         return TableCell()
     mean = figures["mean"]
-    text = metric.write(mean)
-    if metric.write is percent:
-        return TableCell(text, mean)
-    return TableCell(text, mean, below=metric.write(figures["p95"]))
+    below = ""
+    if metric.write is not percent:
+        below = metric.write(figures["p95"])
+    return TableCell(metric.write(mean), mean, below=below)
 
 
 def _interval_cell(
@@ -297,12 +305,13 @@ def _interval_cell(
     kind = "best" if star else ""
     if interval is None or interval["value"] is None:
         return TableCell(kind=kind)
-    value, low, high = (interval[name] for name in ("value", "low", "high"))
+    low = write(interval["low"])
+    high = write(interval["high"])
     return TableCell(
-        text=write(value),
-        key=value,
+        text=write(interval["value"]),
+        key=interval["value"],
         kind=kind,
-        below=f"{write(low)} to {write(high)}",
+        below=f"{low} to {high}",
         star=star,
     )
 

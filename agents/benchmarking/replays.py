@@ -70,25 +70,30 @@ def rerun(
     """
     entries = result.entries if controllers is None else read_entries(controllers)
     entry_of = {entry.name: entry for entry in entries}
-    jobs: list[dict[str, Any]] = []
+    jobs: dict[tuple[str, str], dict[str, Any]] = {}
     records: dict[tuple[str, str], dict[str, Any]] = {}
-    for (name, task_name), runs in _by_cell(episodes).items():
+    for cell, runs in _by_cell(episodes).items():
+        name, task_name = cell
         try:
             task = result.task(task_name)
             entry = _given(name, entry_of)
         except InputError as error:
-            records[name, task_name] = {"refused": str(error)}
+            records[cell] = {"refused": str(error)}
             continue
         if entry.is_text:
-            job = {"task": task.to_dict(), "entry": name, "source": entry.source}
-            jobs.append({**job, "runs": runs})
+            jobs[cell] = {
+                "task": task.to_dict(),
+                "entry": name,
+                "source": entry.source,
+                "runs": runs,
+            }
         else:
-            records[name, task_name] = _record(entry, task, runs)
+            records[cell] = _record(entry, task, runs)
 
-    tell = progress and partial(progress, "episodes run again")
-    found = run_jobs(rerun_job, jobs, JobEngine(workers=workers), tell)
-    for job, record in zip(jobs, found, strict=True):
-        records[job["entry"], job["task"]["name"]] = record
+    where = JobEngine(workers=workers)
+    on_progress = progress and partial(progress, "episodes run again")
+    results = run_jobs(rerun_job, list(jobs.values()), where, on_progress)
+    records |= dict(zip(jobs, results, strict=True))
     return _collect(result, records)
 
 
@@ -104,20 +109,23 @@ def _by_cell(
     episodes: Sequence[EpisodeId],
 ) -> dict[tuple[str, str], list[dict[str, Any]]]:
     """Training runs by controller and task, each with its seeds."""
-    seeds: dict[tuple[str, str], dict[int, list[int]]] = {}
+    cells: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    known: dict[tuple[str, str, int], dict[str, Any]] = {}
     for name, task, run, seed in episodes:
-        by_run = seeds.setdefault((name, task), {})
-        by_run.setdefault(run, []).append(seed)
-    cells = {}
-    for cell, by_run in seeds.items():
-        cells[cell] = [{"run": run, "seeds": of_run} for run, of_run in by_run.items()]
+        key = name, task, run
+        if key not in known:
+            known[key] = {"run": run, "seeds": []}
+            runs = cells.setdefault((name, task), [])
+            runs.append(known[key])
+        known[key]["seeds"].append(seed)
     return cells
 
 
 def rerun_job(job: dict[str, Any]) -> dict[str, Any]:
     """Run chosen episodes of a controller and task, in any process; see `_record`."""
     entry = Entry(job["entry"], job["source"])
-    return _record(entry, BenchmarkTask.from_dict(job["task"]), job["runs"])
+    task = BenchmarkTask.from_dict(job["task"])
+    return _record(entry, task, job["runs"])
 
 
 def _record(
@@ -128,9 +136,11 @@ def _record(
     try:
         policies = entry.policies(task)
         for run in runs:
-            found = recorded(policies[run["run"]], task, run["seeds"])
-            contents = [episode and vars(episode) for episode in found.episodes]
-            records.append({**run, "costs": found.costs, "episodes": contents})
+            policy = policies[run["run"]]
+            again = recorded(policy, task, run["seeds"])
+            fields = [episode and vars(episode) for episode in again.episodes]
+            record = {**run, "costs": again.costs, "episodes": fields}
+            records.append(record)
     except InputError as error:
         return {"refused": str(error)}
     except Exception as error:  # it cannot be run again, which is no reason for no page
@@ -144,24 +154,28 @@ def _collect(
     episodes: dict[EpisodeId, Episode] = {}
     refused: dict[tuple[str, str], str] = {}
     different: list[EpisodeId] = []
-    for (name, task), record in records.items():
+    for cell, record in records.items():
         if record["refused"]:
-            refused[name, task] = record["refused"]
+            refused[cell] = record["refused"]
             continue
         for run in record["runs"]:
             rows = zip(run["seeds"], run["costs"], run["episodes"], strict=True)
             for seed, cost, content in rows:
-                key = EpisodeId(name, task, run["run"], seed)
+                key = EpisodeId(*cell, run["run"], seed)
                 if content is not None:
                     episodes[key] = Episode(**content)
-                is_same = np.isclose(cost, cost_of(result, key), rtol=SAME_COST)
-                if np.isfinite(cost) and not is_same:
+                if not _is_same(cost, cost_of(result, key)):
                     different.append(key)
     return Rerun(episodes, refused, tuple(different))
+
+
+def _is_same(cost: float, before: float) -> bool:
+    """Tell whether two costs are equal to rounding; one that is not known is."""
+    return not np.isfinite(cost) or bool(np.isclose(cost, before, rtol=SAME_COST))
 
 
 def cost_of(result: BenchmarkResult, episode: EpisodeId) -> float:
     """Return the cost of an episode in the results."""
     costs = result.figures(episode.controller, episode.task)
-    number = episode.seed - result.summary["seeds"]["first"]
+    number = result.seeds.index(episode.seed)
     return float(costs[episode.run, number])

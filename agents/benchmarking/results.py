@@ -83,6 +83,18 @@ class BenchmarkResult:
         """Names of the tasks."""
         return tuple(self.summary["tasks"])
 
+    @cached_property
+    def seeds(self) -> range:
+        """Seeds of the episodes of each task."""
+        first = self.summary["seeds"]["first"]
+        count = self.summary["seeds"]["count"]
+        return range(first, first + count)
+
+    def cells(self, task: str) -> dict[str, Any]:
+        """Return the figures in a task of each controller that could run it."""
+        cells: dict[str, Any] = self.summary["tasks"][task]
+        return cells
+
     def task(self, name: str) -> BenchmarkTask:
         """Return a task to run again.
 
@@ -103,12 +115,13 @@ class BenchmarkResult:
         for name, about in self.summary["controllers"].items():
             for task, why in about["refused"].items():
                 failures.append(f"{name} could not run {task}: {why}")
-            for task, cells in self.summary["tasks"].items():
-                cell = cells.get(name)
-                if cell is not None and cell["failed"]:
-                    count, failure = cell["failed"], cell["failure"]
+
+            for task in self.tasks:
+                cell = self.cells(task).get(name)
+                if cell and cell["failed"]:
                     failures.append(
-                        f"{name} failed in {count} episodes of {task}: {failure}"
+                        f"{name} failed in {cell['failed']} episodes of {task}:"
+                        f" {cell['failure']}"
                     )
         return failures
 
@@ -121,11 +134,12 @@ class BenchmarkResult:
         check_choice(controller, self.summary["controllers"], "controller")
         check_choice(task, self.tasks, "task")
         check_choice(name, self.episodes, "figure")
-        is_controller = self.episodes["controller"] == controller
-        is_task = self.episodes["task"] == task
-        figures = self.episodes[name][is_controller & is_task]
-        n_episodes = self.summary["seeds"]["count"]
-        return np.reshape(figures, (-1, n_episodes))
+
+        episodes = self.episodes
+        is_controller = episodes["controller"] == controller
+        is_task = episodes["task"] == task
+        figures = episodes[name][is_controller & is_task]
+        return np.reshape(figures, (-1, len(self.seeds)))
 
     def save(self, folder: str | Path) -> Self:
         """Write `episodes.parquet` and then `results.json`, each whole or not at all.
@@ -139,7 +153,8 @@ class BenchmarkResult:
         table = target / EPISODES
         write_episodes(self.episodes, table)
 
-        about_table = {**self.summary["episodes"], "sha256": file_hash(table)}
+        sha256 = file_hash(table)
+        about_table = {**self.summary["episodes"], "sha256": sha256}
         summary = {**self.summary, "episodes": about_table}
         write_json(summary, target / RESULTS)
         return replace(self, summary=summary)
@@ -191,27 +206,23 @@ def collect(
     `cells` has every entry in every task, by the names of both.
     """
     names = [entry.name for entry in entries]
+    controllers = {}
     in_order = {}
-    for name in names:
+    for entry in entries:
+        controllers[entry.name] = _about_entry(entry, tasks, cells)
         for task in tasks:
-            in_order[name, task.name] = cells[name, task.name]
+            key = entry.name, task.name
+            in_order[key] = cells[key]
+
     seeds = FIRST_SEED + np.arange(n_episodes)
     table = episode_table(in_order, seeds)
     summary = {
         "format": FORMAT,
         "kind": KIND,
         "versions": versions(),
-        "suite": {
-            "name": suite.name,
-            "sha256": suite.sha256,
-            "file": Path(suite.source).name if suite.source.endswith(".toml") else "",
-            "complete": len(tasks) == len(suite.tasks),
-            "tasks": {task.name: _about_task(task) for task in tasks},
-        },
+        "suite": _about_suite(suite, tasks),
         "seeds": {"first": FIRST_SEED, "count": n_episodes},
-        "controllers": {
-            entry.name: _about_entry(entry, tasks, cells) for entry in entries
-        },
+        "controllers": controllers,
         **summarise(tasks, names, cells),
         "episodes": {
             "file": EPISODES,
@@ -220,6 +231,17 @@ def collect(
         },
     }
     return BenchmarkResult(summary, table, suite, tuple(entries))
+
+
+def _about_suite(suite: Suite, tasks: Sequence[BenchmarkTask]) -> dict[str, Any]:
+    source = Path(suite.source)
+    return {
+        "name": suite.name,
+        "sha256": suite.sha256,
+        "file": source.name if source.suffix == ".toml" else "",
+        "complete": len(tasks) == len(suite.tasks),
+        "tasks": {task.name: _about_task(task) for task in tasks},
+    }
 
 
 def versions() -> dict[str, str]:
@@ -285,44 +307,54 @@ def load_results(path: str | Path, suite: Suite | None = None) -> BenchmarkResul
     where = Path(path)
     if where.is_dir():
         where = where / RESULTS
-    summary = read_json(where, "file of benchmark results", REMEDY)
-    if summary.get("kind") != KIND:
-        raise InputError(
-            f"{where}: kind: expected '{KIND}', got {summary.get('kind')!r}"
-        )
-    check_format(summary, FORMAT, str(where))
-    check_fields(summary, FIELDS, str(where), REMEDY)
-    check_summary(summary, str(where))
-    about = summary["suite"]
-    if suite is None and about["name"] in list_suites():
-        suite = load_suite(about["name"])
-    elif suite is not None and suite.sha256 != about["sha256"]:
+    summary = _read_summary(where)
+
+    about_suite = summary["suite"]
+    if suite is None and about_suite["name"] in list_suites():
+        suite = load_suite(about_suite["name"])
+    elif suite is not None and suite.sha256 != about_suite["sha256"]:
         raise InputError(f"{where}: expected results of this suite, got of another")
 
-    table, about_table = where.with_name(EPISODES), summary["episodes"]
+    table = where.with_name(EPISODES)
+    about_table = summary["episodes"]
     if about_table["sha256"] != file_hash(table):
         raise InputError(
             f"{table}: expected the file that {RESULTS} was written with, got another"
             f" or one that is cut short; {REMEDY}"
         )
     episodes = read_episodes(table, about_table["rows"])
-    _check_rows(summary, episodes, str(where))
-    return BenchmarkResult(dict(summary), episodes, suite)
+    _check_rows(summary, episodes, where)
+    return BenchmarkResult(summary, episodes, suite)
 
 
-def _check_rows(summary: Mapping[str, Any], episodes: Columns, where: str) -> None:
+def _read_summary(path: Path) -> dict[str, Any]:
+    summary = read_json(path, "file of benchmark results", REMEDY)
+    kind = summary.get("kind")
+    if kind != KIND:
+        raise InputError(f"{path}: kind: expected '{KIND}', got {kind!r}")
+    where = str(path)
+    check_format(summary, FORMAT, where)
+    check_fields(summary, FIELDS, where, REMEDY)
+    check_summary(summary, where)
+    return dict(summary)
+
+
+def _check_rows(summary: Mapping[str, Any], episodes: Columns, where: Path) -> None:
     """Refuse a table whose rows are not those that the summary counts."""
-    runs_of: dict[tuple[str, str], int] = {}
+    runs: Counter[tuple[str, str]] = Counter()
     for task, cells in summary["tasks"].items():
         for name, cell in cells.items():
-            runs_of[name, task] = cell["runs"]
-    names, tasks = episodes["controller"].tolist(), episodes["task"].tolist()
+            runs[name, task] = cell["runs"]
+
+    names = episodes["controller"].tolist()
+    tasks = episodes["task"].tolist()
     rows = Counter(zip(names, tasks, strict=True))
-    count = summary["seeds"]["count"]
-    for name, task in [*runs_of, *rows]:
-        runs = runs_of.get((name, task), 0)
-        if rows[name, task] != runs * count:
+    n_episodes = summary["seeds"]["count"]
+    for key in [*runs, *rows]:
+        if rows[key] != runs[key] * n_episodes:
+            name, task = key
             raise InputError(
-                f"{where}: expected {runs} runs of {count} episodes of '{name}' on"
-                f" '{task}' in {EPISODES}, got {rows[name, task]} episodes; {REMEDY}"
+                f"{where}: expected {runs[key]} runs of {n_episodes} episodes of"
+                f" '{name}' on '{task}' in {EPISODES}, got {rows[key]} episodes;"
+                f" {REMEDY}"
             )

@@ -88,18 +88,21 @@ def check_summary(content: Mapping[str, Any], where: str) -> None:
     """
     for name, shape in SUMMARY.items():
         check_shape(content[name], shape, f"{where}: {name}")
-    check_whole(content["seeds"]["count"], f"{where}: seeds.count", at_least=1)
+    n_episodes = content["seeds"]["count"]
+    check_whole(n_episodes, f"{where}: seeds.count", at_least=1)
 
-    controllers = content["controllers"]
+    known = content["controllers"]
     ranked = [total["name"] for total in content["ranking"]]
-    named = [*ranked, *content["improvement"], *content["profile"]["shares"]]
-    for name in named:
-        check_choice(name, controllers, f"{where}: name of a controller")
+    improving = content["improvement"]
+    profiled = content["profile"]["shares"]
+    for name in [*ranked, *improving, *profiled]:
+        check_choice(name, known, f"{where}: name of a controller")
 
-    tasks = content["suite"]["tasks"]
-    for task in content["reference"]:
-        check_choice(task, tasks, f"{where}: name of a task")
-    for task, cells in content["tasks"].items():
-        check_choice(task, tasks, f"{where}: name of a task")
+    tasks = content["tasks"]
+    known_tasks = content["suite"]["tasks"]
+    for task in [*content["reference"], *tasks]:
+        check_choice(task, known_tasks, f"{where}: name of a task")
+    for task, cells in tasks.items():
+        field = f"{where}: tasks.{task}: name of a controller"
         for name in cells:
-            check_choice(name, ranked, f"{where}: tasks.{task}: name of a controller")
+            check_choice(name, ranked, field)

@@ -1,4 +1,4 @@
-"""The benchmark: every controller steers every task of a suite, in the same episodes."""
+"""The benchmark: every controller in every task of a suite, the same episodes."""
 
 import shutil
 from collections.abc import Sequence
@@ -70,21 +70,21 @@ def benchmark(
         Python files and modules that a suite of your own may name.
     """
     entries = read_entries(controllers)
-    read = load_suite(suite, allow_code)
-    selected = read.select(tasks)
+    the_suite = load_suite(suite, allow_code)
+    selected = the_suite.select(tasks)
     check_whole(episodes, "episodes", at_least=1, at_most=N_EPISODES)
     where = JobEngine(engine, workers, address)
     for entry in entries:
         check_agents(entry, selected)
     if out is None:
-        return _run(read, selected, entries, episodes, where, progress)
+        return _run(the_suite, selected, entries, episodes, where, progress)
 
-    folder = check_new(Path(out), resume, read.name)
+    folder = check_new(Path(out), resume, the_suite.name)
     parts = folder / PARTS
     where = replace(where, keep=parts)
     with in_use(folder):
         try:
-            result = _run(read, selected, entries, episodes, where, progress)
+            result = _run(the_suite, selected, entries, episodes, where, progress)
         except NoResultsError:
             if not resume:
                 shutil.rmtree(parts, ignore_errors=True)
@@ -122,17 +122,19 @@ def _run_cells(
     progress: Progress | None,
 ) -> dict[tuple[str, str], Cell]:
     """Run every entry in every task; cells by the names of both."""
-    pairs = list(product(entries, tasks))
-    elsewhere = [(entry, task) for entry, task in pairs if entry.is_text]
-    jobs = [job_of(entry, task, n_episodes) for entry, task in elsewhere]
-    tell = progress and partial(progress, "tasks done")
-    contents = run_jobs(run_job, jobs, where, tell)
-
     cells: dict[tuple[str, str], Cell] = {}
-    for (entry, task), content in zip(elsewhere, contents, strict=True):
-        part = f"part of '{entry.name}' on '{task.name}'"
-        cells[entry.name, task.name] = Cell.from_dict(content, n_episodes, part)
-    for entry, task in pairs:
+    jobs: dict[tuple[str, str], dict[str, Any]] = {}
+    for entry, task in product(entries, tasks):
+        if entry.is_text:
+            jobs[entry.name, task.name] = job_of(entry, task, n_episodes)
+    on_progress = progress and partial(progress, "tasks done")
+    results = run_jobs(run_job, list(jobs.values()), where, on_progress)
+    for (name, task_name), result in zip(jobs, results, strict=True):
+        part = f"part of '{name}' on '{task_name}'"
+        cells[name, task_name] = Cell.from_dict(result, n_episodes, part)
+
+    # no other process can make objects
+    for entry, task in product(entries, tasks):
         if not entry.is_text:
             cells[entry.name, task.name] = run_cell(entry, task, n_episodes)
     return cells

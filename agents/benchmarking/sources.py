@@ -46,7 +46,10 @@ def names_code(text: str) -> bool:
 
 
 def import_code(text: str) -> Any:
-    """Import the function that a text names, or make one of a subclass of Controller."""
+    """Import the function that a text names.
+
+    A subclass of Controller is registered, and becomes a function that designs it.
+    """
     module, _, name = text.rpartition(":")
     try:
         with working_folder():
@@ -57,7 +60,8 @@ def import_code(text: str) -> Any:
             f" imported ({error})"
         ) from None
     if isinstance(function, type) and issubclass(function, Controller):
-        return partial(design, register_controller(function).kind)
+        kind = register_controller(function).kind
+        return partial(design, kind)
     check_object(function, text)
     return function
 
@@ -88,11 +92,15 @@ def make_policies(source: Any, task: BenchmarkTask) -> list[Policy]:
             function = import_code(source)
             return [make_policy(function, task)]
 
-    paths = source_files(source, task)
-    if not paths:
-        what = f"pretrained {source} agent" if source in LEARNED else f"file '{source}'"
-        raise InputError(f"there is no {what} for task '{task.name}'")
-    return [make_policy(load_source(path), task) for path in paths]
+    policies = []
+    for path in source_files(source, task):
+        agent = load_source(path)
+        policies.append(make_policy(agent, task))
+    if not policies:
+        is_learned = source in LEARNED
+        missing = f"pretrained {source} agent" if is_learned else f"file '{source}'"
+        raise InputError(f"there is no {missing} for task '{task.name}'")
+    return policies
 
 
 def _designed(kind: str, task: BenchmarkTask) -> Policy:
@@ -105,7 +113,9 @@ def _designed(kind: str, task: BenchmarkTask) -> Policy:
 
 def make_policy(source: Source, task: BenchmarkTask) -> Policy:
     """Return a policy itself, or what a function makes for a task."""
-    policy: Any = source if hasattr(source, "predict") else source(task)
+    policy: Any = source
+    if not hasattr(source, "predict"):
+        policy = source(task)
     if not callable(getattr(policy, "predict", None)):
         name = getattr(source, "__name__", source)
         raise InputError(
@@ -131,10 +141,11 @@ def source_files(text: str, task: BenchmarkTask) -> list[Path]:
     if names_code(text):
         module_name, _, _ = text.rpartition(":")
         module = sys.modules.get(module_name)
-        source = getattr(module, "__file__", None)
-        return [Path(source)] if source else []
+        file = getattr(module, "__file__", None)
+        return [Path(file)] if file else []
     if text in known_names():
         return []
+
     paths: list[Path] = []
     for pattern in text.split("+"):
         paths += matching_files(pattern.replace("{task}", name))

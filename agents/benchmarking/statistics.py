@@ -1,4 +1,4 @@
-"""Statistics of costs and scores: rliable's, with episodes as a second source of chance.
+"""Statistics of costs and scores, as in rliable, with episodes drawn as well.
 
 A score is the share of the way from the cost of wheel-over designed on the model (0) to
 the best known cost (1). Costs have the shape (n_runs, n_episodes), runs being training
@@ -96,12 +96,12 @@ class Draws:
 
 def interval(value: float, draws: Floats) -> Interval:
     """A statistic with its percentile interval over draws of shape (n_draws,)."""
-    if not (np.isfinite(value) and np.isfinite(draws).all()):
-        return Interval(float(value), np.nan, np.nan)
-    tail = 50.0 * (1.0 - LEVEL)
-    ends = tail, 100.0 - tail
-    low, high = np.percentile(draws, ends).tolist()
-    return Interval(float(value), low, high)
+    is_known = np.isfinite(value) and np.isfinite(draws).all()
+    if not is_known:
+        return Interval(value, np.nan, np.nan)
+    tail = (1.0 - LEVEL) / 2.0
+    low, high = np.quantile(draws, [tail, 1.0 - tail])
+    return Interval(value, float(low), float(high))
 
 
 def mean_cost(costs: Floats, draws: Draws, task: int, controller: int = 0) -> Interval:
@@ -116,14 +116,17 @@ def interquartile_cost(
     """Interquartile mean over runs and episodes of one task, without rare bad ends."""
     n_runs, _ = costs.shape
     runs = draws.runs(task, n_runs, controller)
-    run_counts = (runs[:, :, None] == np.arange(n_runs)).sum(axis=1)
+    run_counts = np.zeros_like(runs)
+    for run in range(n_runs):
+        run_counts[:, run] = np.count_nonzero(runs == run, axis=1)
+
+    # an episode of a run is drawn as often as both of them together
     episode_counts = draws.counts[task]
-    weights = run_counts[:, :, None] * episode_counts[:, None, :]
-    drawn = weighted_interquartile_mean(
-        costs.ravel(),
-        weights.reshape(draws.n_draws, -1),
-    )
-    return interval(float(interquartile_mean(costs)), drawn)
+    counts = run_counts[:, :, None] * episode_counts[:, None, :]
+    weights = counts.reshape(draws.n_draws, -1)
+    drawn = weighted_interquartile_mean(costs.ravel(), weights)
+    value = interquartile_mean(costs)
+    return interval(float(value), drawn)
 
 
 def weighted_interquartile_mean(values: Floats, weights: Integers) -> Floats:
@@ -143,21 +146,22 @@ def weighted_interquartile_mean(values: Floats, weights: Integers) -> Floats:
     # places of the values in each sorted sample end where the next value's begin
     ends = np.cumsum(weights[:, order], axis=1)
     size = ends[:, -1:]
-    n_cut = np.floor(TRIMMED * size).astype(np.int64)
+    n_cut = (TRIMMED * size).astype(np.int64)
     kept_ends = np.clip(ends, n_cut, size - n_cut)
     kept_counts = np.diff(kept_ends, axis=1, prepend=n_cut)
+
     sums = kept_counts @ values[order]
-    return np.asarray(sums / kept_counts.sum(axis=1))
+    means: Floats = sums / kept_counts.sum(axis=1)
+    return means
 
 
 def score(cost: ArrayLike, zero: ArrayLike, best: ArrayLike) -> Floats:
-    """Share of the way from the cost `zero` to the cost `best`; NaN if there is none."""
-    start = np.asarray(zero, dtype=np.float64)
-    whole_way = start - np.asarray(best, dtype=np.float64)
-    way = start - np.asarray(cost, dtype=np.float64)
+    """Share of the way from the cost `zero` to `best`; NaN if there is no way."""
+    way = np.subtract(zero, cost)
+    whole_way = np.subtract(zero, best)
     with np.errstate(divide="ignore", invalid="ignore"):
-        shares = way / whole_way
-    return np.where(whole_way > 0.0, shares, np.nan)
+        share = way / whole_way
+    return np.where(whole_way > 0.0, share, np.nan)
 
 
 def aggregate_score(
@@ -181,7 +185,8 @@ def aggregate_score(
     """
     if not tasks:
         return NOTHING
-    scores, drawn = [], []
+    scores = []
+    drawn = []
     for task, cost, (zero, best) in zip(tasks, costs, references, strict=True):
         run_costs = cost.mean(axis=1)
         drawn_costs = draws.means(cost, task, controller)
@@ -189,7 +194,8 @@ def aggregate_score(
         drawn.append(score(drawn_costs, zero, best))
 
     value = interquartile_mean(np.concatenate(scores))
-    drawn_values = interquartile_mean(np.concatenate(drawn, axis=1), axis=1)
+    drawn_scores = np.concatenate(drawn, axis=1)
+    drawn_values = interquartile_mean(drawn_scores, axis=1)
     return interval(float(value), drawn_values)
 
 
@@ -211,20 +217,22 @@ def improvement(
     controllers : pair of int
         Numbers of both.
     """
-    common = sorted(set(costs) & set(other_costs))
-    if not common:
-        return NOTHING
-    values, drawn = [], np.zeros(draws.n_draws)
-    for task in common:
+    values = []
+    drawn = []
+    for task in sorted(costs.keys() & other_costs.keys()):
         wins = _wins(costs[task], other_costs[task])
         values.append(wins.mean())
-        drawn += _drawn_wins(wins, draws, task, controllers)
-    return interval(float(np.mean(values)), drawn / len(common))
+        drawn.append(_drawn_wins(wins, draws, task, controllers))
+    if not values:
+        return NOTHING
+    drawn_values = np.mean(drawn, axis=0)
+    return interval(float(np.mean(values)), drawn_values)
 
 
 def _wins(costs: Floats, other_costs: Floats) -> Floats:
     """Wins of each run over each other run, shape (n_runs, n_others, n_episodes)."""
-    first, second = costs[:, None], other_costs[None]
+    first = costs[:, None, :]
+    second = other_costs[None, :, :]
     wins: Floats = (first < second) + 0.5 * (first == second)
     return wins
 
@@ -238,18 +246,16 @@ def _drawn_wins(
     first_runs = draws.runs(task, n_first, first)
     second_runs = draws.runs(task, n_second, second)
 
+    # drawn over episodes, then over the runs of the one and of the other
     by_pair = np.tensordot(draws.shares(task), wins, axes=(1, 2))
-    rows = np.arange(draws.n_draws)
-    drawn_pairs = by_pair[
-        rows[:, None, None],
-        first_runs[:, :, None],
-        second_runs[:, None, :],
-    ]
-    return np.asarray(drawn_pairs.mean(axis=(1, 2)))
+    by_second = np.take_along_axis(by_pair, first_runs[:, :, None], axis=1)
+    pairs = np.take_along_axis(by_second, second_runs[:, None, :], axis=2)
+    means: Floats = np.mean(pairs, axis=(1, 2))
+    return means
 
 
 def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Floats:
-    """Share of the scores, of any shape, above each threshold, shape (n_thresholds,)."""
+    """Share of scores above each threshold, shape (n_thresholds,)."""
     ordered = np.sort(np.ravel(scores))
-    n_below = np.searchsorted(ordered, np.asarray(thresholds), side="right")
-    return np.asarray(1.0 - n_below / len(ordered))
+    n_not_above = np.searchsorted(ordered, np.asarray(thresholds), side="right")
+    return np.asarray(1.0 - n_not_above / len(ordered))

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import permutations
+from statistics import fmean
 from typing import Any
 
 import numpy as np
@@ -70,20 +71,17 @@ class _Costs:
     names: tuple[str, ...]
     cells: Mapping[tuple[str, str], Cell]
 
-    def cell(self, controller: int, task: int) -> Cell:
-        """Return the cell of a controller in a task."""
-        return self.cells[self.names[controller], self.tasks[task].name]
-
     @cached_property
     def costs(self) -> dict[int, dict[int, Floats]]:
         """Costs by controller and by task that it ran, shape (n_runs, n_episodes)."""
         costs: dict[int, dict[int, Floats]] = {}
-        for controller in range(len(self.names)):
-            costs[controller] = {}
-            for task in range(len(self.tasks)):
-                cell = self.cell(controller, task)
+        for controller, name in enumerate(self.names):
+            by_task = {}
+            for number, task in enumerate(self.tasks):
+                cell = self.cells[name, task.name]
                 if cell.runs:
-                    costs[controller][task] = cell.costs
+                    by_task[number] = cell.costs
+            costs[controller] = by_task
         return costs
 
     @cached_property
@@ -120,42 +118,35 @@ class _Costs:
         """Return the figures of each controller in a task, by name."""
         figures = {}
         lowest = self._lowest(task)
-        for controller, by_task in self.costs.items():
-            if task in by_task:
-                name = self.names[controller]
-                figures[name] = self._figures(controller, task, lowest)
+        task_name = self.tasks[task].name
+        for controller, name in enumerate(self.names):
+            if task in self.costs[controller]:
+                costs = self._cost_figures(controller, task, lowest)
+                figures[name] = {**costs, **_run_figures(self.cells[name, task_name])}
         return figures
 
     def _lowest(self, task: int) -> float:
         """Lowest mean cost in a task among controllers that are usable at sea."""
-        means = []
-        for controller, by_task in self.costs.items():
-            if task in by_task and self.names[controller] != BEST_KNOWN:
-                means.append(by_task[task].mean())
-        return min(means, default=np.nan)
+        lowest = np.inf
+        for controller, name in enumerate(self.names):
+            costs = self.costs[controller].get(task)
+            if costs is not None and name != BEST_KNOWN:
+                lowest = min(lowest, costs.mean())
+        return lowest if np.isfinite(lowest) else np.nan
 
-    def _figures(self, controller: int, task: int, lowest: float) -> dict[str, Any]:
-        """Return the figures of a controller in a task, whose lowest cost is given."""
+    def _cost_figures(
+        self, controller: int, task: int, lowest: float
+    ) -> dict[str, Any]:
+        """Costs and score of a controller in a task, whose lowest cost is given."""
         costs = self.costs[controller][task]
         cost = statistics.mean_cost(costs, self.draws, task, controller)
         cost_iqm = statistics.interquartile_cost(costs, self.draws, task, controller)
         score = _score_of(cost, self.reference.get(task))
-
-        cell = self.cell(controller, task)
-        seconds = float(np.mean([run.seconds_per_action for run in cell.runs]))
-        failures = [run.failure for run in cell.runs if run.failure]
         return {
             "cost": cost.to_dict(),
             "cost_iqm": cost_iqm.to_dict(),
             "score": score.to_dict(),
             "relative_cost": finite(cost.value / lowest),
-            "runs": len(cell.runs),
-            "lost": cell.count("terminated"),
-            "failed": cell.count("failed"),
-            "failure": failures[0] if failures else "",
-            "policy_sha256": [run.policy_sha256 for run in cell.runs],
-            "microseconds_per_action": finite(1e6 * seconds),
-            "metrics": _metrics(cell),
         }
 
     def ranking(self, by_task: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -164,13 +155,13 @@ class _Costs:
         Those that could run all tasks come first; they are ordered by score if every
         task has references, otherwise by relative cost.
         """
+        elsewhere = [on for on in SETS if on != "ship" and self.tasks_on(on)]
         ranked = []
         for controller, name in enumerate(self.names):
+            on_ship = self._total(controller, "ship", by_task)
             totals = {}
-            for on in SETS:
-                if on == "ship" or self.tasks_on(on):
-                    totals[on] = self._total(controller, on, by_task)
-            on_ship = totals.pop("ship")
+            for on in elsewhere:
+                totals[on] = self._total(controller, on, by_task)
             ranked.append({"name": name, **on_ship, "elsewhere": totals})
 
         tasks = self.tasks_on("ship")
@@ -181,28 +172,29 @@ class _Costs:
         self, controller: int, on: str, by_task: Mapping[str, Any]
     ) -> dict[str, Any]:
         """Return the totals of a controller in all tasks of a set of episodes."""
-        costs, name = self.costs[controller], self.names[controller]
-        tasks = [task for task in self.tasks_on(on) if task in costs]
+        tasks = [task for task in self.tasks_on(on) if task in self.costs[controller]]
         scored = [task for task in tasks if self._has_room(task)]
-        score = statistics.aggregate_score(
-            costs=[costs[task] for task in scored],
-            references=[self.reference[task] for task in scored],
-            draws=self.draws,
-            tasks=scored,
-            controller=controller,
-        )
-
+        name = self.names[controller]
         cells = [by_task[self.tasks[task].name][name] for task in tasks]
-        relative = [cell["relative_cost"] for cell in cells if cell["relative_cost"]]
-        geometric_mean = np.exp(np.mean(np.log(relative))) if relative else np.nan
         return {
-            "score": score.to_dict(),
+            "score": self._score(controller, scored).to_dict(),
             "scored_tasks": len(scored),
-            "relative_cost": finite(geometric_mean),
+            "relative_cost": _relative_cost(cells),
             "tasks": len(tasks),
             "lost": sum(cell["lost"] for cell in cells),
             "failed": sum(cell["failed"] for cell in cells),
         }
+
+    def _score(self, controller: int, tasks: Sequence[int]) -> Interval:
+        """Score of a controller over tasks."""
+        costs = self.costs[controller]
+        return statistics.aggregate_score(
+            costs=[costs[task] for task in tasks],
+            references=[self.reference[task] for task in tasks],
+            draws=self.draws,
+            tasks=tasks,
+            controller=controller,
+        )
 
     def _has_room(self, task: int) -> bool:
         """Tell whether the best known cost of a task is below that of wheel-over."""
@@ -220,16 +212,16 @@ class _Costs:
     def improvements(self) -> dict[str, dict[str, Any]]:
         """Return the probability that one costs less than another, for all pairs."""
         improvements: dict[str, dict[str, Any]] = {name: {} for name in self.names}
-        numbers = range(len(self.names))
-        for first, second in permutations(numbers, 2):
+        for pair in permutations(range(len(self.names)), 2):
+            first, second = pair
             better = statistics.improvement(
                 costs=self._on_ship(first),
                 other_costs=self._on_ship(second),
                 draws=self.draws,
-                controllers=(first, second),
+                controllers=pair,
             )
-            name, other = self.names[first], self.names[second]
-            improvements[name][other] = better.to_dict()
+            others = improvements[self.names[first]]
+            others[self.names[second]] = better.to_dict()
         return improvements
 
     def profiles(self) -> dict[str, Any]:
@@ -244,13 +236,12 @@ class _Costs:
 
     def _episode_scores(self, controller: int) -> Floats:
         """Scores of all episodes on the ship that have one, shape (n,)."""
-        parts = [np.zeros(0)]
+        scores = [np.zeros(0)]
         for task, costs in self._on_ship(controller).items():
-            if task in self.reference:
+            if self._has_room(task):
                 zero, best = self.reference[task]
-                scores = score(costs, zero, best)
-                parts.append(scores.ravel())
-        all_scores = np.concatenate(parts)
+                scores.append(score(costs, zero, best).ravel())
+        all_scores = np.concatenate(scores)
         return all_scores[np.isfinite(all_scores)]
 
 
@@ -258,10 +249,34 @@ def _score_of(cost: Interval, reference: ScoreScale | None) -> Interval:
     """Score of a mean cost; it falls as the cost rises, so that the bounds swap."""
     if reference is None:
         return NOTHING
-    zero, best = reference
-    costs = cost.value, cost.high, cost.low
-    value, low, high = score(costs, zero, best).tolist()
-    return Interval(value, low, high)
+    costs = [cost.value, cost.high, cost.low]
+    scores = score(costs, *reference)
+    return Interval(*scores.tolist())
+
+
+def _relative_cost(cells: Sequence[Mapping[str, Any]]) -> float | None:
+    """Geometric mean of the relative costs that there are."""
+    costs = [cell["relative_cost"] for cell in cells]
+    known = [cost for cost in costs if cost]
+    if not known:
+        return None
+    mean_log = np.mean(np.log(known))
+    return finite(np.exp(mean_log))
+
+
+def _run_figures(cell: Cell) -> dict[str, Any]:
+    """Failures, times and metrics of all training runs of a cell."""
+    failures = [run.failure for run in cell.runs if run.failure]
+    seconds = fmean(run.seconds_per_action for run in cell.runs)
+    return {
+        "runs": len(cell.runs),
+        "lost": cell.count("terminated"),
+        "failed": cell.count("failed"),
+        "failure": failures[0] if failures else "",
+        "policy_sha256": [run.policy_sha256 for run in cell.runs],
+        "microseconds_per_action": finite(1e6 * seconds),
+        "metrics": _metrics(cell),
+    }
 
 
 def _metrics(cell: Cell) -> dict[str, dict[str, float | None]]:
@@ -282,10 +297,9 @@ def _metrics(cell: Cell) -> dict[str, dict[str, float | None]]:
 def _sort_key(total: Mapping[str, Any], by_score: bool) -> tuple[float, ...]:
     """Return what controllers are sorted by: tasks, score, relative cost."""
     score = total["score"]["value"]
+    if score is None or not by_score:
+        score = -np.inf
     cost = total["relative_cost"]
-    has_score = by_score and score is not None
-    return (
-        -total["tasks"],
-        -score if has_score else np.inf,
-        np.inf if cost is None else cost,
-    )
+    if cost is None:
+        cost = np.inf
+    return (-total["tasks"], -score, cost)

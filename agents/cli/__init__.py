@@ -67,7 +67,7 @@ def shipgym_command(
         ),
     ] = False,
 ) -> None:
-    """From recorded ship trials to an identified model, its uncertainty and verified autopilots."""
+    """From recorded ship trials to an identified model and verified autopilots."""
 
 
 def replay_command(
@@ -77,7 +77,10 @@ def replay_command(
     ],
     out: Annotated[Path, Option(metavar="REPLAY.HTML", help="The page to write.")],
 ) -> None:
-    """Replay recorded episodes in one HTML page. Chart, time slider, time histories; several overlaid."""
+    """Replay recorded episodes in one HTML page.
+
+    Chart, time slider and time histories, several episodes overlaid.
+    """
     from agents.cli.terminal import answer, say
     from agents.rollouts.replay_page import write_replay
 
@@ -87,7 +90,7 @@ def replay_command(
 
 
 def doctor_command() -> None:
-    """Check the installation. Versions, cache, optional packages, the import name agents.
+    """Check the installation: versions, cache, optional packages, import names.
 
     Exits with 1 if something does not work.
     """

@@ -63,7 +63,10 @@ def autopilot_command(
     workers: Workers = 1,
     address: Address = None,
 ) -> None:
-    """Go from trials to a report on autopilots. Identifies, predicts, designs, runs them on drawn models.
+    """Go from trials to a report on autopilots.
+
+    Identifies a model, predicts manoeuvres, designs autopilots, and runs them on models
+    drawn from it.
 
     Options not given here are taken from the ship file's table [identify]. Exits with 1
     if the identified model is unstable, or no autopilot designed on it can be trusted;
@@ -94,7 +97,7 @@ def autopilot_command(
 
 
 def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
-    """Print the result of the chain; fail for an unstable model, and if every design is refused."""
+    """Print the result; fail for an unstable model or if all designs are refused."""
     from agents.cli.terminal import answer, say, warn
     from identification.validation.warnings import model_warnings
 

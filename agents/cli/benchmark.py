@@ -24,8 +24,8 @@ Controllers = Annotated[
     str | None,
     Option(
         help=(
-            "What is compared, separated by commas: classical controllers (pid, lq, mpc,"
-            " ...), tuned-pid, pretrained agents (ppo, sac), files of agents,"
+            "What is compared, separated by commas: classical controllers (pid, lq,"
+            " mpc, ...), tuned-pid, pretrained agents (ppo, sac), files of agents,"
             " module:function, name=...; default: all classical ones."
         )
     ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from rich.text import Text
@@ -35,48 +36,65 @@ def ranking_table(result: BenchmarkResult) -> Table:
         ">us by\naction",
     )
     for ranked in summary["ranking"]:
-        name, score, failed = ranked["name"], ranked["score"], ranked["failed"]
+        name = ranked["name"]
+        score = ranked["score"]
+        failed = ranked["failed"]
+        about = summary["controllers"][name]
         table.add_row(
             name,
             number(score["value"], 3),
             between((score["low"], score["high"]), 3),
             number(ranked["relative_cost"], 3),
             str(ranked["tasks"]),
-            str(summary["controllers"][name]["runs"]),
+            str(about["runs"]),
             str(ranked["lost"]),
             Text(str(failed), "bold red") if failed else "0",
-            number(_mean_time(summary, name), 2),
+            number(_mean_time(result, name), 2),
         )
     return table
 
 
-def _mean_time(summary: Mapping[str, Any], name: str) -> float | None:
+def _mean_time(result: BenchmarkResult, name: str) -> float | None:
     """Return the mean time of an action, us; None for the best known."""
     times = []
-    for cells in summary["tasks"].values():
-        if name in cells and cells[name]["microseconds_per_action"] is not None:
-            times.append(cells[name]["microseconds_per_action"])
-    return sum(times) / len(times) if times else None
+    for task in result.tasks:
+        cell = result.cells(task).get(name, {})
+        time = cell.get("microseconds_per_action")
+        if time is not None:
+            times.append(time)
+    return fmean(times) if times else None
 
 
 def costs_table(result: BenchmarkResult) -> Table:
     """Return a table of mean costs, a row for each task and controller."""
-    title = "Mean cost of an episode, 95 % interval; the lowest first"
     table = plain_table(
-        title, "task", "controller", ">cost", ">95 %", ">score", ">lost", ">success"
+        "Mean cost of an episode, 95 % interval; the lowest first",
+        "task",
+        "controller",
+        ">cost",
+        ">95 %",
+        ">score",
+        ">lost",
+        ">success",
     )
-    for task, cells in result.summary["tasks"].items():
-        names = sorted(cells, key=lambda name: cells[name]["cost"]["value"])
-        for name in names:
-            cell = cells[name]
-            cost, success = cell["cost"], cell["metrics"].get("success", {}).get("mean")
-            table.add_row(
-                task if name == names[0] else "",
-                name,
-                number(cost["value"], 2),
-                between((cost["low"], cost["high"]), 2),
-                number(cell["score"]["value"], 2),
-                str(cell["lost"] + cell["failed"]),
-                "-" if success is None else f"{100.0 * success:.0f} %",
-            )
+    for task in result.tasks:
+        label = task
+        cells = result.cells(task)
+        for name in sorted(cells, key=lambda name: cells[name]["cost"]["value"]):
+            table.add_row(label, name, *_figures(cells[name]))
+            label = ""
     return table
+
+
+def _figures(cell: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return cost, interval, score, lost ships and share of success."""
+    cost = cell["cost"]
+    success = cell["metrics"].get("success", {"mean": None})
+    share = success["mean"]
+    return (
+        number(cost["value"], 2),
+        between((cost["low"], cost["high"]), 2),
+        number(cell["score"]["value"], 2),
+        str(cell["lost"] + cell["failed"]),
+        "-" if share is None else f"{100.0 * share:.0f} %",
+    )

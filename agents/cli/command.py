@@ -1,4 +1,4 @@
-"""What all commands share: one message for an error, the options --json and --quiet, and options of several."""
+"""Options, arguments and error messages that commands share."""
 
 import functools
 import inspect
@@ -49,7 +49,7 @@ Quiet = Annotated[
 
 
 def shared_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command --json and --quiet, and let an expected error be one message and an exit code."""
+    """Give a command --json and --quiet; an expected error is one message."""
 
     @functools.wraps(command)
     def wrapped(*, as_json: bool = False, quiet: bool = False, **options: Any) -> None:
@@ -70,13 +70,16 @@ def shared_options(command: Callable[..., None]) -> Callable[..., None]:
     parameters = typed_parameters(command)
     for name, annotation in {"as_json": Json, "quiet": Quiet}.items():
         parameters[name] = inspect.Parameter(
-            name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=annotation
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=False,
+            annotation=annotation,
         )
     return take_parameters(wrapped, parameters)
 
 
 def report(error: Exception) -> int | None:
-    """Print the message of an expected error; its exit code, None for an unexpected error."""
+    """Print an expected error and return its exit code; None for an unexpected one."""
     from agents.cli.terminal import print_error
     from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 
@@ -126,13 +129,16 @@ class Commands(TyperGroup):
     """The commands; an empty argument is refused before any of them runs."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
-        """Refuse empty arguments, and those with a null byte, which no file name has."""
-        for position, text in enumerate(args):
-            name, value = "argument", text
+        """Refuse arguments that are empty or have a null byte."""
+        before = ""
+        for text in args:
+            name = "argument"
+            value = text
             if text.startswith("--") and "=" in text:
                 name, _, value = text.partition("=")
-            elif position > 0 and args[position - 1].startswith("-"):
-                name = args[position - 1]
+            elif before.startswith("-"):
+                name = before
             if not value or "\0" in text:
                 ctx.fail(f"{name}: expected a non-empty string, got {value!r}")
+            before = text
         return super().parse_args(ctx, args)

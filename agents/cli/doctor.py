@@ -1,4 +1,4 @@
-"""What `shipgym doctor` checks: versions, the cache of compiled ships, optional packages, names."""
+"""Checks of `shipgym doctor`: versions, compiled ships, optional packages, names."""
 
 import importlib.metadata
 import importlib.util
@@ -6,6 +6,7 @@ import os
 import platform
 import re
 import tempfile
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,20 +64,21 @@ def examine_installation() -> list[Finding]:
     findings = [Finding("shipgym", "fine", system)]
     for extra, names in declared_packages().items():
         if extra == "":
-            findings += [
-                package_finding(one, [one], "wrong", "shipgym") for one in names
-            ]
+            for name in names:
+                findings.append(package_finding(name, [name], "wrong", "shipgym"))
         elif extra not in ("dev", "docs"):
             remedy = f"'shipgym[{extra}]'"
             findings.append(package_finding(f"extra {extra}", names, "absent", remedy))
+
     findings.append(cache_finding())
     findings += left_findings()
-    findings += [name_finding(name) for name in ("shipgym", "identification", "agents")]
+    for name in ("shipgym", "identification", "agents"):
+        findings.append(name_finding(name))
     return findings
 
 
 def declared_packages() -> dict[str, list[str]]:
-    """Packages that shipgym declares to need, by extra, those of no extra by an empty text."""
+    """Packages that shipgym needs, by extra; those of no extra under an empty name."""
     try:
         requirements = importlib.metadata.requires("shipgym") or []
     except importlib.metadata.PackageNotFoundError:  # run from a checkout
@@ -84,16 +86,18 @@ def declared_packages() -> dict[str, list[str]]:
     packages: dict[str, list[str]] = {}
     for line in requirements:
         name = re.match(r"[\w.-]+", line)
-        extra = re.search(r'extra == "(\w+)"', line)
-        if name is not None and name[0] != "shipgym":
-            packages.setdefault(extra[1] if extra else "", []).append(name[0])
+        if name is None or name[0] == "shipgym":
+            continue
+        of_extra = re.search(r'extra == "(\w+)"', line)
+        extra = of_extra[1] if of_extra else ""
+        packages.setdefault(extra, []).append(name[0])
     return packages
 
 
 def package_finding(
     what: str, names: list[str], otherwise: str, remedy: str
 ) -> Finding:
-    """Versions of packages, or which of them are missing, with the state `otherwise`."""
+    """Versions of packages; `otherwise` is the state if one is missing."""
     versions = []
     missing = []
     for name in names:
@@ -117,8 +121,7 @@ def cache_finding() -> Finding:
         files = [path for path in folder.iterdir() if path.is_file()]
         size = sum(path.stat().st_size for path in files) / 1e6
         content = f"{folder}, {len(files)} files, {size:.1f} MB"
-        faults = [(path.name, loop_fault(path)) for path in files]
-        unusable = [f"{name} {fault}" for name, fault in faults if fault]
+        unusable = _unusable(files)
         if unusable:
             return Finding(
                 "cache",
@@ -146,8 +149,21 @@ def cache_finding() -> Finding:
     return Finding("cache", "fine", content)
 
 
+def _unusable(files: Iterable[Path]) -> list[str]:
+    """Files of the cache that cannot be used, each with the reason."""
+    unusable = []
+    for path in files:
+        fault = loop_fault(path)
+        if fault:
+            unusable.append(f"{path.name} {fault}")
+    return unusable
+
+
 def left_findings() -> list[Finding]:
-    """Folders in use, and what dead processes left: here, one level below, and in the cache."""
+    """Folders in use, and what dead processes left behind.
+
+    Looks here, one level below, and in the cache.
+    """
     here = Path.cwd()
     below = sorted(path for path in here.iterdir() if path.is_dir())
     findings = []
@@ -161,7 +177,10 @@ def left_findings() -> list[Finding]:
 
 
 def name_finding(name: str) -> Finding:
-    """Check that an import name is this project's alone; `agents` is also that of other packages."""
+    """Check that no other package has an import name.
+
+    `agents` is also the import name of other packages.
+    """
     what = f"import {name}"
     packages = importlib.metadata.packages_distributions().get(name, ())
     others = sorted(set(packages) - {"shipgym"})

@@ -1,4 +1,4 @@
-"""`shipgym export`: controllers, learned policies and ship models for use outside Python."""
+"""`shipgym export`: controllers, policies and models for use outside Python."""
 
 from __future__ import annotations
 
@@ -38,7 +38,10 @@ def export_command(
         float, Option(metavar="M", help="For a model: water depth; default: deep.")
     ] = inf,
 ) -> None:
-    """Write an autopilot or a ship model as C99 or FMU. Learned policies also as ONNX."""
+    """Write an autopilot or a ship model as C99 or FMU.
+
+    Learned policies also as ONNX.
+    """
     from agents.cli.terminal import answer, say, warn
     from shipgym.errors import InputError
 
@@ -73,7 +76,7 @@ def _write(
     fmi: str,
     onnx: Path | None,
 ) -> None:
-    """Check all files before the first is written, and write first what may still fail."""
+    """Check all files before any is written; write first what may still fail."""
     from agents.agent_file import load_agent
     from agents.deployment.fmu import write_fmu
     from agents.output import check_file, check_folder, whole_folder

@@ -43,7 +43,9 @@ def identify_command(
         ),
     ] = None,
 ) -> None:
-    """Identify a manoeuvring model from recorded trials. Writes model, metrics, settings and report.
+    """Identify a manoeuvring model from recorded trials.
+
+    Writes the model, its metrics, the settings and a report.
 
     Options not given here are taken from the ship file's table [identify]; if neither
     names a structure, the structure and method that best predict held-out trials are
@@ -62,7 +64,10 @@ def identify_command(
 def _chosen(
     ship: Path, options: dict[str, Any], *unnamed: str
 ) -> tuple[ShipFile, dict[str, Any]]:
-    """The ship file, and the options: of the command line first; `unnamed`: the structure if not auto."""
+    """Read the ship file and the options, those of the command line first.
+
+    `unnamed` is the structure if none is named.
+    """
     from agents.identifying import identification_settings
     from shipgym.trials.ship_file import ShipFile
 
@@ -201,7 +206,9 @@ def reduce_command(
     *,
     options: dict[str, Any],
 ) -> None:
-    """Drop the terms that the trials do not support. Identifies the model with the remaining ones.
+    """Drop the terms that the trials do not support.
+
+    Identifies the model with the remaining ones.
 
     Writes the reduced model's files and reduction.json, with all steps. Exits with 1 if
     the reduced model is unstable.

@@ -1,12 +1,10 @@
 """Options of `identify` on the command line: common ones by name, others by `--set`."""
 
-import functools
-from collections.abc import Callable
 from typing import Annotated, Any
 
 from typer import Option
 
-from agents.cli.parameters import take_parameters, typed_parameters
+from agents.cli.parameters import with_options
 
 
 def identify_options(
@@ -89,15 +87,5 @@ def identify_options(
     return found
 
 
-def with_identify_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the parameters of `identify_options`, whose result it takes as `options`."""
-    own = typed_parameters(identify_options)
-
-    @functools.wraps(command)
-    def wrapped(**arguments: Any) -> None:
-        given = {name: arguments.pop(name) for name in own}
-        command(options=identify_options(**given), **arguments)
-
-    parameters = typed_parameters(command)
-    del parameters["options"]
-    return take_parameters(wrapped, parameters | own)
+#: Gives a command these options, as its argument `options`.
+with_identify_options = with_options(identify_options, "options")

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Argument, Option
 
 if TYPE_CHECKING:
-    from shipgym import Trial
     from shipgym.trials.guesses import TrialGuess
 
 
@@ -33,7 +32,10 @@ def new_ship_command(
         ),
     ] = None,
 ) -> None:
-    """Write a ship file for recorded trials. Guesses columns, units and signs, and reports the guesses."""
+    """Write a ship file for recorded trials.
+
+    Guesses columns, units and signs, and reports the guesses.
+    """
     from agents.cli.terminal import answer, say, warn
     from shipgym.checks import shown
     from shipgym.errors import InputError
@@ -45,16 +47,9 @@ def new_ship_command(
             f"{out}: exists already; choose another name with --out, or remove it"
         )
     guessed = _guess_trials(logs)
-    first = guessed[0]
-
-    # one log with another convention is enough: the usual one is also guessed from a
-    # log that does not tell
-    conventions: dict[str, str] = {}
-    for one in guessed:
-        for convention in one.conventions:
-            conventions[convention.name] = convention.value
+    conventions = _conventions(guessed)
     rudder_side = conventions.pop("rudder_positive", "starboard")
-
+    first, *_ = guessed
     facts: dict[str, Any] = {
         "out": out,
         "length": length,
@@ -62,32 +57,53 @@ def new_ship_command(
         "side": rudder_side,
         "conventions": conventions,
         "trial": first.trial,
-        "unused": ", ".join(map(shown, first.unused)),
-        "speed": _service_speed([one.trial for one in guessed]),
+        "unused": ", ".join(shown(column) for column in first.unused),
+        "speed": _service_speed(guessed),
         "files": [_toml_path(log, out.parent) for log in logs],
     }
-    write_text(render("shipgym.pages/ship.toml.jinja", **facts), out)
+    ship_file = render("shipgym.pages/ship.toml.jinja", **facts)
+    write_text(ship_file, out)
 
-    columns = {}
-    for guess in first.columns:
-        columns[guess.channel] = {"column": guess.column, "unit": guess.unit}
+    notes = first.trial.notes
     answer(
         {
             "written": str(out),
-            "columns": columns,
+            "columns": _columns(first),
             "unused": first.unused,
             "rudder_positive": rudder_side,
             **conventions,
-            "notes": [*first.trial.notes],
+            "notes": [*notes],
         }
     )
-    say(render("shipgym.pages/new_ship.txt.jinja", **facts).strip())
-    for note in first.trial.notes:
+    summary = render("shipgym.pages/new_ship.txt.jinja", **facts)
+    say(summary.strip())
+    for note in notes:
         warn(note)
 
 
+def _conventions(guessed: list[TrialGuess]) -> dict[str, str]:
+    """Conventions of logs by name.
+
+    One log with another convention is enough: the usual one is also guessed from a log
+    that does not tell.
+    """
+    conventions = {}
+    for one in guessed:
+        for convention in one.conventions:
+            conventions[convention.name] = convention.value
+    return conventions
+
+
+def _columns(guessed: TrialGuess) -> dict[str, Any]:
+    """Column and unit of each channel."""
+    columns = {}
+    for guess in guessed.columns:
+        columns[guess.channel] = {"column": guess.column, "unit": guess.unit}
+    return columns
+
+
 def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
-    """Logs read with guessed columns; the first has to be readable, others may not be."""
+    """Logs read with guessed columns; only the first has to be readable."""
     from agents.cli.terminal import warn
     from shipgym.errors import InputError
     from shipgym.trials.guesses import guess_trial
@@ -112,12 +128,13 @@ def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
     return guessed
 
 
-def _service_speed(trials: list[Trial]) -> float | None:
+def _service_speed(guessed: list[TrialGuess]) -> float | None:
     """Speed, m/s, that is exceeded for a tenth of the time in the fastest trial."""
     import numpy as np
 
     speeds = []
-    for trial in trials:
+    for one in guessed:
+        trial = one.trial
         for channel in ("u", "stw", "sog"):
             if channel in trial.channels:
                 speeds.append(float(np.quantile(trial[channel], 0.9)))
@@ -139,7 +156,10 @@ def look_command(
         "look.html"
     ),
 ) -> None:
-    """Draw the trials of a ship file, or a log. Shows track, channels, repairs and problems found."""
+    """Draw the trials of a ship file, or a log.
+
+    Shows track, channels, repairs and the problems that were found.
+    """
     from agents.cli.terminal import answer, say, warn
     from agents.output import check_page
     from shipgym.files import write_text
@@ -156,20 +176,20 @@ def look_command(
     write_text(look_page(log.name, trials), out)
     fields = []
     for trial in trials:
-        fields.append(
-            {
-                "name": trial.name,
-                "samples": len(trial),
-                "duration_s": trial.duration,
-                "channels": [*trial.channels],
-                "notes": [*trial.notes],
-            }
-        )
+        about = {
+            "name": trial.name,
+            "samples": len(trial),
+            "duration_s": trial.duration,
+            "channels": [*trial.channels],
+            "notes": [*trial.notes],
+        }
+        fields.append(about)
     answer({"written": str(out), "trials": fields})
     for trial in trials:
+        channels = ", ".join(trial.channels)
         say(
             f"{trial.name}: {len(trial)} samples over {trial.duration:.5g} s:"
-            f" {', '.join(trial.channels)}"
+            f" {channels}"
         )
         for note in trial.notes:
             warn(f"{trial.name}: {note}")

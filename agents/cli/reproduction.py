@@ -1,4 +1,4 @@
-"""`shipgym reproduce`: the papers' tables are evidence, run from a checkout by `scripts/reproduce.py`."""
+"""`shipgym reproduce`: the papers' tables, run from a checkout."""
 
 import subprocess
 import sys

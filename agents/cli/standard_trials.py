@@ -1,11 +1,12 @@
-"""Standard manoeuvres of one model, for `shipgym trials`: runs, indices and criteria."""
+"""Standard manoeuvres of a model for `shipgym trials`: runs, indices, criteria."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from shipgym.arrays import finite
 from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres import Criterion, IndexInterval, Manoeuvre
 from shipgym.manoeuvres.imo import imo_criteria
@@ -61,7 +62,7 @@ class StandardTrials:
             manoeuvres[name] = {key: index.to_dict() for key, index in indices.items()}
         return {
             "draws": self.draws,
-            "water_depth": None if np.isinf(self.water_depth) else self.water_depth,
+            "water_depth": finite(self.water_depth),
             "manoeuvres": manoeuvres,
             "refused": self.refused,
             "imo": {name: one.to_dict() for name, one in self.criteria.items()},
@@ -75,7 +76,7 @@ def standard_trials(
     progress: Callable[[int], None] | None = None,
     water_depth: float = np.inf,
 ) -> StandardTrials:
-    """Simulate every standard manoeuvre that suits a ship, with the model and with models drawn from it.
+    """Simulate the standard manoeuvres of a ship, with its model and with draws of it.
 
     A manoeuvre that cannot be simulated, or has no indices, is in `refused`. Raises
     InputError for water too shallow, or for a ship without shallow-water equations;
@@ -99,26 +100,42 @@ def standard_trials(
     for family in families.values():
         manoeuvres |= family
 
-    runs: dict[str, Trial | Spiral] = {}
-    nominal: dict[str, dict[str, float | None]] = {}
-    refused: dict[str, str] = {}
-    for name, manoeuvre in manoeuvres.items():
-        nominal[name] = manoeuvre.no_indices
-        try:
-            runs[name] = manoeuvre.sail(model)
-            nominal[name] = asdict(manoeuvre.indices(runs[name]))
-        except (InputError, ManoeuvreError, UnstableModelError) as error:
-            refused[name] = str(error)
-            last_error = error
-    if not runs and manoeuvres:
-        raise last_error
-
+    nominal = _simulate(model, manoeuvres)
     drawn = []
     if draws and model.covariance is not None:
         drawn = model.sample(draws, seed)
     evaluate = {name: manoeuvre.evaluate for name, manoeuvre in manoeuvres.items()}
-    indices = intervals_of(nominal, drawn, evaluate, progress)
-    criteria = imo_criteria(model, indices) if np.isinf(water_depth) else {}
+    indices = intervals_of(nominal.indices, drawn, evaluate, progress)
     return StandardTrials(
-        families, runs, indices, criteria, refused, len(drawn), water_depth
+        families=families,
+        runs=nominal.runs,
+        indices=indices,
+        criteria=imo_criteria(model, indices) if np.isinf(water_depth) else {},
+        refused=nominal.refused,
+        draws=len(drawn),
+        water_depth=water_depth,
     )
+
+
+class _Nominal(NamedTuple):
+    """Manoeuvres of the model itself: runs, indices, and why there are none."""
+
+    runs: dict[str, Trial | Spiral]
+    indices: dict[str, dict[str, float | None]]
+    refused: dict[str, str]
+
+
+def _simulate(model: ShipModel, manoeuvres: Mapping[str, Manoeuvre]) -> _Nominal:
+    nominal = _Nominal({}, {}, {})
+    for name, manoeuvre in manoeuvres.items():
+        nominal.indices[name] = manoeuvre.no_indices
+        try:
+            run = manoeuvre.sail(model)
+            nominal.runs[name] = run
+            nominal.indices[name] = asdict(manoeuvre.indices(run))
+        except (InputError, ManoeuvreError, UnstableModelError) as error:
+            nominal.refused[name] = str(error)
+            last_error = error
+    if manoeuvres and not nominal.runs:
+        raise last_error
+    return nominal

@@ -1,4 +1,4 @@
-"""`shipgym steer` and `shipgym simulate`: an autopilot and a simulated ship, the two ends of NMEA 0183."""
+"""`shipgym steer` and `shipgym simulate`: the two ends of a line of NMEA 0183."""
 
 from math import inf, radians
 from pathlib import Path
@@ -66,7 +66,9 @@ def steer_command(
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
 ) -> None:
-    """Steer over NMEA 0183. Reads HDT/THS, ROT, RSA, VBW, VTG/RMC, APB, XTE, BWC, BWR; writes ROR, HTD.
+    """Steer over NMEA 0183.
+
+    Reads HDT/THS, ROT, RSA, VBW, VTG/RMC, APB, XTE, BWC, BWR; writes ROR, HTD.
 
     It begins when everything that the autopilot reads is available. If a sensor falls
     silent, two disagree, the rudder does not follow or the computer is late, it raises
@@ -130,7 +132,9 @@ def simulate_command(
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
 ) -> None:
-    """Simulate a ship for `shipgym steer`. Sends instrument readings and receives rudder orders.
+    """Simulate a ship for `shipgym steer`.
+
+    Sends instrument readings and receives rudder orders.
 
     Over TCP it waits for connections; the autopilot and a chart plotter may connect at
     once.

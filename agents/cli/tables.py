@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def plain_table(title: str, *headings: str) -> Table:
-    """A table without lines, its title to the left; headings that begin with > are aligned right."""
+    """A table without lines; columns whose heading begins with > align right."""
     table = Table(
         title=title,
         title_style="bold",
@@ -45,8 +45,8 @@ def between(ends: tuple[float | None, float | None] | None, decimals: int) -> st
     """An interval with decimals, a dash for None."""
     if ends is None or None in ends:
         return "-"
-    low, high = ends
-    return f"{low:.{decimals}f} to {high:.{decimals}f}"
+    low, high = (number(end, decimals) for end in ends)
+    return f"{low} to {high}"
 
 
 def prediction_table(result: IdentificationResult, note: str = "") -> Table:
@@ -61,16 +61,15 @@ def prediction_table(result: IdentificationResult, note: str = "") -> Table:
         "measured -> predicted\n(rudder reversed at headings)", no_wrap=True
     )
 
+    degrees = 180.0 / np.pi
+    scales = {"psi": degrees, "r": degrees, "u": 1.0, "v": 1.0}
     for file, metrics in result.metrics["trials"].items():
         errors = []
-        for channel, scale in (
-            ("psi", 180.0 / np.pi),
-            ("r", 180.0 / np.pi),
-            ("u", 1.0),
-            ("v", 1.0),
-        ):
+        for channel, scale in scales.items():
             error = metrics["rmse"][channel]
-            errors.append(number(None if error is None else scale * error, 3))
+            if error is not None:
+                error *= scale
+            errors.append(number(error, 3))
         indices: str | Text = _indices(metrics)
         if metrics["diverged"]:
             indices = Text("ran away", "bold red")
@@ -100,7 +99,7 @@ def _indices(metrics: Mapping[str, Any]) -> str:
 
 
 def selection_table(ranking: Mapping[str, Any]) -> Table:
-    """Structures and methods by how well they predict the held-out trials, the best first."""
+    """Structures and methods, those that predict held-out trials best first."""
     table = plain_table(
         f"Structures and methods by how they predict {ranking['held_out']}",
         "method",
@@ -130,9 +129,10 @@ def manoeuvre_table(
     rows: Mapping[str, Mapping[str, IndexInterval]], water: str = "deep water"
 ) -> Table:
     """Indices of manoeuvres, one line each, with intervals if models were drawn."""
-    has_draws = any(
-        len(index.values) for indices in rows.values() for index in indices.values()
-    )
+    has_draws = False
+    for indices in rows.values():
+        for index in indices.values():
+            has_draws = has_draws or len(index.values) > 0
     headings = ["manoeuvre", "index", ">value"]
     if has_draws:
         headings += [">95 % interval", ">draws without value"]
@@ -152,25 +152,29 @@ def manoeuvre_table(
 
 def criteria_table(criteria: Mapping[str, Criterion]) -> Table:
     """IMO criteria, with interval and probability of passing if models were drawn."""
-    has_draws = any(one.share_passed is not None for one in criteria.values())
-    is_measured = any(one.measured is not None for one in criteria.values())
-    hidden = set()
-    if not has_draws:
-        hidden |= {">95 % interval", ">probability"}
-    if not is_measured:
-        hidden.add(">measured")
+    hidden = {">95 % interval", ">probability", ">measured"}
+    for criterion in criteria.values():
+        if criterion.share_passed is not None:
+            hidden -= {">95 % interval", ">probability"}
+        if criterion.measured is not None:
+            hidden.discard(">measured")
 
-    rows = [_criterion_cells(name, one) for name, one in criteria.items()]
-    headings = [heading for heading in rows[0] if heading not in hidden] if rows else []
+    rows = []
+    headings: list[str] = []
+    for name, criterion in criteria.items():
+        cells = _criterion_cells(name, criterion)
+        headings = [heading for heading in cells if heading not in hidden]
+        rows.append([cells[heading] for heading in headings])
     table = plain_table("IMO criteria, resolution MSC.137(76)", *headings)
     for row in rows:
-        table.add_row(*(row[heading] for heading in headings))
+        table.add_row(*row)
     return table
 
 
 def _criterion_cells(name: str, criterion: Criterion) -> dict[str, str | Text]:
     """Cells of a criterion by heading."""
     probability = criterion.probability
+    _, _, paragraph = criterion.source.rpartition(" ")
     return {
         "criterion": name,
         ">measured": number(criterion.measured, 2),
@@ -181,7 +185,7 @@ def _criterion_cells(name: str, criterion: Criterion) -> dict[str, str | Text]:
         "verdict": _verdict(criterion),
         ">probability": "-" if probability is None else f"{100 * probability:.1f} %",
         "manoeuvre": criterion.manoeuvre,
-        "paragraph": criterion.source.rpartition(" ")[2],
+        "paragraph": paragraph,
     }
 
 
@@ -194,11 +198,15 @@ def _verdict(criterion: Criterion) -> str | Text:
 
 
 def criteria_notes(criteria: Mapping[str, Criterion]) -> list[str]:
-    """Notes below the table of criteria: why one is not decided, and draws without a value."""
-    notes = [f"{name}: {one.note}" for name, one in criteria.items() if one.note]
+    """Notes on undecided criteria, and on draws without a value."""
+    notes = []
     for name, criterion in criteria.items():
-        lost = "" if criterion.drawn is None else criterion.drawn.lost_in_words
-        if lost:
+        if criterion.note:
+            notes.append(f"{name}: {criterion.note}")
+    for name, criterion in criteria.items():
+        drawn = criterion.drawn
+        if drawn is not None and drawn.lost_in_words:
+            lost = drawn.lost_in_words
             notes.append(f"{name}: {lost}, which are not in its interval")
     return notes
 

@@ -1,4 +1,4 @@
-"""What the commands print: results to standard output, progress and messages to standard error."""
+"""Output of the commands: results to standard output, all else to standard error."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ CONTROL_CODES = (
 
 
 class PlainConsole(Console):
-    """A console to which brackets, colons and control characters mean nothing, since names come from files."""
+    """A console without mark-up: brackets, colons and control characters mean nothing.
+
+    Names that it prints come from files.
+    """
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(highlight=False, markup=False, emoji=False, **settings)
@@ -123,7 +126,7 @@ def progress_bars() -> Iterator[Progress | None]:
 
 @contextmanager
 def identifying(stage: str) -> Iterator[None]:
-    """Bars of an identification: one without a total, and one for each part that has one."""
+    """Bars of an identification: one without a total, one for each part with one."""
     from identification.progress import PROGRESS
 
     with progress_bars() as on_progress:
@@ -137,7 +140,7 @@ def identifying(stage: str) -> Iterator[None]:
 
 @contextmanager
 def training_bar() -> Iterator[Callable[[TrainingProgress], None] | None]:
-    """A bar of a training on standard error, or a line for each evaluation where that is no terminal.
+    """Progress of a training: a bar, or off a terminal a line for each evaluation.
 
     Yields a function that is called with the progress; None where nothing is shown.
     """

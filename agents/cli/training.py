@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from dataclasses import asdict
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,12 +19,15 @@ from agents.cli.command import (
     Workers,
     fail,
 )
+from agents.cli.parameters import with_options
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from agents.training.plan import TrainingPlan
     from agents.training.request import TrainingRequest
     from agents.training.training import TrainingResult
-    from agents.training.tuning import TuningResult
+    from agents.training.tuning import TuningResult, TuningTrial
 
 Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
 Environment = Annotated[
@@ -84,9 +88,8 @@ Randomise = Annotated[
 ]
 
 
-def train_command(
+def learning_options(
     algorithm: Algorithm,
-    out: Annotated[Path, Option(metavar="FOLDER", help="Folder of the run.")],
     env: Environment = None,
     model: Model = None,
     sea: Sea = None,
@@ -97,13 +100,41 @@ def train_command(
     total_steps: TotalSteps = None,
     settings: Settings = None,
     set_: Setting = None,
+    randomise: Randomise = None,
+) -> dict[str, Any]:
+    """Fields of a `TrainingRequest` that are options of `train` and `tune`."""
+    overrides = _named(set_, "--set")
+    if total_steps is not None:
+        overrides["total_steps"] = total_steps
+    return {
+        "algorithm": algorithm,
+        "environment": env,
+        "model": model,
+        "sea": sea,
+        "task": task,
+        "options": _named(environment_options, "--option"),
+        "settings_file": settings,
+        "settings": overrides,
+        "randomise": randomise,
+        "suite": suite,
+        "allow_code": allow_code or (),
+    }
+
+
+with_learning_options = with_options(learning_options, "fields")
+
+
+@with_learning_options
+def train_command(
+    out: Annotated[Path, Option(metavar="FOLDER", help="Folder of the run.")],
+    *,
+    fields: dict[str, Any],
     from_nothing: Annotated[
         bool, Option("--from-nothing", help="Without a base: --set base=none.")
     ] = False,
     seed: Annotated[
         int | None, Option(min=0, max=799, help="Random seed; default: 0.")
     ] = None,
-    randomise: Randomise = None,
     threads: Annotated[
         int | None, Option(min=1, help="Threads for torch and the ships; default: 1.")
     ] = None,
@@ -114,35 +145,21 @@ def train_command(
         bool, Option("--resume", help="Continue the run in the folder.")
     ] = False,
 ) -> None:
-    """Train an autopilot by reinforcement learning. Writes policy, learning curve and checkpoints.
+    """Train an autopilot by reinforcement learning.
+
+    Writes policy, learning curve and checkpoints.
 
     A run killed at any moment resumes with --resume from its last checkpoint, at most a
-    minute old, and ends as if it had never stopped. With --resume, options not request
-    keep their values; others must be the same.
+    minute old, and ends as if it had never stopped. With --resume, options that are not
+    given keep their values; others must be the same.
     """
     from agents.training.request import TrainingRequest
 
-    overrides = _named(set_, "--set")
-    if total_steps is not None:
-        overrides["total_steps"] = total_steps
     if from_nothing:
-        overrides["base"] = "none"
-    request = TrainingRequest(
-        algorithm,
-        environment=env,
-        model=model,
-        sea=sea,
-        task=task,
-        options=_named(environment_options, "--option"),
-        settings_file=settings,
-        settings=overrides,
-        seed=seed,
-        randomise=randomise,
-        threads=threads,
-        suite=suite,
-        allow_code=allow_code or (),
-    )
-    _print_result(_train(request, out, resume, max_seconds), out)
+        fields["settings"]["base"] = "none"
+    request = TrainingRequest(**fields, seed=seed, threads=threads)
+    result = _train(request, out, resume, max_seconds)
+    _print_result(result, out)
 
 
 def _named(texts: list[str] | None, option: str) -> dict[str, Any]:
@@ -155,7 +172,7 @@ def _named(texts: list[str] | None, option: str) -> dict[str, Any]:
 def _train(
     request: TrainingRequest, out: Path, resume: bool, max_seconds: float | None
 ) -> TrainingResult:
-    """Check what is request before torch is imported or anything is written, then train."""
+    """Check the request before torch is imported or anything is written; train."""
     from agents.cli.terminal import training_bar
 
     plan = _checked_plan(request, out, resume)
@@ -181,7 +198,7 @@ def _train(
 
 
 def _checked_plan(request: TrainingRequest, out: Path, resume: bool) -> TrainingPlan:
-    """The plan of a new run, or of one that is resumed, with warnings of what differs."""
+    """Plan of a new or a resumed run, with warnings of what differs."""
     from agents.cli.terminal import warn
     from agents.training import run_folder
     from agents.training.request import make_plan
@@ -223,10 +240,9 @@ def _print_result(result: TrainingResult, out: Path) -> None:
     say(f"{costs} (step {result.best_steps:,} of {result.steps:,})")
     reached = result.lq_reached
     if reached is not None:
-        say(
-            f"LQ's cost reached at step {reached['steps']:,}, after"
-            f" {reached['seconds']:.0f} s"
-        )
+        steps = reached["steps"]
+        seconds = reached["seconds"]
+        say(f"LQ's cost reached at step {steps:,}, after {seconds:.0f} s")
     if not result.finished:
         total = result.plan.settings.total_steps
         say(
@@ -236,34 +252,27 @@ def _print_result(result: TrainingResult, out: Path) -> None:
     say(f"written: {agent}")
 
 
+@with_learning_options
 def tune_command(
-    algorithm: Algorithm,
     out: Annotated[
         Path,
         Option(metavar="FOLDER", help="Folder of the study; resumed if it exists."),
     ],
-    env: Environment = None,
-    model: Model = None,
-    sea: Sea = None,
-    task: TaskName = None,
-    suite: SuiteName = "shipgym-v1",
-    allow_code: AllowCode = None,
-    environment_options: EnvironmentOptions = None,
+    *,
+    fields: dict[str, Any],
     trials: Annotated[
         int, Option(min=1, help="Trials in all, with those already done.")
     ] = 20,
-    total_steps: TotalSteps = None,
-    settings: Settings = None,
-    set_: Setting = None,
     seed: Annotated[
         int, Option(min=0, max=799, help="Random seed of trainings and search.")
     ] = 0,
-    randomise: Randomise = False,
     engine: EngineName = "local",
     workers: Workers = 1,
     address: Address = None,
 ) -> None:
-    """Search the settings with which an agent learns best. Uses Optuna; writes them for `train --settings`.
+    """Search the settings with which an agent learns best.
+
+    Uses Optuna; writes them for `train --settings`.
 
     Four trials are proposed at a time, so more than four workers are of no use. If it
     is killed, the same command continues with the trials that are not done.
@@ -273,25 +282,8 @@ def tune_command(
     from agents.training.request import TrainingRequest, make_plan
     from agents.training.tuning import evaluated_evenly, tune
 
-    fixed = _named(set_, "--set")
-    overrides = dict(fixed)
-    if total_steps is not None:
-        overrides["total_steps"] = total_steps
-    request = TrainingRequest(
-        algorithm,
-        environment=env,
-        model=model,
-        sea=sea,
-        task=task,
-        options=_named(environment_options, "--option"),
-        settings_file=settings,
-        settings=overrides,
-        seed=seed,
-        randomise=randomise,
-        threads=1,
-        suite=suite,
-        allow_code=allow_code or (),
-    )
+    fixed = sorted(fields["settings"].keys() - {"total_steps"})
+    request = TrainingRequest(**fields, seed=seed, threads=1)
     where = JobEngine(engine, workers, address)
     plan = make_plan(request)
     if "evaluate_every" not in fixed:
@@ -308,7 +300,7 @@ def tune_command(
                 plan,
                 out,
                 trials,
-                fixed=tuple(fixed),
+                fixed=fixed,
                 where=where,
                 on_progress=on_progress,
             )
@@ -322,7 +314,7 @@ def tune_command(
 
 def print_tuning(tuning: TuningResult, out: Path) -> None:
     """Print trials and where the best settings are."""
-    from agents.cli.tables import plain_table
+    from agents.cli.tables import number, plain_table
     from agents.cli.terminal import answer, console, say
     from agents.training.tuning import BEST
 
@@ -332,19 +324,25 @@ def print_tuning(tuning: TuningResult, out: Path) -> None:
 
     title = "Trials by the mean cost of a held-out episode, best first"
     table = plain_table(title, ">trial", ">cost", "ended", "what was varied")
-    by_cost = sorted(
-        tuning.trials, key=lambda trial: (trial.cost is None, trial.cost or 0.0)
-    )
-    for trial in by_cost:
-        varied = []
-        for name, value in trial.parameters.items():
-            shown = f"{value:.3g}" if isinstance(value, float) else str(value)
-            varied.append(f"{name} {shown}")
+    for trial in sorted(tuning.trials, key=_rank):
         table.add_row(
             str(trial.number),
-            "-" if trial.cost is None else f"{trial.cost:.3f}",
+            number(trial.cost, 3),
             trial.ended,
-            ", ".join(varied) or "nothing: as it was",
+            _varied(trial.parameters),
         )
     console.print(table)
     say(f"\nwritten: {best}")
+
+
+def _rank(trial: TuningTrial) -> float:
+    """Cost of a trial; those without one come last."""
+    return inf if trial.cost is None else trial.cost
+
+
+def _varied(parameters: Mapping[str, Any]) -> str:
+    varied = []
+    for name, value in parameters.items():
+        text = f"{value:.3g}" if isinstance(value, float) else str(value)
+        varied.append(f"{name} {text}")
+    return ", ".join(varied) or "nothing: as it was"

@@ -46,14 +46,13 @@ def _section(
         for index in trials.indices[manoeuvre]:
             by_manoeuvre = [trials.indices[other].get(index) for other in family]
             rows[readable_index(index)] = by_manoeuvre
+    refused = {key: why for key, why in trials.refused.items() if key in family}
     return {
         "name": name,
         "title": FAMILIES[name].title,
         "manoeuvres": list(family),
         "indices": rows,
-        "refused": {
-            key: trials.refused[key] for key in family if key in trials.refused
-        },
+        "refused": refused,
         "figures": _figures(name, family, trials),
     }
 
@@ -62,10 +61,11 @@ def _figures(
     name: str, family: dict[str, Manoeuvre], trials: StandardTrials
 ) -> list[Figure]:
     """All figures of one family of manoeuvres."""
-    runs = {key: trials.runs[key] for key in family if key in trials.runs}
+    runs = {key: run for key, run in trials.runs.items() if key in family}
     simulated = {key: run for key, run in runs.items() if isinstance(run, Trial)}
     if name == "pull-outs" and simulated:
-        caption = family[next(iter(simulated))].caption
+        first, *_ = simulated
+        caption = family[first].caption
         figures = [(name, pull_out_figure(simulated), caption)]
     else:
         figures = _manoeuvre_figures(name, family, runs)
@@ -90,17 +90,26 @@ def _manoeuvre_figures(
     """A figure of each manoeuvre."""
     figures = []
     for number, (key, run) in enumerate(runs.items()):
-        draw = family[key].figure or manoeuvre_figure
-        caption = f"{key[0].upper()}{key[1:]}. {family[key].caption}"
+        manoeuvre = family[key]
+        draw = manoeuvre.figure or manoeuvre_figure
+        title = key[0].upper() + key[1:]
+        caption = f"{title}. {manoeuvre.caption}"
         figures.append((f"{name}-{number}", draw(run), caption))
     return figures
 
 
 def readable_index(name: str) -> str:
     """The name of an index as words with its unit."""
-    units = {"_deg_s": "deg/s", "_deg": "deg", "_lengths": "ship lengths", "_s": "s"}
+    units = {
+        "_deg_s": "deg/s",
+        "_deg": "deg",
+        "_lengths": "ship lengths",
+        "_s": "s",
+    }
+    words = name.replace("_", " ")
+    if name == "final_speed":
+        return f"{words}, m/s"
     for ending, unit in units.items():
         if name.endswith(ending):
-            return f"{name.removesuffix(ending).replace('_', ' ')}, {unit}"
-    words = name.replace("_", " ")
-    return f"{words}, m/s" if name == "final_speed" else words
+            return f"{words[: -len(ending)]}, {unit}"
+    return words

@@ -1,4 +1,4 @@
-"""`shipgym warm`: compile beforehand what environments and models need, so that no run waits for it."""
+"""`shipgym warm`: compile beforehand, so that no run waits for it."""
 
 import time
 import warnings
@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from typer import Argument, Option
+
+from agents.cli.command import WRONG_INPUT, fail
 
 
 def warm_command(
@@ -38,7 +40,7 @@ def warm_command(
     cache (SHIPGYM_CACHE or the user's cache folder).
     """
     from agents.cli.terminal import answer, say
-    from shipgym.engine.cache_folder import CacheWarning, usable_folder
+    from shipgym.engine.cache_folder import usable_folder
     from shipgym.errors import InputError
 
     folder = usable_folder()
@@ -53,10 +55,7 @@ def warm_command(
         begin = time.perf_counter()
         refused = ""
         try:
-            with warnings.catch_warnings(action="error", category=CacheWarning):
-                compile_it()
-        except CacheWarning as error:
-            raise InputError(f"{what}: {error}") from None
+            _compile(what, compile_it)
         except InputError as error:
             if not everything:
                 raise
@@ -66,6 +65,17 @@ def warm_command(
         say(f"{number}/{len(jobs)}  {what}: {refused or f'{seconds:.1f} s'}")
     answer({"cache": str(folder), "ready": ready})
     say(f"kept in {folder}")
+
+
+def _compile(what: str, compile_it: Callable[[], Any]) -> None:
+    """Compile a ship; a cache that does not take it is an error that ends the work."""
+    from shipgym.engine.cache_folder import CacheWarning
+
+    with warnings.catch_warnings(action="error", category=CacheWarning):
+        try:
+            compile_it()
+        except CacheWarning as error:
+            fail(f"{what}: {error}", WRONG_INPUT)
 
 
 def warm_names(wanted: list[str] | None, everything: bool) -> list[str]:
@@ -80,7 +90,7 @@ def warm_names(wanted: list[str] | None, everything: bool) -> list[str]:
 
 
 def warm_jobs(name: str, ship: str | None = None) -> dict[str, Callable[[], Any]]:
-    """Functions that compile what an environment's id, a model or a file needs, by a description.
+    """Functions that compile what an id, a model or a file needs, by a description.
 
     Raises InputError for what is none of these.
     """

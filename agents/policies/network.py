@@ -1,4 +1,4 @@
-"""A policy's network in NumPy: dense layers in single precision, as they were learned."""
+"""A policy's network in NumPy: dense layers in single precision."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ class Network:
 
         for i, (before, layer) in enumerate(pairwise(self.layers), start=1):
             n_outputs = len(before.bias)
-            n_inputs = layer.weight.shape[1]
+            _, n_inputs = layer.weight.shape
             if n_inputs != n_outputs:
                 raise InputError(
                     f"network.layers[{i}].weight: expected {n_outputs} inputs, as many"
@@ -63,7 +63,7 @@ class Network:
         return (n_inputs, *(len(layer.bias) for layer in self.layers))
 
     def __call__(self, inputs: Numbers) -> Numbers:
-        """Outputs of shape (n, n_out) for inputs of shape (n, n_in), which stay as they are."""
+        """Outputs of shape (n, n_out) for inputs of shape (n, n_in)."""
         *hidden, last = self.layers
         activate = ACTIVATIONS[self.activation]
 
@@ -98,7 +98,8 @@ def _check_array(array: Any, ndim: int, where: str) -> None:
     expected = f"float32 with {ndim} axes, none of them empty"
     if not isinstance(array, np.ndarray):
         raise unexpected(where, expected, array)
-    if array.dtype != np.float32 or array.ndim != ndim or array.size == 0:
+    is_filled = array.ndim == ndim and array.size > 0
+    if not is_filled or array.dtype != np.float32:
         raise InputError(
             f"{where}: expected {expected}, got {array.dtype} of shape {array.shape}"
         )

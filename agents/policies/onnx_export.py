@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.policies.network import Network
+from agents.policies.network import Layer, Network
 from agents.policies.policy import ORDERS, LearnedPolicy
 from shipgym import InputError
 from shipgym.extras import library
@@ -72,16 +72,17 @@ def onnx_model(policy: Any) -> Any:
 
 
 def _graph(policy: LearnedPolicy, onnx: Any) -> Any:
-    """Graph from the observations, and the base's action if there is a base, to the action."""
-    inputs = {"observations": policy.frame_stack * len(policy.observation_names)}
-    outputs = {"action": 2 if policy.action == "rudder-shaft" else 1}
-    if policy.base is not None:
-        inputs["base_action"] = 1
-        outputs["part"] = 1
-
+    """Graph from the observations, and from a base's action, to the action."""
     graph = _Graph(onnx)
+    n_observed = policy.frame_stack * len(policy.observation_names)
+    n_commands = 2 if policy.action == "rudder-shaft" else 1
+    inputs = [graph.port("observations", n_observed)]
+    outputs = [graph.port("action", n_commands)]
+
     seen = "observations"
     if policy.base is not None:
+        inputs.append(graph.port("base_action", 1))
+        outputs.append(graph.port("part", 1))
         seen = graph.add("Concat", [seen, "base_action"], "seen", axis=1)
     output = _add_network(graph, policy.network, seen)
     _add_action(graph, policy, output)
@@ -89,27 +90,31 @@ def _graph(policy: LearnedPolicy, onnx: Any) -> Any:
     return onnx.helper.make_graph(
         graph.nodes,
         "policy",
-        [graph.port(name, size) for name, size in inputs.items()],
-        [graph.port(name, size) for name, size in outputs.items()],
+        inputs,
+        outputs,
         graph.constants,
     )
 
 
 def _add_network(graph: _Graph, network: Network, inputs: str) -> str:
     """Dense layers; returns the name of their output."""
-    between = OPERATORS[network.activation]
+    activation = OPERATORS[network.activation]
     last = len(network.layers) - 1
-
     x = inputs
     for i, layer in enumerate(network.layers):
-        weight = graph.constant(f"layers.{i}.weight", layer.weight)
-        bias = graph.constant(f"layers.{i}.bias", layer.bias)
-        x = graph.add("Gemm", [x, weight, bias], f"sum.{i}", transB=1)
+        x = _add_layer(graph, layer, i, x)
         if i < last:
-            x = graph.add(between, [x], f"layer.{i}")
+            x = graph.add(activation, [x], f"layer.{i}")
     if network.output == "tanh":
         x = graph.add("Tanh", [x], "output")
     return x
+
+
+def _add_layer(graph: _Graph, layer: Layer, number: int, inputs: str) -> str:
+    name = f"layers.{number}"
+    weight = graph.constant(f"{name}.weight", layer.weight)
+    bias = graph.constant(f"{name}.bias", layer.bias)
+    return graph.add("Gemm", [inputs, weight, bias], f"sum.{number}", transB=1)
 
 
 def _add_action(graph: _Graph, policy: LearnedPolicy, output: str) -> None:
@@ -126,6 +131,7 @@ def _add_action(graph: _Graph, policy: LearnedPolicy, output: str) -> None:
         graph.add("Clip", [output, low, high], "action")
         return
 
+    # part = authority * output; action = base + part, both within the limits
     authority = graph.constant("authority", np.float32(policy.authority))
     limited = graph.add("Clip", [output, low, high], "limited")
     part = graph.add("Mul", [limited, authority], "part")

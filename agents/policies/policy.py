@@ -52,7 +52,7 @@ SHOWING = ("action", "roll", "corridor", "ground")
 
 
 class Memory(NamedTuple):
-    """What a policy remembers of ships; for a single observation without the first axis."""
+    """Memory of a policy of n ships; for a single ship without the first axis."""
 
     seen: (
         Numbers  # past observations, oldest first, (n, frame_stack - 1, n_observations)
@@ -65,7 +65,7 @@ class Memory(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LearnedPolicy:
-    """A learned autopilot in the signature of `Controller.predict`; steers without torch.
+    """A learned autopilot with `predict` as in `Controller`; steers without torch.
 
     Raises InputError naming the field whose value does not fit.
 
@@ -120,7 +120,8 @@ class LearnedPolicy:
     def __post_init__(self) -> None:
         check_choice(self.action, ACTIONS, "action")
         check_part(self)
-        names, scales = self.observation_names, self.observation_scales
+        names = self.observation_names
+        scales = self.observation_scales
         if len(scales) != len(names):
             raise InputError(
                 f"observation_scales: expected {len(names)} numbers, got {len(scales)}"
@@ -191,67 +192,71 @@ class LearnedPolicy:
         episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[Action, Any]:
-        """See `Policy.predict`: the mean of what was learned, or the most likely discrete order.
+        """Commands as in `Policy.predict`: the mean, or the most likely discrete order.
 
         Of discrete orders the order itself is returned, not its number (`order_numbers`
         gives it). The state is a `Memory` if the policy `remembers` anything, else as
         given.
         """
         given = checked_observation(observation, self.observation_names, np.float32)
-        shape = given.shape[:-1]
+        *shape, _ = given.shape
         rows = np.atleast_2d(given)[:, : len(self.observation_names)]
         if not self.remembers:
-            action = self.commands(self.network(rows))
-            return action.reshape(*shape, action.shape[-1]), state
+            commands = self.commands(self.network(rows))
+            return commands.reshape(*shape, commands.shape[1]), state
 
-        memory = self._recalled(state, episode_start, rows, shape)
+        memory = self._recalled(state, episode_start, rows, tuple(shape))
         window = np.concatenate([memory.seen, rows[:, None]], axis=1)
-        inputs = window.reshape(len(rows), -1)
         memory = memory._replace(seen=window[:, 1:])
+        inputs = window.reshape(len(rows), -1)
 
         proposed = None
         if self.base is not None:
-            order, base = self.base.predict(
-                given, memory.base, episode_start, deterministic
+            order, base_state = self.base.predict(
+                given,
+                memory.base,
+                episode_start,
+                deterministic,
             )
+            memory = memory._replace(base=base_state)
             proposed = np.asarray(order, dtype=np.float32).reshape(-1, 1)
             inputs = np.hstack([inputs, proposed])
-            memory = memory._replace(base=base)
 
         memory = self._decided(inputs, memory)
-        action = self.commands(memory.in_force, proposed)
-        action = action.reshape(*shape, action.shape[-1])
-        return action, _shaped(memory, shape)
+        commands = self.commands(memory.in_force, proposed)
+        commands = commands.reshape(*shape, commands.shape[1])
+        return commands, _shaped(memory, tuple(shape))
 
     def _decided(self, inputs: Numbers, memory: Memory) -> Memory:
         """Ask the network for ships whose last output is over, or was not a number."""
-        in_force = memory.in_force
-        known = np.isfinite(memory.output + in_force)
-        over = memory.left < 1.0
-        due = over | ~known.all(axis=1, keepdims=True)
-
         left = memory.left
         output = memory.output
-        if due.any():
-            left = np.where(due, np.float32(self.action_repeat), left)
-            output = np.where(due, self.network(inputs), output)
+        in_force = memory.in_force
+        is_known = np.isfinite(output + in_force)
+        is_due = (left < 1.0) | ~is_known.all(axis=1, keepdims=True)
+        if is_due.any():
+            left = np.where(is_due, np.float32(self.action_repeat), left)
+            output = np.where(is_due, self.network(inputs), output)
 
         if self.rate_limit < NO_LIMIT:
             before = np.where(np.isfinite(in_force), in_force, np.float32(0.0))
             in_force = toward(output, before, self.rate_limit)
         else:
             in_force = output
-        return memory._replace(left=left - 1.0, output=output, in_force=in_force)
+        return memory._replace(
+            left=left - 1.0,
+            output=output,
+            in_force=in_force,
+        )
 
     def commands(self, output: Numbers, proposed: Numbers | None = None) -> Action:
-        """Commands for outputs of the network and a base's action, each of shape (n, ...)."""
+        """Commands for outputs of the network and a base's action, both (n, ...)."""
         if self.action == "rudder-discrete":
             likeliest = output.argmax(axis=1, keepdims=True)
             return np.asarray(ORDERS[likeliest])
-        limited: Action = np.clip(output, -1.0, 1.0)
-        if proposed is None:
-            return limited
-        action: Action = combined(proposed, limited, float(self.authority))
+        action: Action = np.clip(output, -1.0, 1.0)
+        if proposed is not None:
+            action = combined(proposed, action, float(self.authority))
         return action
 
     def _recalled(
@@ -290,12 +295,13 @@ class LearnedPolicy:
     def check_fits(
         self, names: Sequence[str], scales: Sequence[float], where: str = "observations"
     ) -> None:
-        """Refuse what shows other quantities first, or in other scales, than those it learned with.
+        """Refuse observations that do not begin as those it learned with.
 
         Arguments and errors as in `Controller.check_fits`.
         """
+        learned = self.observation_names
         named = f"{where}: not those that the agent learned with in {self.env_id}"
-        check_names(names[: len(self.observation_names)], self.observation_names, named)
+        check_names(names[: len(learned)], learned, named)
         check_scales(
             names,
             scales,
@@ -306,7 +312,7 @@ class LearnedPolicy:
         )
 
     def check_fits_model(self, model: ShipModel) -> None:
-        """Refuse a ship with other observation scales in the environment that it learned in.
+        """Refuse a ship with other observation scales in its environment.
 
         One that learned a task of a user's own is checked where it meets the task.
         """
@@ -318,8 +324,11 @@ class LearnedPolicy:
             "roll": "roll" in self.observation_names,
             **self.env_options,
         }
-        asked = set(SHOWING) & set(Task.option_names(definition)) & set(known)
-        task = Task.of(definition, **{name: known[name] for name in asked})
+        options = {}
+        for name in Task.option_names(definition):
+            if name in SHOWING and name in known:
+                options[name] = known[name]
+        task = Task.of(definition, **options)
         task.check_fits(model)
 
         shown = task.observed(model)
@@ -328,7 +337,7 @@ class LearnedPolicy:
         self.check_fits(names, scales, f"model '{model.name}'")
 
     def save(self, path: str | Path) -> None:
-        """Write NAME.json and, beside it, NAME.safetensors (fields in docs/policies.md)."""
+        """Write NAME.json and NAME.safetensors (fields in docs/policies.md)."""
         content, tensors = self.file_fields()
         write_policy(content, tensors, Path(path))
 
@@ -383,13 +392,15 @@ def combined(proposed: Any, part: Any, authority: float) -> Any:
 
 
 def _shaped(memory: Memory, shape: tuple[int, ...]) -> Memory:
-    """Memory of ships whose arrays begin with other axes: (n,), or () for a single one."""
+    """Memory with other first axes: (n,) ships, or () for a single one."""
+    *_, past, n_observed = memory.seen.shape
+    *_, n_outputs = memory.output.shape
     return Memory(
-        seen=memory.seen.reshape(*shape, *memory.seen.shape[-2:]),
+        seen=memory.seen.reshape(*shape, past, n_observed),
         base=memory.base,
         left=memory.left.reshape(*shape, 1),
-        output=memory.output.reshape(*shape, memory.output.shape[-1]),
-        in_force=memory.in_force.reshape(*shape, memory.in_force.shape[-1]),
+        output=memory.output.reshape(*shape, n_outputs),
+        in_force=memory.in_force.reshape(*shape, n_outputs),
     )
 
 
@@ -397,8 +408,8 @@ def network_fields(network: Network) -> tuple[dict[str, Any], Tensors]:
     """Description of a network in a policy's JSON, and its weights by name."""
     tensors = Tensors()
     for i, layer in enumerate(network.layers):
-        tensors[f"layers.{i}.weight"] = np.ascontiguousarray(layer.weight)
-        tensors[f"layers.{i}.bias"] = np.ascontiguousarray(layer.bias)
+        for part, numbers in layer._asdict().items():
+            tensors[f"layers.{i}.{part}"] = np.ascontiguousarray(numbers)
 
     described = {
         "activation": network.activation,
@@ -409,7 +420,7 @@ def network_fields(network: Network) -> tuple[dict[str, Any], Tensors]:
 
 
 def order_numbers(action: ArrayLike) -> NDArray[np.int64]:
-    """Numbers of discrete rudder orders, for environments with the action "rudder-discrete".
+    """Numbers of discrete rudder orders, for the action "rudder-discrete".
 
     `action`: as `LearnedPolicy.predict` hands them back, shape (..., 1). Returns the
     index of the nearest order, shape (...).

@@ -1,4 +1,4 @@
-"""The network of a trained agent of stable-baselines3, and what it observed, as fields of a `LearnedPolicy`.
+"""Fields of a `LearnedPolicy` from a trained agent of stable-baselines3.
 
 PPO and A2C have the mean of their action, SAC and TQC the hyperbolic tangent of it, TD3
 and DDPG a network that ends so. Whatever else is found (other extractors of features,
@@ -124,7 +124,7 @@ def _check_wrapper(wrapper: Any) -> None:
 
 
 def _residual(stack: Sequence[Any]) -> dict[str, Any]:
-    """Base and other settings of the wrapper that adds to a controller, if there is one."""
+    """Base and other settings of the wrapper that adds to a controller, if any."""
     for wrapper in stack:
         if not vars(wrapper).keys() >= {"base", *RESIDUAL}:
             continue
@@ -169,9 +169,10 @@ def _options(keywords: Mapping[str, Any]) -> dict[str, Any]:
     """Keywords that say what is asked of the ships, as JSON has them."""
     options = {}
     for name, value in keywords.items():
-        task_of_package = name == "task" and value in TASKS
-        if name not in RUNNING and not task_of_package:
-            options[name] = as_json(value)
+        is_of_package = name == "task" and value in TASKS
+        if name in RUNNING or is_of_package:
+            continue
+        options[name] = as_json(value)
     return options
 
 
@@ -192,9 +193,10 @@ def _network(agent: Any) -> Network:
         )
     check_exploration(getattr(agent, "use_sde", False), "agent: ")
 
-    activation = getattr(getattr(policy, "activation_fn", None), "__name__", None)
+    activation = getattr(policy, "activation_fn", None)
+    name = getattr(activation, "__name__", None)
     what = f"{type(agent).__name__} with {type(policy).__name__}"
-    return actor_network(policy.state_dict(), activation, what)
+    return actor_network(policy.state_dict(), name, what)
 
 
 def check_exploration(use_sde: Any, where: str = "") -> None:
@@ -226,24 +228,27 @@ def actor_network(
     if between not in ACTIVATION_OF:
         raise InputError(f"agent: expected {DENSE}, got {between} as layer 1")
 
-    layers = _dense_layers(actor, weights)
-    used = {f"{layer}.{part}" for layer in layers for part in Layer._fields}
+    names = _dense_layers(actor, weights)
     acting = {name for name in weights if not name.startswith(NOT_ACTING)}
+    used = set()
+    for name in names:
+        used |= {f"{name}.weight", f"{name}.bias"}
     if used != acting:
         raise InputError(
             f"agent: expected {DENSE}, got weights missing or unknown:"
             f" {quoted(sorted(used ^ acting))}"
         )
 
-    tensors = [
-        Layer(_array(weights[f"{layer}.weight"]), _array(weights[f"{layer}.bias"]))
-        for layer in layers
-    ]
-    return Network(tuple(tensors), ACTIVATION_OF[between], actor.output)
+    layers = []
+    for name in names:
+        weight = _array(weights[f"{name}.weight"])
+        bias = _array(weights[f"{name}.bias"])
+        layers.append(Layer(weight, bias))
+    return Network(tuple(layers), ACTIVATION_OF[between], actor.output)
 
 
 def _dense_layers(actor: Actor, weights: Mapping[str, Any]) -> list[str]:
-    """Names of the layers from observation to command; activations stand between them."""
+    """Names of the layers from observation to command, without activations."""
     layers = []
     for number in count(step=2):
         layer = f"{actor.body}.{number}"
@@ -261,8 +266,8 @@ def _array(parameter: Any) -> NDArray[np.float32]:
 
 
 def _check_extraction(network: Network, agent: Any, action: str) -> None:
-    """Refuse a network that commands otherwise than its agent, on observations at random."""
-    n_inputs = network.sizes[0]
+    """Refuse a network that differs from its agent at random observations."""
+    n_inputs, *_ = network.sizes
     shape = agent.observation_space.shape
     if shape != (n_inputs,):
         raise InputError(
@@ -271,7 +276,8 @@ def _check_extraction(network: Network, agent: Any, action: str) -> None:
         )
 
     random = np.random.default_rng(0)
-    inputs = random.uniform(-1.0, 1.0, (N_COMPARED, n_inputs)).astype(np.float32)
+    uniform = random.uniform(-1.0, 1.0, (N_COMPARED, n_inputs))
+    inputs = uniform.astype(np.float32)
     commands, _ = agent.predict(inputs, deterministic=True)
     output = network(inputs)
     if action == "rudder-discrete":

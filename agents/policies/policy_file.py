@@ -59,8 +59,9 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy:
     check_format(content, FORMAT, where)
     check_keys(content, FIELDS, where, FIELDS)
 
-    table = check_table(content["weights"], f"{where}: weights", ("sha256",))
-    sha256 = check_text(table.get("sha256"), f"{where}: weights.sha256")
+    field = f"{where}: weights"
+    table = check_table(content["weights"], field, ("sha256",))
+    sha256 = check_text(table.get("sha256"), f"{field}.sha256")
     tensors = read_weights(path, sha256)
     with placed(where):
         agent = _learned(content, tensors)
@@ -108,8 +109,9 @@ def _network(value: Any, tensors: Tensors) -> Network:
 
     layers = []
     for i, (n_in, n_out) in enumerate(pairwise(sizes)):
-        weight = _tensor(tensors, f"layers.{i}.weight", (n_out, n_in))
-        bias = _tensor(tensors, f"layers.{i}.bias", (n_out,))
+        name = f"layers.{i}"
+        weight = _tensor(tensors, f"{name}.weight", (n_out, n_in))
+        bias = _tensor(tensors, f"{name}.bias", (n_out,))
         layers.append(Layer(weight, bias))
     return Network(
         tuple(layers),
@@ -124,23 +126,29 @@ def _tensor(tensors: Tensors, name: str, shape: tuple[int, ...]) -> NDArray[np.f
     if name not in tensors:
         raise InputError(f"{where}: expected shape {shape}, got none; {REMEDY}")
     array = tensors.pop(name)
-    if array.shape != shape or array.dtype != np.float32:
+    kind = array.dtype
+    if array.shape != shape or kind != np.float32:
         raise InputError(
-            f"{where}: expected float32 of shape {shape}, got {array.dtype} of shape"
+            f"{where}: expected float32 of shape {shape}, got {kind} of shape"
             f" {array.shape}; {REMEDY}"
         )
     return array
 
 
 def _names(value: Any, own_task: bool) -> tuple[str, ...]:
-    """Names of observations; except in a user's own task the first are those of course keeping."""
+    """Read the names of observations.
+
+    Except in a user's own task the first are those of course keeping.
+    """
     where = "observation_names"
     if not isinstance(value, list):
         raise unexpected(where, "a list of names", value)
     for i, name in enumerate(value):
         check_text(name, f"{where}[{i}]")
     if not own_task:
-        check_names(value[: len(OBSERVATION_NAMES)], OBSERVATION_NAMES, where)
-    if len(set(value)) < len(value):
+        first = value[: len(OBSERVATION_NAMES)]
+        check_names(first, OBSERVATION_NAMES, where)
+    different = set(value)
+    if len(different) < len(value):
         raise InputError(f"{where}: expected each name once, got {quoted(value)}")
     return tuple(value)

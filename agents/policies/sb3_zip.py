@@ -1,4 +1,4 @@
-"""The zip in which stable-baselines3 saves an agent, read without running anything that is in it.
+"""Agents saved by stable-baselines3, read without running anything in the zip.
 
 Two of its members are read: `data`, JSON whose pickles (in base64) stay closed, and
 `policy.pth`, by torch's reader of weights alone. One pickle, that of the last
@@ -70,6 +70,7 @@ class Sb3Agent:
         """
         shown = task.observed(ship)
         names = tuple(quantity.name for quantity in shown)
+        scales = tuple(quantity.scale for quantity in shown)
         bounds = np.array([(quantity.low, quantity.high) for quantity in shown])
         if bounds.shape != self.bounds.shape or not np.allclose(bounds, self.bounds):
             raise InputError(
@@ -82,7 +83,7 @@ class Sb3Agent:
             return LearnedPolicy(
                 network=self.network,
                 observation_names=names,
-                observation_scales=tuple(quantity.scale for quantity in shown),
+                observation_scales=scales,
                 action=task.action,
                 env_id=env_id(task_showing(names)),
                 model_name=ship.name,
@@ -98,7 +99,9 @@ def read_sb3(path: Path) -> Sb3Agent:
     not installed.
     """
     data, weights = _members(path)
-    about = check_table(parse_json(data, f"{path}: data:", REMEDY), f"{path}: data")
+    where = f"{path}: data"
+    content = parse_json(data, f"{where}:", REMEDY)
+    about = check_table(content, where)
     with placed(str(path)):
         activation = _activation(about)
         bounds = _bounds(about)
@@ -127,12 +130,15 @@ def _members(path: Path) -> tuple[str, dict[str, Any]]:
 
 
 def _opened(content: bytes) -> ZipFile:
-    """Open a zip of uncompressed members, all of them together no larger than the whole."""
+    """Open a zip of uncompressed members, together no larger than the whole."""
     file = ZipFile(BytesIO(content))
-    members = file.infolist()
-    stored = all(member.compress_type == ZIP_STORED for member in members)
-    if not stored or sum(member.file_size for member in members) > len(content):
-        raise ValueError("expected members as `save` writes them, got compressed ones")
+    size = 0
+    for member in file.infolist():
+        size += member.file_size
+        if member.compress_type != ZIP_STORED or size > len(content):
+            raise ValueError(
+                "expected members as `save` writes them, got compressed ones"
+            )
     return file
 
 
@@ -145,15 +151,15 @@ def _weights(content: bytes) -> dict[str, Any]:
             BytesIO(content), map_location="cpu", weights_only=True
         )
     for name, tensor in tensors.items():
-        single = isinstance(name, str) and tensor.dtype == torch.float32
-        if not single or tensor.nbytes > len(content):
+        is_single = isinstance(name, str) and tensor.dtype == torch.float32
+        if not is_single or tensor.nbytes > len(content):
             raise ValueError(f"weights {name!r}: expected numbers of type float32")
         tensor.numpy()
     return tensors
 
 
 def _activation(about: Mapping[str, Any]) -> str | None:
-    """Name of what is between the layers, None for the usual; refuses policies of one's own."""
+    """Name of the activation, None for the usual; refuses a user's own policy."""
     policy_class = check_table(about.get("policy_class"), "data: policy_class")
     module = policy_class.get("__module__")
     if not POLICIES.fullmatch(str(module)):
@@ -170,15 +176,17 @@ def _activation(about: Mapping[str, Any]) -> str | None:
             f" {quoted(sorted(other))}"
         )
     # such as <class 'torch.nn.modules.activation.ReLU'>
-    name = str(keywords.get("activation_fn", "")).rpartition(".")[2]
+    activation = str(keywords.get("activation_fn", ""))
+    _, _, name = activation.rpartition(".")
     return name.removesuffix("'>") or None
 
 
 def _bounds(about: Mapping[str, Any]) -> Floats:
     space = check_table(about.get("observation_space"), "data: observation_space")
     try:
-        low, high = (str(space[name]).strip("[]").split() for name in ("low", "high"))
-        return np.array([low, high], dtype=np.float64).T
+        low = str(space["low"]).strip("[]")
+        high = str(space["high"]).strip("[]")
+        return np.array([low.split(), high.split()], dtype=np.float64).T
     except (KeyError, ValueError):
         raise InputError(
             "data: observation_space: expected the flat Box of a task, got another"
@@ -187,16 +195,19 @@ def _bounds(about: Mapping[str, Any]) -> Floats:
 
 
 def _check_not_scaled(about: Mapping[str, Any], n: int) -> None:
-    """Refuse what saw scaled observations: the first two are the sine and cosine of one angle."""
+    """Refuse an agent that saw scaled observations.
+
+    Without scaling the first two are the sine and cosine of one angle.
+    """
     if about.get("_last_obs") is None:  # has not learned
         return
     try:
         last = _last_observations(about).reshape(-1, n)
-        length = np.hypot(last[:, 0], last[:, 1])
-        known = np.allclose(length, 1.0, atol=1e-4)
+        sine, cosine, *_ = last.T
+        is_angle = np.allclose(np.hypot(sine, cosine), 1.0, atol=1e-4)
     except (LookupError, TypeError, ValueError, OverflowError):
-        known = False
-    if not known:
+        is_angle = False
+    if not is_angle:
         raise InputError(
             "data: _last_obs: expected observations of shipgym that are not scaled, got"
             " others: a zip lacks the statistics of VecNormalize; train with"
@@ -212,4 +223,5 @@ def _last_observations(about: Mapping[str, Any]) -> NDArray[np.float32]:
     for _, argument, _ in pickletools.genops(pickled):
         if isinstance(argument, bytes | bytearray):
             buffers.append(argument)
-    return np.frombuffer(max(buffers, key=len), np.float32)
+    largest = max(buffers, key=len)
+    return np.frombuffer(largest, np.float32)

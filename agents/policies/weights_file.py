@@ -1,4 +1,4 @@
-"""The two files of a policy, NAME.json and NAME.safetensors: written whole, and the weights read back.
+"""The two files of a policy, NAME.json and NAME.safetensors.
 
 The weights are written first, and the JSON holds their SHA-256, so that files that do
 not belong together are refused. No pickle, no torch.

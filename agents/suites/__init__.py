@@ -1,1 +1,1 @@
-"""Suites: tasks with the seeds of their episodes, and the costs and settings that are kept with them."""
+"""Suites: tasks with their episodes, and the costs and settings kept with them."""

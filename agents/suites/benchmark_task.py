@@ -1,4 +1,4 @@
-"""Tasks of a suite: what a controller is made for, and the episodes it is evaluated in."""
+"""Tasks of a suite: what a controller is made for and what it is evaluated in."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -16,7 +16,7 @@ from shipgym.envs.engine import Engine
 from shipgym.envs.environment import DEFAULT_TASK, read_options
 from shipgym.envs.randomisation import Randomisation
 from shipgym.envs.registration import env_id
-from shipgym.tasks.task import Task
+from shipgym.tasks.task import Observed, Task
 
 #: Seeds of the episodes that are scored; training and tuning use smaller ones.
 FIRST_SEED = 1_000_000
@@ -32,6 +32,10 @@ class Scenario(NamedTuple):
     ship: ShipModel
     task: Task
     randomisation: Randomisation
+
+    def observed(self) -> tuple[Observed, ...]:
+        """Return what the task shows of the ship."""
+        return self.task.observed(self.ship)
 
 
 @dataclass(frozen=True)
@@ -83,10 +87,11 @@ class BenchmarkTask:
 
         Raises InputError, also for an unknown model, ship or option.
         """
-        designed = self.design.task.observed(self.design.ship)
-        steered = self.evaluation.task.observed(self.evaluation.ship)
+        designed = self.design.observed()
+        steered = self.evaluation.observed()
         for on_model, on_ship in zip(designed, steered, strict=True):
-            if (on_model.name, on_model.scale) != (on_ship.name, on_ship.scale):
+            same_name = on_model.name == on_ship.name
+            if not same_name or on_model.scale != on_ship.scale:
                 raise InputError(
                     f"task '{self.name}': ship: expected the particulars of"
                     f" '{self.model}', got '{self.true_ship}', whose '{on_ship.name}'"
@@ -119,9 +124,11 @@ class BenchmarkTask:
         options = {**self.options, **self.far}
         changes = options.pop("gear", {})
         scenario = self._scenario(self.true_ship or self.model, options)
-        gear = {**asdict(scenario.ship.steering), **changes}
+
+        ship = scenario.ship
+        gear = {**asdict(ship.steering), **changes}
         steering = SteeringGear.from_mapping(gear, "far.gear")
-        return scenario._replace(ship=replace(scenario.ship, steering=steering))
+        return scenario._replace(ship=replace(ship, steering=steering))
 
     def _scenario(self, model: str, options: Mapping[str, Any]) -> Scenario:
         task = SHORT_NAMES.get(self.environment, self.environment)
@@ -159,25 +166,35 @@ class BenchmarkTask:
     ) -> Engine:
         """Return many ships at once in its episodes, by default its own ship."""
         ship, task, randomisation = self.evaluation
-        steered = ship if model is None else model
-        return Engine(steered, num_envs, task, randomisation, threads=threads)
+        return Engine(
+            ship if model is None else model,
+            num_envs,
+            task,
+            randomisation,
+            threads=threads,
+        )
 
     @property
     def files(self) -> list[Path]:
         """Files of the user's own that it names: tasks, models, rewards, sensors."""
-        named = [self.environment, self.model, self.true_ship]
-        named += [*self.options.values(), *self.far.values()]
-        texts = [value for value in named if isinstance(value, str)]
-        paths = [Path(text) for text in texts if text.endswith((".py", ".json"))]
-        return [path for path in paths if path.is_file()]
+        options = {**self.options, **self.far}
+        named = [self.environment, self.model, self.true_ship, *options.values()]
+        files = []
+        for name in named:
+            if isinstance(name, str) and name.endswith((".py", ".json")):
+                path = Path(name)
+                if path.is_file():
+                    files.append(path)
+        return files
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `from_dict` reads, ready for JSON."""
         content = {part.name: getattr(self, part.name) for part in fields(self)}
         for name in OPTION_FIELDS:
             options = dict(content[name])
-            if isinstance(options.get("sea"), Weather):
-                options["sea"] = options["sea"].to_dict()
+            sea = options.get("sea")
+            if isinstance(sea, Weather):
+                options["sea"] = sea.to_dict()
             content[name] = options
         return content
 
@@ -187,7 +204,8 @@ class BenchmarkTask:
         values = dict(content)
         for name in OPTION_FIELDS:
             options = dict(values[name])
-            if isinstance(options.get("sea"), Mapping):
-                options["sea"] = Weather.from_dict(options["sea"], "sea")
+            sea = options.get("sea")
+            if isinstance(sea, Mapping):
+                options["sea"] = Weather.from_dict(sea, "sea")
             values[name] = options
         return cls(**values)

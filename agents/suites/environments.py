@@ -1,4 +1,4 @@
-"""Environments as users name them: by a short name, by an id, or by the file of a task."""
+"""Environments as users name them: by short name, by id, or by a task's file."""
 
 from importlib import import_module
 from pathlib import Path
@@ -63,8 +63,8 @@ def read_environment(
         _import(module, text, where)
     options = dict(_registered(name, where))
     task = options.pop("task")
-    for short_name, shipped in SHORT_NAMES.items():
-        if task == shipped:
+    for short_name, shipped_task in SHORT_NAMES.items():
+        if task == shipped_task:
             return Environment(short_name, options)
     if isinstance(task, str) and task.endswith(".py"):
         return Environment(task, options)
@@ -87,11 +87,10 @@ def _import(module: str, text: str, where: str) -> None:
 
 def _registered(name: str, where: str) -> dict[str, Any]:
     """Keywords of an environment of shipgym by its id."""
-    registered = {
-        env_id: spec.kwargs
-        for env_id, spec in gymnasium.registry.items()
-        if spec.entry_point == ENTRY_POINT and "task" in spec.kwargs
-    }
+    registered = {}
+    for env_id, spec in gymnasium.registry.items():
+        if spec.entry_point == ENTRY_POINT and "task" in spec.kwargs:
+            registered[env_id] = spec.kwargs
     if name in registered:
         return registered[name]
     known = [*SHORT_NAMES, *registered]

@@ -34,10 +34,12 @@ def best_known(suite: str) -> dict[str, dict[str, Any]]:
     content = read_json(path, "file of best known costs", "take another copy")
     check_shape(content, BEST, str(path))
     for task, known in content.items():
-        if not len(known["costs"]) == len(known["by"]) == N_EPISODES:
+        n_costs = len(known["costs"])
+        n_by = len(known["by"])
+        if n_costs != N_EPISODES or n_by != N_EPISODES:
             raise InputError(
                 f"{path}: {task}: expected costs of {N_EPISODES} episodes and what"
-                f" reached them, got {len(known['costs'])} and {len(known['by'])}"
+                f" reached them, got {n_costs} and {n_by}"
             )
     return dict(content)
 
@@ -47,10 +49,11 @@ def reference_costs(suite: str) -> dict[str, tuple[float, float]]:
 
     The first is that of wheel-over designed on the model, the second the best known.
     """
-    return {
-        task: (float(known["zero"]), float(np.mean(known["costs"])))
-        for task, known in best_known(suite).items()
-    }
+    costs = {}
+    for task, known in best_known(suite).items():
+        best = np.mean(known["costs"])
+        costs[task] = (float(known["zero"]), float(best))
+    return costs
 
 
 def best_costs(task: BenchmarkTask) -> Floats:
@@ -74,7 +77,8 @@ def load_tuned(suite: str) -> dict[str, dict[str, dict[str, Any]]]:
     remedy = "make it again with scripts/tune_controllers.py"
     content = read_json(path, "file of tuned settings", remedy)
     tasks = check_table(content.get("tasks"), f"{path}: tasks")
-    return {
-        name: dict(check_table(controllers, f"{path}: tasks.{name}"))
-        for name, controllers in tasks.items()
-    }
+    settings = {}
+    for name, controllers in tasks.items():
+        table = check_table(controllers, f"{path}: tasks.{name}")
+        settings[name] = dict(table)
+    return settings

@@ -78,12 +78,12 @@ class Suite:
         if not names:
             raise InputError("tasks: expected at least one, got none")
 
-        selected: dict[str, BenchmarkTask] = {}
+        selected: list[BenchmarkTask] = []
         for name in names:
             sets = [task for task in self.tasks if task.design_name == name]
-            for task in sets or [self.task(name)]:
-                selected[task.name] = task
-        return tuple(selected.values())
+            selected += sets or [self.task(name)]
+        each_once = {task.name: task for task in selected}
+        return tuple(each_once.values())
 
 
 def list_suites() -> list[str]:
@@ -112,13 +112,20 @@ def load_suite(
     where = str(suite)
     if not where.endswith(".toml"):
         return _shipped(where)
+
     path = Path(where).resolve()
     content = read_bytes(path, "TOML file of a suite", LARGEST_SUITE)
     try:
         text = content.decode()
     except UnicodeDecodeError:
         raise InputError(f"{where}: expected UTF-8, got other bytes") from None
-    return parse_suite(text, where, path.parent, allow_code, source=str(path))
+    return parse_suite(
+        text,
+        where,
+        folder=path.parent,
+        allow_code=allow_code,
+        source=str(path),
+    )
 
 
 @cache
@@ -135,8 +142,10 @@ def find_task(
 
     Raises InputError for an unknown name, with the nearest, or as `load_suite`.
     """
-    tasks = load_suite(suite, allow_code).tasks
-    known = {task.name: task for task in tasks if task.on == "ship"}
+    known = {}
+    for task in load_suite(suite, allow_code).tasks:
+        if task.on == "ship":
+            known[task.name] = task
     check_choice(name, known, "task")
     return known[name].design_task
 
@@ -180,10 +189,17 @@ def _read_suite(text: str, where: str, reader: "_Reader", source: str) -> Suite:
 
     tasks: list[BenchmarkTask] = []
     for task_name, table in tables.items():
-        task = reader.read(task_name, table, f"{where}: tasks.{task_name}")
+        field = f"{where}: tasks.{task_name}"
+        task = reader.read(task_name, table, field)
         tasks += _sets_of(replace(task, suite=source))
-    sha256 = hashlib.sha256(text.encode()).hexdigest()
-    return Suite(name, tuple(tasks), source, sha256)
+
+    digest = hashlib.sha256(text.encode())
+    return Suite(
+        name=name,
+        tasks=tuple(tasks),
+        source=source,
+        sha256=digest.hexdigest(),
+    )
 
 
 @dataclass(frozen=True)
@@ -210,9 +226,13 @@ class _Reader:
         options |= self.options(table.get("options", {}), f"{where}.options")
         if "sea" in table:
             options |= self.options({"sea": table["sea"]}, where)
+        far = self.options(table.get("far", {}), f"{where}.far")
+
         default_model = options.pop("model", None)
         model = check_text(table.get("model", default_model), f"{where}.model")
-        ship = check_text(table["ship"], f"{where}.ship") if "ship" in table else ""
+        ship = ""
+        if "ship" in table:
+            ship = check_text(table["ship"], f"{where}.ship")
         with placed(where):
             return BenchmarkTask(
                 name=name,
@@ -221,7 +241,7 @@ class _Reader:
                 why=str(table.get("why", "")),
                 options=options,
                 true_ship=self.absolute(ship),
-                far=self.options(table.get("far", {}), f"{where}.far"),
+                far=far,
                 design_name=name,
             )
 
@@ -249,17 +269,21 @@ class _Reader:
             return {key: self.without_allowed(part) for key, part in value.items()}
         if isinstance(value, list):
             return [self.without_allowed(part) for part in value]
-        is_allowed = isinstance(value, str) and self.allows(value)
-        return None if is_allowed else value
+        if isinstance(value, str) and self.allows(value):
+            return None
+        return value
 
     def options(self, value: Any, where: str) -> dict[str, Any]:
         """Keywords of an environment: a sea may be a table, paths become absolute."""
-        table = check_table(value, where)
-        options = {name: self.absolute(part) for name, part in table.items()}
+        options = {}
+        for name, option in check_table(value, where).items():
+            options[name] = self.absolute(option)
+
         sea = options.get("sea")
         if isinstance(sea, Mapping):
-            with placed(f"{where}.sea"):
-                options["sea"] = Weather.from_dict(sea, f"{where}.sea")
+            field = f"{where}.sea"
+            with placed(field):
+                options["sea"] = Weather.from_dict(sea, field)
         return options
 
     def absolute(self, value: Any) -> Any:
@@ -267,7 +291,8 @@ class _Reader:
         if isinstance(value, list):
             return [self.absolute(part) for part in value]
         if isinstance(value, str) and value.endswith((".py", ".json")):
-            return str((self.folder / value).resolve())
+            path = self.folder / value
+            return str(path.resolve())
         return value
 
 

@@ -37,7 +37,8 @@ class StaggeredShips(ShipVecEnv):
         """Begin an episode in each row, each of them of another age."""
         observations: NDArray[np.float32] = super().reset()
         longest = self.vector_env.task.episode_steps
-        ages = np.arange(self.num_envs) * longest // self.num_envs
+        rows = np.arange(self.num_envs)
+        ages = rows * longest // self.num_envs
         self.vector_env.write("steps", ages)
         return observations
 
@@ -73,9 +74,10 @@ def make_ships(plan: TrainingPlan, base: Controller | None) -> VecEnv:
 def scaled_rewards(ships: VecEnv, settings: LearningSettings) -> VecEnv:
     """Scale rewards as the settings say; observations are scaled as they are."""
     scaled = VecNormalize(ships, norm_obs=False, gamma=settings.gamma)
-    if settings.reward_scale != "running":
+    scale = settings.reward_scale
+    if scale != "running":
         scaled.training = False
-        scaled.ret_rms.var = np.float64(settings.reward_scale) ** 2
+        scaled.ret_rms.var = np.float64(scale) ** 2
         scaled.epsilon = 0.0
     return scaled
 
@@ -86,11 +88,16 @@ def make_agent(plan: TrainingPlan, base: Controller | None) -> Any:
     `base` is the controller that it adds to. The agent's seed is also that of the
     ships; the random numbers start again.
     """
+    settings = plan.settings
     ships = make_ships(plan, base)
-    arguments = sb3_arguments(plan.settings, ships.action_space.shape)
-    kind = algorithm_class(plan.algorithm)
-    agent = kind("MlpPolicy", ships, seed=plan.training_seed, **arguments)
-    if base is not None and isinstance(plan.settings, OffPolicySettings):
+    algorithm = algorithm_class(plan.algorithm)
+    agent = algorithm(
+        "MlpPolicy",
+        ships,
+        seed=plan.training_seed,
+        **sb3_arguments(settings, ships.action_space.shape),
+    )
+    if base is not None and isinstance(settings, OffPolicySettings):
         begin_as_base(agent)
     return agent
 
@@ -101,11 +108,15 @@ def begin_as_base(agent: Any) -> None:
     Source: Silver et al. 2018, arXiv:1812.06298. PPO's last layer is next to zero
     anyway.
     """
-    # SAC and TQC have no target
-    for actor in (agent.actor, getattr(agent, "actor_target", agent.actor)):
-        layers = [one for one in actor.mu.modules() if isinstance(one, torch.nn.Linear)]
-        torch.nn.init.zeros_(layers[-1].weight)
-        torch.nn.init.zeros_(layers[-1].bias)
+    actors = [agent.actor]
+    if hasattr(agent, "actor_target"):  # SAC and TQC have none
+        actors.append(agent.actor_target)
+    for actor in actors:
+        for layer in actor.mu.modules():
+            if isinstance(layer, torch.nn.Linear):
+                last = layer
+        torch.nn.init.zeros_(last.weight)
+        torch.nn.init.zeros_(last.bias)
 
 
 def sb3_arguments(
@@ -153,8 +164,10 @@ def _network(settings: LearningSettings) -> dict[str, Any]:
     if isinstance(settings, PPOSettings):
         network["log_std_init"] = settings.log_std_init
     if isinstance(settings, OffPolicySettings):
-        critics = list(settings.critic_arch)
-        network["net_arch"] = {"pi": list(settings.net_arch), "qf": critics}
+        network["net_arch"] = {
+            "pi": list(settings.net_arch),
+            "qf": list(settings.critic_arch),
+        }
     if isinstance(settings, TQCSettings):
         network["n_critics"] = settings.n_critics
         network["n_quantiles"] = settings.n_quantiles
@@ -181,7 +194,8 @@ def set_deviation(agent: Any, settings: LearningSettings) -> None:
         done = min(agent.num_timesteps / settings.total_steps, 1.0)
         begin = settings.log_std_init
         end = float(settings.log_std_end)
-        agent.policy.log_std.data.fill_(begin + done * (end - begin))
+        log_std = begin + done * (end - begin)
+        agent.policy.log_std.data.fill_(log_std)
 
 
 def algorithm_class(name: str) -> Any:

@@ -55,20 +55,24 @@ def agent_state(agent: Any) -> State:
     `agent` is between a rollout and the next, its ships begun. Returns nested values
     for `nested_values.write_values`.
     """
-    _, variables = agent._get_torch_save_params()
+    _, names = agent._get_torch_save_params()
+    variables = {name: recursive_getattr(agent, name) for name in names}
+    ships = [_layer_state(layer) for layer in _layers(agent.env)]
+    replay_buffer = getattr(agent, "replay_buffer", None)
+    actions = agent.action_space.np_random
     return {
         "parameters": agent.get_parameters(),
-        "variables": {name: recursive_getattr(agent, name) for name in variables},
+        "variables": variables,
         "counters": {name: getattr(agent, name) for name in COUNTERS},
         "episodes": list(agent.ep_info_buffer),
         "successes": [float(success) for success in agent.ep_success_buffer],
-        "ships": [_layer_state(layer) for layer in _layers(agent.env)],
-        "replay": _replay_state(getattr(agent, "replay_buffer", None)),
+        "ships": ships,
+        "replay": _replay_state(replay_buffer),
         "random": {
             "python": random.getstate(),
             "numpy": np.random.get_state(),
             "torch": torch.get_rng_state(),
-            "actions": agent.action_space.np_random.bit_generator.state,
+            "actions": actions.bit_generator.state,
         },
     }
 
@@ -82,13 +86,16 @@ def restore_agent(agent: Any, state: State) -> None:
     """
     state = _with_own_settings(agent, state)
     check_like(state, _expected_state(agent), "agent")
-    check_weights(state["parameters"])
-    _check_observations(agent, state["counters"]["_last_obs"])
+    parameters = state["parameters"]
+    counters = state["counters"]
+    check_weights(parameters)
+    _check_observations(agent, counters["_last_obs"])
 
-    agent.set_parameters(state["parameters"], exact_match=True, device="cpu")
+    agent.set_parameters(parameters, exact_match=True, device="cpu")
     for name, value in state["variables"].items():
-        recursive_getattr(agent, name).data.copy_(value)
-    for name, value in state["counters"].items():
+        variable = recursive_getattr(agent, name)
+        variable.data.copy_(value)
+    for name, value in counters.items():
         setattr(agent, name, value)
     window = agent._stats_window_size
     agent.ep_info_buffer = deque(state["episodes"], maxlen=window)
@@ -104,10 +111,11 @@ def check_weights(parameters: State) -> None:
     """Raise ValueError for weights with which a network's outputs overflow."""
     for part, weights in parameters.items():
         for name, weight in weights.items():
-            if not (isinstance(weight, torch.Tensor) and weight.is_floating_point()):
+            if not isinstance(weight, torch.Tensor) or not weight.is_floating_point():
                 continue
             largest = 20.0 if "log_std" in name else 1e9
-            if not bool((weight.abs() <= largest).all()):
+            is_small = weight.abs() <= largest
+            if not is_small.all():
                 raise ValueError(
                     f"parameters.{part}.{name}: expected numbers of magnitude"
                     f" {largest:g} at most"
@@ -145,11 +153,10 @@ def _with_own_settings(agent: Any, state: Any) -> Any:
         for name, own in agent.get_parameters().items():
             if "param_groups" not in own:
                 continue
-            found = parameters[name]["param_groups"]
-            groups = [
-                {**group, "lr": kept["lr"]}
-                for group, kept in zip(own["param_groups"], found, strict=True)
-            ]
+            kept_groups = parameters[name]["param_groups"]
+            groups = []
+            for group, kept in zip(own["param_groups"], kept_groups, strict=True):
+                groups.append({**group, "lr": kept["lr"]})
             parameters[name] = {**parameters[name], "param_groups": groups}
     except (LookupError, TypeError, ValueError):
         return state  # `check_like` says where it differs
@@ -164,31 +171,39 @@ def _expected_state(agent: Any) -> State:
     own = agent_state(agent)
     own["episodes"] = list_of({"r": NUMBER, "l": COUNT, "t": NUMBER})
     own["successes"] = list_of(NUMBER)
+
     for name, weights in own["parameters"].items():
         if "param_groups" in weights:
-            weights["state"] = _moments(recursive_getattr(agent, name))
-    if own["replay"] is not None:
+            optimizer = recursive_getattr(agent, name)
+            weights["state"] = _moments(optimizer)
+
+    replay = own["replay"]
+    if replay is not None:
         for name in STORED:
-            own["replay"][name] = _as_much_of(getattr(agent.replay_buffer, name))
-    version, words, _ = own["random"]["python"]
-    own["random"]["python"] = (version, words, optional_number)
+            stored = getattr(agent.replay_buffer, name)
+            replay[name] = _as_much_of(stored)
+
+    random_numbers = own["random"]
+    version, words, _ = random_numbers["python"]
+    random_numbers["python"] = (version, words, optional_number)
     return own
 
 
 def _moments(optimizer: torch.optim.Optimizer) -> Callable[[Any], dict[int, State]]:
     """Return what Adam keeps of each weight that had a step."""
-    weights = [
-        weight.data for group in optimizer.param_groups for weight in group["params"]
-    ]
-    moments = [
-        {"step": torch.zeros(()), "exp_avg": weight, "exp_avg_sq": weight}
-        for weight in weights
-    ]
+    moments: dict[int, State] = {}
+    for group in optimizer.param_groups:
+        for weight in group["params"]:
+            moments[len(moments)] = {
+                "step": torch.zeros(()),
+                "exp_avg": weight.data,
+                "exp_avg_sq": weight.data,
+            }
 
     def of_weights_with_a_step(found: Any) -> dict[int, State]:
         if not isinstance(found, dict):
-            return dict(enumerate(moments))
-        return {k: kept for k, kept in enumerate(moments) if k in found}
+            return moments
+        return {number: kept for number, kept in moments.items() if number in found}
 
     return of_weights_with_a_step
 
@@ -230,8 +245,11 @@ def _replay_state(buffer: Any) -> State | None:
     if buffer is None:
         return None
     filled = buffer.buffer_size if buffer.full else buffer.pos
-    held = {name: getattr(buffer, name)[:filled].copy() for name in STORED}
-    return {"pos": buffer.pos, "full": buffer.full, **held}
+    state = {"pos": buffer.pos, "full": buffer.full}
+    for name in STORED:
+        stored = getattr(buffer, name)
+        state[name] = stored[:filled].copy()
+    return state
 
 
 def _restore_replay(buffer: Any, state: Mapping[str, Any]) -> None:
@@ -239,14 +257,16 @@ def _restore_replay(buffer: Any, state: Mapping[str, Any]) -> None:
     filled = buffer.buffer_size if state["full"] else position
     lengths = {len(state[name]) for name in STORED}
     if position >= buffer.buffer_size or lengths != {filled}:
+        texts = [str(length) for length in sorted(lengths)]
         raise ValueError(
             f"agent.replay: expected {filled} steps by its position {position}, got"
-            f" {', '.join(map(str, sorted(lengths)))}"
+            f" {', '.join(texts)}"
         )
     buffer.pos = position
     buffer.full = state["full"]
     for name in STORED:
-        getattr(buffer, name)[:filled] = state[name]
+        stored = getattr(buffer, name)
+        stored[:filled] = state[name]
 
 
 def _restore_random_numbers(agent: Any, state: State) -> None:

@@ -19,7 +19,8 @@ def check_like(found: Any, own: Any, where: str) -> None:
     """
     if callable(own):
         own = own(found)
-    kind, expected = _kind(found), _kind(own)
+    kind = _kind(found)
+    expected = _kind(own)
     if kind != expected:
         raise ValueError(f"{where}: expected {expected}, got {kind}")
     if isinstance(own, dict):
@@ -37,18 +38,21 @@ def _check_entries(
     for name, entry in own.items():
         place = f"{where}.{name}" if isinstance(name, str) else f"{where}[{name}]"
         if name not in found:
-            others = ", ".join(map(str, found))
+            others = ", ".join(str(other) for other in found)
             raise ValueError(f"{place}: expected, got only {others[:200]}")
         check_like(found[name], entry, place)
 
 
 def _check_finite(found: Any, own: Any, where: str) -> None:
     numbers = numbers_of(found)
-    wrong = np.argwhere(np.isfinite(numbers_of(own)) & ~np.isfinite(numbers))
-    if len(wrong):
-        place = wrong[0].tolist()
-        number = numbers[tuple(place)]
-        raise ValueError(f"{where}: expected a finite number at {place}, got {number}")
+    has_to_be_finite = np.isfinite(numbers_of(own))
+    is_wrong = has_to_be_finite & ~np.isfinite(numbers)
+    if not is_wrong.any():
+        return
+    first, *_ = np.argwhere(is_wrong)
+    place = first.tolist()
+    number = numbers[tuple(place)]
+    raise ValueError(f"{where}: expected a finite number at {place}, got {number}")
 
 
 def _has_axes(value: Any) -> bool:
@@ -62,15 +66,17 @@ def _kind(value: Any) -> str:
     if isinstance(value, list | tuple):
         return f"{type(value).__name__} of {len(value)}"
     if _has_axes(value):
-        return f"{type(value).__name__} of {value.dtype}, shape {tuple(value.shape)}"
-    number = value.item() if isinstance(value, np.ndarray | np.generic) else value
-    if _is_count(number) or (isinstance(number, float) and math.isfinite(number)):
+        shape = tuple(value.shape)
+        return f"{type(value).__name__} of {value.dtype}, shape {shape}"
+
+    number = value
+    if isinstance(value, np.ndarray | np.generic):
+        number = value.item()
+    is_count = isinstance(number, int) and number >= 0
+    is_finite = isinstance(number, float) and math.isfinite(number)
+    if is_count or is_finite:
         return type(number).__name__
     return repr(number)[:80]
-
-
-def _is_count(value: Any) -> bool:
-    return isinstance(value, int) and value >= 0
 
 
 def optional_number(found: Any) -> float | None:

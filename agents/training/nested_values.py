@@ -30,7 +30,8 @@ def write_values(value: Any, path: Path) -> None:
     from safetensors.numpy import save
 
     arrays: Arrays = {}
-    content = json.dumps(_packed(value, "", arrays))
+    packed = _packed(value, "", arrays)
+    content = json.dumps(packed)
     metadata = {CONTENT: content, SHA256: _hash(content, arrays)}
     write_bytes(save(arrays, metadata), path)
 
@@ -72,7 +73,8 @@ def _read_arrays(path: Path) -> tuple[Mapping[str, str], Arrays]:
     with safe_open(path, "numpy") as file:
         names = list(file.keys())
         for name in names:
-            kind = file.get_slice(name).get_dtype()
+            tensor = file.get_slice(name)
+            kind = tensor.get_dtype()
             if kind not in known:
                 raise ValueError(
                     f"'{name}': expected a type of {', '.join(known)}, got {kind}"
@@ -85,7 +87,8 @@ def _hash(content: str, arrays: Arrays) -> str:
     """SHA-256 of the content and of arrays with their names, types and shapes."""
     digest = hashlib.sha256(content.encode())
     for name, array in sorted(arrays.items()):
-        digest.update(f"{name} {array.dtype} {array.shape}".encode())
+        about = f"{name} {array.dtype} {array.shape}"
+        digest.update(about.encode())
         digest.update(array.tobytes())
     return digest.hexdigest()
 
@@ -111,14 +114,15 @@ def _packed(value: Any, name: str, arrays: Arrays) -> Any:
         arrays[name] = np.array(numbers_of(value), order="C")
         return {"tensor" if is_tensor(value) else "array": name}
     if isinstance(value, dict):
-        inner = f"{name}." if name else ""
-        entries = [
-            [key, _packed(entry, f"{inner}{key}", arrays)]
-            for key, entry in value.items()
-        ]
+        entries = []
+        for key, entry in value.items():
+            inner = f"{name}.{key}" if name else str(key)
+            entries.append([key, _packed(entry, inner, arrays)])
         return {"dict": entries}
     if isinstance(value, list | tuple):
-        items = [_packed(item, f"{name}.{i}", arrays) for i, item in enumerate(value)]
+        items = []
+        for number, item in enumerate(value):
+            items.append(_packed(item, f"{name}.{number}", arrays))
         return {"tuple" if isinstance(value, tuple) else "list": items}
     raise TypeError(f"{name}: {type(value).__name__} cannot be written")
 
@@ -132,7 +136,9 @@ def _unpacked(content: Any, arrays: Arrays, deeper: int) -> Any:
         return content
     ((kind, inner),) = content.items()
     if not deeper or kind not in ("array", "tensor", "dict", "list", "tuple"):
-        raise ValueError(f"{kind!r} found among its values, {DEEPEST - deeper} deep")
+        depth = DEEPEST - deeper
+        raise ValueError(f"{kind!r} found among its values, {depth} deep")
+
     if kind == "array":
         return arrays[inner]
     if kind == "tensor":

@@ -9,10 +9,12 @@ from agents.controllers.controller import model_hash
 from agents.policies.weights_file import as_json
 from agents.suites.suite import BenchmarkTask
 from agents.training.settings import LearningSettings, make_settings, settings_of
+from shipgym import ShipModel
 from shipgym.checks import check_keys, check_whole
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather, as_weather
 from shipgym.sea.weather_column import weather_column
+from shipgym.tasks.task import Task
 
 #: Seeds below those that are scored: of training a thousand for each `seed`, then those
 #: held out.
@@ -71,7 +73,8 @@ class TrainingPlan:
         self._check_action()
 
     def _check_action(self) -> None:
-        action, base = self.task.task.action, self.settings.base
+        action = self.task.task.action
+        base = self.settings.base
         if action == "rudder-discrete" and self.algorithm != "ppo":
             raise InputError(
                 f"action: expected one that {self.algorithm} learns, got '{action}';"
@@ -105,24 +108,24 @@ class TrainingPlan:
     @classmethod
     def from_configuration(cls, content: Mapping[str, Any], threads: int) -> Self:
         """Make the plan that `configuration` describes."""
-        options = {
-            name: _read_option(value, name)
-            for name, value in content["options"].items()
-        }
+        options = {}
+        for name, value in content["options"].items():
+            options[name] = _read_option(value, name)
         task = BenchmarkTask(
-            content["task"],
-            content["environment"],
-            content["model"],
+            name=content["task"],
+            environment=content["environment"],
+            model=content["model"],
             options=options,
             suite=content["suite"],
         )
+        algorithm = content["algorithm"]
         return cls(
-            content["algorithm"],
-            task,
-            make_settings(content["algorithm"], content["settings"]),
-            content["seed"],
-            content["randomise"],
-            threads,
+            algorithm=algorithm,
+            task=task,
+            settings=make_settings(algorithm, content["settings"]),
+            seed=content["seed"],
+            randomise=content["randomise"],
+            threads=threads,
         )
 
 
@@ -143,28 +146,30 @@ def training_options(plan: TrainingPlan) -> dict[str, Any]:
     speed of 0.8 to 1.1 times the service speed, and any of the sea states that the
     ship's particulars allow, the task's own among them and its current in all of them.
     """
-    options = plan.task.arguments
-    drawn = plan.randomise or plan.settings.model_uncertainty == "covariance"
-    if drawn and plan.task.ship.covariance is not None:
+    task = plan.task
+    options = task.arguments
+    uncertain = plan.settings.model_uncertainty == "covariance"
+    has_covariance = task.ship.covariance is not None
+    if has_covariance and (plan.randomise or uncertain):
         options.setdefault("model_uncertainty", "covariance")
     if plan.randomise:
         options.setdefault("speed_range", (0.8, 1.1))
-        options["sea"] = _seas(plan.task)
+        options["sea"] = _seas(task.task, task.ship)
     return options
 
 
-def _seas(learned: BenchmarkTask) -> list[Weather]:
+def _seas(task: Task, ship: ShipModel) -> list[Weather]:
     """Return the seas of a task, and the other sea states that its ship allows."""
-    ship, task = learned.ship, learned.task
     seas = list(task.seas)
     known = {sea.name for sea in seas}
     for name in ("calm", "slight", "moderate", "rough"):
         if name in known:
             continue
-        sea = replace(as_weather(name, "sea", None), current=task.weather.current)
+        sea = as_weather(name, "sea", None)
+        with_current = replace(sea, current=task.weather.current)
         with suppress(InputError):
-            weather_column(ship, sea, task.substep(ship), task.water_depth)
-            seas.append(sea)
+            weather_column(ship, with_current, task.substep(ship), task.water_depth)
+            seas.append(with_current)
     return seas
 
 
@@ -173,7 +178,8 @@ def first_difference(
 ) -> str | None:
     """Describe the first entry in which two configurations differ, if there is one."""
     for name in {**expected, **found}:
-        value, other = found.get(name), expected.get(name)
+        value = found.get(name)
+        other = expected.get(name)
         place = f"{where}{name}"
         if isinstance(value, Mapping) and isinstance(other, Mapping):
             inner = first_difference(value, other, f"{place}.")

@@ -81,9 +81,14 @@ def make_plan(
     """
     settings_of(request.algorithm)  # its error goes before those of the task
     task = _task(request, stored)
-    settings = _settings(request, stored, task)
     others = {} if stored is None else _others(stored)
-    return TrainingPlan(request.algorithm, task, settings, **others | _others(request))
+    others |= _others(request)
+    return TrainingPlan(
+        algorithm=request.algorithm,
+        task=task,
+        settings=_settings(request, stored, task),
+        **others,
+    )
 
 
 def _others(source: TrainingRequest | TrainingPlan) -> dict[str, Any]:
@@ -107,11 +112,11 @@ def _settings(
         return changed(stored.settings, given)
     return load_settings(
         request.algorithm,
-        task.environment,
-        task.name,
-        given,
-        task.task.action,
-        task.suite,
+        environment=task.environment,
+        task=task.name,
+        given=given,
+        action=task.task.action,
+        suite=task.suite,
     )
 
 
@@ -145,9 +150,9 @@ def _changed_task(request: TrainingRequest, before: BenchmarkTask) -> BenchmarkT
     options |= request.options
     model = options.pop("model", before.model)
     return BenchmarkTask(
-        before.name,
-        environment.name,
-        request.model or model,
+        name=before.name,
+        environment=environment.name,
+        model=request.model or model,
         options=options,
         suite=before.suite,
     )

@@ -10,7 +10,7 @@ from gymnasium import spaces
 from agents.controllers.controller import Policy
 from agents.policies.network import Numbers
 from agents.policies.policy import NO_LIMIT, check_part, toward
-from shipgym.arrays import Flags
+from shipgym.arrays import Flags, Integers
 from shipgym.errors import InputError
 from shipgym.extras import library
 
@@ -95,6 +95,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
             if self.base is not None:
                 self._outputs[dones] = 0
             observations, more, ends, latest = self._interval()
+            # where an episode has ended, they are of the next one
             rewards = rewards + np.where(dones, np.float32(0.0), more)
             for row in np.flatnonzero(~dones):
                 infos[row] = latest[row]
@@ -106,12 +107,18 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         self.venv.step_async(self._commands())
         observations, rewards, dones, infos = self.venv.step_wait()
         self._in_force[dones] = 0.0
-        self._past[:, :-1] = self._past[:, 1:]
+        self._past = np.roll(self._past, -1, axis=1)
         self._past[:, -1] = observations
-        ended = np.flatnonzero(dones)
-        if len(ended) == 0:
-            return self._observed(self._no_starts()), rewards, dones, infos
+        if not np.any(dones):
+            stacked = self._observed(self._no_starts())
+            return stacked, rewards, dones, infos
 
+        self._show_ends(np.flatnonzero(dones), infos)
+        first = self._begin(observations, np.asarray(dones, dtype=np.bool_))
+        return first, rewards, dones, infos
+
+    def _show_ends(self, ended: Integers, infos: list[dict[str, Any]]) -> None:
+        """Stack the last observations of rows whose episode has ended."""
         for row in ended:
             self._past[row, -1] = infos[row]["terminal_observation"]
         before = copy.deepcopy(self._base_state)  # a base may write into its state
@@ -119,8 +126,6 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         self._base_state = before
         for row in ended:
             infos[row]["terminal_observation"] = last[row]
-        first = self._begin(observations, np.asarray(dones, dtype=np.bool_))
-        return first, rewards, dones, infos
 
     def memory(self) -> dict[str, Any]:
         """Return what further steps depend on here, for `remember`.
@@ -142,7 +147,8 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         self._past[:] = memory["past"]
         self._base_state = memory["state"]
         self._proposed = memory["proposed"]
-        self._in_force = memory.get("in_force", self._in_force)
+        if "in_force" in memory:
+            self._in_force = memory["in_force"]
 
     def _commands(self) -> Any:
         """Return what the ships do."""
@@ -168,9 +174,11 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         histories = self._past.reshape(self.num_envs, -1)
         if self.base is None:
             return histories.copy()
-        newest = self._past[:, -1].copy()
         proposed, self._base_state = self.base.predict(
-            newest, self._base_state, starts, True
+            self._past[:, -1].copy(),
+            self._base_state,
+            starts,
+            True,
         )
         self._proposed = np.asarray(proposed, dtype=np.float32)
         return np.concatenate([histories, self._proposed], axis=1)
@@ -181,22 +189,25 @@ def _stacked_space(venv: Any, frame_stack: int, base: Policy | None) -> spaces.B
     space = venv.observation_space
     if not isinstance(space, spaces.Box) or len(space.shape) != 1:
         raise InputError(f"venv: expected observations in a flat Box, got {space}")
-    low = np.tile(space.low, frame_stack)
-    high = np.tile(space.high, frame_stack)
+    low = [space.low] * frame_stack
+    high = [space.high] * frame_stack
     if base is not None:
         _check_base(venv, base)
-        low = np.append(low, venv.action_space.low)
-        high = np.append(high, venv.action_space.high)
-    return spaces.Box(low.astype(np.float32), high.astype(np.float32))
+        low.append(venv.action_space.low)
+        high.append(venv.action_space.high)
+    return spaces.Box(
+        np.concatenate(low, dtype=np.float32),
+        np.concatenate(high, dtype=np.float32),
+    )
 
 
 def _check_base(venv: Any, base: Policy) -> None:
     """Refuse commands that cannot be added to, and a controller of another ship."""
     space = venv.action_space
-    bounded = isinstance(space, spaces.Box) and bool(
-        np.all(space.low >= -1.0) and np.all(space.high <= 1.0)
-    )
-    if not bounded:
+    is_bounded = False
+    if isinstance(space, spaces.Box):
+        is_bounded = bool(np.all(space.low >= -1.0) and np.all(space.high <= 1.0))
+    if not is_bounded:
         raise InputError(
             f"venv: expected actions in a Box within [-1, 1], got {space}; a base needs"
             " the action 'rudder'"

@@ -97,12 +97,13 @@ def read_plan(folder: Path, request: TrainingRequest | None = None) -> TrainingP
     """
     content = _content(folder)
     configuration = content["configuration"]
-    where = f"{folder / RUN}"
-    code = {
-        name: configuration.get(name) for name in ("environment", "model", "options")
-    }
+    where = str(folder / RUN)
+
+    may_be_code = ("environment", "model", "options")
+    code = {name: configuration.get(name) for name in may_be_code}
     own_code = None if request is None else code_in(request)
     data_only(code, f"{where}: configuration", own_code)
+
     with placed(where):
         check_shape(configuration, CONFIGURATION, "configuration")
         plan = TrainingPlan.from_configuration(configuration, content["threads"])
@@ -117,13 +118,13 @@ def check_resumable(folder: Path, plan: TrainingPlan) -> None:
 
 def other_versions(folder: Path) -> list[str]:
     """Say what was installed in another version when the run began, a line each."""
-    where = f"{folder / RUN}: versions"
-    found: Mapping[str, str] = check_table(_content(folder)["versions"], where)
-    return [
-        f"{name} {now} in place of {found[name]}"
-        for name, now in versions().items()
-        if name in found and found[name] != now
-    ]
+    content = _content(folder)
+    before = check_table(content["versions"], f"{folder / RUN}: versions")
+    others = []
+    for name, now in versions().items():
+        if name in before and before[name] != now:
+            others.append(f"{name} {now} in place of {before[name]}")
+    return others
 
 
 def _content(folder: Path) -> Mapping[str, Any]:
@@ -132,10 +133,12 @@ def _content(folder: Path) -> Mapping[str, Any]:
         raise InputError(
             f"{folder}: no run of training is there; leave --resume out to begin one"
         )
+
+    where = str(path)
     remedy = "start a new run in another folder"
     content = read_json(path, "run file", remedy)
     fields = ("format", "configuration", "threads", "command", "versions")
-    check_fields(content, fields, str(path), remedy)
-    check_format(content, FORMAT, str(path))
+    check_fields(content, fields, where, remedy)
+    check_format(content, FORMAT, where)
     check_table(content["configuration"], f"{path}: configuration")
     return content

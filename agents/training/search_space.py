@@ -61,11 +61,12 @@ def search_space(algorithm: str, fixed: Sequence[str] = ()) -> dict[str, Any]:
             "action_noise": real(0.03, 0.5, log=True),
             "policy_delay": integer(1, 8),
         }
-    return {
-        name: distribution
-        for name, distribution in space.items()
-        if STANDS_FOR.get(name, name) not in fixed
-    }
+    varied = {}
+    for name, distribution in space.items():
+        setting = STANDS_FOR.get(name, name)
+        if setting not in fixed:
+            varied[name] = distribution
+    return varied
 
 
 def with_parameters(
@@ -75,15 +76,18 @@ def with_parameters(
 
     Raises InputError if they conflict with those that are not varied.
     """
-    given = {
-        name: value for name, value in parameters.items() if name not in STANDS_FOR
-    }
-    if "one_minus_gamma" in parameters:
-        given["gamma"] = 1.0 - parameters["one_minus_gamma"]
+    varied = dict(parameters)
+    one_minus_gamma = varied.pop("one_minus_gamma", None)
+    if one_minus_gamma is not None:
+        varied["gamma"] = 1.0 - one_minus_gamma
     for name in ("net_arch", "critic_arch"):
-        if name in given:
-            given[name] = [int(width) for width in given[name].split()]
-    if "minibatches" in parameters:
-        n_steps = given.get("n_steps", settings.to_dict()["n_steps"])
-        given["batch_size"] = settings.ships * n_steps // parameters["minibatches"]
-    return changed(settings, given)
+        if name in varied:
+            widths = varied[name].split()
+            varied[name] = [int(width) for width in widths]
+
+    minibatches = varied.pop("minibatches", None)
+    if minibatches is not None:
+        before = settings.to_dict()
+        n_steps = varied.get("n_steps", before["n_steps"])
+        varied["batch_size"] = settings.ships * n_steps // minibatches
+    return changed(settings, varied)

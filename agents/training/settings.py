@@ -110,10 +110,12 @@ class LearningSettings:
 
     def __post_init__(self) -> None:
         for one in fields(self):
-            value = _checked(getattr(self, one.name), one)
-            object.__setattr__(self, one.name, value)
-        if not check_text(self.base, "base").endswith(".json"):
-            check_choice(self.base, ("none", "tuned", *controller_kinds()), "base")
+            value = getattr(self, one.name)
+            object.__setattr__(self, one.name, _checked(value, one))
+
+        base = check_text(self.base, "base")
+        if not base.endswith(".json"):
+            check_choice(base, ("none", "tuned", *controller_kinds()), "base")
         if self.base == "none" and self.authority != 1.0:
             raise InputError(
                 f"authority: expected 1 without a base, got {self.authority:g}"
@@ -272,23 +274,25 @@ ALGORITHMS: Mapping[str, type[LearningSettings]] = {
 
 def _checked(value: Any, one: Field[Any]) -> Any:
     """Return the value of a setting, if its type and bounds allow it."""
-    name, about = one.name, one.metadata
+    name = one.name
+    about = one.metadata
+    bounds = about["bounds"]
     if one.type is int:
-        return check_whole(value, name, **about["bounds"])
+        return check_whole(value, name, **bounds)
     if one.type is float:
-        return check_number(value, name, **about["bounds"])
+        return check_number(value, name, **bounds)
     if about["options"]:
         return check_choice(value, about["options"], name)
     if one.type is str:
         return value
     if about["word"]:
-        return _number_or_word(value, name, about["word"], about["bounds"])
+        return _number_or_word(value, name, about["word"], bounds)
 
     if isinstance(value, str) or not isinstance(value, Sequence):
         raise InputError(
             f"{name}: expected widths of layers, such as [64, 64], got {value!r}"
         )
-    return tuple(check_whole(width, name, **about["bounds"]) for width in value)
+    return tuple(check_whole(width, name, **bounds) for width in value)
 
 
 def _number_or_word(
@@ -344,15 +348,17 @@ def load_settings(
     if not environment.endswith(".py"):
         check_choice(environment, SHORT_NAMES, "environment")
     check_choice(action, ACTIONS, "action")
-    content = shipped_toml("agents.training", f"hyperparameters/{algorithm}.toml")
     given = given or {}
-    chosen = dict(content["defaults"])
-    if action == "rudder" and given.get("base") != "none":
-        chosen |= content["residual"].get(environment, {})
-        if suite in content["suites"]:
-            chosen |= content["suites"][suite]
-            chosen |= content.get("tasks", {}).get(task, {})
-    return make_settings(algorithm, {**chosen, **given})
+    tables = shipped_toml("agents.training", f"hyperparameters/{algorithm}.toml")
+    values = dict(tables["defaults"])
+    has_base = action == "rudder" and given.get("base") != "none"
+    if has_base:
+        values |= tables["residual"].get(environment, {})
+    if has_base and suite in tables["suites"]:
+        values |= tables["suites"][suite]
+        tasks = tables.get("tasks", {})
+        values |= tasks.get(task, {})
+    return make_settings(algorithm, {**values, **given})
 
 
 def settings_of(algorithm: str) -> type[LearningSettings]:
@@ -368,13 +374,15 @@ def make_settings(algorithm: str, values: Mapping[str, Any]) -> LearningSettings
     kind = settings_of(algorithm)
     where = f"settings of {algorithm}"
     table = _known_settings(values, kind, where)
-    check_keys(table, table, where, [one.name for one in fields(kind)])
+    needed = [one.name for one in fields(kind)]
+    check_keys(table, table, where, needed)
     return kind(**table)
 
 
 def changed(settings: LearningSettings, given: Mapping[str, Any]) -> LearningSettings:
     """Replace some settings; InputError for an unknown one or a value out of range."""
-    return replace(settings, **_known_settings(given, type(settings), "settings"))
+    changes = _known_settings(given, type(settings), "settings")
+    return replace(settings, **changes)
 
 
 def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:

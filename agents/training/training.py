@@ -293,31 +293,38 @@ class TrainingRun(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is n
         policy = LearnedPolicy.from_sb3(self.agent)
         cost = self.held_out.cost(policy)
         returns = [episode["r"] for episode in self.agent.ep_info_buffer]
-        best = self.evaluations.add(
-            self.agent.num_timesteps,
-            round(self.seconds, 3),
-            cost,
-            mean_return=sum(returns) / len(returns) if returns else None,
+        mean_return = sum(returns) / len(returns) if returns else None
+        is_best = self.evaluations.add(
+            steps=self.agent.num_timesteps,
+            seconds=round(self.seconds, 3),
+            cost=cost,
+            mean_return=mean_return,
         )
         self.agent.logger.record("evaluation/cost", cost)
 
         policy = replace(policy, training=self._record())
-        if best:
+        if is_best:
             self.policy = policy
         if self.folder is not None:
-            policy.save(self.folder / run_folder.LAST)
-            if best:
-                policy.save(self.folder / run_folder.AGENT)
-            progress = {"lq_cost": self.held_out.lq_cost, **self.evaluations.to_dict()}
-            write_json(progress, self.folder / run_folder.PROGRESS)
+            self._write(policy, is_best, self.folder)
+
+    def _write(self, policy: LearnedPolicy, is_best: bool, folder: Path) -> None:
+        """Write an evaluated policy, and the evaluations so far."""
+        policy.save(folder / run_folder.LAST)
+        if is_best:
+            policy.save(folder / run_folder.AGENT)
+        evaluations = self.evaluations.to_dict()
+        progress = {"lq_cost": self.held_out.lq_cost, **evaluations}
+        write_json(progress, folder / run_folder.PROGRESS)
 
     def _record(self) -> dict[str, Any]:
         """Return how a policy was made, without times: the same run writes the same."""
         first = self.plan.training_seed
+        last = first + self.plan.settings.ships - 1
         last_evaluated = EVALUATION_SEED + self.evaluation_episodes - 1
         return {
             **self.plan.configuration(),
-            "training_seeds": [first, first + self.plan.settings.ships - 1],
+            "training_seeds": [first, last],
             "evaluation_seeds": [EVALUATION_SEED, last_evaluated],
             "steps": self.agent.num_timesteps,
             "cost": self.evaluations.last_cost,
@@ -331,8 +338,10 @@ class TrainingRun(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is n
         self.kept_at = time.monotonic()
         if self.folder is None:
             return
-        run = {**self.evaluations.to_dict(), "seconds": self.seconds}
-        content = {"run": run, "agent": checkpoints.agent_state(self.agent)}
+        content = {
+            "run": {**self.evaluations.to_dict(), "seconds": self.seconds},
+            "agent": checkpoints.agent_state(self.agent),
+        }
         write_values(content, self.folder / run_folder.CHECKPOINT)
 
     def restore(self, checkpoint: Path) -> None:
@@ -347,7 +356,8 @@ class TrainingRun(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is n
             checkpoints.restore_agent(self.agent, content["agent"])
         except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
             # torch lists every network's layer after it
-            why = str(error).partition("\n")[0].rstrip(" :")
+            first_line, _, _ = str(error).partition("\n")
+            why = first_line.rstrip(" :")
             raise InputError(
                 f"{checkpoint}: does not fit this run ({why}); start a new run"
             ) from None

@@ -123,34 +123,42 @@ def tune(
         study = open_study(folder, plan, fixed)
         done: list[TuningTrial] = []
         while len(done) < trials:
-            proposals = propose(plan, done, min(BATCH, trials - len(done)), fixed)
-            jobs = _jobs(plan, done, proposals)
-            report = _report_of_batch(done, trials, on_progress)
-            results = run_jobs(training or train_trial, jobs, kept, report)
+            number = min(BATCH, trials - len(done))
+            proposals = propose(plan, done, number, fixed)
+            results = run_jobs(
+                training or train_trial,
+                _jobs(plan, done, proposals),
+                kept,
+                _report_of_batch(done, trials, on_progress),
+            )
             for proposal, result in zip(proposals, results, strict=True):
                 done.append(_as_trial(len(done), proposal, result))
 
             _record(study, done, plan, fixed)
-            if all(trial.ended == "diverged" for trial in done):
-                raise InputError(
-                    f"every trial diverged, the first: {results[0]['why']}"
-                )
+            _check_progress(done, results)
             write_best(folder, plan, done)
         return TuningResult(tuple(done), best_trial(done))
+
+
+def _check_progress(
+    done: Sequence[TuningTrial], results: Sequence[Mapping[str, Any]]
+) -> None:
+    """Refuse to go on if every trial so far has diverged."""
+    if all(trial.ended == "diverged" for trial in done):
+        why = results[0]["why"]
+        raise InputError(f"every trial diverged, the first: {why}")
 
 
 def _jobs(
     plan: TrainingPlan, done: Sequence[TuningTrial], proposals: Sequence[Proposal]
 ) -> list[dict[str, Any]]:
-    configuration = plan.configuration()
     bounds = limits(done, plan.settings.total_steps)
-    return [
-        {
-            "configuration": {**configuration, "settings": proposal.settings},
-            "limits": bounds,
-        }
-        for proposal in proposals
-    ]
+    jobs = []
+    for proposal in proposals:
+        configuration = plan.configuration()
+        configuration["settings"] = proposal.settings
+        jobs.append({"configuration": configuration, "limits": bounds})
+    return jobs
 
 
 def _report_of_batch(
@@ -188,10 +196,12 @@ def train_trial(job: dict[str, Any]) -> dict[str, Any]:
     curve: list[tuple[int, float]] = []
 
     def stop_early(now: TrainingProgress) -> None:
-        if now.evaluated and now.cost is not None and now.steps > 0:
-            curve.append((now.steps, now.cost))
-            if lowest(curve, now.steps) > lowest(job["limits"], now.steps):
-                raise _StoppedEarlyError
+        if not now.evaluated or now.cost is None or now.steps == 0:
+            return
+        curve.append((now.steps, now.cost))
+        limit = lowest(job["limits"], now.steps)
+        if lowest(curve, now.steps) > limit:
+            raise _StoppedEarlyError
 
     try:
         result = train(plan, on_progress=stop_early)
@@ -200,7 +210,10 @@ def train_trial(job: dict[str, Any]) -> dict[str, Any]:
     except InputError as error:
         return {"cost": None, "curve": curve, "ended": "diverged", "why": str(error)}
 
-    whole = [(row["steps"], row["cost"]) for row in result.curve if row["steps"] > 0]
+    whole = []
+    for evaluation in result.curve:
+        if evaluation["steps"] > 0:
+            whole.append((evaluation["steps"], evaluation["cost"]))
     return {"cost": lowest(whole, np.inf), "curve": whole, "ended": "finished"}
 
 
@@ -216,12 +229,16 @@ def limits(trials: Sequence[TuningTrial], total_steps: int) -> list[tuple[int, f
     finished = [trial.curve for trial in trials if trial.ended == "finished"]
     if len(finished) < 4:
         return []
-    marks = {steps for curve in finished for steps, _ in curve}
+    marks = set()
+    for curve in finished:
+        for steps, _ in curve:
+            if steps >= 0.25 * total_steps:
+                marks.add(steps)
+
     found = []
     for mark in sorted(marks):
-        if mark >= 0.25 * total_steps:
-            median = np.median([lowest(curve, mark) for curve in finished])
-            found.append((mark, float(median)))
+        best_so_far = [lowest(curve, mark) for curve in finished]
+        found.append((mark, float(np.median(best_so_far))))
     return found
 
 
@@ -237,8 +254,15 @@ def _as_trial(number: int, proposal: Proposal, result: Any) -> TuningTrial:
         "ended": (str,),
     }
     check_shape(result, expected, f"trial {number}")
-    curve = tuple((int(steps), float(cost)) for steps, cost in result["curve"])
-    return TuningTrial(number, *proposal, result["cost"], curve, result["ended"])
+    curve = [(int(steps), float(cost)) for steps, cost in result["curve"]]
+    return TuningTrial(
+        number=number,
+        parameters=proposal.parameters,
+        settings=proposal.settings,
+        cost=result["cost"],
+        curve=tuple(curve),
+        ended=result["ended"],
+    )
 
 
 def best_trial(trials: Sequence[TuningTrial]) -> TuningTrial:
@@ -266,10 +290,12 @@ def propose(
 
     proposals: list[Proposal] = []
     for _ in range(number):
-        first = not done and not proposals
-        parameters = {} if first else dict(study.ask(space).params)
-        settings = with_parameters(plan.settings, parameters).to_dict()
-        proposals.append(Proposal(parameters, settings))
+        parameters: dict[str, Any] = {}
+        if done or proposals:  # the first has the settings as they are
+            asked = study.ask(space)
+            parameters = dict(asked.params)
+        settings = with_parameters(plan.settings, parameters)
+        proposals.append(Proposal(parameters, settings.to_dict()))
     return proposals
 
 
@@ -329,8 +355,9 @@ def _record(
     """Add to the study what it lacks: an interruption may have left it incomplete."""
     recorded = {trial.user_attrs.get("number") for trial in study.trials}
     space = search_space(plan.algorithm, fixed)
-    new = [trial for trial in done if trial.number not in recorded]
-    study.add_trials([_frozen(trial, space) for trial in new])
+    for trial in done:
+        if trial.number not in recorded:
+            study.add_trial(_frozen(trial, space))
 
 
 def write_best(folder: Path, plan: TrainingPlan, trials: Sequence[TuningTrial]) -> None:
@@ -339,11 +366,12 @@ def write_best(folder: Path, plan: TrainingPlan, trials: Sequence[TuningTrial]) 
     cost = "no trial has finished"
     if best.cost is not None:
         cost = f"mean cost held out {best.cost:.6g}"
-    learned = plan.task.name or plan.task.environment
+    algorithm = plan.algorithm
+    task = plan.task
     lines = [
         f"# Trial {best.number} of {len(trials)}: {cost}, seed {plan.seed},"
-        f" {plan.algorithm} on {learned} with {plan.task.model}.",
-        f"# shipgym train {plan.algorithm} --settings {BEST} ...",
+        f" {algorithm} on {task.name or task.environment} with {task.model}.",
+        f"# shipgym train {algorithm} --settings {BEST} ...",
         "",
     ]
     for name, value in best.settings.items():

@@ -6,7 +6,6 @@ import json
 import re
 import sys
 from dataclasses import replace
-from types import SimpleNamespace
 
 import gymnasium
 import numpy as np
@@ -139,11 +138,12 @@ def test_the_command_of_the_page_names_what_is_not_the_default(result):
         "controllers": controllers,
         "suite": suite,
         "tasks": {"calm": {}, "rough": {}},
-        "seeds": {"count": 100},
+        "seeds": {"first": FIRST, "count": 100},
     }
     whole = "shipgym benchmark --controllers lq,mine=... --suite shipgym-v1"
     assert command(BenchmarkResult(summary, {})) == f"{whole} --out results"
-    part = summary | {"suite": suite | {"complete": False}, "seeds": {"count": 99}}
+    part = summary | {"suite": suite | {"complete": False}}
+    part["seeds"] = {"first": FIRST, "count": 99}
     expected = f"{whole} --tasks calm,rough --episodes 99 --out results"
     assert command(BenchmarkResult(part, {})) == expected
 
@@ -321,14 +321,21 @@ def test_each_is_shown_with_the_best_in_the_same_episode(result):
 
 
 def made_up(costs, means, ranking):
-    """What the page asks of results in one task."""
-    cells = {name: {"cost": {"value": mean}} for name, mean in means.items()}
-    return SimpleNamespace(
-        ranking=ranking,
-        tasks=["calm"],
-        summary={"tasks": {"calm": cells}, "seeds": {"first": 100}},
-        figures=lambda name, task: costs[name],
-    )
+    """Results of controllers in one task, whose seeds begin at 100."""
+    n_episodes = max((values.shape[1] for values in costs.values()), default=1)
+    names = [name for name, values in costs.items() for _ in values.flat]
+    summary = {
+        "ranking": [{"name": name} for name in ranking],
+        "controllers": dict.fromkeys(ranking),
+        "tasks": {"calm": {name: {"cost": {"value": means[name]}} for name in means}},
+        "seeds": {"first": 100, "count": n_episodes},
+    }
+    episodes = {
+        "controller": np.array(names),
+        "task": np.full(len(names), "calm"),
+        "cost": np.concatenate([np.zeros(0), *map(np.ravel, costs.values())]),
+    }
+    return BenchmarkResult(summary, episodes)
 
 
 def test_worst_hardest_and_best_by_hand():
@@ -347,6 +354,7 @@ def test_worst_hardest_and_best_by_hand():
     assert [(one.run, one.seed) for one in worst] == [(1, 102), (1, 101), (0, 101)]
     assert hardest_seed(result, "calm") == 102
     costs["a"][1, 2] = 2.0
+    result = made_up(costs, means, ranking)
     assert hardest_seed(result, "calm") == 101  # medians of 0.75, 3.5 and 3
     assert choices(result, "calm", 1) == [
         Choice("", [EpisodeId(name, "calm", 0, 101) for name in "ba"]),

@@ -19,7 +19,6 @@ from agents.cli import app, doctor
 from agents.cli.warm import warm_jobs, warm_names
 from shipgym import InputError
 from shipgym.engine.cache_folder import CacheWarning
-from tests.golden.texts import same_text
 
 ROOT = Path(__file__).parents[2]
 
@@ -73,12 +72,13 @@ def test_doctor_tells_of_a_cache_that_is_damaged_or_open_to_others(
         )
 
 
-def test_doctor_has_a_mark_for_each_state():
-    told = [
-        doctor.Finding(f"what is {state}", state, "and why").line().plain
-        for state in doctor.MARKS
-    ]
-    assert same_text("doctor", "\n".join(told))
+@pytest.mark.parametrize(
+    ("state", "mark"),
+    [("fine", "ok"), ("absent", "absent"), ("left", "left"), ("wrong", "wrong")],
+)
+def test_doctor_has_a_mark_for_each_state(state, mark):
+    line = doctor.Finding("cache", state, "and why").line().plain
+    assert line.split() == [mark, "cache", "and", "why"]
 
 
 def test_warm_compiles_into_the_cache_and_writes_nothing_else(tmp_path):

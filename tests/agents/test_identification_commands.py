@@ -19,7 +19,6 @@ from identification.estimators.methods import METHODS
 from identification.reading import ARGUMENTS, stage_settings
 from identification.validation import selection
 from shipgym import InputError, ShipFile, list_structures, load_model
-from tests.golden.texts import same_text
 
 #: The table of terms that the documentation shows.
 TABLE = re.search(
@@ -280,7 +279,6 @@ def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
         "window=9",
     )
     assert answer.exit_code == 0, answer.stderr
-    assert same_text("identify with options", answer.stdout + answer.stderr)
     found = settings_of(tmp_path / "out")
     assert found["method"] == {
         "name": "ls-svm",
@@ -378,7 +376,6 @@ def test_compare_ranks_methods_and_writes_their_models(demo, tmp_path):
     )
     rows = [line.split()[0] for line in again.stdout.splitlines() if " stable " in line]
     assert rows == [row["method"] for row in told["ranking"]]
-    assert same_text("compare", again.stdout + again.stderr)
     for name in names:
         assert (tmp_path / "out" / name).read_bytes() == (
             tmp_path / "again" / name
@@ -431,7 +428,6 @@ def test_without_a_structure_it_is_auto_but_for_what_needs_a_table(
         "Structures and methods by how they predict each trial in turn" in answer.stdout
     )
     assert "mmg by map was not fitted: trial" in answer.stdout
-    assert same_text("identify auto", answer.stdout + answer.stderr)
     told = json.loads((tmp_path / "out" / "metrics.json").read_text())["selection"]
     assert (
         told["ranking"][0]["structure"]
@@ -547,7 +543,6 @@ def test_advise_tells_information_and_what_to_run_next(demo):
     assert information["zigzag_35_30_port.csv"] > information["zigzag_10_10.csv"] > 0.0
     table = shipgym("advise", demo, "--coefficient", "N_vvv", "--number", "1").stdout
     assert f"run next: {told['run_next'][0]}" in table
-    assert same_text("advise", table)
     assert shipgym("advise", demo, "--coefficient", "N_vv").exit_code == 2
     for wrong in (
         ("--criterion", "D", "--coefficient", "N_vvv"),
@@ -567,7 +562,6 @@ def test_reduce_writes_the_smaller_model_and_its_path(ship, tmp_path):
         f"{told['terms']['reduced']} of {told['terms']['full']} coefficients left"
         in answer.stdout
     )
-    assert same_text("reduce", answer.stdout + answer.stderr)
     assert (
         len(load_model(tmp_path / "out" / "model.json").coefficients)
         == told["terms"]["reduced"]

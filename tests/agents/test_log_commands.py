@@ -13,7 +13,6 @@ from shipgym.errors import InputError
 from shipgym.trials.guesses import guess_columns, guess_trial
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.ship_file import ShipFile
-from tests.golden.texts import same_page, same_text
 
 
 @pytest.fixture
@@ -51,8 +50,10 @@ def test_a_ship_file_is_written_from_a_log_and_says_what_was_guessed(
     assert "psi: column 'Gyro [deg]' in deg, unit from its name" in said
     assert "delta: column 'Rudder' in deg, unit from its size, up to 10" in said
     assert "a positive rudder steers to port, by the yaw that follows" in said
-    assert same_text("new ship", said + (log / "ship.toml").read_text())
-    (trial,) = ShipFile.load(log / "ship.toml").trials()
+    written = ShipFile.load(log / "ship.toml")
+    assert written.particulars["length"] == 150.0
+    assert written.identify["structure"] == "nomoto"
+    (trial,) = written.trials()
     assert trial["delta"][20] == pytest.approx(np.radians(10.0))
     code, said = command(monkeypatch, capsys, "new-ship", "log.csv")
     assert (code, "ship.toml: exists already" in said) == (2, True)
@@ -62,8 +63,6 @@ def test_the_record_is_drawn_on_a_page(log, monkeypatch, capsys):
     code, said = command(monkeypatch, capsys, "look", "log.csv")
     assert (code, "log.csv: 300 samples over 299 s: psi, r, delta" in said) == (0, True)
     page = (log / "look.html").read_text()
-    assert same_text("look", said)
-    assert same_page("look page", page)
     assert page.count("Plotly.newPlot(") == 1
     assert "The channels over time." in page
 

