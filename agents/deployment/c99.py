@@ -1,33 +1,23 @@
 """Texts of what is exported: C99, XML and sentences of NMEA 0183, made from templates."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 import shipgym
 from agents.deployment.c_syntax import KEYWORDS, literal
+from agents.deployment.variables import Variables
 from shipgym import InputError
 from shipgym.trials.units import UNITS
 
 LONGEST_NAME = 31  # characters, so that what is made of it stays within the 63 of C99
 LONGEST_TITLE = 120
-
-
-class Variable(NamedTuple):
-    """A number that is given to what was exported, or read of it."""
-
-    unit: str
-    meaning: str
-    start: float = 0.0  # value at the beginning
-
-
-Variables = Mapping[str, Variable]
 
 
 @dataclass(frozen=True)
@@ -79,7 +69,12 @@ def render(template: str, name: str = "", **data: Any) -> str:
     return (
         _environment()
         .get_template(template)
-        .render(**data, name=name, NAME=name.upper(), version=shipgym.__version__)
+        .render(
+            **data,
+            name=name,
+            NAME=name.upper(),
+            version=shipgym.__version__,
+        )
     )
 
 

@@ -25,10 +25,11 @@ from agents import (
 from agents.cli import app
 from agents.controllers.guided import TURNS, bend
 from agents.controllers.law import Turns
-from agents.deployment.autopilot import VARIABLES, Autopilot, BridgeInput
+from agents.deployment.autopilot import Autopilot, BridgeInput
 from agents.deployment.autopilot_c99 import autopilot_source
 from agents.deployment.c99 import checked_name, degrees, heading, knots, single
 from agents.deployment.ship_c99 import ShipInput, advance, ship_source
+from agents.deployment.variables import AUTOPILOT_INPUTS
 from shipgym.engine.motion import Motion
 from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
@@ -293,7 +294,7 @@ def test_guidance_orders_what_it_commands_along_a_path(kind):
 
 
 def test_every_input_has_its_unit_and_meaning():
-    assert list(BridgeInput._fields) == list(VARIABLES["autopilot_input"])
+    assert list(BridgeInput._fields) == list(AUTOPILOT_INPUTS)
 
 
 @pytest.mark.parametrize(
