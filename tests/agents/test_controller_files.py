@@ -76,7 +76,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing_behind(tmp_path):
 SWAPPED = [*NAMES[:2], NAMES[3], NAMES[2], *NAMES[4:]]
 #: Kind of file, what is changed in it, and what the message says.
 BAD_FILES = [
-    ("pid", {"format": 2}, "this version of shipgym reads format 1"),
+    ("pid", {"format": 2}, "expected format 1"),
     ("pid", {"kind": None}, "field 'kind' is missing"),
     ("pid", {"kind": "pdi"}, "kind: .*Did you mean 'pid'"),
     ("pid", {"kind": "learned"}, "policy|field"),
@@ -149,7 +149,7 @@ def test_a_filter_has_three_states_or_five(n_states, message, tmp_path):
             b'{"format": 1, "kind": "pid", "gai',
             "broken JSON .*line 1 column 30.*cut short",
         ),
-        (b"\x89PNG\xff\xfe", "binary content.*expected a controller file"),
+        (b"\x89PNG\xff\xfe", "expected a controller file.*binary content"),
         (b"[1, 2]", "expected a table"),
         (b"{}", "field 'format' is missing"),
     ],

@@ -183,7 +183,7 @@ def test_the_state_is_that_of_as_many_ships():
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("wave_period", 1.0, "expected a number > 2; two control intervals"),
+        ("wave_period", 1.0, "expected a number > 2 \\(two control intervals"),
         ("noise", 0.0, "expected a number > 0"),
         ("wave_heading_deg", 0.0, "expected a number > 0"),
         ("disturbance_deg", 0.0, "expected a number > 0"),
