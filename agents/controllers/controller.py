@@ -40,7 +40,7 @@ Action = NDArray[np.float32]
 FORMAT = 1  # of the controller file
 SMALL = 1e-5  # rad, and other SI units, of motions about straight running
 SCALE_TOLERANCE = 1e-6  # relative difference of observation scales that is rounding
-UNKNOWN_MARGINS = Margins(np.nan, np.nan, np.nan, np.nan)
+UNKNOWN_MARGINS = Margins(np.nan, np.nan, np.nan, np.nan, np.nan)
 
 
 class Bounds(NamedTuple):

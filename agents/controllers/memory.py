@@ -37,9 +37,9 @@ def to_rows(record: Any, n_ships: int) -> Floats:
 
     A number in place of a column is that of all ships.
     """
-    size = size_of(type(record))
-    rows = np.zeros((n_ships, size))
-    for i, column in enumerate(_columns(record)):
+    columns = list(_columns(record))
+    rows = np.zeros((n_ships, len(columns)))
+    for i, column in enumerate(columns):
         rows[:, i] = column
     return rows
 
