@@ -153,7 +153,7 @@ def path_order(
     guide: Law,
     law: Law,
 ) -> Step:
-    """Rudder, rad, not yet limited, for a heading error against the path's direction."""
+    """Rudder for a heading error, rad, against the path; it is not yet limited."""
     seen = path_signals(error, given)
     course, guidance = guide(seen, state.guidance, p.guide)
     to_course = wrapped(error + course)
@@ -205,7 +205,7 @@ def own_observations(
 def policy_observations(
     given: BridgeInput, state: BridgeState, p: BridgeParameters
 ) -> tuple[OwnObservations, BridgeState]:
-    """Observations of a policy's set-point and memory, and its state with the integral."""
+    """Observations of a policy's set-point and memory, and its next state."""
     error = wrapped(given.set_point - given.heading)
     integral = gathered(state.integral, error, state.started, p.dt, p.reach)
     own = own_observations(error, integral, given, state.last_command)

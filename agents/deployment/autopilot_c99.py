@@ -164,7 +164,7 @@ def steering_step(
 
 
 def parts_of(agent: Any) -> tuple[Any, Any]:
-    """Guidance, or None, and the heading autopilot; InputError if one is no closed form."""
+    """Guidance or None, and the heading autopilot; InputError if one has no law."""
     check_closed_form(agent)
     if not isinstance(agent, Guided):
         return None, agent
@@ -208,7 +208,7 @@ def state_kind(agent: Any) -> Kind:
 
 
 def observation_rows(policy: LearnedPolicy) -> list[dict[str, Any]]:
-    """Observations of a policy: value in C, scale, bounds, and its input, if it is one."""
+    """Observations of a policy: value in C, scale, bounds and name of the input."""
     scales = dict(zip(policy.observation_names, policy.observation_scales, strict=True))
     rows = []
     for name, scale in scales.items():

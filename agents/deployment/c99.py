@@ -1,14 +1,13 @@
-"""Texts of what is exported: C99, XML and sentences of NMEA 0183, made from templates."""
+"""C99, XML and sentences of NMEA 0183, made from templates."""
 
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FunctionLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 import shipgym
 from agents.deployment.c_syntax import KEYWORDS, literal
@@ -100,15 +99,17 @@ def heading(angle: float) -> float:
 
 def array(numbers: Iterable[Any]) -> str:
     """Numbers of an array in single precision as C initialises it."""
-    rows = [single(one) if np.ndim(one) == 0 else array(one) for one in numbers]
-    return f"{{{', '.join(rows)}}}"
+    entries = []
+    for entry in numbers:
+        is_number = np.ndim(entry) == 0
+        entries.append(single(entry) if is_number else array(entry))
+    return f"{{{', '.join(entries)}}}"
 
 
 @cache
 def _environment() -> Environment:
-    folder = files("agents.deployment") / "templates"
     environment = Environment(
-        loader=FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8")),
+        loader=PackageLoader("agents.deployment"),
         undefined=StrictUndefined,
         trim_blocks=True,
         keep_trailing_newline=True,

@@ -69,12 +69,12 @@ def steady_sea(given: ShipInput) -> Sea:
 def ship_source(
     model: ShipModel, name: str | None = None, water_depth: float = np.inf
 ) -> Source:
-    """Write a ship model as C99, by default under the model's name, in water of a depth in m.
+    """Write a ship model as C99, by default under the model's name.
 
-    A ship with too few particulars for wind forces is written without them, as
-    `Source.notes` says. Raises InputError for a name that C does not take, shallow
-    water that the model does not know, and equations of one's own that use more than
-    arithmetic.
+    `water_depth`: m. A ship with too few particulars for wind forces is written without
+    them, as `Source.notes` says. Raises InputError for a name that C does not take,
+    shallow water that the model does not know, and equations of one's own that use more
+    than arithmetic.
     """
     name = checked_name(name or model.name)
     longest = LONGEST_STEP * model.travel_time
@@ -150,7 +150,7 @@ def _translated(
 
 
 def _weather(model: ShipModel, water_depth: float) -> tuple[Floats, str]:
-    """Numbers of a weather whose wind is given later, and a note if there is no wind."""
+    """Numbers of a weather whose wind comes later, and a note if it has no wind."""
     wind = Weather(wind=Wind(1.0, 0.0, gust=False))
     note = ""
     try:
