@@ -1,7 +1,8 @@
-"""Autopilots designed on a model, and what becomes of them over models drawn from its covariance."""
+"""Autopilots designed on a model, and run over models drawn from its covariance."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -36,7 +37,7 @@ def verify(
     guests: Sequence[Agent] = (),
     designs: Sequence[str] = DESIGNS,
 ) -> Verification:
-    """Design autopilots on a model and run them, and guests, over models drawn from its covariance.
+    """Design autopilots on a model and run them over models drawn from its covariance.
 
     `model`: with a covariance; `draws`, `seed`, `where`, `designs`: see
     `build_autopilot`; `tell`: called with the progress; `guests`: further autopilots.
@@ -57,19 +58,19 @@ def verify(
     for guest in guests:
         episodes.append(sail(guest, found.draws, seeds=seed + np.arange(draws)))
 
-    unstable = found.manoeuvres.unstable
-    stable = [
-        draw for draw, lost in zip(found.draws, unstable, strict=True) if not lost
-    ]
-    ships = [model, *stable]
+    ships = [model]
+    for draw, is_lost in zip(found.draws, found.manoeuvres.unstable, strict=True):
+        if not is_lost:
+            ships.append(draw)
     autopilots = [*designed.controllers, *guests]
+    n = len(autopilots)
     keys = unique_keys([str(autopilot.name) for autopilot in autopilots])
     pilots = []
-    for done, (key, autopilot) in enumerate(zip(keys, autopilots, strict=True)):
-        tell("step responses", done, len(autopilots))
-        step = step_response(autopilot, ships, STEP_DEG)
-        pilots.append(Pilot(key, autopilot, episodes[done], step))
-    tell("step responses", len(autopilots), len(autopilots))
+    for i in range(n):
+        tell("step responses", i, n)
+        step = step_response(autopilots[i], ships, STEP_DEG)
+        pilots.append(Pilot(keys[i], autopilots[i], episodes[i], step))
+    tell("step responses", n, n)
 
     tracks, late = kept_tracks(designed.guides, ships)
     return Verification(
@@ -99,7 +100,7 @@ class Designed:
 
 
 def design_autopilots(model: ShipModel, designs: Sequence[str]) -> Designed:
-    """Autopilots of some kinds; InputError if none that keeps a heading can be designed."""
+    """Autopilots of some kinds; InputError if none of them keeps a heading."""
     found = Designed()
     for kind in dict.fromkeys(designs):
         made: Any = controller_class(kind)
@@ -124,20 +125,28 @@ def design_autopilots(model: ShipModel, designs: Sequence[str]) -> Designed:
 def kept_tracks(
     guides: Sequence[Controller], ships: Sequence[ShipModel]
 ) -> tuple[tuple[Track, ...], dict[str, str]]:
-    """The track of each path autopilot, and why one is refused that does not arrive on the first ship."""
-    tracks = tuple(keep_track(guide, ships) for guide in guides)
-    late = {
-        track.key: "it does not reach the end of the track on the identified model"
-        for track in tracks
-        if not track.arrived[0]
-    }
-    return tracks, late
+    """The track of each path autopilot, and reasons to refuse those that fail.
+
+    One fails that does not arrive on the first ship.
+    """
+    tracks = []
+    late = {}
+    for guide in guides:
+        track = keep_track(guide, ships)
+        tracks.append(track)
+        if not track.arrived[0]:
+            late[track.key] = (
+                "it does not reach the end of the track on the identified model"
+            )
+    return tuple(tracks), late
 
 
 def unique_keys(names: Sequence[str]) -> list[str]:
     """Names, those that were there before with a number."""
+    times: Counter[str] = Counter()
     keys = []
-    for place, name in enumerate(names):
-        number = names[: place + 1].count(name)
+    for name in names:
+        times[name] += 1
+        number = times[name]
         keys.append(name if number == 1 else f"{name}-{number}")
     return keys

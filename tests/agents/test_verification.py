@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from agents import PID, WheelOver
-from agents.jobs import JobEngine
 from agents.verification.chain import build_autopilot, stage, with_standards
 from agents.verification.result import pilot_metrics, track_metrics
 from agents.verification.standards import heading_control
@@ -225,9 +224,8 @@ def test_a_stage_is_told_at_its_beginning_and_end_and_its_parts_in_between():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"seed": -1}, "seed: -1 found, expected"),
-        ({"seed": 2**32 + 1}, "seed: 4.*found, expected"),
-        ({"where": JobEngine("lokal")}, "Did you mean 'local'"),
+        ({"seed": -1}, "seed: expected"),
+        ({"seed": 2**32 + 1}, "seed: expected.*got 4"),
         ({"designs": ("lqq",)}, "lqq"),
     ],
 )
