@@ -1,4 +1,4 @@
-"""Controller files: read back as they were, and refused with the field at fault named."""
+"""Controller files are read back as they were, or the field at fault is named."""
 
 import json
 import math
@@ -31,7 +31,7 @@ SCALES = list(DESIGNS["pid"].observation_scales)
 
 
 def changed(kind, tmp_path, changes):
-    """A file of a kind with fields changed, `outer__inner`; a field that becomes None is taken away."""
+    """A file of a kind with fields `outer__inner` changed; None takes one away."""
     content = json.loads(CORPUS[kind].read_text())
     for field, value in changes.items():
         *parents, name = field.split("__")

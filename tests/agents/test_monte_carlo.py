@@ -1,4 +1,4 @@
-"""Monte Carlo over the covariance gives the same in this process, in others, resumed, and draw by draw."""
+"""Monte Carlo gives the same in this process, in others, resumed, and draw by draw."""
 
 from dataclasses import fields, replace
 from types import SimpleNamespace
@@ -137,7 +137,7 @@ def test_runs_are_kept_for_25_and_30_lengths_and_the_circle_within_the_rudder_s_
 
 
 def sailed(count, lost=()):
-    """Draws of which some lose the runs that are kept, headings and paths by their number."""
+    """Draws, some without runs that are kept; headings and paths by their number."""
     numbers = [np.full((3, 2), float(k)) for k in range(count) if k not in lost]
     return SailedDraws(
         values={"turn": {"advance": np.arange(float(count))}},
@@ -155,7 +155,7 @@ def criteria_of(*ran_away):
 
 
 def test_draws_that_run_away_in_any_manoeuvre_count_once_and_have_no_paths(ship):
-    """Of seven draws the second runs away in one criterion, the fifth loses the runs that are kept."""
+    """Of seven draws the second runs away in one criterion, the fifth has no runs."""
     away = np.arange(7) == 1
     criteria = criteria_of(away, np.zeros(7, dtype=bool))
     found = with_paths(criteria, NominalRuns("zigzag", "circle"), sailed(7, [4]))

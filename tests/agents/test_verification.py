@@ -179,7 +179,7 @@ def test_twice_the_time_that_the_track_takes_is_sailed_at_most():
         ((False, None), 2, 3, False),
     ],
 )
-def test_a_verdict_is_certain_where_nothing_is_missed_or_open_and_no_model_drawn_is_lost(
+def test_a_verdict_is_certain_if_all_is_met_and_no_model_drawn_is_lost(
     passed, runaway, lost, certain
 ):
     best = SimpleNamespace(episodes=SimpleNamespace(terminated=np.arange(9) < lost))
@@ -240,7 +240,7 @@ def test_names_that_were_there_before_get_a_number():
 
 
 def test_standards_are_those_of_the_best_design_and_the_tracks_that_are_given(chain):
-    """Without the best design, the next one is asked; without a track, its rows have no value."""
+    """Without the best design the next one is asked; without a track rows are empty."""
     found = chain[1].verification
     ranked = [pilot for pilot in found.pilots if pilot.design is not None]
     first = ranked[0].key
