@@ -64,24 +64,7 @@ def check_controller(
 
     asking = _Asking(controller, f"{name}.predict")
     engine = Engine(ship, N_SHIPS, asked)
-    seen: Observations = engine.reset(np.arange(N_SHIPS))
-    state: Any = None
-    alone: list[Any] = [None] * N_SHIPS
-    begins = np.ones(N_SHIPS, dtype=np.bool_)
-    starts = begins
-    for step in range(n_steps):
-        action, state = asking.answer(seen, state, starts, f"step {step}")
-        for i in range(N_SHIPS):
-            where = f"step {step}, ship {i} alone"
-            own, alone[i] = asking.answer(seen[i], alone[i], starts[:1], where)
-            asking.check_same(own, action[i], where)
-        seen, *_ = engine.step(action)
-        starts = np.zeros(N_SHIPS, dtype=np.bool_)
-
-    fresh, _ = asking.answer(seen, None, begins, "a first observation")
-    where = "episode_start True and the state of another episode"
-    begun, _ = asking.answer(seen, state, begins, where)
-    asking.check_same(begun, fresh, where)
+    asking.check_episode(engine, n_steps)
 
 
 def check_signature(controller: Any, name: str) -> None:
@@ -126,6 +109,27 @@ class _Asking:
 
     controller: Policy
     who: str
+
+    def check_episode(self, engine: Engine, n_steps: int) -> None:
+        """Steer ships together and each alone, and begin another episode at the end."""
+        seen: Observations = engine.reset(np.arange(N_SHIPS))
+        state: Any = None
+        alone: list[Any] = [None] * N_SHIPS
+        begins = np.ones(N_SHIPS, dtype=np.bool_)
+        starts = begins
+        for step in range(n_steps):
+            action, state = self.answer(seen, state, starts, f"step {step}")
+            for i in range(N_SHIPS):
+                where = f"step {step}, ship {i} alone"
+                own, alone[i] = self.answer(seen[i], alone[i], starts[:1], where)
+                self.check_same(own, action[i], where)
+            seen, *_ = engine.step(action)
+            starts = np.zeros(N_SHIPS, dtype=np.bool_)
+
+        fresh, _ = self.answer(seen, None, begins, "a first observation")
+        where = "episode_start True and the state of another episode"
+        begun, _ = self.answer(seen, state, begins, where)
+        self.check_same(begun, fresh, where)
 
     def answer(
         self, seen: Any, state: Any, starts: Any, where: str

@@ -140,10 +140,16 @@ def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floa
     frequency = 2.0 * np.pi / period
     spring = frequency**2
     damping = 2.0 * WAVE_DAMPING * frequency
-    flow = np.array([[0.0, 1.0], [-spring, -damping]])
+    flow = np.array(
+        [
+            [0.0, 1.0],
+            [-spring, -damping],
+        ]
+    )
     transition: Floats = np.asarray(expm(flow * dt), dtype=np.float64)
 
-    steady = deviation**2 * np.diag([1.0, spring])
+    variances = [1.0, spring]  # of heading and rate, by that of the heading
+    steady = deviation**2 * np.diag(variances)
     left = transition @ steady @ transition.T
     return transition, steady - left
 

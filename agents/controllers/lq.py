@@ -130,26 +130,30 @@ def lq_gains(ship: SampledShip, cost: SteeringCost) -> dict[str, float]:
 
 
 def lq_gain(ship: SampledShip, cost: SteeringCost) -> Floats:
-    """Gain G of order = -G x that minimises the steering cost on a ship, shape (5,).
-
-    The reward of an interval is on the state at its end: z[k] = C x[k] + D order[k] =
-    (error, weighted rudder, weighted rudder rate, weighted integral)[k + 1], which
-    couples state and input (Anderson & Moore 1990, chapter 3).
-    """
+    """Gain G of order = -G x that minimises the steering cost on a ship, shape (5,)."""
     import control  # here, because it takes a second to import
 
+    C, D = cost_outputs(ship, cost)
+    measured = np.eye(len(SIGNALS))
+    plant = control.ss(ship.A, ship.B, measured, 0.0, ship.dt)
+    gain, _, _ = control.lqr(plant, C.T @ C, D.T @ D, C.T @ D)
+    return np.asarray(gain, dtype=np.float64).reshape(-1)
+
+
+def cost_outputs(ship: SampledShip, cost: SteeringCost) -> tuple[Floats, Floats]:
+    """Outputs z[k] = C x[k] + D order[k] whose squares add up to the steering cost.
+
+    The reward of an interval is on the state at its end, z[k] = (error, weighted
+    rudder, weighted rudder rate, weighted integral)[k + 1], which couples state and
+    input (Anderson & Moore 1990, chapter 3).
+    """
     of_rudder = np.sqrt(cost.rudder_weight)
     of_rate = np.sqrt(cost.rate_weight_s2) / ship.dt
     of_integral = 1.0 / cost.integral_time
     weights = np.array([[1.0], [of_rudder], [of_rate], [of_integral]])
 
     rows = [ERROR, RUDDER, RUDDER, INTEGRAL]
+    rate = 2
     next_state = ship.A[rows]
-    next_state[2, RUDDER] -= 1.0  # the change of the rudder
-    C = weights * next_state
-    D = weights * ship.B[rows]
-
-    measured = np.eye(len(SIGNALS))
-    plant = control.ss(ship.A, ship.B, measured, 0.0, ship.dt)
-    gain, _, _ = control.lqr(plant, C.T @ C, D.T @ D, C.T @ D)
-    return np.asarray(gain, dtype=np.float64).reshape(-1)
+    next_state[rate, RUDDER] -= 1.0  # the change of the rudder
+    return weights * next_state, weights * ship.B[rows]

@@ -85,12 +85,17 @@ class Compensator:
 
         An integral that is not fed back is left out.
         """
-        motions = [ship.A + ship.B @ self.D, ship.B @ self.C]
-        memory = [self.B, self.A]
-        whole = np.block([motions, memory])
-
-        by_integral = np.append(self.D[:, INTEGRAL], self.B[:, INTEGRAL])
-        if by_integral.any():
+        steered = ship.A + ship.B @ self.D
+        by_memory = ship.B @ self.C
+        whole = np.block(
+            [
+                [steered, by_memory],
+                [self.B, self.A],
+            ]
+        )
+        feeds_order = self.D[:, INTEGRAL].any()
+        feeds_memory = self.B[:, INTEGRAL].any()
+        if feeds_order or feeds_memory:
             return whole
         without = np.delete(whole, INTEGRAL, axis=0)
         return np.delete(without, INTEGRAL, axis=1)
@@ -104,7 +109,8 @@ class Compensator:
         """
         import control
 
-        pole = largest_pole(self.closed_loop(ship))
+        matrix = self.closed_loop(ship)
+        pole = largest_pole(matrix)
         if pole >= 1.0:
             raise InputError(
                 f"{name}: expected sampled poles below 1, got {pole:.4f}: the closed"

@@ -205,8 +205,7 @@ class MPC(WheelOver):
             candidates[:, :, 0] = best[:, :1]
 
             costs = self.simulated_costs(seen, current, candidates)
-            order = np.argsort(costs, axis=1, kind="stable")
-            elites = np.take_along_axis(candidates, order[:, :ELITES, None], axis=1)
+            elites = cheapest(candidates, costs)
             mean = elites.mean(axis=1)
             deviation = np.maximum(elites.std(axis=1), LEAST_DEVIATION)
 
@@ -247,6 +246,13 @@ class MPC(WheelOver):
             add_step_cost(cost, self, models, place, progress, moved)
         cost = np.where(np.isfinite(cost), cost, np.inf)
         return cost.reshape(n_ships, n_plans)
+
+
+def cheapest(plans: Floats, costs: Floats) -> Floats:
+    """Cheapest plans of each ship, shape (n_ships, ELITES, KNOTS), the best first."""
+    order = np.argsort(costs, axis=1, kind="stable")
+    elites = order[:, :ELITES, None]
+    return np.take_along_axis(plans, elites, axis=1)
 
 
 def path_costs(task: Task, model: ShipModel) -> PathCosts:

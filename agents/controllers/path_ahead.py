@@ -65,37 +65,46 @@ class Arc:
 
         Also the distance to the arc, m, and the angle that is left of it, rad.
         """
+        radius = self.radius
         past = leg.x - self.distance
-        to_centre = self.radius - self.side * leg.y
-        innermost = INNERMOST * self.radius
-        swept = np.arctan2(past, np.maximum(to_centre, innermost))
+        to_centre = radius - self.side * leg.y
+        swept = np.arctan2(past, np.maximum(to_centre, INNERMOST * radius))
 
         entered = leg.reached & (past > 0.0) & (self.angle > 0.0)
-        self.passed = self.passed | (entered & (swept >= self.angle))
-        on_arc = entered & ~self.passed
+        leaves = entered & (swept >= self.angle)
+        passed = self.passed | leaves
+        self.passed = passed
+        on_arc = entered & ~passed
         bent = np.where(on_arc, swept, 0.0)
-        from_centre = np.hypot(past, to_centre)
 
+        from_centre = np.hypot(past, to_centre)
         here = PathPoint(
-            along_track=leg.begins + self.distance + self.radius * bent,
-            cross_track=self.side * (self.radius - from_centre),
+            along_track=leg.begins + self.distance + radius * bent,
+            cross_track=self.side * (radius - from_centre),
             course=leg.course + self.side * bent,
         )
-        to_arc = np.where(self.passed, FAR, np.maximum(-past, 0.0))
-        left = np.where(self.passed, 0.0, self.side * (self.angle - bent))
-        return chosen(on_arc, here, before), to_arc, left
+        ahead = np.maximum(-past, 0.0)
+        left = self.side * (self.angle - bent)
+        return (
+            chosen(on_arc, here, before),
+            np.where(passed, FAR, ahead),
+            np.where(passed, 0.0, left),
+        )
 
     def next_leg(self, leg: Leg) -> Leg:
         """Leg behind the arc, for the ships that have passed it."""
-        ahead = leg.x - self.distance - self.radius * np.sin(self.angle)
-        aside = leg.y - self.side * self.radius * (1.0 - np.cos(self.angle))
+        passed = self.passed
+        radius = self.radius
+        ahead = leg.x - self.distance - radius * np.sin(self.angle)
+        aside = leg.y - self.side * radius * (1.0 - np.cos(self.angle))
         x, y = turned(ahead, aside, self.turn)
+        course = leg.course + self.turn
         return Leg(
-            x=np.where(self.passed, x, leg.x),
-            y=np.where(self.passed, y, leg.y),
-            begins=leg.begins + self.distance + self.radius * self.angle,
-            course=np.where(self.passed, leg.course + self.turn, leg.course),
-            reached=leg.reached & self.passed,
+            x=np.where(passed, x, leg.x),
+            y=np.where(passed, y, leg.y),
+            begins=leg.begins + self.distance + radius * self.angle,
+            course=np.where(passed, course, leg.course),
+            reached=leg.reached & passed,
         )
 
 

@@ -121,10 +121,14 @@ def optimal_poles(response: Nomoto, rate_weight: float) -> Poles:
     import control  # here, because it takes a second to import
 
     # states: yaw rate, heading error, rudder
-    yaw = [-1.0 / response.T, 0.0, response.rudder_effect]
-    heading = [-1.0, 0.0, 0.0]
-    rudder = [0.0, 0.0, 0.0]
-    A = np.array([yaw, heading, rudder])
+    yaw_damping = 1.0 / response.T
+    A = np.array(
+        [
+            [-yaw_damping, 0.0, response.rudder_effect],
+            [-1.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0],
+        ]
+    )
     B = np.array([[0.0], [0.0], [1.0]])
     Q = np.diag([0.0, 1.0, RUDDER_WEIGHT])
     R = np.array([[rate_weight]])

@@ -246,10 +246,14 @@ def _turns_to_one_side(
 def course_rate(model: ShipModel, turns: SteadyTurns, neutral: float) -> float:
     """Rate, rad/s, of a steady turn with `COURSE_RUDDER`: that of course changes."""
     largest = COURSE_RUDDER * model.steering.limit
-    reached = np.abs(turns.rudders - neutral) <= largest
-    some = SteadyTurns(turns.rates[reached], turns.rudders[reached])
+    off_neutral = np.abs(turns.rudders - neutral)
+    reached = off_neutral <= largest
+    gentle = SteadyTurns(
+        rates=turns.rates[reached],
+        rudders=turns.rudders[reached],
+    )
     least_rate = float(GRID[0]) / model.travel_time
-    return max(some.largest_rate, least_rate)
+    return max(gentle.largest_rate, least_rate)
 
 
 def check_rising(values: Sequence[float], name: str) -> None:

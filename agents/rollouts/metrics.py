@@ -286,9 +286,10 @@ def distance_made_good(run: Rollout) -> Floats:
         distance = during(run, "distance_made_good")
         return np.asarray(distance.max(axis=0, initial=0.0))
     error = during(run, "heading_error")
-    ahead = during(run, "u") * np.cos(error)
-    aside = during(run, "v") * np.sin(error)
-    return total(ahead + aside) * run.dt
+    surge = during(run, "u")
+    sway = during(run, "v")
+    along_course = surge * np.cos(error) + sway * np.sin(error)
+    return total(along_course) * run.dt
 
 
 def path_following(run: Rollout) -> dict[str, Floats]:

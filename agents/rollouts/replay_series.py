@@ -144,7 +144,11 @@ def _angles(states: Mapping[str, Floats]) -> dict[str, Floats]:
         error = wrapped(states[order] - heading)
         radians["heading_error"] = error
         radians["course_order"] = heading + error  # without a jump from the heading
-    return {name: np.degrees(values) for name, values in radians.items()}
+
+    in_degrees = {}
+    for name, values in radians.items():
+        in_degrees[name] = np.degrees(values)
+    return in_degrees
 
 
 def _orders(episode: Episode) -> dict[str, Floats]:

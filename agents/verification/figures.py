@@ -215,9 +215,10 @@ def tracks_figure(tracks: Mapping[str, Track], length: float) -> Figure:
     errors = []
     for (name, track), colour in zip(tracks.items(), PILOT_COLOURS, strict=False):
         north, east = track.positions.T / length
+        paths.append(line(east, north, name, colour, 2.0))
+
         steps = np.hypot(np.diff(north), np.diff(east))
         sailed = np.append(0.0, np.cumsum(steps))
-        paths.append(line(east, north, name, colour, 2.0))
         errors.append(line(sailed, track.cross_track, name, colour, 1.6))
 
     north_axis = axis("north, ship lengths", scaleanchor="x", scaleratio=1)

@@ -216,6 +216,9 @@ def _wheel_overs(guide: Controller, along: SteeredRun) -> Integers:
     reach = guide.gains["turn_reach"]
     distances = [given["next_turn_distance"] for given in along.given]
     angles = [given["next_turn_angle"] for given in along.given]
-    to_go: Floats = np.where(np.array(angles) != 0.0, distances, np.nan)
-    passed = (to_go[:-1] > reach) & (to_go[1:] <= reach)
-    return np.flatnonzero(passed) + 1
+    is_turn = np.array(angles) != 0.0
+    to_go: Floats = np.where(is_turn, distances, np.nan)
+
+    was_far = to_go[:-1] > reach
+    is_near = to_go[1:] <= reach
+    return 1 + np.flatnonzero(was_far & is_near)
