@@ -235,7 +235,11 @@ class Controller:
         if not is_linear:
             return self.reads
         gains = self.parameters.gains._asdict()
-        return tuple(name for name in self.reads if gains[name] != 0.0)
+        read = []
+        for name in self.reads:
+            if gains[name] != 0.0:
+                read.append(name)
+        return tuple(read)
 
     @classmethod
     def is_closed_form(cls) -> bool:

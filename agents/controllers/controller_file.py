@@ -108,11 +108,10 @@ def _names(value: Any, where: str) -> tuple[str, ...]:
 
 
 def _gains(value: Any, design: type[Controller]) -> dict[str, float]:
-    names = design.gain_names or tuple(design.feedback)
-    table = check_table(value, "gains", names)
-    bounds = dict.fromkeys(names, ANY_NUMBER)
-    for name in names:
+    bounds = {}
+    for name in design.gain_names or design.feedback:
         bounds[name] = design.bounds.get(name, ANY_NUMBER)
+    table = check_table(value, "gains", bounds)
     return _numbers(table, bounds, "gains")
 
 

@@ -110,8 +110,9 @@ def rudder_response(
     effect of the rudder angle, per rad, shape (3,).
     """
     linear = np.column_stack(linearise(model, about))
-    A, B = sampled(linear, 0.0, dt)
-    return A[:RUDDER, :RUDDER], B[:RUDDER]
+    A, B = sampled(linear, lag=0.0, dt=dt)
+    motions = slice(RUDDER)  # without rudder and integral
+    return A[motions, motions], B[motions]
 
 
 def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floats]:

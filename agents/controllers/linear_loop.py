@@ -93,7 +93,12 @@ def sample_ship(model: ShipModel, dt: float, first_order: bool = False) -> Sampl
         sway_decay = 1.0 / model.travel_time
         yaw_decay = 1.0 / form.T
         steering = np.diag([-sway_decay, -yaw_decay])
-        rudder = np.array([[0.0], [form.rudder_effect]])
+        rudder = np.array(
+            [
+                [0.0],
+                [form.rudder_effect],
+            ]
+        )
 
     linear = np.column_stack([steering, rudder])
     lag = model.steering.time_constant

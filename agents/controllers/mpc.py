@@ -234,11 +234,11 @@ class MPC(WheelOver):
         for step in range(int(self.design["horizon_steps"])):
             along_before = place.along_track
             rudder_before = models.rudder
-            of_path = course_over_ground(
+            own_course = place.course + course_over_ground(
                 place.cross_track, place.turns, self.parameters
             )
-            of_plan = added(plan, step * COARSE / KNOT_STEPS)
-            models.steer(place.course + of_path + of_plan)
+            knots = step * COARSE / KNOT_STEPS
+            models.steer(own_course + added(plan, knots))
 
             place = path.fix(models.x, models.y)
             progress = place.along_track - along_before

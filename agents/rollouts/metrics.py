@@ -193,13 +193,14 @@ def course_changes(run: Rollout) -> dict[str, Floats]:
     Returns the fields of `CourseChange`, each of shape (n,).
     """
     figures = CourseChange._fields
-    means = np.full((len(figures), len(run.seeds)), np.nan)
-    courses = run.states["set_point"]
-    headings = run.states["psi"]
-    for episode, steps in enumerate(run.steps):
-        sailed = slice(int(steps) + 1)
-        course = courses[sailed, episode]
-        heading = headings[sailed, episode]
+    n_episodes = len(run.seeds)
+    means = np.full((len(figures), n_episodes), np.nan)
+    courses = run.states["set_point"].T
+    headings = run.states["psi"].T
+    for episode in range(n_episodes):
+        n_samples = int(run.steps[episode]) + 1
+        course = courses[episode, :n_samples]
+        heading = headings[episode, :n_samples]
         changes = changes_of_course(course, heading, run.dt)
         if changes:
             means[:, episode] = np.mean(changes, axis=0)

@@ -31,9 +31,11 @@ def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
     target = Path(out)
     check_page(target)
     files = [Path(path) for path in paths]
+    titles = names(files)
     episodes = {}
-    for title, path in zip(names(files), files, strict=True):
+    for title, path in zip(titles, files, strict=True):
         episodes[title] = Episode.load(path)
+
     page = replay_page(episodes)
     write_text(page, target)
 

@@ -1,6 +1,6 @@
 """A simulated ship steered as by `shipgym steer`, by readings instead of sentences."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from math import radians
 from typing import Any, NamedTuple
 
@@ -60,10 +60,8 @@ def steer(
     now = 0.0
     while now < seconds:
         measured = ship.measured()
-        for quantity, value in measured.items():
-            if quantity not in lost or now < LOST_S:
-                reading = NmeaReading(quantity, value, talker="II")
-                helm.sensors.take(reading, now)
+        silent = () if now < LOST_S else lost
+        show(helm, measured, silent, now)
         helm.watch(dt, now)
         helm.steer(now)
         if helm.alarm:
@@ -92,6 +90,16 @@ def steer(
     )
 
 
+def show(
+    helm: Helm, measured: Mapping[str, float], silent: Collection[str], now: float
+) -> None:
+    """Show an autopilot what is measured, but for quantities that are silent."""
+    for quantity, value in measured.items():
+        if quantity not in silent:
+            reading = NmeaReading(quantity, value, talker="II")
+            helm.sensors.take(reading, now)
+
+
 def steer_to_heading(
     model: ShipModel,
     pilot: Controller,
@@ -112,6 +120,17 @@ def steer_to_heading(
     return steer(helm, ship, LENGTHS * model.travel_time, lost)
 
 
+def positions(places: Floats) -> Floats:
+    """Latitude and longitude, degrees, of places north and east of the start, m.
+
+    `places` and result: shape (n, 2).
+    """
+    north, east = places.T / MINUTE / 60.0  # degrees of latitude
+    latitude = START[0] + north
+    longitude = START[1] + east / np.cos(np.radians(latitude))
+    return np.column_stack([latitude, longitude])
+
+
 def steer_along(
     model: ShipModel,
     track: Track,
@@ -121,11 +140,7 @@ def steer_along(
 ) -> SteeredRun:
     """Keep a ship to a track, from a distance to starboard of where it begins, m."""
     pilot = track.controller
-    north, east = track.waypoints.T / MINUTE / 60.0  # degrees of latitude
-    latitude = START[0] + north
-    longitude = START[1] + east / np.cos(np.radians(latitude))
-    places = np.column_stack([latitude, longitude])
-    route = Route(places, pilot.gains["path_radius"])
+    route = Route(positions(track.waypoints), pilot.gains["path_radius"])
 
     step = pilot.design["dt"] / PER_INTERVAL
     weather = track_task(model).weather

@@ -12,7 +12,7 @@ import numpy as np
 from agents.controllers.controller import Controller
 from agents.controllers.registry import controller_class
 from agents.jobs import HERE, JobEngine
-from agents.rollouts.course_keeping import sail, step_response
+from agents.rollouts.course_keeping import Episodes, sail, step_response
 from agents.verification.monte_carlo import monte_carlo
 from agents.verification.result import STEP_DEG, Pilot, Verification
 from agents.verification.tracks import Track, keep_track, track_task
@@ -63,15 +63,7 @@ def verify(
         if not is_lost:
             ships.append(draw)
     autopilots = [*designed.controllers, *guests]
-    n = len(autopilots)
-    keys = unique_keys([str(autopilot.name) for autopilot in autopilots])
-    pilots = []
-    for i in range(n):
-        tell("step responses", i, n)
-        step = step_response(autopilots[i], ships, STEP_DEG)
-        pilots.append(Pilot(keys[i], autopilots[i], episodes[i], step))
-    tell("step responses", n, n)
-
+    pilots = run_pilots(autopilots, episodes, ships, tell)
     tracks, late = kept_tracks(designed.guides, ships)
     return Verification(
         draws=draws,
@@ -83,6 +75,29 @@ def verify(
         refused={**designed.refused, **late},
         tracks=tracks,
     )
+
+
+def run_pilots(
+    autopilots: Sequence[Any],
+    episodes: Sequence[Episodes],
+    ships: Sequence[ShipModel],
+    tell: Progress,
+) -> list[Pilot]:
+    """Autopilots with the episodes of each and its step responses on ships."""
+    n = len(autopilots)
+    keys = unique_keys([str(autopilot.name) for autopilot in autopilots])
+    pilots = []
+    for i, key in enumerate(keys):
+        tell("step responses", i, n)
+        pilot = Pilot(
+            key=key,
+            controller=autopilots[i],
+            episodes=episodes[i],
+            step=step_response(autopilots[i], ships, STEP_DEG),
+        )
+        pilots.append(pilot)
+    tell("step responses", n, n)
+    return pilots
 
 
 def _mean_cost(pilot: Pilot) -> float:
