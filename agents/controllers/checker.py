@@ -1,4 +1,7 @@
-"""Conformance suite for controllers: what rollouts, the benchmark and stable-baselines3's tools rely on."""
+"""Conformance suite for controllers.
+
+It checks what rollouts, the benchmark and the tools of stable-baselines3 rely on.
+"""
 
 import inspect
 from copy import deepcopy
@@ -30,13 +33,13 @@ def check_controller(
     *,
     n_steps: int = 60,
 ) -> None:
-    """Check that a controller meets the requirements of `predict`, on ships that it steers.
+    """Check a controller on ships that it steers.
 
-    Its signature; names and scales of observations, if it has `observation_names` and
-    `observation_scales`; one finite command in [-1, 1] for each ship, also for a single
-    one; the same answer to the same question, which leaves observations and state as
-    they were; each ship steered as if it were alone; and a memory that ends where
-    `episode_start` says so.
+    The requirements are those of `Policy.predict`: its signature; names and scales of
+    observations, if it has `observation_names` and `observation_scales`; one finite
+    command in [-1, 1] for each ship, also for a single one; the same answer to the same
+    question, which leaves observations and state as they were; each ship steered as if
+    it were alone; and a memory that ends where `episode_start` says so.
 
     Raises InputError naming the first requirement that is not met, what was expected
     and what was found.
@@ -61,26 +64,7 @@ def check_controller(
 
     asking = _Asking(controller, f"{name}.predict")
     engine = Engine(ship, N_SHIPS, asked)
-    seen: Observations = engine.reset(np.arange(N_SHIPS))
-    state: Any = None
-    alone: list[Any] = [None] * N_SHIPS
-    starts = np.ones(N_SHIPS, dtype=np.bool_)
-    for step in range(n_steps):
-        action, state = asking.answer(seen, state, starts, f"step {step}")
-        for ship_number in range(N_SHIPS):
-            where = f"step {step}, ship {ship_number} alone"
-            own, alone[ship_number] = asking.answer(
-                seen[ship_number], alone[ship_number], starts[:1], where
-            )
-            asking.check_same(own, action[ship_number], where)
-        seen, *_ = engine.step(action)
-        starts = np.zeros(N_SHIPS, dtype=np.bool_)
-
-    begins = np.ones(N_SHIPS, dtype=np.bool_)
-    fresh, _ = asking.answer(seen, None, begins, "a first observation")
-    where = "episode_start True and the state of another episode"
-    begun, _ = asking.answer(seen, state, begins, where)
-    asking.check_same(begun, fresh, where)
+    asking.check_episode(engine, n_steps)
 
 
 def check_signature(controller: Any, name: str) -> None:
@@ -101,7 +85,7 @@ def check_signature(controller: Any, name: str) -> None:
 def check_observations(
     controller: Any, model: ShipModel, task: Task, name: str
 ) -> None:
-    """Refuse a controller whose observations, if it names them, are not the first of the task's."""
+    """Refuse a controller whose observations are not the first of the task's."""
     names = getattr(controller, "observation_names", None)
     if names is None:
         return
@@ -111,11 +95,11 @@ def check_observations(
     check_names(known[: len(names)], list(names), where)
     check_scales(
         known,
-        [quantity.scale for quantity in shown],
-        getattr(controller, "observation_scales", ()),
-        where,
-        "it was made for another ship or task; make it for this one, or name its own"
-        " with model= and task=",
+        scales=[quantity.scale for quantity in shown],
+        own=getattr(controller, "observation_scales", ()),
+        where=where,
+        remedy="it was made for another ship or task; make it for this one, or name"
+        " its own with model= and task=",
     )
 
 
@@ -126,33 +110,60 @@ class _Asking:
     controller: Policy
     who: str
 
+    def check_episode(self, engine: Engine, n_steps: int) -> None:
+        """Steer ships together and each alone, and begin another episode at the end."""
+        seen: Observations = engine.reset(np.arange(N_SHIPS))
+        state: Any = None
+        alone: list[Any] = [None] * N_SHIPS
+        begins = np.ones(N_SHIPS, dtype=np.bool_)
+        starts = begins
+        for step in range(n_steps):
+            action, state = self.answer(seen, state, starts, f"step {step}")
+            for i in range(N_SHIPS):
+                where = f"step {step}, ship {i} alone"
+                own, alone[i] = self.answer(seen[i], alone[i], starts[:1], where)
+                self.check_same(own, action[i], where)
+            seen, *_ = engine.step(action)
+            starts = np.zeros(N_SHIPS, dtype=np.bool_)
+
+        fresh, _ = self.answer(seen, None, begins, "a first observation")
+        where = "episode_start True and the state of another episode"
+        begun, _ = self.answer(seen, state, begins, where)
+        self.check_same(begun, fresh, where)
+
     def answer(
         self, seen: Any, state: Any, starts: Any, where: str
     ) -> tuple[NDArray[np.float32], Any]:
-        """Action and state, computed three times from inputs that must not be changed."""
-        shown, kept = np.copy(seen), deepcopy(state)
+        """Action and state, computed three times; the inputs must not be changed."""
+        seen_before = np.copy(seen)
+        state_before = deepcopy(state)
         answer: Any = self.controller.predict(seen, state, starts, True)
         if not isinstance(answer, tuple) or len(answer) != 2:
-            raise self._refusal(
-                where, "a pair: action and state", type(answer).__name__
-            )
-        action = self._checked(answer[0], seen.shape[:-1], where)
+            got = type(answer).__name__
+            raise self._refusal(where, "a pair: action and state", got)
+        action, state_after = answer
+        action = self._checked(action, seen.shape[:-1], where)
 
-        for memory in (state, kept):
+        for memory in (state, state_before):
             again, _ = self.controller.predict(seen, memory, starts, True)
-            if not np.array_equal(np.asarray(again), action):
-                raise self._refusal(
-                    where,
-                    f"the same action for the same state, {action.ravel()}",
-                    f"{np.asarray(again).ravel()}; what it remembers belongs into the"
-                    " state that predict returns, and deterministic=True allows no"
-                    " chance",
-                )
-        if not np.array_equal(shown, seen):
+            self._check_repeated(again, action, where)
+        if not np.array_equal(seen_before, seen):
             raise self._refusal(
-                where, "the observation left as it was", "a changed one; work on a copy"
+                where,
+                expected="the observation left as it was",
+                got="a changed one; work on a copy",
             )
-        return action, answer[1]
+        return action, state_after
+
+    def _check_repeated(self, again: Any, action: Any, where: str) -> None:
+        """Refuse another action for the same state."""
+        if not np.array_equal(np.asarray(again), action):
+            raise self._refusal(
+                where,
+                expected=f"the same action for the same state, {np.ravel(action)}",
+                got=f"{np.ravel(again)}; what it remembers belongs into the state that"
+                " predict returns, and deterministic=True allows no chance",
+            )
 
     def _checked(self, action: Any, rows: tuple[int, ...], where: str) -> Any:
         """An action, which must be one finite number in [-1, 1] for each ship."""
@@ -160,19 +171,24 @@ class _Asking:
             array = np.asarray(action, dtype=np.float64)
         except (TypeError, ValueError):
             raise self._refusal(where, "numbers", f"{action!r}") from None
-        if array.shape != (*rows, 1):
+        shape = (*rows, 1)
+        if array.shape != shape:
             raise self._refusal(
-                where, f"an action of shape {(*rows, 1)}", f"shape {array.shape}"
+                where,
+                expected=f"an action of shape {shape}",
+                got=f"shape {array.shape}",
             )
         if not np.isfinite(array).all():
             raise self._refusal(
                 where,
-                "finite numbers",
-                f"{array.ravel()}; look for a division by zero",
+                expected="finite numbers",
+                got=f"{array.ravel()}; look for a division by zero",
             )
         if np.abs(array).max() > 1.0:
             raise self._refusal(
-                where, "parts of the rudder limit in [-1, 1]", f"{array.ravel()}"
+                where,
+                expected="parts of the rudder limit in [-1, 1]",
+                got=f"{array.ravel()}",
             )
         return np.asarray(action)
 
@@ -181,9 +197,9 @@ class _Asking:
         if not np.allclose(found, expected, rtol=0.0, atol=ROUNDING):
             raise self._refusal(
                 where,
-                f"{np.ravel(expected)} as otherwise",
-                f"{np.ravel(found)}; rows of a batch and episodes must be independent"
-                " of each other",
+                expected=f"{np.ravel(expected)} as otherwise",
+                got=f"{np.ravel(found)}; rows of a batch and episodes must be"
+                " independent of each other",
             )
 
     def _refusal(self, where: str, expected: str, got: str) -> InputError:

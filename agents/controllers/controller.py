@@ -1,4 +1,4 @@
-"""The classical autopilots' common part: from what the environment shows to the rudder."""
+"""Common part of the classical autopilots: from observations to the rudder."""
 
 import hashlib
 import json
@@ -30,7 +30,7 @@ from agents.controllers.memory import (
     to_rows,
 )
 from shipgym import InputError, ShipModel
-from shipgym.arrays import Floats, finite
+from shipgym.arrays import Flags, Floats, finite
 from shipgym.engine.records import Record, leaves
 from shipgym.files import write_json
 from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
@@ -40,7 +40,7 @@ Action = NDArray[np.float32]
 FORMAT = 1  # of the controller file
 SMALL = 1e-5  # rad, and other SI units, of motions about straight running
 SCALE_TOLERANCE = 1e-6  # relative difference of observation scales that is rounding
-UNKNOWN_MARGINS = Margins(np.nan, np.nan, np.nan, np.nan)
+UNKNOWN_MARGINS = Margins(np.nan, np.nan, np.nan, np.nan, np.nan)
 
 
 class Bounds(NamedTuple):
@@ -55,7 +55,7 @@ ANY_NUMBER = Bounds(-1e9, 1e9)
 
 
 class Policy(Protocol):
-    """Anything that steers: controllers of shipgym, agents of stable-baselines3, your own."""
+    """Anything that steers: controllers of shipgym, of stable-baselines3, your own."""
 
     def predict(
         self,
@@ -64,10 +64,11 @@ class Policy(Protocol):
         episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[Any, Any]:
-        """Return commands for one or many observations, with the signature of stable-baselines3.
+        """Return commands for one or many observations.
 
-        Raises InputError if the observation has fewer entries or another number of
-        dimensions, or the state is not one of as many ships.
+        The signature is that of stable-baselines3. Raises InputError if the observation
+        has fewer entries or another number of dimensions, or the state is not one of as
+        many ships.
 
         Parameters
         ----------
@@ -181,12 +182,13 @@ class Controller:
         **more
             Further fields of the class.
         """
+        scales = observation_scales(model).tolist()
         made = cls(
             gains=gains,
             neutral_rudder=ship.about.rudder,
             neutral_sway=ship.about.sway,
             margins=UNKNOWN_MARGINS,
-            observation_scales=tuple(observation_scales(model).tolist()),
+            observation_scales=tuple(scales),
             model_name=model.name,
             model_sha256=model_hash(model),
             design={"dt": ship.dt, **design},
@@ -221,20 +223,27 @@ class Controller:
         for gain, (signal, sign) in self.feedback.items():
             by_signal[signal] = sign * self.gains[gain]
         return LinearFeedback(
-            Gains(**by_signal), self.neutral_rudder, self.neutral_sway
+            gains=Gains(**by_signal),
+            neutral_rudder=self.neutral_rudder,
+            neutral_sway=self.neutral_sway,
         )
 
     @property
     def needed_signals(self) -> tuple[str, ...]:
-        """What it reads of the ship beside her heading: of `reads`, what has an effect."""
-        if not self.is_closed_form() or type(self).law is not linear_law:
+        """Signals of `reads` that have an effect."""
+        is_linear = self.is_closed_form() and type(self).law is linear_law
+        if not is_linear:
             return self.reads
-        gains = self.parameters.gains
-        return tuple(name for name in self.reads if getattr(gains, name) != 0.0)
+        gains = self.parameters.gains._asdict()
+        read = []
+        for name in self.reads:
+            if gains[name] != 0.0:
+                read.append(name)
+        return tuple(read)
 
     @classmethod
     def is_closed_form(cls) -> bool:
-        """Whether it steers by its `law` alone, which can be written in another language."""
+        """Return True if it steers by its `law` alone, which can be translated to C."""
         return cls.steer is Controller.steer
 
     def steer(self, seen: Signals, memory: Any) -> tuple[Number, Any]:
@@ -263,12 +272,14 @@ class Controller:
         episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[Action, Any]:
-        """See `Policy.predict`; the state is an array of shape (memory_size,) or (n, memory_size).
+        """See `Policy.predict`.
 
-        A controller that remembers nothing returns the state as given.
+        The state is an array of shape (memory_size,) or (n, memory_size). A controller
+        that remembers nothing returns the state as given.
         """
         given = checked_observation(observation, self.observation_names)
-        shape, size = given.shape[:-1], self.memory_size
+        shape = given.shape[:-1]
+        size = self.memory_size
         kept = recalled(state if size else None, episode_start, shape, size)
 
         seen = self.signals(np.atleast_2d(given))
@@ -284,14 +295,14 @@ class Controller:
         return action, state
 
     def signals(self, observations: Floats) -> Signals:
-        """What observations, shape (n_ships, n_observations), say of the ships, SI units."""
+        """Signals by observations of shape (n_ships, n_observations), SI units."""
         known = self.observed(observations)
+        sine = known["heading_error_sin"]
+        cosine = known["heading_error_cos"]
         return Signals(
             sway=known["sway"],
             yaw_rate=known["yaw_rate"],
-            heading_error=np.arctan2(
-                known["heading_error_sin"], known["heading_error_cos"]
-            ),
+            heading_error=np.arctan2(sine, cosine),
             rudder=known["rudder"],
             heading_error_integral=known["heading_error_integral"],
             surge=known["surge"],
@@ -305,44 +316,63 @@ class Controller:
         return dict(zip(self.observation_names, columns, strict=True))
 
     def reset(self) -> None:
-        """Return the state with which an episode begins: None, whatever the number of ships."""
+        """Return the state with which an episode begins: None."""
 
     def loop(self) -> Compensator:
-        """Linear controller for small motions, without limits, from which the margins are computed."""
+        """Linear controller for small motions, without limits, for the margins."""
         if type(self).law is linear_law:
             return Compensator.static(np.array(self.parameters.gains))
         return self._linearised()
 
     def _linearised(self) -> Compensator:
         """Law about straight running by central differences; the episode has begun."""
-        paths = leaves(self.memory_record)
-        varied = [path for path in paths if path != "started"]
-        n, size = len(SIGNALS), len(SIGNALS) + len(varied)
-        small = SMALL * np.concatenate([np.eye(size), -np.eye(size)])
-        signals = dict(zip(SIGNALS, small[:, :n].T, strict=True))
-        kept = dict(zip(varied, small[:, n:].T, strict=True))
+        n = len(SIGNALS)
+        remembered = np.array(leaves(self.memory_record)) != "started"
+        small = SMALL * np.eye(n + int(remembered.sum()))
+        above = self._response(small, remembered)
+        below = self._response(-small, remembered)
 
-        seen = Signals(
-            sway=self.neutral_sway + signals["sway"],
-            yaw_rate=signals["yaw_rate"],
-            heading_error=signals["heading_error"],
-            rudder=self.neutral_rudder + signals["rudder"],
-            heading_error_integral=signals["heading_error_integral"],
-            surge=np.zeros(2 * size),
-            rate_of_turn=np.zeros(2 * size),
-        )
-        started = np.ones(2 * size)
-        columns = [kept.get(path, started) for path in paths]
-        memory = from_columns(self.memory_record, iter(columns))
-
-        order, after = self.steer(seen, memory)
-        rows = to_rows(after, 2 * size)
-        outputs = [order, *(rows[:, paths.index(path)] for path in varied)]
-        above, below = np.split(np.column_stack(outputs), 2)
         slopes = (above - below).T / (2.0 * SMALL)
         return Compensator(
-            A=slopes[1:, n:], B=slopes[1:, :n], C=slopes[:1, n:], D=slopes[:1, :n]
+            A=slopes[1:, n:],
+            B=slopes[1:, :n],
+            C=slopes[:1, n:],
+            D=slopes[:1, :n],
         )
+
+    def _response(self, deviations: Floats, remembered: Flags) -> Floats:
+        """Order and memory of the law for small motions and memories.
+
+        Parameters
+        ----------
+        deviations : array of shape (n_ships, n_signals + n_remembered)
+            Of signals and memories from straight running.
+        remembered : bool array of shape (memory_size,)
+            The numbers of the memory that vary; the others are 1.
+
+        Returns
+        -------
+        array of shape (n_ships, 1 + n_remembered)
+        """
+        n_ships = len(deviations)
+        motions = Gains(*deviations.T[: len(SIGNALS)])
+        zero = np.zeros(n_ships)
+        seen = Signals(
+            sway=self.neutral_sway + motions.sway,
+            yaw_rate=motions.yaw_rate,
+            heading_error=motions.heading_error,
+            rudder=self.neutral_rudder + motions.rudder,
+            heading_error_integral=motions.heading_error_integral,
+            surge=zero,
+            rate_of_turn=zero,
+        )
+        kept = np.ones((len(remembered), n_ships))
+        kept[remembered] = deviations.T[len(SIGNALS) :]
+        memory = from_columns(self.memory_record, iter(kept))
+
+        order, after = self.steer(seen, memory)
+        rows = to_rows(after, n_ships)
+        return np.column_stack([order, rows[:, remembered]])
 
     def margins_on(self, model: ShipModel) -> Margins:
         """Margins and bandwidth of the same controller on another ship.
@@ -359,7 +389,9 @@ class Controller:
     def check_fits(
         self, names: Sequence[str], scales: Sequence[float], where: str = "observations"
     ) -> None:
-        """Refuse other quantities or scales than those designed for; InputError names the first difference.
+        """Refuse other quantities or scales than those designed for.
+
+        Raises InputError, which names the first difference.
 
         Parameters
         ----------
@@ -369,24 +401,22 @@ class Controller:
         where : str
             Start of the message.
         """
-        check_names(names[: len(self.observation_names)], self.observation_names, where)
-        check_scales(
-            names,
-            scales,
-            self.observation_scales,
-            where,
+        own_names = self.observation_names
+        check_names(names[: len(own_names)], own_names, where)
+        remedy = (
             f"controller '{self.name}' was designed on another ship or rudder limit"
             f" (model '{self.model_name}'); design one on this model with"
-            f" {type(self).__name__}.from_model",
+            f" {type(self).__name__}.from_model"
         )
+        check_scales(names, scales, self.observation_scales, where, remedy)
 
     def check_fits_model(self, model: ShipModel) -> None:
-        """Refuse a ship with other observation scales (length, service speed, rudder limit)."""
+        """Refuse a ship of another length, service speed or rudder limit."""
         scales = observation_scales(model).tolist()
         self.check_fits(OBSERVATION_NAMES, scales, f"model '{model.name}'")
 
     def save(self, path: str | Path) -> None:
-        """Write the controller as a JSON file, whose fields are listed in docs/deployment.md.
+        """Write the controller as a JSON file (fields: docs/deployment.md).
 
         Raises InputError if the folder does not exist or cannot be written.
         """
@@ -414,7 +444,10 @@ class Controller:
 
 
 def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> None:
-    """Refuse observations by other names or in another order; InputError names the first difference."""
+    """Refuse observations by other names or in another order.
+
+    Raises InputError, which names the first difference.
+    """
     for i, (name, wanted) in enumerate(zip(found, expected, strict=False)):
         if name != wanted:
             raise InputError(
@@ -423,9 +456,10 @@ def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> No
     if len(found) != len(expected):
         missing = [name for name in expected if name not in found]
         unknown = [name for name in found if name not in expected]
+        different = ", ".join(unknown + missing)
         raise InputError(
             f"{where}: expected {len(expected)} observations, got {len(found)}; in one"
-            f" and not in the other: {', '.join(unknown + missing)}"
+            f" and not in the other: {different}"
         )
 
 
@@ -436,11 +470,12 @@ def check_scales(
     where: str,
     remedy: str,
 ) -> None:
-    """Refuse observations in other scales than an agent's own; InputError names the first of them."""
+    """Refuse observations in other scales than an agent's own; InputError names one."""
     for name, scale, wanted in zip(names, scales, own, strict=False):
         if abs(scale - wanted) > SCALE_TOLERANCE * abs(wanted):
             raise InputError(
-                f"{where}: scale of '{name}': expected {wanted:g}, got {scale:g}: {remedy}"
+                f"{where}: scale of '{name}': expected {wanted:g}, got {scale:g}:"
+                f" {remedy}"
             )
 
 
@@ -452,4 +487,5 @@ def model_hash(model: ShipModel) -> str:
         model.particulars.to_dict(),
         model.steering.to_dict(),
     ]
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    text = json.dumps(content, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,4 +1,7 @@
-"""Read a controller file: JSON, versioned, checked field by field (docs/deployment.md lists the fields)."""
+"""Read a controller file: JSON, versioned, checked field by field.
+
+docs/deployment.md lists the fields.
+"""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -51,7 +54,10 @@ FIELDS = (
 
 
 def read_controller(content: Mapping[str, Any], where: str) -> Controller:
-    """Controller from what `Controller.to_dict` returned; InputError names the field at fault."""
+    """Make a controller from what `Controller.to_dict` returned.
+
+    Raises InputError, which names the field at fault.
+    """
     check_keys(content, content, where, ("format", "kind"))
     check_format(content, FORMAT, where)
     known_kinds = controller_kinds()
@@ -102,17 +108,20 @@ def _names(value: Any, where: str) -> tuple[str, ...]:
 
 
 def _gains(value: Any, design: type[Controller]) -> dict[str, float]:
-    names = design.gain_names or tuple(design.feedback)
-    table = check_table(value, "gains", names)
-    bounds = {name: design.bounds.get(name, ANY_NUMBER) for name in names}
+    bounds = {}
+    for name in design.gain_names or design.feedback:
+        bounds[name] = design.bounds.get(name, ANY_NUMBER)
+    table = check_table(value, "gains", bounds)
     return _numbers(table, bounds, "gains")
 
 
 def _design(value: Any, design: type[Controller]) -> dict[str, float]:
-    """How it was designed: any numbers, and those that its law needs within their bounds."""
-    gains = design.gain_names or tuple(design.feedback)
-    needed = {name: one for name, one in design.bounds.items() if name not in gains}
-    return _numbers(check_table(value, "design"), needed, "design")
+    """Design settings: any numbers, those that the law needs within their bounds."""
+    table = check_table(value, "design")
+    needed = dict(design.bounds)
+    for gain in design.gain_names or design.feedback:
+        needed.pop(gain, None)
+    return _numbers(table, needed, "design")
 
 
 def _parts(content: Mapping[str, Any], design: type[Controller]) -> dict[str, Any]:
@@ -136,52 +145,69 @@ def _parts(content: Mapping[str, Any], design: type[Controller]) -> dict[str, An
 def _arrays(value: Any, axes_of: Mapping[str, tuple[str | int, ...]]) -> dict[str, Any]:
     """Arrays of numbers, whose axes of one name have one length."""
     table = check_table(value, "arrays", axes_of, axes_of)
-    lengths: dict[str, int] = {}
+    lengths: dict[str, int] = {}  # of named axes
     arrays = {}
     for name, axes in axes_of.items():
-        shape = tuple(lengths.get(a) if isinstance(a, str) else a for a in axes)
-        array = check_array(table[name], shape, f"arrays.{name}")
-        if not _is_array_of(array, axes, lengths):
+        array = check_array(table[name], _shape(axes, lengths), f"arrays.{name}")
+        if not _has_axes(array, axes, lengths) or not _is_bounded(array):
+            expected = ", ".join(map(str, axes))
             raise InputError(
                 f"arrays.{name}: expected numbers of magnitude"
                 f" {ANY_NUMBER.largest:g} at most, of shape"
-                f" ({', '.join(map(str, axes))}), got shape {array.shape}; {REMEDY}"
+                f" ({expected}), got shape {array.shape}; {REMEDY}"
             )
         arrays[name] = array
     return arrays
 
 
-def _is_array_of(
+def _shape(
+    axes: tuple[str | int, ...], lengths: Mapping[str, int]
+) -> tuple[int | None, ...]:
+    """Lengths of axes; None for a named one whose length is not known yet."""
+    shape = []
+    for axis in axes:
+        length = lengths.get(axis) if isinstance(axis, str) else axis
+        shape.append(length)
+    return tuple(shape)
+
+
+def _has_axes(
     array: Floats, axes: tuple[str | int, ...], lengths: dict[str, int]
 ) -> bool:
-    """Whether an array has these axes and numbers within bounds; lengths of named axes are kept."""
+    """Compare an array's axes with those expected; keep lengths of named ones."""
     if array.ndim != len(axes) or array.size == 0:
         return False
     for axis, length in zip(axes, array.shape, strict=True):
         if isinstance(axis, str) and lengths.setdefault(axis, length) != length:
             return False
+    return True
+
+
+def _is_bounded(array: Floats) -> bool:
     return bool(np.abs(array).max() <= ANY_NUMBER.largest)
 
 
 def read_model(value: Any) -> dict[str, str]:
     """Name and hash of the model that an agent was made for, as its fields."""
     table = check_table(value, "model", ("name", "sha256"))
-    return {
-        "model_name": check_text(table.get("name"), "model.name"),
-        "model_sha256": check_text(table.get("sha256"), "model.sha256"),
-    }
+    name = check_text(table.get("name"), "model.name")
+    sha256 = check_text(table.get("sha256"), "model.sha256")
+    return {"model_name": name, "model_sha256": sha256}
 
 
 def read_scales(value: Any, names: tuple[str, ...]) -> tuple[float, ...]:
     """Observation scales, positive numbers, one for each name."""
-    if not isinstance(value, list) or len(value) != len(names):
-        got = len(value) if isinstance(value, list) else shown(value)
-        raise InputError(
-            f"observation_scales: expected {len(names)} numbers, got {got}"
-        )
+    where = "observation_scales"
+    n = len(names)
+    if not isinstance(value, list):
+        raise InputError(f"{where}: expected {n} numbers, got {shown(value)}")
+    if len(value) != n:
+        raise InputError(f"{where}: expected {n} numbers, got {len(value)}")
+
     scales = []
-    for i, (name, scale) in enumerate(zip(names, value, strict=True)):
-        scales.append(_number(scale, SCALE, f"observation_scales[{i}] ('{name}')"))
+    for i, name in enumerate(names):
+        scale = _number(value[i], SCALE, f"{where}[{i}] ('{name}')")
+        scales.append(scale)
     return tuple(scales)
 
 
@@ -192,23 +218,26 @@ def _number(value: Any, bounds: Bounds, where: str) -> float:
 def _numbers(
     table: Mapping[str, Any], needed: Mapping[str, Bounds], where: str
 ) -> dict[str, float]:
-    """Numbers by name, all that are needed among them; InputError names one that is missing."""
+    """Numbers by name; InputError names one that is needed and missing."""
     for name in needed:
         if name not in table:
             raise InputError(
                 f"{where}: expected {quoted(needed)}, got no '{name}'; {REMEDY}"
             )
-    return {
-        name: _number(number, needed.get(name, FINITE), f"{where}.{name}")
-        for name, number in table.items()
-    }
+    numbers = {}
+    for name, value in table.items():
+        bounds = needed.get(name, FINITE)
+        numbers[name] = _number(value, bounds, f"{where}.{name}")
+    return numbers
 
 
 def _margins(value: Any) -> Margins:
     """Margins; null is no limit."""
-    bounds = dict.fromkeys((margin.name for margin in fields(Margins)), FINITE)
-    table = check_table(value, "margins", bounds)
-    limited = {name: number for name, number in table.items() if number is not None}
-    unlimited = dict.fromkeys(table.keys() - limited.keys(), np.inf)
-    needed = {name: one for name, one in bounds.items() if name not in unlimited}
-    return Margins(**_numbers(limited, needed, "margins"), **unlimited)
+    needed = {margin.name: FINITE for margin in fields(Margins)}
+    table = dict(check_table(value, "margins", needed))
+    unlimited = {}
+    for name in list(table):
+        if table[name] is None:
+            del table[name], needed[name]
+            unlimited[name] = np.inf
+    return Margins(**_numbers(table, needed, "margins"), **unlimited)

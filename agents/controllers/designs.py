@@ -1,4 +1,4 @@
-"""Classical controllers by name, designed for the ship, the control interval and the path of a task."""
+"""Classical controllers by name, designed for the ship and the path of a task."""
 
 import json
 from collections.abc import Mapping
@@ -49,23 +49,23 @@ def design(
         `lq_`.
     """
     made: Any = controller_class(kind)
-    given = dict(settings or {})
+    own = dict(settings or {})
     if not made.has_autopilot:
         ship = _Ship(task.ship, model_hash(task.ship))
         interval = task.task.interval(task.ship)
-        return _designed(made, ship, interval, json.dumps(given, sort_keys=True))
+        return _designed(made, ship, interval, json.dumps(own, sort_keys=True))
     if not task.task.follows_path:
         raise no_path(kind, task)
 
-    inner, own = {}, {}
-    for name, value in given.items():
+    of_autopilot = {}
+    for name in list(own):
         if name.startswith(INNER):
-            inner[name.removeprefix(INNER)] = value
-        else:
-            own[name] = value
-    autopilot = design("lq", task, inner)
+            of_autopilot[name.removeprefix(INNER)] = own.pop(name)
     guide: Controller = made.from_model(
-        task.ship, autopilot=autopilot, task=task.task, **own
+        task.ship,
+        autopilot=design("lq", task, of_autopilot),
+        task=task.task,
+        **own,
     )
     return guide
 
@@ -83,18 +83,16 @@ def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:
     `NO_BASES`. Raises InputError if there are no such settings.
     """
     found = load_tuned(suite).get(task.name, {})
-    without: dict[str, tuple[str, ...]] = {"best": (), "base": NO_BASES}
-    if kind in without:
-        costs = {
-            name: float(one["cost"])
-            for name, one in found.items()
-            if name not in without[kind]
-        }
-        kind = min(costs, key=costs.__getitem__, default=kind)
+    if kind == "best":
+        kind = _cheapest(found, kind)
+    elif kind == "base":
+        bases = {name: one for name, one in found.items() if name not in NO_BASES}
+        kind = _cheapest(bases, kind)
+
     if not found:
         raise InputError(
-            f"controller: expected a task of suite '{suite}' with tuned controllers, got"
-            f" '{task.name}'"
+            f"controller: expected a task of suite '{suite}' with tuned controllers,"
+            f" got '{task.name}'"
         )
     if kind not in found:
         raise InputError(
@@ -102,6 +100,11 @@ def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:
             f" '{suite}', {quoted(found)}, got '{kind}'"
         )
     return design(kind, task, found[kind]["settings"])
+
+
+def _cheapest(found: Mapping[str, Any], default: str) -> str:
+    """Kind of controller that cost least."""
+    return min(found, key=lambda kind: float(found[kind]["cost"]), default=default)
 
 
 def no_path(kind: str, task: BenchmarkTask) -> InputError:
@@ -131,8 +134,8 @@ def design_base(name: str, task: BenchmarkTask) -> Controller | None:
     if name == "tuned":
         if not task.suite:
             raise InputError(
-                "base: expected a task of a suite for 'tuned', got none; give --task, or"
-                " another base"
+                "base: expected a task of a suite for 'tuned', got none; give --task,"
+                " or another base"
             )
         return tuned("base", task, task.suite)
     if name.endswith(".json"):

@@ -7,9 +7,9 @@ the autopilot. A guidance law is a law (`agents.controllers.law`) that reads
 the ship, rad.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,6 +48,14 @@ TURNS = (
 )
 
 
+class GuidanceMemory(NamedTuple):
+    """Memory of guidance, each number of shape (n_ships,)."""
+
+    law: Any  # of the guidance law
+    integral: Number  # rad s, of the heading error
+    started: Number  # 0 where an episode begins, else 1
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Guided(Controller):
     """A heading autopilot that is led along a path.
@@ -78,45 +86,43 @@ class Guided(Controller):
         gains: Mapping[str, float],
         design: Mapping[str, float],
     ) -> Self:
-        """Make guidance with these gains, SI units, of an autopilot, by default LQ, along a task's paths.
+        """Make guidance of an autopilot, by default LQ, along the paths of a task.
 
-        `design` is how the gains were found. Raises InputError if the autopilot was
-        designed for another ship, or the task does not show what guidance observes.
+        `gains`: SI units; `design`: how they were found. Raises InputError if the
+        autopilot was designed for another ship, or the task does not show what guidance
+        observes.
         """
         dt = task.interval(model)
-        like: Controller
         if autopilot is None:
             autopilot = LQ.from_model(model, dt=dt)
         if isinstance(autopilot, Controller):
-            like, margins = autopilot, autopilot.margins
+            like: Controller = autopilot
+            margins = autopilot.margins
         else:
-            like, margins = LQ.from_model(model, dt=dt), UNLIMITED
+            like = LQ.from_model(model, dt=dt)
+            margins = UNLIMITED
         like.check_fits_model(model)
 
-        scales = {quantity.name: quantity.scale for quantity in task.observed(model)}
-        for name in cls.observes:
-            if name not in scales:
-                raise InputError(
-                    f"task: expected one that shows '{name}', got '{task.name}'"
-                )
+        scales = _scales_of(task, model, cls.observes)
         task_lookahead = task.lookahead * model.particulars["length"]
+        design_model = {"ship": model} if cls.has_ship else {}
         return cls(
             gains={**gains, "task_lookahead": task_lookahead},
             neutral_rudder=like.neutral_rudder,
             neutral_sway=like.neutral_sway,
             margins=margins,
-            observation_scales=tuple(scales[name] for name in cls.observes),
+            observation_scales=scales,
             observation_names=cls.observes,
             model_name=like.model_name,
             model_sha256=like.model_sha256,
             design={"dt": dt, **design},
             autopilot=autopilot,
-            **({"ship": model} if cls.has_ship else {}),
+            **design_model,
         )
 
     @property
     def path_radius(self) -> float:
-        """Radius of the path's arcs, m; of no effect where guidance observes no turns."""
+        """Radius of the path's arcs, m; of no effect on guidance that sees no turns."""
         return self.gains.get("path_radius", 1.0)
 
     @classmethod
@@ -150,40 +156,57 @@ class Guided(Controller):
         episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[Action, Any]:
-        """See `Policy.predict`; it observes the path-following environment, and the state is a pair."""
+        """See `Policy.predict`; the state is a pair, of guidance and of the autopilot.
+
+        The observation is that of the path-following environment.
+        """
         given = checked_observation(observation, self.observation_names)
-        shape, size = given.shape[:-1], self.memory_size
+        rows = np.atleast_2d(given)
+        shape = given.shape[:-1]
         own, inner = (None, None) if state is None else state
-        kept = recalled(own, episode_start, shape, size + 2)
+        memory = self._recalled(own, episode_start, shape)
 
-        seen = self.path_signals(np.atleast_2d(given))
-        n_ships = len(seen.cross_track)
-        columns = kept.reshape(n_ships, size + 2).T
-        memory = from_columns(self.memory_record, iter(columns[:size]))
-        integral, started = columns[size], columns[size + 1]
-
-        course, memory = self.course(seen, memory)
+        seen = self.path_signals(rows)
+        course, law = self.course(seen, memory.law)
         error = wrapped(seen.heading_error + course)
         reach = self.observation_scales[N_HEADING - 1]
-        integral = gathered(integral, error, started, self.design["dt"], reach)
+        dt = self.design["dt"]
+        integral = gathered(memory.integral, error, memory.started, dt, reach)
 
-        heading = np.atleast_2d(given)[:, :N_HEADING]
-        shown = on_course(heading, error, integral, reach).reshape(*shape, N_HEADING)
-        starts = None if inner is None else started == 0.0
+        shown = on_course(rows[:, :N_HEADING], error, integral, reach)
+        shown = shown.reshape(*shape, N_HEADING)
+        starts = None if inner is None else memory.started == 0.0
         action, inner = self.autopilot.predict(shown, inner, starts, deterministic)
 
-        after = [to_rows(memory, n_ships), integral[:, None], np.ones((n_ships, 1))]
-        return action, (np.hstack(after).reshape(*shape, size + 2), inner)
+        after = GuidanceMemory(law, integral, started=np.ones(len(rows)))
+        own = to_rows(after, len(rows)).reshape(*shape, -1)
+        return action, (own, inner)
+
+    def _recalled(
+        self, own: Any, episode_start: Any, shape: tuple[int, ...]
+    ) -> GuidanceMemory:
+        """Memory of ships of a shape, zeros where an episode begins."""
+        size = self.memory_size + 2  # the integral and whether it started
+        kept = recalled(own, episode_start, shape, size)
+        columns = iter(kept.reshape(-1, size).T)
+        return GuidanceMemory(
+            law=from_columns(self.memory_record, columns),
+            integral=next(columns),
+            started=next(columns),
+        )
 
     def path_signals(self, observations: Floats) -> PathSignals:
-        """What observations, shape (n_ships, n_observations), say of ships and paths, SI units."""
+        """Signals by observations of shape (n_ships, n_observations), SI units."""
         known = self.observed(observations)
         zero = np.zeros(len(observations))
         error = np.arctan2(known["heading_error_sin"], known["heading_error_cos"])
         course_error = zero
-        if COURSE_ERROR[0] in known:
-            course_error = np.arctan2(*(known[name] for name in COURSE_ERROR))
+        if "course_error_sin" in known:
+            sine = known["course_error_sin"]
+            cosine = known["course_error_cos"]
+            course_error = np.arctan2(sine, cosine)
 
+        turns = Turns(*[known.get(name, zero) for name in TURNS])
         seen = PathSignals(
             heading_error=error,
             cross_track=known["cross_track"],
@@ -192,7 +215,7 @@ class Guided(Controller):
             surge=known["surge"],
             yaw_rate=known["yaw_rate"],
             rudder=known["rudder"],
-            turns=Turns(*(known.get(name, zero) for name in TURNS)),
+            turns=turns,
         )
         shown = shown_course(seen, self.gains["task_lookahead"], self.path_radius)
         return seen._replace(heading_error=wrapped(error - shown))
@@ -212,31 +235,50 @@ class Guided(Controller):
         return {**super().to_dict(), "autopilot": autopilot}
 
     def heading_autopilot(self, purpose: str) -> Controller:
-        """Autopilot, if it is one of this package; else InputError says that the purpose needs one."""
+        """Autopilot, for a purpose that needs one of this package, else InputError."""
         if isinstance(self.autopilot, Controller):
             return self.autopilot
+        name = type(self.autopilot).__name__
         raise InputError(
-            f"autopilot: expected a controller of shipgym for {purpose}, got"
-            f" {type(self.autopilot).__name__}"
+            f"autopilot: expected a controller of shipgym for {purpose}, got {name}"
         )
 
 
-def shown_course(seen: PathSignals, lookahead: float, path_radius: float) -> Number:
-    """Course that the environment's heading error refers to, against the path beside the ship, rad.
+def _scales_of(task: Task, model: ShipModel, names: Sequence[str]) -> tuple[float, ...]:
+    """Scales of observations of a task; InputError for one that it does not show."""
+    scales = {quantity.name: quantity.scale for quantity in task.observed(model)}
+    for name in names:
+        if name not in scales:
+            raise InputError(
+                f"task: expected one that shows '{name}', got '{task.name}'"
+            )
+    return tuple(scales[name] for name in names)
 
-    Line of sight with a lookahead, m, to the course of the path half of that ahead.
+
+def shown_course(seen: PathSignals, lookahead: float, path_radius: float) -> Number:
+    """Course that the environment's heading error refers to, rad.
+
+    Line of sight with a lookahead, m, to the course of the path half of that ahead; 0
+    is the direction of the path beside the ship.
     """
     ahead = bend(0.5 * lookahead, seen.turns, path_radius)
     return ahead - np.arctan2(seen.cross_track, lookahead)
 
 
 def bend(distance: float, turns: Turns, radius: float) -> Number:
-    """Change of the path's course over a distance ahead, rad; its turns are arcs of one radius, m."""
+    """Change of the path's course over a distance ahead, rad.
+
+    The turns are arcs of one radius, m.
+    """
     first = arc_turned(distance - turns.next_distance, turns.next_angle, radius)
     second = arc_turned(distance - turns.second_distance, turns.second_angle, radius)
     return first + second
 
 
-def arc_turned(way: Number, angle: Number, radius: float) -> Number:
-    """Change of course after a way, m, on an arc of an angle, rad; nothing before and no more after it."""
-    return np.sign(angle) * np.clip(way / radius, 0.0, np.abs(angle))
+def arc_turned(along_arc: Number, angle: Number, radius: float) -> Number:
+    """Change of course at a distance, m, along an arc of an angle, rad.
+
+    It is 0 before the arc, and the whole angle behind it.
+    """
+    turned = np.clip(along_arc / radius, 0.0, np.abs(angle))
+    return np.sign(angle) * turned

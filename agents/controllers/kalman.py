@@ -1,4 +1,4 @@
-"""Models that a Kalman filter for the course is designed on, and its stationary gain.
+"""Kalman filter for the course: its models and its stationary gain.
 
 Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 8.2.6
 (wave model) and 11.3 (Kalman filter).
@@ -21,7 +21,7 @@ WAVE_DAMPING = 0.1  # of the model of first-order motion
 
 @dataclass(frozen=True, eq=False)
 class KalmanFilter:
-    """What a Kalman filter takes the ship for, from one measurement to the next.
+    """Model of a ship from one measurement to the next, for a Kalman filter.
 
     Attributes
     ----------
@@ -40,10 +40,17 @@ class KalmanFilter:
     output: Floats
 
     def gain(self, noise: float) -> tuple[Floats, Floats]:
-        """Stationary gain, and standard deviations of the innovations, for noise in sea trials' sensors."""
-        deviations = noise * np.array([SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise])
+        """Stationary gain, and standard deviations of the innovations.
+
+        `noise`: in multiples of a sea trial's sensors.
+        """
+        of_sensors = [SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise]
+        deviations = noise * np.array(of_sensors)
         return kalman_gain(
-            self.transition, self.process, self.output, np.diag(deviations**2)
+            transition=self.transition,
+            process=self.process,
+            output=self.output,
+            noise=np.diag(deviations**2),
         )
 
 
@@ -65,8 +72,13 @@ def course_filter(
     transition, effect = rudder_response(model, about, dt)
     pushed = disturbance * effect
     pushed[ERROR] = np.hypot(pushed[ERROR], COURSE_NOISE)
-    output = np.eye(len(effect))[[YAW_RATE, ERROR]]
-    return KalmanFilter(transition, effect, np.diag(pushed**2), output)
+    states = np.eye(len(effect))
+    return KalmanFilter(
+        transition=transition,
+        effect=effect,
+        process=np.diag(pushed**2),
+        output=states[[YAW_RATE, ERROR]],
+    )
 
 
 def with_waves(
@@ -92,18 +104,21 @@ def with_waves(
 def rudder_response(
     model: ShipModel, about: StraightRunning, dt: float
 ) -> tuple[Floats, Floats]:
-    """Sway, yaw rate and heading error with the rudder held over an interval of `dt`, s.
+    """Sway, yaw rate and heading error with the rudder held over an interval.
 
-    Returns their transition, shape (3, 3), and the effect of the rudder angle, per rad,
-    shape (3,).
+    `dt`: length of the interval, s. Returns their transition, shape (3, 3), and the
+    effect of the rudder angle, per rad, shape (3,).
     """
     linear = np.column_stack(linearise(model, about))
-    A, B = sampled(linear, 0.0, dt)
-    return A[:RUDDER, :RUDDER], B[:RUDDER]
+    A, B = sampled(linear, lag=0.0, dt=dt)
+    motions = slice(RUDDER)  # without rudder and integral
+    return A[motions, motions], B[motions]
 
 
 def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floats]:
-    """First-order heading in waves as a lightly damped oscillator driven by noise (Fossen 2011, 8.2.6).
+    """First-order heading in waves as a lightly damped oscillator driven by noise.
+
+    Source: Fossen 2011, 8.2.6.
 
     Parameters
     ----------
@@ -124,10 +139,18 @@ def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floa
     from scipy.linalg import expm
 
     frequency = 2.0 * np.pi / period
-    flow = np.array([[0.0, 1.0], [-(frequency**2), -2.0 * WAVE_DAMPING * frequency]])
+    spring = frequency**2
+    damping = 2.0 * WAVE_DAMPING * frequency
+    flow = np.array(
+        [
+            [0.0, 1.0],
+            [-spring, -damping],
+        ]
+    )
     transition: Floats = np.asarray(expm(flow * dt), dtype=np.float64)
 
-    steady = deviation**2 * np.diag([1.0, frequency**2])
+    variances = [1.0, spring]  # of heading and rate, by that of the heading
+    steady = deviation**2 * np.diag(variances)
     left = transition @ steady @ transition.T
     return transition, steady - left
 
@@ -135,7 +158,7 @@ def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floa
 def kalman_gain(
     transition: Floats, process: Floats, output: Floats, noise: Floats
 ) -> tuple[Floats, Floats]:
-    """Stationary Kalman gain on the innovation, for the estimate at the time of the measurement.
+    """Stationary Kalman gain for the estimate at the time of the measurement.
 
     Parameters
     ----------
@@ -155,8 +178,10 @@ def kalman_gain(
     """
     import control
 
-    n = len(transition)
-    _, covariance, _ = control.dlqe(transition, np.eye(n), output, process, noise)
-    innovation = output @ covariance @ output.T + noise
-    gain: Floats = np.linalg.solve(innovation, output @ covariance).T
-    return gain, np.sqrt(np.diag(innovation))
+    disturbed = np.eye(len(transition))  # each state by its own disturbance
+    _, covariance, _ = control.dlqe(transition, disturbed, output, process, noise)
+    of_output = output @ covariance
+    innovation = of_output @ output.T + noise
+    gain: Floats = np.linalg.solve(innovation, of_output).T
+    deviations = np.sqrt(np.diag(innovation))
+    return gain, deviations

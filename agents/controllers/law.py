@@ -1,7 +1,7 @@
-"""What control laws are made of: named records, and functions of numbers that several laws share.
+"""Named records of control laws, and functions of numbers that several laws share.
 
-A law is a plain function `law(seen, memory, parameters) -> (order, memory)`: arithmetic,
-NumPy's functions of numbers, and `np.where`. Each number in its records is a float, or
+A law is a plain function `law(seen, memory, parameters) -> (order, memory)` of
+arithmetic, NumPy's functions and `np.where`. Each number in its records is a float, or
 an array with one entry for each of many ships, so that Python steers one ship or many;
 `agents.deployment.translator` writes the same function as C99. A memory of zeros is
 that of an episode that begins.

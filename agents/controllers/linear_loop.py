@@ -47,20 +47,24 @@ class SampledShip:
 
 
 def checked_interval(model: ShipModel, dt: float | None) -> float:
-    """Control interval of a design, s; by default that of the environments. InputError if it is not positive."""
+    """Control interval of a design, s, by default that of the environments.
+
+    Raises InputError if it is not positive.
+    """
     if dt is None:
         return control_interval(model)
     return check_number(dt, "dt", above=0.0)
 
 
 def rate_weight(model: ShipModel) -> float:
-    """Weight of the squared rudder rate for linear designs, s^2; that of the squared heading error is 1.
+    """Weight of the squared rudder rate for linear designs, s^2.
 
-    It is the environment's own, and as much again as makes the rudder's full rate cost
-    like a heading error of `FULL_RATE_ERROR`. A linear design knows no largest rate;
-    with a slow gear it would ask for far more and swing. The figure is measured: with
-    it both designs cost at most 1.06 times the best gains of a direct search on stable
-    and unstable ships whose gears need 0.3 to 6 ship lengths for 35 degrees.
+    That of the squared heading error is 1. It is the environment's own, and as much
+    again as makes the rudder's full rate cost like a heading error of
+    `FULL_RATE_ERROR`. A linear design knows no largest rate; with a slow gear it would
+    ask for far more and swing. The figure is measured: with it both designs cost at
+    most 1.06 times the best gains of a direct search on stable and unstable ships whose
+    gears need 0.3 to 6 ship lengths for 35 degrees.
     """
     of_environment = RATE_WEIGHT * model.travel_time**2
     of_gear = (FULL_RATE_ERROR / model.steering.rate) ** 2
@@ -68,11 +72,11 @@ def rate_weight(model: ShipModel) -> float:
 
 
 def sample_ship(model: ShipModel, dt: float, first_order: bool = False) -> SampledShip:
-    """Linearise a ship about straight running, with her steering gear, and sample her with the order held.
+    """Linearise a ship and her steering gear about straight running, and sample her.
 
-    A gear without lag is taken to reach its order within the interval. In a table with
-    a memory of yaw, the memory stands in the place of sway. Raises InputError if the
-    model has no straight course.
+    The order is held over each interval. A gear without lag is taken to reach its order
+    within the interval. In a table with a memory of yaw, the memory stands in the place
+    of sway. Raises InputError if the model has no straight course.
 
     Parameters
     ----------
@@ -86,16 +90,24 @@ def sample_ship(model: ShipModel, dt: float, first_order: bool = False) -> Sampl
     steering, rudder = linearise(model, about)
     if first_order:
         form = nomoto_of(steering, rudder)
-        steering = np.diag([-1.0 / model.travel_time, -1.0 / form.T])
-        rudder = np.array([[0.0], [form.rudder_effect]])
+        sway_decay = 1.0 / model.travel_time
+        yaw_decay = 1.0 / form.T
+        steering = np.diag([-sway_decay, -yaw_decay])
+        rudder = np.array(
+            [
+                [0.0],
+                [form.rudder_effect],
+            ]
+        )
 
     linear = np.column_stack([steering, rudder])
-    A, B = sampled(linear, model.steering.time_constant, dt)
-    return SampledShip(A, B[:, None], dt, about)
+    lag = model.steering.time_constant
+    A, B = sampled(linear, lag, dt)
+    return SampledShip(A=A, B=B[:, None], dt=dt, about=about)
 
 
 def sampled(linear: Floats, lag: float, dt: float) -> tuple[Floats, Floats]:
-    """Sample a ship with her steering gear, the order held over a control interval (zero-order hold).
+    """Sample a ship with her steering gear by a zero-order hold of the rudder order.
 
     Parameters
     ----------
@@ -114,19 +126,22 @@ def sampled(linear: Floats, lag: float, dt: float) -> tuple[Floats, Floats]:
     from scipy.linalg import expm
 
     order = RUDDER + 1  # behind sway, yaw rate, heading error and rudder
+    by_motions = linear[:, :ERROR]
+    by_rudder = linear[:, ERROR]
     flow = np.zeros((order + 1, order + 1))
-    flow[:ERROR, :ERROR] = linear[:, :ERROR]
+    flow[:ERROR, :ERROR] = by_motions
     flow[ERROR, YAW_RATE] = -1.0
     if lag > 0.0:
-        flow[:ERROR, RUDDER] = linear[:, ERROR]
+        flow[:ERROR, RUDDER] = by_rudder
         flow[RUDDER, RUDDER] = -1.0 / lag
         flow[RUDDER, order] = 1.0 / lag
     else:
-        flow[:ERROR, order] = linear[:, ERROR]
+        flow[:ERROR, order] = by_rudder
 
     held = expm(dt * flow)
-    A = np.zeros((len(SIGNALS), len(SIGNALS)))
-    B = np.zeros(len(SIGNALS))
+    n = len(SIGNALS)
+    A = np.zeros((n, n))
+    B = np.zeros(n)
     A[:order, :order] = held[:order, :order]
     B[:order] = held[:order, order]
     if lag == 0.0:

@@ -1,4 +1,4 @@
-"""Line of sight over any heading autopilot, and its integral and adaptive forms against drift.
+"""Line of sight over any heading autopilot, and integral and adaptive forms of it.
 
 Sources: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 10.3
 (line of sight); Borhaug, Pavlov & Pettersen 2008, Integral LOS control for path
@@ -52,22 +52,26 @@ def line_of_sight(
 def integral_line_of_sight(
     seen: PathSignals, memory: DriftMemory, p: LineOfSightGains
 ) -> tuple[Number, DriftMemory]:
-    """Course with an integral of the cross-track error (Borhaug et al. 2008, eq. 12)."""
-    offset = seen.cross_track + memory.drift
+    """Course with integral of the cross-track error (Borhaug et al. 2008, eq. 12)."""
+    cross_track = seen.cross_track
+    offset = cross_track + memory.drift
     squared = p.lookahead * p.lookahead
-    rate = p.integral * squared * seen.cross_track / (offset * offset + squared)
+    rate = p.integral * squared * cross_track / (offset * offset + squared)
+    drift = memory.drift + p.dt * rate
     course = -np.arctan2(offset, p.lookahead)
-    return course, DriftMemory(memory.drift + p.dt * rate)
+    return course, DriftMemory(drift)
 
 
 def adaptive_line_of_sight(
     seen: PathSignals, memory: DriftMemory, p: LineOfSightGains
 ) -> tuple[Number, DriftMemory]:
     """Course less an estimate of the crab angle (Fossen 2023)."""
-    distance = np.hypot(p.lookahead, seen.cross_track)
-    rate = p.integral * seen.cross_track / distance
-    course = -memory.drift - np.arctan2(seen.cross_track, p.lookahead)
-    return course, DriftMemory(memory.drift + p.dt * rate)
+    cross_track = seen.cross_track
+    distance = np.hypot(p.lookahead, cross_track)
+    rate = p.integral * cross_track / distance
+    drift = memory.drift + p.dt * rate
+    course = -memory.drift - np.arctan2(cross_track, p.lookahead)
+    return course, DriftMemory(drift)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -139,13 +143,18 @@ class LineOfSight(Guided):
         """Parameters of its law."""
         gains = self.gains
         return LineOfSightGains(
-            gains["lookahead"], gains["integral"], self.design["dt"]
+            lookahead=gains["lookahead"],
+            integral=gains["integral"],
+            dt=self.design["dt"],
         )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IntegralLineOfSight(LineOfSight):
-    """Line of sight with an integral of the cross-track error, which goes to 0 in a steady current."""
+    """Line of sight with an integral of the cross-track error.
+
+    The error goes to 0 in a steady current.
+    """
 
     kind: ClassVar[str] = "ilos"
     law: ClassVar[Law] = staticmethod(integral_line_of_sight)
@@ -154,7 +163,10 @@ class IntegralLineOfSight(LineOfSight):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AdaptiveLineOfSight(LineOfSight):
-    """Line of sight minus an estimate of the crab angle (Fossen 2023); a steady current leaves no error."""
+    """Line of sight minus an estimate of the crab angle (Fossen 2023).
+
+    A steady current leaves no error.
+    """
 
     kind: ClassVar[str] = "alos"
     law: ClassVar[Law] = staticmethod(adaptive_line_of_sight)

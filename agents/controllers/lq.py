@@ -1,4 +1,4 @@
-"""LQ autopilot: the feedback that minimises the environment's own cost on the linearised ship.
+"""LQ autopilot: the feedback that minimises the environment's cost on a linear ship.
 
 Source: Norrbin 1972, On the added resistance due to steering on a straight course (the
 cost); van Amerongen 1982, Adaptive steering of ships, chapter 3; Anderson & Moore 1990,
@@ -100,7 +100,8 @@ class LQ(Controller):
             measured = sample_ship(model, interval, first_order=True)
 
         design = {"integral_lengths": float(integral_lengths), **cost.weights}
-        return cls.designed(model, ship, lq_gains(measured, cost), design)
+        gains = lq_gains(measured, cost)
+        return cls.designed(model, ship, gains, design)
 
 
 def steering_cost(
@@ -109,14 +110,17 @@ def steering_cost(
     rudder_weight: float,
     rate_weight_s2: float | None,
 ) -> SteeringCost:
-    """Cost of a ship from the arguments of `LQ.from_model`; InputError if one is out of its range."""
+    """Cost from the arguments of `LQ.from_model`; InputError if one is out of range."""
     check_number(integral_lengths, "integral_lengths", above=0.0)
     check_number(rudder_weight, "rudder_weight", above=0.0)
     if rate_weight_s2 is None:
         rate_weight_s2 = rate_weight(model)
     check_number(rate_weight_s2, "rate_weight_s2", above=0.0)
-    integral_time = integral_lengths * model.travel_time
-    return SteeringCost(float(rudder_weight), float(rate_weight_s2), integral_time)
+    return SteeringCost(
+        rudder_weight=float(rudder_weight),
+        rate_weight_s2=float(rate_weight_s2),
+        integral_time=integral_lengths * model.travel_time,
+    )
 
 
 def lq_gains(ship: SampledShip, cost: SteeringCost) -> dict[str, float]:
@@ -126,28 +130,30 @@ def lq_gains(ship: SampledShip, cost: SteeringCost) -> dict[str, float]:
 
 
 def lq_gain(ship: SampledShip, cost: SteeringCost) -> Floats:
-    """Gain G of order = -G x that minimises the steering cost on the sampled linear ship, shape (5,).
-
-    The reward of an interval is on the state at its end: z[k] = C x[k] + D order[k] =
-    (error, weighted rudder, weighted rudder rate, weighted integral)[k + 1], which
-    couples state and input (Anderson & Moore 1990, chapter 3).
-    """
+    """Gain G of order = -G x that minimises the steering cost on a ship, shape (5,)."""
     import control  # here, because it takes a second to import
 
-    weights = np.array(
-        [
-            1.0,
-            np.sqrt(cost.rudder_weight),
-            np.sqrt(cost.rate_weight_s2) / ship.dt,
-            1.0 / cost.integral_time,
-        ]
-    )
-    rows = [ERROR, RUDDER, RUDDER, INTEGRAL]
-    next_state, next_by_order = ship.A[rows], ship.B[rows]
-    next_state[2, RUDDER] -= 1.0  # the change of the rudder
-    C = weights[:, None] * next_state
-    D = weights[:, None] * next_by_order
-
-    plant = control.ss(ship.A, ship.B, np.eye(len(SIGNALS)), 0.0, ship.dt)
+    C, D = cost_outputs(ship, cost)
+    measured = np.eye(len(SIGNALS))
+    plant = control.ss(ship.A, ship.B, measured, 0.0, ship.dt)
     gain, _, _ = control.lqr(plant, C.T @ C, D.T @ D, C.T @ D)
     return np.asarray(gain, dtype=np.float64).reshape(-1)
+
+
+def cost_outputs(ship: SampledShip, cost: SteeringCost) -> tuple[Floats, Floats]:
+    """Outputs z[k] = C x[k] + D order[k] whose squares add up to the steering cost.
+
+    The reward of an interval is on the state at its end, z[k] = (error, weighted
+    rudder, weighted rudder rate, weighted integral)[k + 1], which couples state and
+    input (Anderson & Moore 1990, chapter 3).
+    """
+    of_rudder = np.sqrt(cost.rudder_weight)
+    of_rate = np.sqrt(cost.rate_weight_s2) / ship.dt
+    of_integral = 1.0 / cost.integral_time
+    weights = np.array([[1.0], [of_rudder], [of_rate], [of_integral]])
+
+    rows = [ERROR, RUDDER, RUDDER, INTEGRAL]
+    rate = 2
+    next_state = ship.A[rows]
+    next_state[rate, RUDDER] -= 1.0  # the change of the rudder
+    return weights * next_state, weights * ship.B[rows]

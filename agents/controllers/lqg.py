@@ -1,4 +1,4 @@
-"""LQG autopilot: LQ feedback of what a Kalman filter makes of noisy heading and yaw rate.
+"""LQG autopilot: LQ feedback of a Kalman filter on noisy heading and yaw rate.
 
 Sources: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 11.3
 (Kalman filter and wave model for heading autopilots) and 13.1 (separation); Anderson &
@@ -100,50 +100,60 @@ def lqg_law(seen: Signals, memory: LQGMemory, p: Observer) -> tuple[Number, LQGM
     rudder = seen.rudder - p.neutral_rudder
     before = np.where(memory.started > 0.0, memory.rudder, rudder)
     expected = predicted(seen, memory, 0.5 * (before + rudder), p)
+    now = updated(seen, expected, p)
 
-    off_rate = seen.yaw_rate - product(p.output.yaw_rate, expected)
-    off_heading = wrapped(
-        seen.heading_error - product(p.output.heading_error, expected)
+    gains = p.gains
+    order = (
+        p.neutral_rudder
+        + gains.rudder * rudder
+        + gains.heading_error_integral * seen.heading_error_integral
+        + gains.sway * now.sway
+        + gains.yaw_rate * now.yaw_rate
+        + gains.heading_error * now.heading_error
     )
+    return order, LQGMemory(now, rudder, 1.0)
+
+
+def updated(seen: Signals, expected: Motions, p: Observer) -> Motions:
+    """States expected at this measurement, corrected by it."""
+    expected_rate = product(p.output.yaw_rate, expected)
+    expected_error = product(p.output.heading_error, expected)
+    off_rate = seen.yaw_rate - expected_rate
+    off_heading = wrapped(seen.heading_error - expected_error)
     # a jump that neither noise nor the ship can make is a new course
     jump = np.where(np.abs(off_heading) > p.new_course, off_heading, 0.0)
     innovation = Measured(off_rate, off_heading - jump)
 
     gain = p.kalman
     heading_error = expected.heading_error + jump
-    now = Motions(
-        expected.sway + corrected(gain.sway, innovation),
-        expected.yaw_rate + corrected(gain.yaw_rate, innovation),
-        wrapped(heading_error + corrected(gain.heading_error, innovation)),
-        expected.wave_heading + corrected(gain.wave_heading, innovation),
-        expected.wave_yaw_rate + corrected(gain.wave_yaw_rate, innovation),
+    to_error = corrected(gain.heading_error, innovation)
+    return Motions(
+        sway=expected.sway + corrected(gain.sway, innovation),
+        yaw_rate=expected.yaw_rate + corrected(gain.yaw_rate, innovation),
+        heading_error=wrapped(heading_error + to_error),
+        wave_heading=expected.wave_heading + corrected(gain.wave_heading, innovation),
+        wave_yaw_rate=expected.wave_yaw_rate
+        + corrected(gain.wave_yaw_rate, innovation),
     )
-    order = (
-        p.neutral_rudder
-        + p.gains.rudder * rudder
-        + p.gains.heading_error_integral * seen.heading_error_integral
-        + p.gains.sway * now.sway
-        + p.gains.yaw_rate * now.yaw_rate
-        + p.gains.heading_error * now.heading_error
-    )
-    return order, LQGMemory(now, rudder, 1.0)
 
 
 def predicted(
     seen: Signals, memory: LQGMemory, mean_rudder: Number, p: Observer
 ) -> Motions:
     """States expected at this measurement; where an episode begins, those measured."""
-    rows, effect, before = p.transition, p.effect, memory.motions
-    began = memory.started > 0.0
+    rows = p.transition
+    effect = p.effect
+    before = memory.motions
     sway = product(rows.sway, before) + effect.sway * mean_rudder
     yaw_rate = product(rows.yaw_rate, before) + effect.yaw_rate * mean_rudder
     error = product(rows.heading_error, before) + effect.heading_error * mean_rudder
+    began = memory.started > 0.0
     return Motions(
-        np.where(began, sway, 0.0),
-        np.where(began, yaw_rate, seen.yaw_rate),
-        np.where(began, error, seen.heading_error),
-        product(rows.wave_heading, before),
-        product(rows.wave_yaw_rate, before),
+        sway=np.where(began, sway, 0.0),
+        yaw_rate=np.where(began, yaw_rate, seen.yaw_rate),
+        heading_error=np.where(began, error, seen.heading_error),
+        wave_heading=product(rows.wave_heading, before),
+        wave_yaw_rate=product(rows.wave_yaw_rate, before),
     )
 
 
@@ -168,9 +178,10 @@ def corrected(row: Measured, innovation: Measured) -> Number:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LQG(Controller):
-    """LQ feedback of estimated motions: a stationary Kalman filter on noisy heading and yaw rate.
+    """LQ feedback of motions that a Kalman filter estimates.
 
-    The measured sway speed is not used. The filter's states are sway, yaw rate and
+    The filter is stationary and reads noisy heading and yaw rate; the measured sway
+    speed is not used. Its states are sway, yaw rate and
     heading error and, where a wave period is given, heading and rate of the first-order
     motion, which is not answered with rudder. Its input is the measured rudder, so
     limits of the steering gear do not mislead it. A jump of the heading error that
@@ -217,9 +228,8 @@ class LQG(Controller):
                 f"arrays.input: expected one of {N_STATES} states, got {n}"
             )
         trusted = np.eye(n) - self.kalman @ self.output
-        check_stable(
-            trusted @ self.transition, "arrays: transition of the Kalman filter"
-        )
+        of_errors = trusted @ self.transition
+        check_stable(of_errors, "arrays: transition of the Kalman filter")
 
     @classmethod
     def from_model(
@@ -295,14 +305,20 @@ class LQG(Controller):
     @cached_property
     def parameters(self) -> Observer:
         """Parameters of its law; without a wave model those of the wave are zero."""
-        missing = max(N_STATES) - len(self.input)
-        more_states = (0, missing)
-        as_it_is = (0, 0)
+        n = len(self.input)
+        transition = np.zeros((len(Transition._fields), len(Motions._fields)))
+        transition[:n, :n] = self.transition
+        effect = np.zeros(len(Motions._fields))
+        effect[:n] = self.input
+        kalman = np.zeros((len(KalmanGains._fields), len(Measured._fields)))
+        kalman[:n] = self.kalman
+        output = np.zeros((len(Output._fields), len(Motions._fields)))
+        output[:, :n] = self.output
         return Observer(
-            transition=_filled(Transition, np.pad(self.transition, more_states)),
-            effect=_filled(Motions, np.pad(self.input, more_states)),
-            kalman=_filled(KalmanGains, np.pad(self.kalman, (more_states, as_it_is))),
-            output=_filled(Output, np.pad(self.output, (as_it_is, more_states))),
+            transition=_filled(Transition, transition),
+            effect=_filled(Motions, effect),
+            kalman=_filled(KalmanGains, kalman),
+            output=_filled(Output, output),
             gains=self.linear_feedback.gains,
             neutral_rudder=self.neutral_rudder,
             new_course=self.design["new_course_rad"],
@@ -311,4 +327,5 @@ class LQG(Controller):
 
 def _filled(record: Record, numbers: Floats) -> Any:
     """Record of the numbers of an array, row by row."""
-    return from_columns(record, iter(numbers.ravel().tolist()))
+    flat = numbers.ravel().tolist()
+    return from_columns(record, iter(flat))

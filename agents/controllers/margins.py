@@ -1,4 +1,4 @@
-"""How robust a loop is: a linear controller around a sampled ship, its margins and its bandwidth."""
+"""Margins and bandwidth of the loop of a linear controller around a sampled ship."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
@@ -54,7 +54,7 @@ class Responses(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Compensator:
-    """Linear controller with a memory: s[k + 1] = A s[k] + B y[k], order[k] = C s[k] + D y[k].
+    """Linear controller: s[k + 1] = A s[k] + B y[k], order[k] = C s[k] + D y[k].
 
     Attributes
     ----------
@@ -73,19 +73,32 @@ class Compensator:
     @classmethod
     def static(cls, gains: Floats) -> Self:
         """Feedback without a memory, by gains of shape (5,)."""
-        nothing = np.zeros((0, 0))
-        return cls(nothing, np.zeros((0, len(SIGNALS))), np.zeros((1, 0)), gains[None])
+        return cls(
+            A=np.zeros((0, 0)),
+            B=np.zeros((0, len(SIGNALS))),
+            C=np.zeros((1, 0)),
+            D=gains[None],
+        )
 
     def closed_loop(self, ship: SampledShip) -> Floats:
-        """Matrix of ship and memory from one control interval to the next, without an integral not used."""
-        motions = [ship.A + ship.B @ self.D, ship.B @ self.C]
-        whole = np.block([motions, [self.B, self.A]])
+        """Matrix of ship and memory from one control interval to the next.
 
-        feeds_integral_back = np.any(self.D[:, INTEGRAL]) or np.any(self.B[:, INTEGRAL])
-        if feeds_integral_back:
+        An integral that is not fed back is left out.
+        """
+        steered = ship.A + ship.B @ self.D
+        by_memory = ship.B @ self.C
+        whole = np.block(
+            [
+                [steered, by_memory],
+                [self.B, self.A],
+            ]
+        )
+        feeds_order = self.D[:, INTEGRAL].any()
+        feeds_memory = self.B[:, INTEGRAL].any()
+        if feeds_order or feeds_memory:
             return whole
-        kept = np.arange(len(whole)) != INTEGRAL
-        return whole[np.ix_(kept, kept)]
+        without = np.delete(whole, INTEGRAL, axis=0)
+        return np.delete(without, INTEGRAL, axis=1)
 
     def margins(self, ship: SampledShip, name: str) -> Margins:
         """Stability margins and bandwidth with a ship.
@@ -96,7 +109,8 @@ class Compensator:
         """
         import control
 
-        pole = largest_pole(self.closed_loop(ship))
+        matrix = self.closed_loop(ship)
+        pole = largest_pole(matrix)
         if pole >= 1.0:
             raise InputError(
                 f"{name}: expected sampled poles below 1, got {pole:.4f}: the closed"
@@ -110,46 +124,52 @@ class Compensator:
         response = self.responses(ship, omega)
         loop: Any = control.frd(response.broken, omega)
         found = control.stability_margins(loop, returnall=True)
-        gains, phases, _, _, crossings, _ = (np.asarray(one, float) for one in found)
+        gains = np.asarray(found[0], dtype=float)
+        phases = np.asarray(found[1], dtype=float)
+        crossings = np.asarray(found[4], dtype=float)
 
         delays = np.radians(phases % 360.0) / crossings
         return Margins(
-            gain_margin=float(min(gains[gains > 1.0], default=np.inf)),
-            phase_margin_deg=float(min(np.abs(phases), default=np.inf)),
-            delay_margin_s=float(min(delays, default=np.inf)),
+            gain_margin=np.min(gains[gains > 1.0], initial=np.inf).item(),
+            phase_margin_deg=np.min(np.abs(phases), initial=np.inf).item(),
+            delay_margin_s=np.min(delays, initial=np.inf).item(),
             bandwidth_rad_s=bandwidth(omega, np.abs(response.following)),
-            lowest_gain=float(max(gains[gains < 1.0], default=0.0)),
+            lowest_gain=np.max(gains[gains < 1.0], initial=0.0).item(),
         )
 
     def responses(self, ship: SampledShip, omega: Floats) -> Responses:
         """Frequency responses at frequencies in rad/s, shape (n_frequencies,)."""
         z = np.exp(1j * omega * ship.dt)
         motions = _transfer(ship.A, ship.B, z)[:, :, 0].T
-        orders = (self.C @ _transfer(self.A, self.B, z) + self.D)[:, 0].T
+        of_memory = self.C @ _transfer(self.A, self.B, z)
+        orders = (of_memory + self.D)[:, 0].T
 
         by_rudder = orders[RUDDER] * motions[RUDDER]
         by_motions = (orders * motions).sum(axis=0) - by_rudder
-        set_point = orders[ERROR] + orders[INTEGRAL] * ship.dt / (z - 1.0)
+        open_gear = 1.0 - by_rudder
+
+        integral = ship.dt / (z - 1.0)  # of the set-point
+        set_point = orders[ERROR] + orders[INTEGRAL] * integral
         return Responses(
-            broken=-by_motions / (1.0 - by_rudder),
-            following=-motions[ERROR] * set_point / (1.0 - by_rudder - by_motions),
+            broken=-by_motions / open_gear,
+            following=-motions[ERROR] * set_point / (open_gear - by_motions),
         )
 
 
 def largest_pole(matrix: Floats) -> float:
-    """Largest size of the eigenvalues of a sampled linear system; below 1 it is stable."""
+    """Largest size of the eigenvalues of a sampled system; below 1 it is stable."""
     return float(np.abs(np.linalg.eigvals(matrix)).max())
 
 
 def check_stable(matrix: Floats, where: str) -> None:
-    """Refuse a sampled linear system that grows by itself, with an InputError that begins with `where`."""
+    """Refuse a sampled linear system that grows by itself with an InputError."""
     pole = largest_pole(matrix)
     if not pole < 1.0:
         raise InputError(f"{where}: expected sampled poles below 1, got {pole:.4g}")
 
 
 def bandwidth(omega: Floats, size: Floats) -> float:
-    """Frequency at which a response first falls to -3 dB; the last one where it does not.
+    """Frequency at which a response first falls to -3 dB; the last one if it does not.
 
     `omega`: rad/s, rising; `size`: of the response there, both of shape (n,). Between
     two frequencies it is straight over their logarithm.
@@ -164,14 +184,13 @@ def bandwidth(omega: Floats, size: Floats) -> float:
 
     low, high = size[first], size[first - 1]
     share = (high - half_power) / (high - low)
-    logarithm = np.log(omega[first - 1]) + share * np.log(
-        omega[first] / omega[first - 1]
-    )
-    return float(np.exp(logarithm))
+    last_above = omega[first - 1]
+    step = np.log(omega[first] / last_above)
+    return float(np.exp(np.log(last_above) + share * step))
 
 
 def _transfer(A: Floats, B: Floats, z: Complexes) -> Complexes:
     """(z I - A)^-1 B at all z, shape (n_z, ...) as B."""
-    shifted = z[:, None, None] * np.eye(len(A)) - A
-    inputs = np.broadcast_to(B.astype(np.complex128), (len(z), *B.shape))
-    return np.linalg.solve(shifted, inputs).astype(np.complex128)
+    diagonal = z[:, None, None] * np.eye(len(A))
+    inputs = B.astype(np.complex128)[None]
+    return np.linalg.solve(diagonal - A, inputs).astype(np.complex128)

@@ -1,6 +1,7 @@
-"""Observations and memories of many ships: arrays with one row a ship, and records of columns."""
+"""Observations and memories of many ships: arrays of rows and records of columns."""
 
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -18,32 +19,39 @@ def size_of(record: Record) -> int:
 
 
 def from_columns(record: Record, columns: Iterator[Any]) -> Any:
-    """Record of columns, taken in the order of its fields; a table takes one for each of its rows."""
+    """Record of columns in the order of its fields; a table takes one for each row."""
     values: list[Any] = []
     for kind in field_types(record).values():
         if is_record(kind):
-            values.append(from_columns(kind, columns))
+            value = from_columns(kind, columns)
         elif is_table(kind):
-            values.append(np.array([next(columns) for _ in range(kind.rows)]))
+            value = np.array(list(islice(columns, kind.rows)))
         else:
-            values.append(next(columns))
+            value = next(columns)
+        values.append(value)
     return record(*values)
 
 
 def to_rows(record: Any, n_ships: int) -> Floats:
-    """Array of shape (n_ships, size) from a record of columns, or of numbers that all ships share."""
-    rows = np.zeros((n_ships, size_of(type(record))))
-    for i, column in enumerate(_columns(record)):
+    """Array of shape (n_ships, size) from a record of columns.
+
+    A number in place of a column is that of all ships.
+    """
+    columns = list(_columns(record))
+    rows = np.zeros((n_ships, len(columns)))
+    for i, column in enumerate(columns):
         rows[:, i] = column
     return rows
 
 
 def selected(record: Any, index: Any) -> Any:
     """Record of some of the ships, by an index of its columns."""
-    values = [
-        selected(value, index) if isinstance(value, tuple) else value[..., index]
-        for value in record
-    ]
+    values = []
+    for value in record:
+        if isinstance(value, tuple):
+            values.append(selected(value, index))
+        else:
+            values.append(value[..., index])
     return type(record)(*values)
 
 
@@ -60,8 +68,9 @@ def _columns(record: Any) -> Iterator[Any]:
 def checked_observation(
     observation: ArrayLike, names: Sequence[str], dtype: type[np.generic] = np.float64
 ) -> NDArray[Any]:
-    """Observations as an array of shape (n_ships, n) or (n,), with no fewer entries than names."""
-    given, n = np.asarray(observation, dtype=dtype), len(names)
+    """Observations of shape (n_ships, n) or (n,), with no fewer entries than names."""
+    given = np.asarray(observation, dtype=dtype)
+    n = len(names)
     if given.ndim not in (1, 2) or given.shape[-1] < n:
         raise InputError(
             f"observation: expected shape ({n},) or (n, {n}) or more entries, of which"
@@ -71,24 +80,32 @@ def checked_observation(
 
 
 def checked_starts(starts: Any, shape: tuple[int, ...]) -> Flags:
-    """Flags of episodes that begin, in the shape of the ships; None is nowhere, one flag is for all."""
-    flags = np.asarray(False if starts is None else starts, dtype=np.bool_)
+    """Flags of episodes that begin, in the shape of the ships.
+
+    None means that none begins; one flag counts for all ships.
+    """
+    if starts is None:
+        return np.zeros(shape, dtype=np.bool_)
+    flags = np.asarray(starts, dtype=np.bool_)
     n = int(np.prod(shape))
-    if flags.size not in (1, n):
-        raise InputError(
-            f"episode_start: expected one for each of {n} ships, got {flags.size}"
-        )
-    return np.full(shape, flags.reshape(shape if flags.size == n else ()))
+    if flags.size == n:
+        return np.array(flags.reshape(shape))
+    if flags.size == 1:
+        return np.full(shape, flags.item())
+    raise InputError(
+        f"episode_start: expected one for each of {n} ships, got {flags.size}"
+    )
 
 
 def checked_memory(memory: Any, shape: tuple[int, ...]) -> NDArray[Any]:
-    """Memory of ships, which must have a shape: not that of other ships or another controller."""
-    if np.shape(memory) != shape:
+    """Memory of ships; InputError for another shape."""
+    array = np.asarray(memory)
+    if array.shape != shape:
         raise InputError(
             f"state: expected shape {shape}, what the last predict of as many ships"
-            f" returned, or None where episodes begin, got {np.shape(memory)}"
+            f" returned, or None where episodes begin, got {array.shape}"
         )
-    return np.asarray(memory)
+    return array
 
 
 def recalled(memory: Any, starts: Any, shape: tuple[int, ...], size: int) -> Floats:
@@ -105,15 +122,20 @@ def recalled(memory: Any, starts: Any, shape: tuple[int, ...], size: int) -> Flo
     """
     if memory is None:
         return np.zeros((*shape, size))
-    kept = np.array(checked_memory(memory, (*shape, size)), dtype=np.float64)
-    kept[checked_starts(starts, shape)] = 0.0
+    given = checked_memory(memory, (*shape, size))
+    kept = np.array(given, dtype=np.float64)
+    begins = checked_starts(starts, shape)
+    kept[begins] = 0.0
     return kept
 
 
 def on_course(
     seen: NDArray[Any], error: Floats, integral: Floats, reach: float
 ) -> NDArray[np.float32]:
-    """Observations of ships with another heading error, rad, and its integral of at most `reach`, rad s."""
+    """Observations of ships with another heading error and its integral.
+
+    `error`: rad; `integral`: rad s, of at most `reach`.
+    """
     shown = seen.astype(np.float32)
     replaced = {
         "heading_error_sin": np.sin(error),

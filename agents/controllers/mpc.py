@@ -30,7 +30,7 @@ from agents.controllers.law import (
 )
 from agents.controllers.lq import LQ
 from agents.controllers.memory import selected
-from agents.controllers.path_ahead import FAR, PathAhead, turned
+from agents.controllers.path_ahead import FAR, PathAhead, Place, turned
 from agents.controllers.wheel_over import WheelOver, course_over_ground
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
@@ -77,7 +77,7 @@ class PathCosts(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MPC(WheelOver):
-    """Wheel-over whose course is improved by sampling on the design model, its `ship`."""
+    """Wheel-over whose course is improved by sampling on the design model `ship`."""
 
     kind: ClassVar[str] = "mpc"
     has_ship: ClassVar[bool] = True
@@ -147,8 +147,9 @@ class MPC(WheelOver):
 
     @cached_property
     def costs(self) -> PathCosts:
-        """What a step of a plan costs."""
-        return PathCosts(*(self.design[name] for name in PathCosts._fields))
+        """Weights of the cost of a step."""
+        weights = {name: self.design[name] for name in PathCosts._fields}
+        return PathCosts(**weights)
 
     def to_dict(self) -> dict[str, Any]:
         """Content of the file, with the design model."""
@@ -162,9 +163,11 @@ class MPC(WheelOver):
         plans = memory.plan.T.copy()
         due = np.flatnonzero(memory.steps == 0.0)
         if len(due):
-            rest = np.column_stack([plans[due, 1:], np.zeros(len(due))])
-            ships = selected(seen, due)
-            plans[due] = self.improved(ships, selected(current, due), rest)
+            rest = np.zeros((len(due), KNOTS))
+            rest[:, :-1] = plans[due, 1:]
+            seen_due = selected(seen, due)
+            current_due = selected(current, due)
+            plans[due] = self.improved(seen_due, current_due, rest)
 
         course, _ = type(self).law(seen, Nothing(), self.parameters)
         course = course + added(plans, memory.steps / KNOT_STEPS)
@@ -172,23 +175,29 @@ class MPC(WheelOver):
         return course, PlanMemory(steps, current, plans.T)
 
     def estimated_current(self, seen: PathSignals, known: Current) -> Current:
-        """Current by the last estimate, turned with the ship, and by the observed course over ground."""
-        ahead, aside = turned(
-            known.ahead, known.aside, seen.yaw_rate * self.design["dt"]
-        )
+        """Estimate the current by the last estimate, which turns with the ship.
+
+        The observed course over ground corrects it.
+        """
+        swung = seen.yaw_rate * self.design["dt"]
+        ahead, aside = turned(known.ahead, known.aside, swung)
         # across the course over ground there is no velocity over ground
         _, across = turned(seen.surge + ahead, seen.sway + aside, seen.drift)
         error = CURRENT_GAIN * across
         return Current(
-            ahead + error * np.sin(seen.drift), aside - error * np.cos(seen.drift)
+            ahead=ahead + error * np.sin(seen.drift),
+            aside=aside - error * np.cos(seen.drift),
         )
 
     def improved(self, seen: PathSignals, current: Current, plans: Floats) -> Floats:
-        """Plans improved by the cross-entropy method, rad, shape (n_ships, KNOTS); the first knot stays."""
-        best, least = plans, np.full(len(plans), np.inf)
+        """Improve plans by the cross-entropy method, rad, shape (n_ships, KNOTS).
+
+        The first knot stays as it is.
+        """
+        best = plans
+        least = np.full(len(plans), np.inf)
         mean = plans
         deviation = np.full(plans.shape, self.design["deviation"])
-        ships = np.arange(len(plans))
         for drawn in draws():
             candidates = mean[:, None] + deviation[:, None] * drawn
             candidates[:, 0] = best
@@ -196,53 +205,61 @@ class MPC(WheelOver):
             candidates[:, :, 0] = best[:, :1]
 
             costs = self.simulated_costs(seen, current, candidates)
-            order = np.argsort(costs, axis=1, kind="stable")
-            cheapest = order[:, 0]
-            better = costs[ships, cheapest] < least
-            best = np.where(better[:, None], candidates[ships, cheapest], best)
-            least = np.minimum(least, costs[ships, cheapest])
-
-            elites = np.take_along_axis(candidates, order[:, :ELITES, None], axis=1)
+            elites = cheapest(candidates, costs)
             mean = elites.mean(axis=1)
             deviation = np.maximum(elites.std(axis=1), LEAST_DEVIATION)
+
+            cost = costs.min(axis=1)
+            cheaper = cost < least
+            best = np.where(cheaper[:, None], elites[:, 0], best)
+            least = np.minimum(least, cost)
         return best
 
     def simulated_costs(
         self, seen: PathSignals, current: Current, plans: Floats
     ) -> Floats:
-        """Costs of plans of shape (n_ships, n_plans, KNOTS) on the design model, shape (n_ships, n_plans)."""
+        """Costs of plans on the design model, shape (n_ships, n_plans).
+
+        `plans`: rad, shape (n_ships, n_plans, KNOTS).
+        """
         n_ships, n_plans, _ = plans.shape
         lanes = np.repeat(np.arange(n_ships), n_plans)
-        seen, plan = selected(seen, lanes), plans.reshape(-1, KNOTS)
+        plan = plans.reshape(-1, KNOTS)
+        seen = selected(seen, lanes)
         models = DesignModels(self, seen, selected(current, lanes))
         path = PathAhead(seen.turns, self.gains["path_radius"])
-        weights, length = self.costs, self.ship.particulars["length"]
-        full_way = self.ship.particulars["speed"] * models.dt
 
         cost = np.zeros(len(plan))
         place = path.fix(models.x, models.y)
         for step in range(int(self.design["horizon_steps"])):
-            before, rudder_before = place.along_track, models.rudder
-            course = place.course + course_over_ground(
+            along_before = place.along_track
+            rudder_before = models.rudder
+            own_course = place.course + course_over_ground(
                 place.cross_track, place.turns, self.parameters
             )
-            models.steer(course + added(plan, step * COARSE / KNOT_STEPS))
+            knots = step * COARSE / KNOT_STEPS
+            models.steer(own_course + added(plan, knots))
 
             place = path.fix(models.x, models.y)
-            progress = np.clip((place.along_track - before) / full_way, -1.0, 1.0)
+            progress = place.along_track - along_before
             moved = np.abs(models.rudder - rudder_before)
-            cost += (place.cross_track / weights.corridor) ** 2 - progress
-            cost += weights.rudder * models.rudder**2
-            cost += weights.rudder_travel / COARSE * moved
-            cost += weights.rudder_rate * (moved * length / full_way) ** 2
-            if weights.roll > 0.0:
-                cost += weights.roll * models.read("phi") ** 2
+            add_step_cost(cost, self, models, place, progress, moved)
         cost = np.where(np.isfinite(cost), cost, np.inf)
         return cost.reshape(n_ships, n_plans)
 
 
+def cheapest(plans: Floats, costs: Floats) -> Floats:
+    """Cheapest plans of each ship, shape (n_ships, ELITES, KNOTS), the best first."""
+    order = np.argsort(costs, axis=1, kind="stable")
+    elites = order[:, :ELITES, None]
+    return np.take_along_axis(plans, elites, axis=1)
+
+
 def path_costs(task: Task, model: ShipModel) -> PathCosts:
-    """What a step costs in a task; without what it charges for reversals, grounding and extrapolation."""
+    """Weights of the cost of a step in a task.
+
+    What it charges for reversals, grounding and extrapolation is left out.
+    """
     travel_weight = getattr(task.settings, "rudder_travel_weight", 0.0)
     return PathCosts(
         corridor=task.corridor * model.particulars["length"],
@@ -255,9 +272,10 @@ def path_costs(task: Task, model: ShipModel) -> PathCosts:
 
 @lru_cache(maxsize=1)
 def draws() -> Floats:
-    """Deviations of plans from their mean, in standard deviations, shape (ROUNDS, CANDIDATES, KNOTS).
+    """Deviations of plans from their mean, in standard deviations.
 
-    They are always the same, each with its mirror image.
+    The shape is (ROUNDS, CANDIDATES, KNOTS). They are always the same, each with its
+    mirror image.
     """
     random = np.random.default_rng(0)
     half = random.standard_normal((ROUNDS, CANDIDATES // 2, KNOTS))
@@ -265,16 +283,20 @@ def draws() -> Floats:
 
 
 def added(plans: Floats, at: Any) -> Floats:
-    """Course that plans, shape (n, KNOTS), add at a number of knots from their beginning, rad, shape (n,).
+    """Course that plans add at a number of knots from their beginning, rad, shape (n,).
 
-    Straight between knots; `at` is one number, or one for each plan.
+    `plans`: shape (n, KNOTS), straight between knots; `at`: one number, or one for each
+    plan.
     """
     distance = np.abs(np.asarray(at)[..., None] - np.arange(KNOTS))
-    return np.asarray((plans * np.maximum(1.0 - distance, 0.0)).sum(axis=-1))
+    share = np.maximum(1.0 - distance, 0.0)
+    return np.asarray((plans * share).sum(axis=-1))
 
 
 class DesignModels:
-    """Design models from where ships are observed, steered by LQ to courses over ground in a current.
+    """Design models from where ships are observed, in a steady current.
+
+    LQ steers them to courses over ground.
 
     Attributes
     ----------
@@ -287,20 +309,19 @@ class DesignModels:
     """
 
     def __init__(self, guide: MPC, seen: PathSignals, current: Current) -> None:
+        n = len(seen.cross_track)
         self.dt = COARSE * guide.design["dt"]
         self.time = 0.0
         self.feedback = guide.heading_autopilot("MPC").linear_feedback
         self.crab_share = guide.gains["crab_share"]
         self.rudder_limit = guide.ship.steering.limit
-        self.engine = _engine(
-            guide.ship, len(seen.cross_track), self.dt, guide.design["water_depth"]
-        )
+        self.engine = _engine(guide.ship, n, self.dt, guide.design["water_depth"])
 
         heading = -seen.heading_error
         self.north, self.east = turned(current.ahead, current.aside, -heading)
-        self.engine.reset(np.zeros(len(heading), dtype=np.int64))
+        self.engine.reset(np.zeros(n, dtype=np.int64))
         start = {
-            "x": np.zeros_like(heading),
+            "x": np.zeros(n),
             "y": seen.cross_track,
             "psi": heading,
             "u": seen.surge,
@@ -324,18 +345,21 @@ class DesignModels:
 
     def steer(self, course: Floats) -> None:
         """Take one step towards a course over ground."""
-        heading, surge, sway = self.read("psi"), self.read("u"), self.read("v")
+        heading = self.read("psi")
+        surge = self.read("u")
+        sway = self.read("v")
         ahead, aside = turned(self.north, self.east, heading)
-        # angle from the way through the water to that over ground
-        drift = np.arctan2(
-            surge * aside - sway * ahead,
-            surge * (surge + ahead) + sway * (sway + aside),
-        )
+        # angle from the velocity through the water to that over ground
+        across = surge * aside - sway * ahead
+        along = surge * (surge + ahead) + sway * (sway + aside)
+        drift = np.arctan2(across, along)
+
+        to_steer = course - self.crab_share * drift
         zero = np.zeros_like(heading)
         seen = Signals(
             sway=sway,
             yaw_rate=self.read("r"),
-            heading_error=wrapped(course - self.crab_share * drift - heading),
+            heading_error=wrapped(to_steer - heading),
             rudder=self.rudder,
             heading_error_integral=zero,
             surge=surge,
@@ -346,6 +370,32 @@ class DesignModels:
         self.engine.advance()
         self.time += self.dt
         self._observe()
+
+
+def add_step_cost(
+    cost: Floats,
+    guide: MPC,
+    models: DesignModels,
+    place: Place,
+    progress: Floats,
+    moved: Floats,
+) -> None:
+    """Add the cost of a step to that of each ship so far.
+
+    `progress`: along the path, m; `moved`: of the rudder, rad.
+    """
+    weights = guide.costs
+    particulars = guide.ship.particulars
+    full_way = particulars["speed"] * models.dt
+    off_track = place.cross_track / weights.corridor
+    rudder_rate = moved * particulars["length"] / full_way
+
+    cost += off_track**2 - np.clip(progress / full_way, -1.0, 1.0)
+    cost += weights.rudder * models.rudder**2
+    cost += weights.rudder_travel / COARSE * moved
+    cost += weights.rudder_rate * rudder_rate**2
+    if weights.roll > 0.0:
+        cost += weights.roll * models.read("phi") ** 2
 
 
 @lru_cache(maxsize=8)

@@ -12,13 +12,21 @@ FAR = 1e9  # m, of a turn that is behind
 INNERMOST = 0.1
 
 
-class Place(NamedTuple):
-    """Where ships are on their path, each number of shape (n,)."""
+class PathPoint(NamedTuple):
+    """Points of ships in coordinates of their path, each number of shape (n,)."""
 
     along_track: Floats  # m, since they observed it
     cross_track: Floats  # m, to starboard of it
     course: Floats  # rad, of the path there
-    turns: Turns  # that are to come
+
+
+class Place(NamedTuple):
+    """Points of ships in coordinates of their path, and the turns to come."""
+
+    along_track: Floats  # m, since they observed it
+    cross_track: Floats  # m, to starboard of it
+    course: Floats  # rad, of the path there
+    turns: Turns
 
 
 class Leg(NamedTuple):
@@ -31,64 +39,115 @@ class Leg(NamedTuple):
     reached: Flags  # whether the ship has come to it
 
 
-class PathAhead:
-    """Legs joined by arcs of one radius, m, from beside each ship on; the path's course there is 0."""
+class Arc:
+    """Arc between two legs, for many ships; it keeps which of them have passed it.
 
-    def __init__(self, turns: Turns, radius: float) -> None:
+    Attributes
+    ----------
+    distance : array of shape (n,)
+        Along the leg before it to where it begins, m.
+    turn : array of shape (n,)
+        Change of course, rad, to starboard positive; 0 if there is no turn.
+    radius : float
+        m.
+    """
+
+    def __init__(self, distance: Floats, turn: Floats, radius: float) -> None:
+        self.distance = distance
+        self.turn = turn
+        self.angle = np.abs(turn)
+        self.side = np.where(turn < 0.0, -1.0, 1.0)
         self.radius = radius
-        self.arcs = [
-            (turns.next_distance, turns.next_angle),
-            (turns.second_distance, turns.second_angle),
-        ]
-        self.passed = [
-            np.zeros(len(turns.next_angle), dtype=np.bool_) for _ in self.arcs
-        ]
+        self.passed = np.zeros(len(turn), dtype=np.bool_)
 
-    def fix(self, x: Floats, y: Floats) -> Place:
-        """Where ships are now; x along the path and y to starboard of it since they observed it, m."""
-        nowhere = np.zeros_like(x)
-        everywhere = np.ones(len(x), dtype=np.bool_)
-        leg = Leg(x, y, begins=nowhere, course=nowhere, reached=everywhere)
-        along, cross, course = x, y, nowhere
-        to_come: list[Floats] = []
+    def fix(self, leg: Leg, before: PathPoint) -> tuple[PathPoint, Floats, Floats]:
+        """Points of the ships that are on the arc, of the others those from before.
 
-        for number, (distance, turn) in enumerate(self.arcs):
-            side, angle = np.where(turn < 0.0, -1.0, 1.0), np.abs(turn)
-            past = leg.x - distance
-            to_centre = self.radius - side * leg.y
-            swept = np.arctan2(past, np.maximum(to_centre, INNERMOST * self.radius))
+        Also the distance to the arc, m, and the angle that is left of it, rad.
+        """
+        radius = self.radius
+        past = leg.x - self.distance
+        to_centre = radius - self.side * leg.y
+        swept = np.arctan2(past, np.maximum(to_centre, INNERMOST * radius))
 
-            entered = leg.reached & (past > 0.0) & (angle > 0.0)
-            passed = self.passed[number] | (entered & (swept >= angle))
-            self.passed[number] = passed
-            on_arc = entered & ~passed
-            bent = np.where(on_arc, swept, 0.0)
-            off = side * (self.radius - np.hypot(past, to_centre))
-            along = np.where(on_arc, leg.begins + distance + self.radius * bent, along)
-            cross = np.where(on_arc, off, cross)
-            course = np.where(on_arc, leg.course + side * bent, course)
-            to_come.append(np.where(passed, FAR, np.maximum(-past, 0.0)))
-            to_come.append(np.where(passed, 0.0, side * (angle - bent)))
+        entered = leg.reached & (past > 0.0) & (self.angle > 0.0)
+        leaves = entered & (swept >= self.angle)
+        passed = self.passed | leaves
+        self.passed = passed
+        on_arc = entered & ~passed
+        bent = np.where(on_arc, swept, 0.0)
 
-            leg = self._next_leg(leg, distance, turn, passed)
-            along = np.where(passed, leg.begins + leg.x, along)
-            cross = np.where(passed, leg.y, cross)
-            course = np.where(passed, leg.course, course)
-        return Place(along, cross, course, Turns(*to_come))
+        from_centre = np.hypot(past, to_centre)
+        here = PathPoint(
+            along_track=leg.begins + self.distance + radius * bent,
+            cross_track=self.side * (radius - from_centre),
+            course=leg.course + self.side * bent,
+        )
+        ahead = np.maximum(-past, 0.0)
+        left = self.side * (self.angle - bent)
+        return (
+            chosen(on_arc, here, before),
+            np.where(passed, FAR, ahead),
+            np.where(passed, 0.0, left),
+        )
 
-    def _next_leg(self, leg: Leg, distance: Floats, turn: Floats, passed: Flags) -> Leg:
-        """Leg behind an arc that begins at a distance, m, for the ships that have passed it."""
-        side, angle = np.where(turn < 0.0, -1.0, 1.0), np.abs(turn)
-        ahead = leg.x - distance - self.radius * np.sin(angle)
-        aside = leg.y - side * self.radius * (1.0 - np.cos(angle))
-        x, y = turned(ahead, aside, turn)
+    def next_leg(self, leg: Leg) -> Leg:
+        """Leg behind the arc, for the ships that have passed it."""
+        passed = self.passed
+        radius = self.radius
+        ahead = leg.x - self.distance - radius * np.sin(self.angle)
+        aside = leg.y - self.side * radius * (1.0 - np.cos(self.angle))
+        x, y = turned(ahead, aside, self.turn)
+        course = leg.course + self.turn
         return Leg(
             x=np.where(passed, x, leg.x),
             y=np.where(passed, y, leg.y),
-            begins=leg.begins + distance + self.radius * angle,
-            course=np.where(passed, leg.course + turn, leg.course),
+            begins=leg.begins + self.distance + radius * self.angle,
+            course=np.where(passed, course, leg.course),
             reached=leg.reached & passed,
         )
+
+
+class PathAhead:
+    """Legs joined by arcs of one radius, m, ahead of many ships.
+
+    It begins beside each ship, where the path's course is 0.
+    """
+
+    def __init__(self, turns: Turns, radius: float) -> None:
+        self.arcs = [
+            Arc(turns.next_distance, turns.next_angle, radius),
+            Arc(turns.second_distance, turns.second_angle, radius),
+        ]
+
+    def fix(self, x: Floats, y: Floats) -> Place:
+        """Places of ships at x along the path and y to starboard of it, m.
+
+        The axes are those of the path where the ships observed it.
+        """
+        nowhere = np.zeros_like(x)
+        everywhere = np.ones(len(x), dtype=np.bool_)
+        leg = Leg(x, y, begins=nowhere, course=nowhere, reached=everywhere)
+        point = PathPoint(along_track=x, cross_track=y, course=nowhere)
+        to_come: list[Floats] = []
+
+        for arc in self.arcs:
+            point, to_arc, left = arc.fix(leg, point)
+            to_come += [to_arc, left]
+
+            leg = arc.next_leg(leg)
+            behind = PathPoint(leg.begins + leg.x, leg.y, leg.course)
+            point = chosen(arc.passed, behind, point)
+        return Place(*point, turns=Turns(*to_come))
+
+
+def chosen(flags: Flags, yes: PathPoint, no: PathPoint) -> PathPoint:
+    """Points of one record where flags are set, of another elsewhere."""
+    return PathPoint(
+        along_track=np.where(flags, yes.along_track, no.along_track),
+        cross_track=np.where(flags, yes.cross_track, no.cross_track),
+        course=np.where(flags, yes.course, no.course),
+    )
 
 
 def turned(ahead: Floats, aside: Floats, angle: Floats) -> tuple[Floats, Floats]:

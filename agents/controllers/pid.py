@@ -28,7 +28,7 @@ FREQUENCY_SHARE = 0.85
 
 @dataclass(frozen=True, eq=False)
 class PID(Controller):
-    """Proportional, integral and derivative feedback of the heading error, with neutral rudder.
+    """Proportional, integral and derivative feedback of the heading error.
 
     order = neutral rudder + proportional * error + integral * (integral of error) -
     derivative * yaw rate.
@@ -121,34 +121,38 @@ def optimal_poles(response: Nomoto, rate_weight: float) -> Poles:
     import control  # here, because it takes a second to import
 
     # states: yaw rate, heading error, rudder
+    yaw_damping = 1.0 / response.T
     A = np.array(
         [
-            [-1.0 / response.T, 0.0, response.rudder_effect],
+            [-yaw_damping, 0.0, response.rudder_effect],
             [-1.0, 0.0, 0.0],
             [0.0, 0.0, 0.0],
         ]
     )
     B = np.array([[0.0], [0.0], [1.0]])
-    weights = np.diag([0.0, 1.0, RUDDER_WEIGHT])
-    _, _, poles = control.lqr(A, B, weights, np.array([[rate_weight]]))
+    Q = np.diag([0.0, 1.0, RUDDER_WEIGHT])
+    R = np.array([[rate_weight]])
+    _, _, poles = control.lqr(A, B, Q, R)
 
     pair = poles[np.abs(poles.imag) > 0.0]
     if len(pair) == 0:
-        slowest = np.argsort(np.abs(poles))[:2]
-        pair = poles[slowest]
+        slowest_first = np.argsort(np.abs(poles))
+        pair = poles[slowest_first[:2]]
+
     # (s - p1) (s - p2) = s^2 + 2 damping frequency s + frequency^2
     frequency = float(np.sqrt(np.prod(pair).real))
-    damping = float(-np.sum(pair).real / (2.0 * frequency))
-    return Poles(frequency, damping)
+    decay = float(-np.sum(pair).real)
+    return Poles(frequency, damping=decay / (2.0 * frequency))
 
 
 def place_poles(
     response: Nomoto, lag: float, frequency: float, damping: float, slow: float
 ) -> dict[str, float]:
-    """PID gains for a pair of poles and a slow one on Nomoto's first-order form with a gear.
+    """PID gains for a pair of poles and a slow one on Nomoto's form with a gear.
 
-    The characteristic polynomial s^2 (s + 1/T) (lag s + 1) + K/T (Kd s^2 + Kp s + Ki)
-    has a fixed sum of roots, which leaves the fourth to the gear.
+    The form is that of first order. The characteristic polynomial
+    s^2 (s + 1/T) (lag s + 1) + K/T (Kd s^2 + Kp s + Ki) has a fixed sum of roots, which
+    leaves the fourth to the gear.
 
     Parameters
     ----------
@@ -165,14 +169,17 @@ def place_poles(
     dict of str to float
         `proportional` (rad/rad), `integral` (1/s), `derivative` (s).
     """
-    fourth = 1.0 / lag + 1.0 / response.T - 2.0 * damping * frequency - slow
-    pair = [1.0, 2.0 * damping * frequency, frequency**2]
+    sum_of_roots = 1.0 / lag + 1.0 / response.T
+    sum_of_pair = 2.0 * damping * frequency
+    fourth = sum_of_roots - sum_of_pair - slow
+    pair = [1.0, sum_of_pair, frequency**2]
     others = np.polymul([1.0, slow], [1.0, fourth])
     _, _, quadratic, linear, constant = np.polymul(pair, others).tolist()
 
+    own_damping = 1.0 / (lag * response.T)  # of ship and gear
     per_rudder = lag / response.rudder_effect
     return {
         "proportional": linear * per_rudder,
         "integral": constant * per_rudder,
-        "derivative": (quadratic - 1.0 / (lag * response.T)) * per_rudder,
+        "derivative": (quadratic - own_damping) * per_rudder,
     }

@@ -1,4 +1,4 @@
-"""Controllers by the names that `--controllers`, files and the setting `base` know them by."""
+"""Controllers by their names in `--controllers`, files and the setting `base`."""
 
 from importlib import import_module
 from typing import TypeVar
@@ -28,10 +28,10 @@ _REGISTERED: dict[str, type[Controller]] = {}
 
 
 def register_controller(controller: type[C]) -> type[C]:
-    """Make a controller known by its `kind` to `--controllers`, files, the benchmark and learning.
+    """Register a controller by its `kind`.
 
-    Raises InputError if it is not such a class, or there is another controller of that
-    kind.
+    The command line, files, the benchmark and learning then know it. Raises InputError
+    if it is not such a class, or there is another controller of that kind.
 
     Parameters
     ----------
@@ -83,12 +83,12 @@ def controller_kinds() -> tuple[str, ...]:
 
 
 def registered_modules() -> tuple[str, ...]:
-    """Modules of the controllers that users registered, for other processes to import."""
+    """Modules of users' controllers, for other processes to import."""
     return tuple({controller.__module__: None for controller in _REGISTERED.values()})
 
 
 def controller_class(kind: str, where: str = "controller") -> type[Controller]:
-    """Class of a kind of controller; InputError if there is none, with the nearest known one."""
+    """Class of a kind of controller; InputError, with the nearest kind, if unknown."""
     check_choice(kind, controller_kinds(), where)
     if kind in _REGISTERED:
         return _REGISTERED[kind]

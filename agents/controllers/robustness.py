@@ -1,13 +1,12 @@
-"""How certain a controller's margins are: its loop with ships drawn from a model's covariance."""
+"""Uncertainty of a controller's margins: its loop with ships drawn at random."""
 
 from collections.abc import Sequence
-from contextlib import suppress
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.controllers.controller import Controller
+from agents.controllers.controller import UNKNOWN_MARGINS, Controller
 from agents.controllers.margins import Margins
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
@@ -35,7 +34,7 @@ class MarginUncertainty:
     def quantiles(
         self, share: Sequence[float] = (0.05, 0.5, 0.95)
     ) -> dict[str, Floats]:
-        """Quantiles of each figure over ships with a stable loop; InputError if none is stable."""
+        """Quantiles over ships with a stable loop; InputError if none is stable."""
         if not self.stable.any():
             raise InputError(
                 "margins: expected a stable loop on at least one ship, got none"
@@ -64,10 +63,22 @@ def margin_uncertainty(
     """
     if not models:
         raise InputError("models: expected at least one, got none")
-    names = [figure.name for figure in fields(Margins)]
-    table = np.full((len(models), len(names)), np.nan)
-    for row, model in zip(table, models, strict=True):
-        with suppress(InputError):
-            row[:] = astuple(controller.margins_on(model))
-    by_name = dict(zip(names, table.T.copy(), strict=True))
-    return MarginUncertainty(controller.margins, by_name, ~np.isnan(table[:, 0]))
+    found = []
+    stable = []
+    for model in models:
+        try:
+            found.append(controller.margins_on(model))
+            stable.append(True)
+        except InputError:
+            found.append(UNKNOWN_MARGINS)
+            stable.append(False)
+
+    by_name = {}
+    for figure in fields(Margins):
+        values = [getattr(margins, figure.name) for margins in found]
+        by_name[figure.name] = np.array(values)
+    return MarginUncertainty(
+        nominal=controller.margins,
+        by_name=by_name,
+        stable=np.array(stable),
+    )

@@ -1,8 +1,8 @@
-"""Rate-of-turn autopilot: proportional-integral control of the yaw rate with feed-forward from steady turns.
+"""Rate-of-turn autopilot: PI control of the yaw rate, with feed-forward.
 
-An ordered rate of turn is steered as it is. Without one it keeps a heading: the rate is
-in proportion to the heading error, and no larger than the rate at which courses are
-changed.
+The feed-forward is the rudder of the steady turn at that rate. An ordered rate of turn
+is steered as it is. Without one it keeps a heading: the rate is in proportion to the
+heading error, and no larger than the rate at which courses are changed.
 
 Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 12.2
 (pole placement, reference feed-forward); Bech 1968, The reverse spiral test (rudder as
@@ -60,7 +60,7 @@ class TurnRateMemory(NamedTuple):
 def turn_rate_law(
     seen: Signals, memory: TurnRateMemory, p: TurnRateGains
 ) -> tuple[Number, TurnRateMemory]:
-    """Steer the ordered rate of turn, or, where it is 0, the rate that the heading error asks for."""
+    """Steer the ordered rate of turn, or, if it is 0, one for the heading error."""
     to_heading = np.clip(seen.heading_error / p.heading_time, -p.rate, p.rate)
     wanted = np.where(seen.rate_of_turn == 0.0, to_heading, seen.rate_of_turn)
     before = np.where(memory.started > 0.0, memory.followed, seen.yaw_rate)
@@ -70,8 +70,14 @@ def turn_rate_law(
     steady = np.interp(followed, p.rates, p.rudders)
     order = steady + p.proportional * off + memory.integral
 
-    more = np.where(np.abs(order) < p.rudder_limit, p.integral * p.dt * off, 0.0)
-    return order, TurnRateMemory(memory.integral + more, followed, 1.0)
+    is_free = np.abs(order) < p.rudder_limit  # else the integral would wind up
+    more = np.where(is_free, p.integral * p.dt * off, 0.0)
+    memory = TurnRateMemory(
+        integral=memory.integral + more,
+        followed=followed,
+        started=1.0,
+    )
+    return order, memory
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -184,16 +190,15 @@ class TurnRate(Controller):
 
 
 def rate_gains(form: Nomoto, frequency: float) -> dict[str, float]:
-    """Proportional and integral gain that place the poles of the yaw rate on Nomoto's first-order form.
+    """PI gains that place the poles of the yaw rate on Nomoto's first-order form.
 
     s^2 + (1 / T + K / T Kp) s + K / T Ki = s^2 + 2 damping frequency s + frequency^2;
     a ship that is damped by herself keeps some proportional gain.
     """
-    damping = max(2.0 * DAMPING * frequency - 1.0 / form.T, frequency)
-    return {
-        "proportional": damping / form.rudder_effect,
-        "integral": frequency**2 / form.rudder_effect,
-    }
+    missing = 2.0 * DAMPING * frequency - 1.0 / form.T
+    damping = max(missing, frequency)
+    effect = form.rudder_effect
+    return {"proportional": damping / effect, "integral": frequency**2 / effect}
 
 
 class SteadyTurns(NamedTuple):
@@ -209,41 +214,54 @@ class SteadyTurns(NamedTuple):
 
 
 def steady_turns(model: ShipModel, neutral: float) -> SteadyTurns:
-    """Tabulate the steady turns of a model; `neutral` is the rudder without a turn, rad.
+    """Tabulate the steady turns of a model; `neutral`: rudder without a turn, rad.
 
     Raises InputError if the model has none to one of the sides.
     """
     for slowed in (True, False):  # some models know no loss of speed
-        rudder_of = {0.0: neutral}
-        for side in (-1.0, 1.0):
-            for rate in (side * GRID / model.travel_time).tolist():
-                rudder = steady_turn_rudder(model, rate, slowed)
-                if rudder is None:
-                    break
-                if abs(rudder) > LARGEST_RUDDER * model.steering.limit:
-                    break
-                rudder_of[rate] = rudder
-        if min(rudder_of) < 0.0 < max(rudder_of):
-            rates = sorted(rudder_of)
-            rudders = [rudder_of[rate] for rate in rates]
-            return SteadyTurns(np.array(rates), np.array(rudders))
+        to_port = _turns_to_one_side(model, -1.0, slowed)
+        to_starboard = _turns_to_one_side(model, 1.0, slowed)
+        if to_port and to_starboard:
+            turns = [*reversed(to_port), (0.0, neutral), *to_starboard]
+            rates, rudders = np.array(turns).T
+            return SteadyTurns(rates, rudders)
     raise InputError(
         f"model {model.name!r}: expected steady turns to either side, got none"
     )
 
 
+def _turns_to_one_side(
+    model: ShipModel, side: float, slowed: bool
+) -> list[tuple[float, float]]:
+    """Rates, rad/s, and rudders, rad, of steady turns from the slowest on."""
+    turns = []
+    for rate in (side * GRID / model.travel_time).tolist():
+        rudder = steady_turn_rudder(model, rate, slowed)
+        if rudder is None or abs(rudder) > LARGEST_RUDDER * model.steering.limit:
+            break
+        turns.append((rate, rudder))
+    return turns
+
+
 def course_rate(model: ShipModel, turns: SteadyTurns, neutral: float) -> float:
-    """Rate at which courses are changed, rad/s: that of a steady turn with `COURSE_RUDDER`."""
-    reached = np.abs(turns.rudders - neutral) <= COURSE_RUDDER * model.steering.limit
-    some = SteadyTurns(turns.rates[reached], turns.rudders[reached])
-    return max(some.largest_rate, float(GRID[0]) / model.travel_time)
+    """Rate, rad/s, of a steady turn with `COURSE_RUDDER`: that of course changes."""
+    largest = COURSE_RUDDER * model.steering.limit
+    off_neutral = np.abs(turns.rudders - neutral)
+    reached = off_neutral <= largest
+    gentle = SteadyTurns(
+        rates=turns.rates[reached],
+        rudders=turns.rudders[reached],
+    )
+    least_rate = float(GRID[0]) / model.travel_time
+    return max(gentle.largest_rate, least_rate)
 
 
 def check_rising(values: Sequence[float], name: str) -> None:
     """Refuse numbers that are not in rising order; InputError names them."""
     for i, value in enumerate(values):
         check_number(value, f"{name}[{i}]")
-    if len(values) < 2 or np.any(np.diff(values) <= 0.0):
+    rises = np.diff(values)
+    if len(values) < 2 or np.any(rises <= 0.0):
         raise InputError(
             f"{name}: expected at least two numbers in rising order, SI units, got"
             f" {list(values)}"

@@ -1,8 +1,8 @@
-"""Wheel-over: line of sight that looks ahead along the path's turns, and counters a current.
+"""Wheel-over: line of sight that looks ahead along the turns of the path.
 
 The course is that of the path so far ahead as the ship runs on before she turns. The
-angle between her course over ground and her way through the water, as observed, counters
-a current.
+angle between her course over ground and her way through the water, as observed,
+counters a current.
 
 Sources: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 10.3
 (line of sight); IEC 62065 (track control: legs, arcs, wheel-over line).
@@ -49,7 +49,7 @@ class WheelOverGains(NamedTuple):
 def wheel_over_law(
     seen: PathSignals, memory: Nothing, p: WheelOverGains
 ) -> tuple[Number, Nothing]:
-    """Course that comes to the path and turns with it, against the drift of a current."""
+    """Course that comes to the path and turns with it, against a current's drift."""
     crab = wrapped(seen.drift - np.arctan2(seen.sway, seen.surge))
     course = course_over_ground(seen.cross_track, seen.turns, p)
     return course - p.crab_share * crab, memory
@@ -63,7 +63,7 @@ def course_over_ground(cross_track: Number, turns: Turns, p: WheelOverGains) -> 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WheelOver(Guided):
-    """Line of sight that begins turns where the ship needs to, and counters the current."""
+    """Line of sight that begins turns where the ship needs to, against currents too."""
 
     kind: ClassVar[str] = "wheel-over"
     law: ClassVar[Law] = staticmethod(wheel_over_law)
@@ -156,15 +156,18 @@ def own_lead(model: ShipModel, autopilot: Policy | None) -> float:
     """
     if not isinstance(autopilot, LQ):
         autopilot = LQ.from_model(model)
-    gains = autopilot.gains
-
     steering, rudder = linearise(model, straight_running(model))
-    by_sway_and_rudder = np.column_stack([steering[:, 0], np.ravel(rudder)])
-    sway, angle = np.linalg.solve(by_sway_and_rudder, -steering[:, 1])  # per yaw rate
+    by_sway, by_yaw_rate = steering.T
+    by_sway_and_rudder = np.column_stack([by_sway, rudder])
+    # in a steady turn, per yaw rate
+    sway, angle = np.linalg.solve(by_sway_and_rudder, -by_yaw_rate)
 
     # the order is the angle: the heading error makes what the other gains do not
-    missing = angle * (1.0 - gains["rudder"]) - gains["yaw_rate"] - gains["sway"] * sway
+    gains = autopilot.gains
+    missing = angle * (1.0 - gains["rudder"])
+    missing = missing - gains["yaw_rate"] - gains["sway"] * sway
     heading_lag = missing / gains["heading_error"]  # s
-    speed, length = model.particulars["speed"], model.particulars["length"]
-    lead = (heading_lag * speed - sway) / length + LATE
+
+    lag_m = heading_lag * model.particulars["speed"] - sway
+    lead = lag_m / model.particulars["length"] + LATE
     return float(np.clip(lead, SHORTEST_LEAD, LONGEST_LEAD))

@@ -1,12 +1,11 @@
-"""An autopilot as it stands on a bridge: numbers of one ship in SI units in, the ordered rudder out.
+"""An autopilot as it stands on a bridge: measurements of one ship in, rudder order out.
 
 What it adds to a controller's law are plain functions on records too, which
-`agents.deployment.autopilot_c99` writes as C.
+`agents.deployment.autopilot_c99` writes as C. All numbers are in SI units.
 """
 
 from collections.abc import Mapping
 from functools import cache
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,20 +25,17 @@ from agents.controllers.law import (
 from agents.controllers.memory import from_columns
 from shipgym import InputError
 from shipgym.engine.records import field_types
-from shipgym.files import read_toml
 from shipgym.tasks import path_following
 from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.scales import rounded_interval
 from shipgym.tasks.steering import Extras, Helm
 
-#: Unit and meaning of variables by name, of ships and autopilots.
-VARIABLES = read_toml(Path(__file__).with_name("variables.toml"), "table of variables")
 #: Inputs that show a signal or an observation of another name.
 SHOWN_BY = {"drift": "course", **dict.fromkeys(COURSE_ERROR, "course")}
 
 
 class BridgeInput(NamedTuple):
-    """What an autopilot is given, with units and signs as in `variables.toml`."""
+    """Input of an autopilot, with units and signs as in `AUTOPILOT_INPUTS`."""
 
     set_point: Number
     heading: Number
@@ -60,7 +56,7 @@ class BridgeInput(NamedTuple):
 
 
 class BridgeState(NamedTuple):
-    """What an autopilot remembers; all zeros when it is switched on."""
+    """Memory of an autopilot; all zeros when it is switched on."""
 
     integral: Number  # rad s, of the heading error
     last_command: Number  # rad
@@ -70,7 +66,7 @@ class BridgeState(NamedTuple):
 
 
 class BridgeParameters(NamedTuple):
-    """What the functions below need to know of an autopilot."""
+    """Constants of an autopilot that the functions below read."""
 
     dt: float  # s
     reach: float  # rad s, largest integral of the heading error
@@ -82,7 +78,7 @@ class BridgeParameters(NamedTuple):
 
 
 class OwnObservations(NamedTuple):
-    """Observations that an autopilot makes of its set-point and of what it remembers."""
+    """Observations that an autopilot derives from its set-point and its memory."""
 
     heading_error_sin: Number
     heading_error_cos: Number
@@ -107,7 +103,10 @@ def heading_step(
 def path_step(
     given: BridgeInput, state: BridgeState, p: BridgeParameters, guide: Law, law: Law
 ) -> Step:
-    """Order of guidance, whose set-point is the direction of the path beside the ship, and its next state."""
+    """Order of guidance and its next state.
+
+    The set-point is the direction of the path beside the ship.
+    """
     error = wrapped(given.set_point - given.heading)
     order, after = path_order(error, given, state, p, guide, law)
     return limited(order, after, p)
@@ -116,10 +115,14 @@ def path_step(
 def base_path_step(
     given: BridgeInput, state: BridgeState, p: BridgeParameters, guide: Law, law: Law
 ) -> Step:
-    """Order of guidance that a policy adds to, whose set-point is the course that its environment shows."""
+    """Order of guidance that a policy adds to, and its next state.
+
+    The set-point is the course that the policy's environment shows.
+    """
     error = wrapped(given.set_point - given.heading)
     seen = path_signals(error, given)
-    from_path = wrapped(error - shown_course(seen, p.task_lookahead, p.path_radius))
+    course = shown_course(seen, p.task_lookahead, p.path_radius)
+    from_path = wrapped(error - course)
     order, after = path_order(from_path, given, state, p, guide, law)
     return limited(order, after, p)
 
@@ -150,14 +153,22 @@ def path_order(
     guide: Law,
     law: Law,
 ) -> Step:
-    """Rudder for a heading error against the direction of the path, rad, not yet limited."""
-    course, guidance = guide(path_signals(error, given), state.guidance, p.guide)
-    order, after = heading_order(wrapped(error + course), given, state, p, law)
+    """Rudder for a heading error, rad, against the path; it is not yet limited."""
+    seen = path_signals(error, given)
+    course, guidance = guide(seen, state.guidance, p.guide)
+    to_course = wrapped(error + course)
+    order, after = heading_order(to_course, given, state, p, law)
     return order, after._replace(guidance=guidance)
 
 
 def path_signals(error: Number, given: BridgeInput) -> PathSignals:
-    """What guidance is told of the ship."""
+    """Signals of guidance by the inputs of the autopilot."""
+    turns = Turns(
+        next_distance=given.next_turn_distance,
+        next_angle=given.next_turn_angle,
+        second_distance=given.second_turn_distance,
+        second_angle=given.second_turn_angle,
+    )
     return PathSignals(
         heading_error=error,
         cross_track=given.cross_track,
@@ -166,12 +177,7 @@ def path_signals(error: Number, given: BridgeInput) -> PathSignals:
         surge=given.surge,
         yaw_rate=given.yaw_rate,
         rudder=given.rudder,
-        turns=Turns(
-            given.next_turn_distance,
-            given.next_turn_angle,
-            given.second_turn_distance,
-            given.second_turn_angle,
-        ),
+        turns=turns,
     )
 
 
@@ -184,22 +190,22 @@ def limited(order: Number, state: BridgeState, p: BridgeParameters) -> Step:
 def own_observations(
     error: Number, integral: Number, given: BridgeInput, last_command: Number
 ) -> OwnObservations:
-    """Observations of the heading error, rad, and of the course over ground against the set-point."""
+    """Observations of the error of heading, rad, and of the course over ground."""
     course_error = given.set_point - given.course
     return OwnObservations(
-        np.sin(error),
-        np.cos(error),
-        last_command,
-        integral,
-        np.sin(course_error),
-        np.cos(course_error),
+        heading_error_sin=np.sin(error),
+        heading_error_cos=np.cos(error),
+        last_command=last_command,
+        heading_error_integral=integral,
+        course_error_sin=np.sin(course_error),
+        course_error_cos=np.cos(course_error),
     )
 
 
 def policy_observations(
     given: BridgeInput, state: BridgeState, p: BridgeParameters
 ) -> tuple[OwnObservations, BridgeState]:
-    """Observations that a policy is shown of its set-point and memory, and its state with the new integral."""
+    """Observations of a policy's set-point and memory, and its next state."""
     error = wrapped(given.set_point - given.heading)
     integral = gathered(state.integral, error, state.started, p.dt, p.reach)
     own = own_observations(error, integral, given, state.last_command)
@@ -209,17 +215,20 @@ def policy_observations(
 @cache
 def observation_bounds() -> dict[str, tuple[float, float]]:
     """Bounds of observations by name, in multiples of their scale."""
-    bounds = {}
+    kinds: dict[str, Any] = {}
     for record in (Helm, Extras, path_following.Observation):
-        for name, kind in field_types(record, notes=True).items():
-            for note in getattr(kind, "__metadata__", ()):
-                if isinstance(note, ObservationSpec):
-                    bounds[name] = (note.low, note.high)
+        kinds |= field_types(record, notes=True)
+
+    bounds = {}
+    for name, kind in kinds.items():
+        for note in getattr(kind, "__metadata__", ()):
+            if isinstance(note, ObservationSpec):
+                bounds[name] = (note.low, note.high)
     return bounds
 
 
 class Autopilot:
-    """Any controller or policy, stepped once in each control interval in double precision.
+    """Any controller or policy, stepped once a control interval in double precision.
 
     Guidance is given the direction of the path beside the ship as its set-point, a
     policy that learned to follow paths the course that its environment shows.
@@ -269,22 +278,25 @@ class Autopilot:
     def step(self, given: Mapping[str, float]) -> float:
         """Ordered rudder, rad, at most `largest`, for the numbers named in `inputs`."""
         numbers = {name: np.array([given[name]]) for name in self.inputs}
-        self._given = BridgeInput(**numbers)
+        inputs = BridgeInput(**numbers)
+        self._given = inputs
         p = self.parameters._replace(limit=self.largest)
+
+        state = self.state
         if isinstance(self.agent, Guided):
-            step = path_step(self._given, self.state, p, self._guide, self._law)
+            order, after = path_step(inputs, state, p, self._guide, self._law)
         else:
-            step = heading_step(self._given, self.state, p, self._law)
-        order, self.state = step
+            order, after = heading_step(inputs, state, p, self._law)
+        self.state = after
         return float(order[0])
 
     def _guide(self, seen: PathSignals, memory: Any, _: Any) -> tuple[Number, Any]:
-        """Course of guidance, by its law or by another of its ways."""
+        """Course of guidance, by its law or by a search of its own."""
         guide: Guided = self.agent
         return guide.course(seen, memory)
 
     def _law(self, seen: Signals, memory: Any, _: Any) -> tuple[Number, Any]:
-        """Rudder of the heading autopilot, by its law or by another of its ways."""
+        """Rudder of the heading autopilot, by its law or by its network."""
         if isinstance(self.pilot, Controller):
             return self.pilot.steer(seen, memory)
         return self._policy(seen, memory)
@@ -292,75 +304,95 @@ class Autopilot:
     def _policy(self, seen: Signals, memory: Any) -> tuple[Number, Any]:
         """Rudder of a policy, which is shown what its environment would show."""
         own = own_observations(
-            seen.heading_error,
-            seen.heading_error_integral,
-            self._given,
-            self.state.last_command,
+            error=seen.heading_error,
+            integral=seen.heading_error_integral,
+            given=self._given,
+            last_command=self.state.last_command,
         )
         known = {**self._given._asdict(), **own._asdict()}
-        bounds, observation = observation_bounds(), []
-        scales = zip(
-            self.pilot.observation_names, self.pilot.observation_scales, strict=True
+
+        pilot = self.pilot
+        scales = dict(
+            zip(pilot.observation_names, pilot.observation_scales, strict=True)
         )
-        for name, scale in scales:
-            observation.append(np.clip(known[name] / scale, *bounds[name]))
-        starts = self.state.started == 0.0
+        bounds = observation_bounds()
+        observation = []
+        for name, scale in scales.items():
+            low, high = bounds[name]
+            observation.append(np.clip(known[name] / scale, low, high))
         shown = np.array(observation, dtype=np.float32).T
-        action, memory = self.pilot.predict(shown, memory, starts)
-        return action[:, 0].astype(np.float64) * self.limit, memory
+
+        starts = self.state.started == 0.0
+        action, memory = pilot.predict(shown, memory, starts)
+        rudder = action[:, 0].astype(np.float64)
+        return rudder * self.limit, memory
 
 
 def bridge_parameters(agent: Any) -> BridgeParameters:
-    """Parameters of any controller or policy; those of a policy's base where it has one."""
-    learned = not isinstance(agent, Controller)
-    base = getattr(agent, "base", None) if learned else agent
-    guide = base if isinstance(base, Guided) else None
-    pilot = base if guide is None else guide.autopilot
+    """Parameters of a controller, or of a policy and the base that it adds to."""
     scales = dict(zip(agent.observation_names, agent.observation_scales, strict=True))
-    if learned:
-        given = getattr(agent, "env_options", {}).get("dt")
-        dt = float(given or rounded_interval(1.0 / scales["yaw_rate"]))
+    if isinstance(agent, Controller):
+        controller: Any = agent
+        dt: Any = agent.design["dt"]
     else:
-        dt = float(agent.design["dt"])
-    return BridgeParameters(
-        dt=dt,
+        controller = getattr(agent, "base", None)
+        dt = getattr(agent, "env_options", {}).get("dt")
+        dt = dt or rounded_interval(1.0 / scales["yaw_rate"])
+
+    without_guidance = BridgeParameters(
+        dt=float(dt),
         reach=float(scales["heading_error_integral"]),
         limit=float(scales["rudder"]),
-        task_lookahead=1.0 if guide is None else guide.gains["task_lookahead"],
-        path_radius=1.0 if guide is None else guide.path_radius,
-        law=pilot.parameters if isinstance(pilot, Controller) else Nothing(),
-        guide=Nothing() if guide is None else guide.parameters,
+        task_lookahead=1.0,
+        path_radius=1.0,
+        law=_law_parameters(controller),
+        guide=Nothing(),
     )
+    if not isinstance(controller, Guided):
+        return without_guidance
+    return without_guidance._replace(
+        task_lookahead=controller.gains["task_lookahead"],
+        path_radius=controller.path_radius,
+        law=_law_parameters(controller.autopilot),
+        guide=controller.parameters,
+    )
+
+
+def _law_parameters(agent: Any) -> Any:
+    """Parameters of a controller's law; none of a policy."""
+    return agent.parameters if isinstance(agent, Controller) else Nothing()
 
 
 def needed_inputs(agent: Any) -> list[str]:
     """Inputs that an autopilot reads, in the order of `BridgeInput`.
 
-    Raises InputError for one that commands the shaft too, or reads what no ship is known
-    to show.
+    Raises InputError for one that commands the shaft too, or reads what no ship is
+    known to show.
     """
+    known = BridgeInput._fields
     names = {"set_point", "heading", *_needed(agent)}
     action = getattr(agent, "action", "rudder")
-    if action == "rudder-shaft" or not names <= set(BridgeInput._fields):
+    if action == "rudder-shaft" or not names <= set(known):
+        read = ", ".join(sorted(names))
         raise InputError(
             "autopilot: expected a policy that commands the rudder alone, by"
-            f" {', '.join(BridgeInput._fields)}, got one that commands {action} and"
-            f" reads {', '.join(sorted(names))[:200]}"
+            f" {', '.join(known)}, got one that commands {action} and"
+            f" reads {read[:200]}"
         )
-    return [name for name in BridgeInput._fields if name in names]
+    return [name for name in known if name in names]
 
 
 def _needed(agent: Any) -> set[str]:
     """Names of inputs that an autopilot reads beside set-point and heading."""
     if isinstance(agent, Controller):
         names = set(agent.needed_signals)
-        if isinstance(agent, Guided):
-            names |= _needed(agent.autopilot)
     else:
         names = set(agent.observation_names)
-        base = getattr(agent, "base", None)
-        names |= set() if base is None else _needed(base)
     shown = {SHOWN_BY.get(name, name) for name in names}
+
+    inner = getattr(agent, "autopilot", None) or getattr(agent, "base", None)
+    if inner is not None:
+        shown |= _needed(inner)
     return shown - set(OwnObservations._fields)
 
 
@@ -368,4 +400,5 @@ def _no_memory(agent: Any) -> Any:
     """Memory of an autopilot that is switched on."""
     if not isinstance(agent, Controller):
         return None
-    return from_columns(agent.memory_record, iter(np.zeros((agent.memory_size, 1))))
+    nothing = np.zeros((agent.memory_size, 1))
+    return from_columns(agent.memory_record, iter(nothing))

@@ -1,4 +1,4 @@
-"""Controllers and learned policies as C99: their laws translated, the network of a policy as a table."""
+"""Controllers and learned policies as C99: laws translated, networks as tables."""
 
 from typing import Any
 
@@ -7,7 +7,6 @@ from agents.controllers.guided import Guided
 from agents.controllers.law import Law, Nothing
 from agents.controllers.registry import controller_class, controller_kinds
 from agents.deployment.autopilot import (
-    VARIABLES,
     BridgeInput,
     BridgeParameters,
     BridgeState,
@@ -21,11 +20,12 @@ from agents.deployment.autopilot import (
     path_step,
     policy_observations,
 )
-from agents.deployment.c99 import Source, Variable, checked_name, comment, render
+from agents.deployment.c99 import Source, checked_name, comment, render
 from agents.deployment.c_expression import Translated
 from agents.deployment.c_structures import kind_of, numbers_of, record_kind
 from agents.deployment.c_syntax import Kind
 from agents.deployment.translator import Translator
+from agents.deployment.variables import AUTOPILOT_INPUTS, AUTOPILOT_OUTPUTS
 from agents.policies.policy import ORDERS, LearnedPolicy, combined, toward
 from shipgym import InputError
 from shipgym.checks import quoted
@@ -50,16 +50,13 @@ POLICY_STATE = record_kind(
 
 
 def autopilot_source(agent: Any, name: str | None = None) -> Source:
-    """Write a controller or a learned policy as C99, with the integral of the heading error.
+    """Write a controller or a learned policy as C99.
 
-    Raises InputError for a controller that does not steer by its `law` alone, for a law
-    of more than can be translated, and for a name that C does not take.
+    The integral of the heading error is part of it. Raises InputError for a controller
+    that does not steer by its `law` alone, for a law of more than can be translated,
+    and for a name that C does not take.
     """
-    needed = needed_inputs(agent)
-    inputs = {one: Variable(*VARIABLES["autopilot_input"][one]) for one in needed}
-    outputs = {
-        one: Variable(*about) for one, about in VARIABLES["autopilot_output"].items()
-    }
+    inputs = {name: AUTOPILOT_INPUTS[name] for name in needed_inputs(agent)}
     p = bridge_parameters(agent)
     name = checked_name(name or agent.name)
     c = Translator({}, name)
@@ -83,7 +80,7 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
         header=render("autopilot.h.j2", name, **data),
         source=render(template, name, **data),
         inputs=inputs,
-        outputs=outputs,
+        outputs=AUTOPILOT_OUTPUTS,
         step=p.dt,
         ship=False,
     )
@@ -102,25 +99,30 @@ def controller_data(c: Translator, agent: Any, p: BridgeParameters) -> dict[str,
         "state_structures": header,
         "step": step.name,
         "step_type": c.structures.type(step.returns),
-        "constants": {
-            "PARAMETERS": (
-                c.structures.type(kind),
-                c.structures.initialiser(kind, numbers_of(p)),
-            )
-        },
+        "constants": parameter_constant(c, kind, p),
     }
+
+
+def parameter_constant(
+    c: Translator, kind: Kind, p: BridgeParameters
+) -> dict[str, Any]:
+    """Type and initialiser of the constant that holds an autopilot's parameters."""
+    type_name = c.structures.type(kind)
+    initialiser = c.structures.initialiser(kind, numbers_of(p))
+    return {"PARAMETERS": (type_name, initialiser)}
 
 
 def policy_data(
     c: Translator, policy: LearnedPolicy, p: BridgeParameters
 ) -> dict[str, Any]:
     """Data of the templates for a learned policy, with or without a base."""
-    c.structures.declare(POLICY_STATE, f"{c.structures.prefix}_own")
+    structures = c.structures
+    structures.declare(POLICY_STATE, f"{structures.prefix}_own")
     base_state = None
     if policy.base is not None:
         base_state = state_kind(policy.base)
-        c.structures.declare(base_state, f"{c.structures.prefix}_base")
-    header, c.structures.texts = c.structures.texts, []
+        structures.declare(base_state, f"{structures.prefix}_base")
+    header, structures.texts = structures.texts, []
 
     kind = kind_of(p)
     observe = c.function(policy_observations, BridgeInput, POLICY_STATE, kind)
@@ -130,19 +132,14 @@ def policy_data(
         "state_structures": header,
         "has_base": policy.base is not None,
         "observe": observe.name,
-        "observe_type": c.structures.type(observe.returns),
-        "own_observations_type": c.structures.type(OwnObservations),
+        "observe_type": structures.type(observe.returns),
+        "own_observations_type": structures.type(OwnObservations),
         "finish": finish.name,
-        "step_type": c.structures.type(finish.returns),
+        "step_type": structures.type(finish.returns),
         "rows": observation_rows(policy),
         "activations": layer_activations(policy),
         "orders": ORDERS,
-        "constants": {
-            "PARAMETERS": (
-                c.structures.type(kind),
-                c.structures.initialiser(kind, numbers_of(p)),
-            )
-        },
+        "constants": parameter_constant(c, kind, p),
     }
     if policy.action != "rudder-discrete":
         data["toward"] = c.function(toward, float, float, float).name
@@ -150,42 +147,43 @@ def policy_data(
         base_step = steering_step(c, policy.base, base_state, kind, base_path_step)
         data["combined"] = c.function(combined, float, float, float).name
         data["base_step"] = base_step.name
-        data["base_step_type"] = c.structures.type(base_step.returns)
+        data["base_step_type"] = structures.type(base_step.returns)
     return data
 
 
 def steering_step(
     c: Translator, agent: Any, state: Kind, parameters: Kind, along_path: Any
 ) -> Translated:
-    """Write one step of a controller; of guidance the function `along_path` with its law and the autopilot's."""
+    """Write one step of a controller, of guidance the function `along_path`."""
     guide, pilot = parts_of(agent)
+    law = law_of(pilot)
+    kinds = (BridgeInput, state, parameters)
     if guide is None:
-        return c.function(heading_step, BridgeInput, state, parameters, law_of(pilot))
-    laws = law_of(guide), law_of(pilot)
-    return c.function(along_path, BridgeInput, state, parameters, *laws)
+        return c.function(heading_step, *kinds, law)
+    return c.function(along_path, *kinds, law_of(guide), law)
 
 
 def parts_of(agent: Any) -> tuple[Any, Any]:
-    """Guidance, if it is any, and the heading autopilot; InputError if one is not a closed-form law."""
-    guide = agent if isinstance(agent, Guided) else None
-    pilot = agent.autopilot if isinstance(agent, Guided) else agent
-    for part in (guide, pilot):
-        if part is not None:
-            check_closed_form(part)
-    return guide, pilot
+    """Guidance or None, and the heading autopilot; InputError if one has no law."""
+    check_closed_form(agent)
+    if not isinstance(agent, Guided):
+        return None, agent
+    check_closed_form(agent.autopilot)
+    return agent, agent.autopilot
 
 
 def check_closed_form(part: Any) -> None:
-    """Refuse what does not steer by its `law` alone, with an InputError that lists what does."""
+    """Refuse what does not steer by its `law` alone; InputError lists what does."""
     if isinstance(part, Controller) and part.is_closed_form():
         return
-    closed = [
-        kind for kind in controller_kinds() if controller_class(kind).is_closed_form()
-    ]
+    closed = []
+    for kind in controller_kinds():
+        if controller_class(kind).is_closed_form():
+            closed.append(kind)
     name = getattr(part, "name", type(part).__name__)
     raise InputError(
-        "controller: expected a closed-form law, which can be written as C, or a learned"
-        f" policy, got '{name}'; closed-form are {quoted(closed)}"
+        "controller: expected a closed-form law, which can be written as C, or a"
+        f" learned policy, got '{name}'; closed-form are {quoted(closed)}"
     )
 
 
@@ -210,20 +208,20 @@ def state_kind(agent: Any) -> Kind:
 
 
 def observation_rows(policy: LearnedPolicy) -> list[dict[str, Any]]:
-    """What a policy observes: a value in C, its scale and bounds, and the input that it is, if it is one."""
+    """Observations of a policy: value in C, scale, bounds and name of the input."""
+    scales = dict(zip(policy.observation_names, policy.observation_scales, strict=True))
     rows = []
-    for name, scale in zip(
-        policy.observation_names, policy.observation_scales, strict=True
-    ):
-        own = name in OwnObservations._fields
+    for name, scale in scales.items():
         low, high = observation_bounds()[name]
         row = {
-            "value": f"own.{name}" if own else f"given.{name}",
-            "given": None if own else name,
+            "value": f"given.{name}",
+            "given": name,
             "scale": scale,
             "low": low,
             "high": high,
         }
+        if name in OwnObservations._fields:
+            row |= {"value": f"own.{name}", "given": None}
         rows.append(row)
     return rows
 
@@ -231,5 +229,6 @@ def observation_rows(policy: LearnedPolicy) -> list[dict[str, Any]]:
 def layer_activations(policy: LearnedPolicy) -> list[str]:
     """Activation of each layer's output in C; empty where there is none."""
     network = policy.network
-    hidden = [ACTIVATIONS[network.activation]] * (len(network.layers) - 1)
-    return [*hidden, ACTIVATIONS[network.output]]
+    hidden = ACTIVATIONS[network.activation]
+    n_hidden = len(network.layers) - 1
+    return [hidden] * n_hidden + [ACTIVATIONS[network.output]]

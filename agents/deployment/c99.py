@@ -1,33 +1,22 @@
-"""Texts of what is exported: C99, XML and sentences of NMEA 0183, made from templates."""
+"""C99, XML and sentences of NMEA 0183, made from templates."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FunctionLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 import shipgym
 from agents.deployment.c_syntax import KEYWORDS, literal
+from agents.deployment.variables import Variables
 from shipgym import InputError
 from shipgym.trials.units import UNITS
 
 LONGEST_NAME = 31  # characters, so that what is made of it stays within the 63 of C99
 LONGEST_TITLE = 120
-
-
-class Variable(NamedTuple):
-    """A number that is given to what was exported, or read of it."""
-
-    unit: str
-    meaning: str
-    start: float = 0.0  # value at the beginning
-
-
-Variables = Mapping[str, Variable]
 
 
 @dataclass(frozen=True)
@@ -79,7 +68,12 @@ def render(template: str, name: str = "", **data: Any) -> str:
     return (
         _environment()
         .get_template(template)
-        .render(**data, name=name, NAME=name.upper(), version=shipgym.__version__)
+        .render(
+            **data,
+            name=name,
+            NAME=name.upper(),
+            version=shipgym.__version__,
+        )
     )
 
 
@@ -105,15 +99,17 @@ def heading(angle: float) -> float:
 
 def array(numbers: Iterable[Any]) -> str:
     """Numbers of an array in single precision as C initialises it."""
-    rows = [single(one) if np.ndim(one) == 0 else array(one) for one in numbers]
-    return f"{{{', '.join(rows)}}}"
+    entries = []
+    for entry in numbers:
+        is_number = np.ndim(entry) == 0
+        entries.append(single(entry) if is_number else array(entry))
+    return f"{{{', '.join(entries)}}}"
 
 
 @cache
 def _environment() -> Environment:
-    folder = files("agents.deployment") / "templates"
     environment = Environment(
-        loader=FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8")),
+        loader=PackageLoader("agents.deployment"),
         undefined=StrictUndefined,
         trim_blocks=True,
         keep_trailing_newline=True,

@@ -3,7 +3,7 @@
 import ast
 import builtins
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import FunctionType, ModuleType
 from typing import Any, NamedTuple
@@ -75,8 +75,9 @@ class ExpressionWriter:
         """An expression in C; InputError with its line if it cannot be written."""
         known = Constants(self.names).value(node)
         if isinstance(known, bool | int | float | np.number):
-            kind = type(known) if type(known) in NUMBERS else float
-            return Expression(literal(known.real), kind)
+            kind = type(known)
+            text = literal(known.real)
+            return Expression(text, kind if kind in NUMBERS else float)
 
         match node:
             case ast.Name():
@@ -97,27 +98,32 @@ class ExpressionWriter:
                 return self._comparison(node)
             case ast.IfExp():
                 test = self.expression(node.test)
-                return choice(
-                    test, self.expression(node.body), self.expression(node.orelse)
-                )
+                yes = self.expression(node.body)
+                no = self.expression(node.orelse)
+                return choice(test, yes, no)
             case ast.Tuple():
-                return self._structure([self.expression(one) for one in node.elts])
+                return self._structure(self._expressions(node.elts))
             case ast.Call():
                 return self._call(node)
         raise self.refusal(node)
 
+    def _expressions(self, nodes: Iterable[ast.expr]) -> list[Expression]:
+        return [self.expression(node) for node in nodes]
+
     def _variable(self, node: ast.Name) -> Expression:
-        if node.id not in self.kinds:
+        name = node.id
+        if name not in self.kinds:
             raise self.refusal(node)
-        return Expression(c_name(node.id), self.kinds[node.id])
+        return Expression(c_name(name), self.kinds[name])
 
     def _member(self, node: ast.Attribute) -> Expression:
-        owner = self.expression(node.value)
-        kinds = members(owner.kind) if is_record(owner.kind) else {}
+        record = self.expression(node.value)
+        kinds = members(record.kind) if is_record(record.kind) else {}
         name = c_name(node.attr)
         if name not in kinds:
             raise self.refusal(node)
-        return Expression(f"{owner.within(Level.ATOM)}.{name}", kinds[name])
+        owner = record.within(Level.ATOM)
+        return Expression(f"{owner}.{name}", kinds[name])
 
     def _arithmetic(self, node: ast.BinOp) -> Expression:
         operator = OPERATORS.get(type(node.op))
@@ -127,16 +133,18 @@ class ExpressionWriter:
         right = self.expression(node.right)
         if isinstance(node.op, ast.Div) and left.kind is int:
             left = Expression(f"(double)({left.text})", float)
-        both_integers = left.kind is int and right.kind is int
-        return binary(left, operator, right, int if both_integers else float)
+
+        are_integers = left.kind is int and right.kind is int
+        kind = int if are_integers else float
+        return binary(left, operator, right, kind)
 
     def _power(self, node: ast.BinOp) -> Expression:
-        base = self.expression(node.left)
-        power = self.expression(node.right)
-        exponent = Constants(self.names).value(node.right)
-        is_whole = isinstance(exponent, int) and exponent > 0
-        name = "whole_power" if is_whole else "pow"
-        return Expression(f"{name}({base.text}, {power.text})", float)
+        base = self.expression(node.left).text
+        exponent = self.expression(node.right).text
+        known = Constants(self.names).value(node.right)
+        if isinstance(known, int) and known > 0:
+            return Expression(f"whole_power({base}, {exponent})", float)
+        return Expression(f"pow({base}, {exponent})", float)
 
     def _signed(self, node: ast.UnaryOp) -> Expression:
         operand = self.expression(node.operand)
@@ -148,53 +156,60 @@ class ExpressionWriter:
         raise self.refusal(node)
 
     def _comparison(self, node: ast.Compare) -> Expression:
-        operands = [self.expression(one) for one in (node.left, *node.comparators)]
+        left = self.expression(node.left)
         pairs = []
-        for k, op in enumerate(node.ops):
+        for op, comparator in zip(node.ops, node.comparators, strict=True):
             operator = OPERATORS.get(type(op))
             if operator is None:
                 raise self.refusal(node)
-            pairs.append(binary(operands[k], operator, operands[k + 1], bool))
+            right = self.expression(comparator)
+            pairs.append(binary(left, operator, right, bool))
+            left = right
         if len(pairs) == 1:
             return pairs[0]
-        return Expression(" && ".join(one.text for one in pairs), bool, Level.LOGIC)
+        text = " && ".join([pair.text for pair in pairs])
+        return Expression(text, bool, Level.LOGIC)
 
     def _logic(
         self, node: ast.expr, op: ast.AST, values: Sequence[ast.expr]
     ) -> Expression:
         """`and`, `or`, and `&`, `|` of booleans."""
-        operands = [self.expression(one) for one in values]
-        if not all(one.kind is bool for one in operands):
-            raise self.refusal(node)
+        texts = []
+        for operand in self._expressions(values):
+            if operand.kind is not bool:
+                raise self.refusal(node)
+            texts.append(operand.within(Level.COMPARISON))
         operator = OPERATORS[type(op)]
-        texts = [one.within(Level.COMPARISON) for one in operands]
-        return Expression(f" {operator.sign} ".join(texts), bool, operator.level)
+        text = f" {operator.sign} ".join(texts)
+        return Expression(text, bool, operator.level)
 
     def _structure(
         self, values: Sequence[Expression], record: Kind = None
     ) -> Expression:
         """A structure of given values, a tuple where no record is named."""
-        kind = record or tuple(stored_kind(one.kind) for one in values)
+        kind = record or tuple(stored_kind(value.kind) for value in values)
+        type_name = self.structures.type(kind)
         fields = []
         for name, value in zip(members(kind), values, strict=True):
             fields.append(f".{name} = {value.text}")
-        inside = ", ".join(fields or ["0"])
-        return Expression(f"({self.structures.type(kind)}){{{inside}}}", kind)
+        inside = ", ".join(fields) or "0"
+        return Expression(f"({type_name}){{{inside}}}", kind)
 
     # Calls.
 
     def _call(self, node: ast.Call) -> Expression:
         if isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
-            return self._replaced(node, self.expression(node.func.value))
+            record = self.expression(node.func.value)
+            return self._replaced(node, record)
 
         function = self._callee(node.func)
         if is_record(function):
-            return self._structure(self._arguments(node, function), function)
+            fields = self._arguments(node, function)
+            return self._structure(fields, function)
         if isinstance(function, FunctionType) and function not in FUNCTIONS:
             return self._function_call(node, function)
 
-        arguments = [self.expression(one) for one in node.args]
-        call = library_call(function, arguments)
+        call = library_call(function, self._expressions(node.args))
         if call is None:
             raise self.refusal(node)
         return call
@@ -224,39 +239,44 @@ class ExpressionWriter:
 
         arguments = []
         for value in bound.arguments.values():
-            given = value if isinstance(value, ast.expr) else ast.Constant(value)
-            arguments.append(self._argument(given))
+            is_given = isinstance(value, ast.expr)
+            argument = value if is_given else ast.Constant(value)
+            arguments.append(self._argument(argument))
         return arguments
 
     def _argument(self, node: ast.expr) -> Expression:
         """An argument; a function has no text."""
-        if isinstance(node, ast.Name):
-            function = self.kinds.get(node.id, self.names.get(node.id))
-            if isinstance(function, FunctionType):
-                return Expression("", function)
+        if not isinstance(node, ast.Name):
+            return self.expression(node)
+        name = node.id
+        function = self.kinds.get(name, self.names.get(name))
+        if isinstance(function, FunctionType):
+            return Expression("", function)
         return self.expression(node)
 
     def _function_call(self, node: ast.Call, function: FunctionType) -> Expression:
         arguments = self._arguments(node, function)
         if function.__name__ == "row_of":  # of `shipgym.engine.records`
             return table_entry(*arguments)
-        called = self.translate(function, *(one.kind for one in arguments))
+        kinds = [argument.kind for argument in arguments]
+        called = self.translate(function, *kinds)
         if called is None:  # it calls itself
             raise self.refusal(node)
-        texts = ", ".join(one.text for one in arguments if one.text)
-        return Expression(f"{called.name}({texts})", called.returns)
+        texts = [argument.text for argument in arguments if argument.text]
+        return Expression(f"{called.name}({', '.join(texts)})", called.returns)
 
     def _replaced(self, node: ast.Call, record: Expression) -> Expression:
         """`record._replace(name=value)`, of a variable."""
-        kinds = members(record.kind) if is_record(record.kind) else {}
-        new = {}
-        for keyword in node.keywords:
-            new[c_name(str(keyword.arg))] = self.expression(keyword.value)
-        if not kinds or node.args or not new.keys() <= kinds.keys():
+        if not is_record(record.kind) or node.args:
             raise self.refusal(node)
-
         owner = record.within(Level.ATOM)
-        values = []
-        for name, kind in kinds.items():
-            values.append(new.get(name, Expression(f"{owner}.{name}", kind)))
-        return self._structure(values, record.kind)
+        values = {}
+        for name, kind in members(record.kind).items():
+            values[name] = Expression(f"{owner}.{name}", kind)
+
+        for keyword in node.keywords:
+            name = c_name(str(keyword.arg))
+            if name not in values:
+                raise self.refusal(node)
+            values[name] = self.expression(keyword.value)
+        return self._structure(list(values.values()), record.kind)

@@ -1,4 +1,4 @@
-"""One plain Python function on numbers and records, written as C99 for arguments of given kinds."""
+"""One plain Python function on numbers and records, written as C99."""
 
 import ast
 import inspect
@@ -48,46 +48,49 @@ class FunctionWriter:
         names = dict(named_globals(function, hooks))
         self.kinds: dict[str, Kind] = {}
         self.expressions = ExpressionWriter(
-            f"{function.__module__}.{function.__name__}",
-            names,
-            self.kinds,
-            structures,
-            translate,
+            place=f"{function.__module__}.{function.__name__}",
+            names=names,
+            kinds=self.kinds,
+            structures=structures,
+            translate=translate,
         )
-        tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
+        source = textwrap.dedent(inspect.getsource(function))
+        tree = ast.parse(source).body[0]
         if not isinstance(tree, ast.FunctionDef):
             raise self.expressions.refusal(tree)
 
         self.docstring = function.__doc__ or ""
         self.arguments = [argument.arg for argument in tree.args.args]
         self.kinds |= zip(self.arguments, kinds, strict=True)
-        body = reachable(tree.body, Constants(names).value)
+        constants = Constants(names)
+        body = reachable(tree.body, constants.value)
         self.body, self.used = used_statements(body)
         self.returns: Kind = None
         self.n_tuples = 0
 
     def written(self, name: str) -> tuple[str, Kind]:
         """Text of the function under a name in C, and the kind that it returns."""
-        lines = self._statements(self.body)
-        passed = [
-            one
-            for one in self.arguments
-            if not isinstance(self.kinds[one], FunctionType)
-        ]
-        parameters = ", ".join(self._declaration(one) for one in passed)
-        type_of = self.expressions.structures.type
-        text = [
-            f"/* {self._summary()} */",
-            f"static {type_of(self.returns)} {name}({parameters or 'void'}) {{",
-        ]
+        statements = self._statements(self.body)
+        passed = []  # functions are known at translation
+        for argument in self.arguments:
+            if not isinstance(self.kinds[argument], FunctionType):
+                passed.append(argument)
 
+        declared = [self._declaration(argument) for argument in passed]
+        parameters = ", ".join(declared) or "void"
+        type_name = self.expressions.structures.type(self.returns)
+        lines = [
+            f"/* {self._summary()} */",
+            f"static {type_name} {name}({parameters}) {{",
+        ]
         for variable in self.kinds:
             if variable not in self.arguments:
-                text.append(f"    {self._declaration(variable)};")
-        for one in passed:
-            if one not in self.used:
-                text.append(f"    (void){c_name(one)};")
-        return "\n".join([*text, *lines, "}\n"]), self.returns
+                lines.append(f"    {self._declaration(variable)};")
+        for argument in passed:
+            if argument not in self.used:
+                lines.append(f"    (void){c_name(argument)};")
+        lines += [*statements, "}\n"]
+        return "\n".join(lines), self.returns
 
     def _declaration(self, variable: str) -> str:
         type_name = self.expressions.structures.type(self.kinds[variable])
@@ -99,7 +102,11 @@ class FunctionWriter:
         return re.sub(r"[^\w .,:;()+-]", "", first, flags=re.ASCII)
 
     def _statements(self, body: Iterable[ast.stmt]) -> list[str]:
-        return [f"    {line}" for node in body for line in self._statement(node)]
+        lines = []
+        for node in body:
+            for line in self._statement(node):
+                lines.append(f"    {line}")
+        return lines
 
     def _statement(self, node: ast.stmt) -> list[str]:
         match node:
@@ -126,26 +133,33 @@ class FunctionWriter:
 
     def _if(self, node: ast.If) -> list[str]:
         test = self.expressions.expression(node.test)
-        lines = [f"if ({test.text}) {{", *self._statements(node.body)]
+        lines = [f"if ({test.text}) {{"]
+        lines += self._statements(node.body)
         if node.orelse:
-            lines += ["} else {", *self._statements(node.orelse)]
-        return [*lines, "}"]
+            lines.append("} else {")
+            lines += self._statements(node.orelse)
+        lines.append("}")
+        return lines
 
     def _for(self, name: str, end: ast.expr, body: Iterable[ast.stmt]) -> list[str]:
         """A loop over `range(end)`."""
         self.kinds[name] = int
         i = c_name(name)
-        last = self.expressions.expression(end).within(Level.SUM)
-        head = f"for ({i} = 0; {i} < {last}; ++{i}) {{"
-        return [head, *self._statements(body), "}"]
+        number = self.expressions.expression(end)
+        lines = [f"for ({i} = 0; {i} < {number.within(Level.SUM)}; ++{i}) {{"]
+        lines += self._statements(body)
+        lines.append("}")
+        return lines
 
     def _assignment(self, target: ast.expr, value: ast.expr) -> list[str]:
         match target, value:
             case ast.Name(id=name), _:
-                return [self._stored(name, self.expressions.expression(value))]
+                stored = self.expressions.expression(value)
+                return [self._stored(name, stored)]
             case ast.Tuple(elts=targets), ast.Tuple(elts=values):
                 written = names_in(targets, ast.Store)
-                if names_in(values, ast.Load) & written:
+                read = names_in(values, ast.Load)
+                if read & written:
                     return self._unpacked(targets, value)
                 return self._each_assigned(targets, values)
             case ast.Tuple(elts=targets), _:
@@ -158,7 +172,8 @@ class FunctionWriter:
         """`a, b = x, y` as two assignments."""
         lines: list[str] = []
         for target, value in zip(targets, values, strict=True):
-            if names_in([target], ast.Store) & self.used:
+            written = names_in([target], ast.Store)
+            if written & self.used:
                 lines += self._assignment(target, value)
         return lines
 

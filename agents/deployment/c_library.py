@@ -54,9 +54,10 @@ FUNCTIONS |= {getattr(np, name): name for name in SAME_NAME}
 
 def library_call(function: Any, arguments: Sequence[Expression]) -> Expression | None:
     """Call of a function of Python's or NumPy's; None if C has no such function."""
-    texts = [one.text for one in arguments]
     if isinstance(function, Hashable) and function in FUNCTIONS:
-        return Expression(f"{FUNCTIONS[function]}({', '.join(texts)})", float)
+        name = FUNCTIONS[function]
+        texts = ", ".join([argument.text for argument in arguments])
+        return Expression(f"{name}({texts})", float)
 
     match function, arguments:
         case np.where, [test, yes, no]:
@@ -64,14 +65,15 @@ def library_call(function: Any, arguments: Sequence[Expression]) -> Expression |
         case np.interp, [x, points, values]:
             return interpolation(x, points, values)
         case _, [number] if function in (float, int):
-            return Expression(f"(({NUMBERS[function]})({number.text}))", function)
+            type_name = NUMBERS[function]
+            return Expression(f"(({type_name})({number.text}))", function)
     return None
 
 
 def interpolation(
     x: Expression, points: Expression, values: Expression
 ) -> Expression | None:
-    """Straight lines between the points of two tables of one length; None for others."""
+    """Straight lines between points of two tables of one length; None for others."""
     if not is_table(points.kind) or points.kind is not values.kind:
         return None
     rows = points.kind.rows

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,7 +56,7 @@ class Structures:
     def initialiser(
         self, kind: Kind, numbers: Iterator[float], name: str = "value"
     ) -> str:
-        """Initialiser by numbers in order; tables in it become arrays declared before."""
+        """Initialiser by numbers in order; tables in it become arrays."""
         if kind in NUMBERS:
             return literal(next(numbers))
         if is_table(kind):
@@ -65,12 +66,15 @@ class Structures:
         for member, member_kind in members(kind).items():
             value = self.initialiser(member_kind, numbers, member)
             fields.append(f".{member} = {value}")
-        return f"{{{', '.join(fields or ['0'])}}}"
+        inside = ", ".join(fields) or "0"
+        return f"{{{inside}}}"
 
     def _array(self, rows: int, numbers: Iterator[float], name: str) -> str:
+        """Declare an array and return its name."""
         array = self.free_name(name)
-        listed = ", ".join(literal(next(numbers)) for _ in range(rows))
-        self.texts.append(f"static const double {array}[{rows}] = {{{listed}}};\n")
+        literals = [literal(number) for number in islice(numbers, rows)]
+        inside = ", ".join(literals)
+        self.texts.append(f"static const double {array}[{rows}] = {{{inside}}};\n")
         return array
 
     def free_name(self, name: str) -> str:
@@ -92,7 +96,9 @@ def kind_of(value: Any) -> Kind:
     if not isinstance(value, tuple):
         return float
     record: Any = type(value)
-    kinds = dict(zip(record._fields, map(kind_of, value), strict=True))
+    kinds = {}
+    for name, part in zip(record._fields, value, strict=True):
+        kinds[name] = kind_of(part)
     if kinds == field_types(record):
         return record
     return record_kind(record.__name__, kinds)

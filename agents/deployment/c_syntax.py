@@ -107,9 +107,10 @@ def binary(
     left: Expression, operator: Operator, right: Expression, kind: Kind
 ) -> Expression:
     """Two operands with an operator between them, which groups from the left."""
-    first = left.within(operator.level)
-    second = right.within(Level(operator.level + 1))
-    return Expression(f"{first} {operator.sign} {second}", kind, operator.level)
+    level = operator.level
+    first = left.within(level)
+    second = right.within(Level(level + 1))
+    return Expression(f"{first} {operator.sign} {second}", kind, level)
 
 
 def prefixed(sign: str, operand: Expression, kind: Kind) -> Expression:
@@ -120,8 +121,10 @@ def prefixed(sign: str, operand: Expression, kind: Kind) -> Expression:
 def choice(test: Expression, yes: Expression, no: Expression) -> Expression:
     """One of two expressions, as a condition says."""
     kind = no.kind if yes.kind is int else yes.kind
-    texts = [one.within(Level.LOGIC) for one in (test, yes, no)]
-    return Expression(f"{texts[0]} ? {texts[1]} : {texts[2]}", kind, Level.CHOICE)
+    condition = test.within(Level.LOGIC)
+    first = yes.within(Level.LOGIC)
+    second = no.within(Level.LOGIC)
+    return Expression(f"{condition} ? {first} : {second}", kind, Level.CHOICE)
 
 
 def stored_kind(kind: Kind) -> Kind:
@@ -150,7 +153,11 @@ def c_name(name: str) -> str:
 def members(kind: Kind) -> dict[str, Kind]:
     """Names and kinds in a record or a tuple; what may be anything is a float."""
     if is_record(kind):
-        kinds = {c_name(name): one for name, one in field_types(kind).items()}
+        named = list(field_types(kind).items())
     else:
-        kinds = {f"v{k}": one for k, one in enumerate(kind)}
-    return {name: float if one is Any else one for name, one in kinds.items()}
+        named = [(f"v{i}", part) for i, part in enumerate(kind)]
+
+    kinds = {}
+    for name, part in named:
+        kinds[c_name(name)] = float if part is Any else part
+    return kinds

@@ -1,4 +1,4 @@
-"""FMUs for co-simulation, FMI 2.0 and 3.0: the exported C with its sources and a binary for this computer."""
+"""FMUs for co-simulation, FMI 2.0 and 3.0: exported C and a binary of it."""
 
 import os
 import platform
@@ -8,6 +8,7 @@ import tempfile
 import uuid
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from agents.deployment.c99 import Source, render
@@ -28,49 +29,65 @@ def write_fmu(source: Source, path: str | Path, fmi: str = "3.0") -> None:
     its place, or if there is no C compiler or no FMPy, whose headers of the standard
     are needed.
     """
-    version, path = int(check_choice(fmi, VERSIONS, "fmi")[0]), Path(path)
+    check_choice(fmi, VERSIONS, "fmi")
+    path = Path(path)
     if path.suffix != ".fmu":
         raise InputError(
             f"{str(path)[:200]}: found, expected a name that ends in .fmu, as"
             " importers do"
         )
-    files = {
-        f"sources/{one.name}": one.read_text(encoding="utf-8")
-        for one in _headers(version)
+
+    name = source.name
+    files = _texts(source, fmi)
+    machine = platform.machine()
+    folder = f"{machine}-linux"
+    if fmi == "2.0" and machine == "x86_64":
+        folder = "linux64"
+    with atomic_path(path) as draft:
+        binary = ZipInfo(f"binaries/{folder}/{name}.so")
+        compiled = _compiled(files, name)
+        with ZipFile(draft, "w", ZIP_DEFLATED) as archive:
+            archive.writestr(binary, compiled, ZIP_DEFLATED)
+            for file, text in files.items():
+                archive.writestr(ZipInfo(file), text, ZIP_DEFLATED)
+
+
+def _texts(source: Source, fmi: str) -> dict[str, str]:
+    """Texts of an FMU by their names in its archive."""
+    version = int(fmi[0])
+    name = source.name
+    content = source.header + source.source + fmi
+    data: dict[str, Any] = {
+        **vars(source),
+        "fmi": version,
+        "token": str(uuid.uuid5(uuid.NAMESPACE_URL, content)),
+        "title": f"Ship {name}" if source.ship else f"Autopilot {name}",
     }
-    token = str(uuid.uuid5(uuid.NAMESPACE_URL, source.header + source.source + fmi))
-    data = {"fmi": version, "token": token, **vars(source)}
-    title = f"{'Ship' if source.ship else 'Autopilot'} {source.name}"
-    files |= {
-        f"sources/{source.name}.h": source.header,
-        f"sources/{source.name}.c": source.source,
+    texts = {}
+    for header in _headers(version):
+        texts[f"sources/{header.name}"] = header.read_text(encoding="utf-8")
+    texts |= {
+        f"sources/{name}.h": source.header,
+        f"sources/{name}.c": source.source,
         "sources/fmu.c": render("fmu.c.j2", **data),
-        "modelDescription.xml": render("modelDescription.xml.j2", title=title, **data),
+        "modelDescription.xml": render("modelDescription.xml.j2", **data),
     }
     if version == 3:
-        files["sources/buildDescription.xml"] = render(
-            "buildDescription.xml.j2", **data
-        )
-    machine = platform.machine()
-    folder = "linux64" if version == 2 and machine == "x86_64" else f"{machine}-linux"
-    with atomic_path(path) as draft:
-        binary = _compiled(files, source.name)
-        with ZipFile(draft, "w", ZIP_DEFLATED) as archive:
-            archive.writestr(
-                ZipInfo(f"binaries/{folder}/{source.name}.so"), binary, ZIP_DEFLATED
-            )
-            for name, text in files.items():
-                archive.writestr(ZipInfo(name), text, ZIP_DEFLATED)
+        build = render("buildDescription.xml.j2", **data)
+        texts["sources/buildDescription.xml"] = build
+    return texts
 
 
 def _headers(version: int) -> list[Path]:
+    """Headers of the standard, which FMPy holds."""
     spec = find_spec("fmpy")
     if spec is None or spec.origin is None:
         raise InputError(
             "fmpy is not installed, an FMU needs its headers: pip install"
             " 'shipgym[fmu]'"
         )
-    return sorted((Path(spec.origin).parent / "c-code").glob(f"fmi{version}*.h"))
+    folder = Path(spec.origin).parent / "c-code"
+    return sorted(folder.glob(f"fmi{version}*.h"))
 
 
 def _compiled(files: dict[str, str], name: str) -> bytes:
@@ -81,10 +98,11 @@ def _compiled(files: dict[str, str], name: str) -> bytes:
             "no C compiler for Linux found, expected gcc, or the one that CC names: an"
             " FMU holds a binary"
         )
+    command = [compiler, *FLAGS, "fmu.c", f"{name}.c", "-o", "fmu.so", "-lm"]
     with tempfile.TemporaryDirectory() as folder:
-        for one, text in files.items():
-            (Path(folder) / Path(one).name).write_text(text, encoding="utf-8")
-        command = [compiler, *FLAGS, "fmu.c", f"{name}.c", "-o", "fmu.so", "-lm"]
+        for file, text in files.items():
+            path = Path(folder, Path(file).name)
+            path.write_text(text, encoding="utf-8")
         done = subprocess.run(
             command,
             cwd=folder,
@@ -95,4 +113,4 @@ def _compiled(files: dict[str, str], name: str) -> bytes:
         )
         if done.returncode:
             raise InputError(f"{compiler}: cannot compile the FMU: {done.stderr[:400]}")
-        return (Path(folder) / "fmu.so").read_bytes()
+        return Path(folder, "fmu.so").read_bytes()

@@ -1,4 +1,4 @@
-"""An autopilot between a ship's instruments and her rudder, which hands over when it cannot trust them."""
+"""An autopilot between instruments and rudder, which hands over after a fault."""
 
 from dataclasses import replace
 from math import inf, radians
@@ -21,11 +21,11 @@ POSITION = ("latitude", "longitude")
 
 
 class Helm:
-    """An autopilot that waits for its sensors, steers, and after a fault hands over for good.
+    """An autopilot that waits for its sensors, steers, and hands over after a fault.
 
-    Its state is `standby`, `steering` or `manual`. Raises InputError for an autopilot
-    that reads what no sentence of NMEA 0183 has, and for one that cannot follow the
-    route or the rate of turn.
+    Its state is `standby`, `steering` or, for good, `manual`. Raises InputError for an
+    autopilot that reads what no sentence of NMEA 0183 has, and for one that cannot
+    follow the route or the rate of turn.
 
     Parameters
     ----------
@@ -39,7 +39,8 @@ class Helm:
     route : Route, optional
         Track to keep, for an autopilot that sees the turn ahead.
     rate : float, optional
-        Rate of turn, rad/s, of an autopilot that steers one; with a heading the largest.
+        Rate of turn, rad/s, of an autopilot that steers one; with a heading the
+        largest.
     """
 
     def __init__(
@@ -74,33 +75,29 @@ class Helm:
         """Quantities that the instruments have to measure."""
         provided = {"set_point", "rate_of_turn"}
         if self.route is not None:
-            provided |= {*Route.GIVES}
-        needed = [
-            name for name in (*self.pilot.inputs, "rudder") if name not in provided
-        ]
+            provided.update(Route.GIVES)
+        needed = []
+        for name in (*self.pilot.inputs, "rudder"):
+            if name not in provided:
+                needed.append(name)
         if self.route is not None:
             needed += POSITION
         return needed
 
     def _check(self, agent: Any) -> None:
+        """Refuse an autopilot that cannot be used in this way."""
         name = getattr(agent, "name", type(agent).__name__)
-        turns = {*TURNS} & {*self.pilot.inputs} if self.follows_path else set()
         if self.rate is not None and not isinstance(agent, TurnRate):
             raise InputError(
                 f"rate of turn: expected autopilot 'turn-rate', got '{name}'"
             )
-        has_route = self.route is not None
-        if has_route != bool(turns) or not turns <= {*Route.GIVES}:
-            raise InputError(
-                "route: expected 'wheel-over' or 'mpc' of shipgym autopilot with a"
-                f" route, or another without, got '{name}'"
-                f" {'with' if has_route else 'without'} a route"
-            )
+        self._check_route(name)
         unknown = set(self.needed) - NMEA_QUANTITIES.keys()
         if unknown:
+            read = ", ".join(sorted(unknown))
             raise InputError(
                 "autopilot: expected one that reads what sentences of NMEA 0183 have,"
-                f" got '{name}', which reads {', '.join(sorted(unknown))}"
+                f" got '{name}', which reads {read}"
             )
         if "cross_track" in self.pilot.inputs and not self.follows_path:
             raise InputError(
@@ -108,25 +105,40 @@ class Helm:
                 " learned to follow paths"
             )
 
+    def _check_route(self, name: str) -> None:
+        """Refuse guidance by turns without a route that shows them, and the reverse."""
+        turns: set[str] = set()
+        if self.follows_path:
+            turns = {*TURNS} & {*self.pilot.inputs}
+        has_route = self.route is not None
+        if has_route != bool(turns) or not turns <= {*Route.GIVES}:
+            preposition = "with" if has_route else "without"
+            raise InputError(
+                "route: expected 'wheel-over' or 'mpc' of shipgym autopilot with a"
+                f" route, or another without, got '{name}' {preposition} a route"
+            )
+
     def hear(self, line: str, now: float) -> None:
         """Take in a line that was received at a time, s."""
-        found = readings(line)
-        if found is None:
+        heard = readings(line)
+        if heard is None:
             self.counts["damaged"] += 1
             return
         self.counts["sentences"] += 1
-        for reading in found:
+        for reading in heard:
             self.sensors.take(reading, now)
 
     def watch(self, step: float, now: float, fault: str | None = None) -> None:
-        """Begin when all sensors are there; hand over for good at a fault of theirs, or another one.
+        """Begin when all sensors are there; hand over for good at a fault.
 
-        `step`: time since the last call, s.
+        `step`: time since the last call, s; `fault`: one of another part.
         """
         inputs = self.inputs(now)
-        self.silent = [
-            name.replace("_", " ") for name, value in inputs.items() if value is None
-        ]
+        self.silent = []
+        for name, value in inputs.items():
+            if value is None:
+                self.silent.append(name.replace("_", " "))
+
         if self.state == STANDBY and not self.silent:
             self.state = STEERING
         elif self.state == STEERING and not fault:
@@ -134,6 +146,7 @@ class Helm:
         if fault and self.state == STEERING:
             self.state = MANUAL
             self.alarm = fault
+
         self.warnings = []
         if self.state == STEERING:
             self.warnings = self.warnings_of(inputs, now)
@@ -150,7 +163,8 @@ class Helm:
     def steer(self, now: float) -> None:
         """One control interval."""
         if self.state == STEERING:
-            self.order = self.pilot.step(_known(self.inputs(now)))
+            inputs = self.inputs(now)
+            self.order = self.pilot.step(_known(inputs))
 
     def inputs(self, now: float) -> dict[str, float | None]:
         """Inputs of the autopilot by name; None for what is not known."""
@@ -160,13 +174,15 @@ class Helm:
         if self.route is None:
             inputs["set_point"] = self._set_point(now)
             return inputs
-        latitude, longitude = (inputs[name] for name in POSITION)
+
+        latitude = inputs["latitude"]
+        longitude = inputs["longitude"]
         if latitude is not None and longitude is not None:
             inputs |= self.route.given(latitude, longitude)
         return inputs
 
     def _set_point(self, now: float) -> float | None:
-        """Heading to steer; without one of its own the plotter's quantity that was heard first."""
+        """Heading to steer, its own or that of the plotter which was heard first."""
         if self.heading is not None:
             return self.heading
         if self.rate is not None:
@@ -184,8 +200,9 @@ class Helm:
 
         keeps_heading = not self.follows_path and not known["rate_of_turn"]
         set_point = known.get("set_point", 0.0)
-        error = abs(wrapped(set_point - known["heading"]))
-        if keeps_heading and error > radians(self.limits.off_heading_deg):
+        error = wrapped(set_point - known["heading"])
+        largest = radians(self.limits.off_heading_deg)
+        if keeps_heading and abs(error) > largest:
             warnings.append("off heading")
 
         cross_track = known.get("cross_track", 0.0)
@@ -206,18 +223,19 @@ class Helm:
             return inf if distance is None else distance / speed
 
         reach = self.pilot.agent.gains["turn_reach"]
-        times = [inf]
         for turn in ("next", "second"):
-            distance = inputs[f"{turn}_turn_distance"]
-            if inputs[f"{turn}_turn_angle"] and distance > reach:
-                times.append(float((distance - reach) / speed))
-        return min(times)
+            to_go = inputs[f"{turn}_turn_distance"] - reach
+            angle = inputs[f"{turn}_turn_angle"]
+            if angle and to_go > 0.0:
+                return float(to_go / speed)
+        return inf
 
     @property
     def status(self) -> str:
         """The state, what it waits for, or why it has handed over."""
         if self.state == STANDBY:
-            return f"{STANDBY}, waits for {', '.join(self.silent)}"
+            silent = ", ".join(self.silent)
+            return f"{STANDBY}, waits for {silent}"
         if self.alarm:
             return f"{MANUAL}: ALARM, {self.alarm}: take the wheel"
         return ", ".join([self.state, *self.warnings])

@@ -1,4 +1,4 @@
-"""NMEA 0183 on a bridge: sentences to numbers in SI units and back, over TCP, UDP or a serial line."""
+"""NMEA 0183 on a bridge: sentences and their numbers over TCP, UDP or a serial line."""
 
 from __future__ import annotations
 
@@ -29,9 +29,10 @@ def library(name: str) -> ModuleType:
 
 
 def readings(line: str) -> list[NmeaReading] | None:
-    """Numbers of a sentence: none of one of another kind or that is not valid, None if it is damaged.
+    """Numbers of a sentence; None if it is damaged.
 
-    A sentence without a checksum counts as damaged, as one with a wrong one.
+    A sentence of another kind, or that is marked as invalid, has no numbers. One
+    without a checksum counts as damaged, as one with a wrong one.
     """
     try:
         sentence = parse_sentence(line)
@@ -76,12 +77,14 @@ class Line(asyncio.Protocol, asyncio.DatagramProtocol):
 
     def data_received(self, data: bytes) -> None:
         """Take bytes of a stream, in any portions."""
-        *lines, self.rest = (self.rest + data).split(b"\n")
+        received = self.rest + data
+        *lines, self.rest = received.split(b"\n")
         if len(self.rest) > self.longest:
             self.rest = b""
         for line in lines:
             if line.strip():
-                self.received(line[: self.longest].decode("ascii", "replace").strip())
+                text = line[: self.longest].decode("ascii", "replace")
+                self.received(text.strip())
 
     def datagram_received(self, data: bytes, address: Any) -> None:
         """Take one datagram, of whole lines."""
@@ -89,15 +92,19 @@ class Line(asyncio.Protocol, asyncio.DatagramProtocol):
         self.data_received(data + b"\n")
 
     def send(self, data: bytes) -> None:
-        """Send bytes; a datagram to the last peer, or to where the socket is connected."""
-        if not hasattr(self.transport, "sendto"):
-            self.transport.write(data)
-        elif self.peer or self.transport.get_extra_info("peername"):
-            self.transport.sendto(data, self.peer)
+        """Send bytes; a datagram to the last peer or the connected address."""
+        transport = self.transport
+        if not hasattr(transport, "sendto"):
+            transport.write(data)
+        elif self.peer or transport.get_extra_info("peername"):
+            transport.sendto(data, self.peer)
 
 
 class Link:
-    """A connection by its address: tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD."""
+    """A connection by its address.
+
+    Addresses are tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE and serial:DEVICE@BAUD.
+    """
 
     def __init__(self, received: Callable[[str], None]) -> None:
         self.received = received
@@ -109,9 +116,10 @@ class Link:
         return Line(self.received, self.ends)
 
     async def open(self, address: str, serve: bool = False) -> None:
-        """Connect; or with `serve` wait for connections over TCP, and send first over UDP.
+        """Connect, or with `serve` wait for connections.
 
-        Raises InputError for an address of another form, or one that cannot be opened.
+        Over UDP `serve` sends first. Raises InputError for an address of another form,
+        or one that cannot be opened.
         """
         kind, _, rest = address.partition(":")
         kinds = {"tcp": self._open_tcp, "udp": self._open_udp}
@@ -148,7 +156,7 @@ class Link:
             await loop.create_datagram_endpoint(self.line, local_addr=place)
 
     async def _open_serial(self, rest: str) -> None:
-        """Open a serial line, which is written to at once, and read when there is something."""
+        """Open a serial line, which is read when there is something."""
         device, _, baud = rest.partition("@")
         standard_baud = 4800
         port = library("serial").Serial(
@@ -172,5 +180,6 @@ class Link:
 
     def close(self) -> None:
         """Close whatever is open."""
-        for one in (*self.others, *(end.transport for end in self.ends)):
-            one.close()
+        transports = [end.transport for end in self.ends]
+        for opened in (*self.others, *transports):
+            opened.close()

@@ -1,4 +1,4 @@
-"""Statements of a Python function without those that constants exclude, and those that nobody reads."""
+"""Statements of a Python function without unreachable and unused ones."""
 
 import ast
 from collections.abc import Callable, Iterable, Mapping
@@ -40,57 +40,74 @@ class _Chosen(ast.NodeTransformer):
 
     def visit_IfExp(self, node: ast.IfExp) -> Any:
         """See `ast.NodeTransformer`."""
-        known = self.known(node.test)
-        if isinstance(known, bool):
-            return self.visit(node.body if known else node.orelse)
-        return self.generic_visit(node)
+        test = self.known(node.test)
+        if not isinstance(test, bool):
+            return self.generic_visit(node)
+        branch = node.body if test else node.orelse
+        return self.visit(branch)
 
 
 def reachable(body: Iterable[ast.stmt], known: Known) -> list[ast.stmt]:
-    """Statements without docstrings, branches that constants exclude, and what follows a return."""
+    """Statements without docstrings, excluded branches, and what follows a return.
+
+    Branches are excluded by constants, whose values are `known`.
+    """
     kept: list[ast.stmt] = []
     for node in body:
         if isinstance(node, ast.Expr):
             continue
-        condition = known(node.test) if isinstance(node, ast.If) else None
-        if isinstance(node, ast.If) and isinstance(condition, bool):
-            kept += reachable(node.body if condition else node.orelse, known)
-        else:
-            if isinstance(node, ast.If | ast.For):
-                node.body = reachable(node.body, known)
-                node.orelse = reachable(node.orelse, known)
-            kept.append(_Chosen(known).visit(node))
+        kept += _reachable_parts(node, known)
         if kept and isinstance(kept[-1], ast.Return):
             break
     return kept
 
 
+def _reachable_parts(node: ast.stmt, known: Known) -> list[ast.stmt]:
+    """Reachable part of a statement, one or many statements."""
+    if isinstance(node, ast.If):
+        test = known(node.test)
+        if isinstance(test, bool):
+            branch = node.body if test else node.orelse
+            return reachable(branch, known)
+    if isinstance(node, ast.If | ast.For):
+        node.body = reachable(node.body, known)
+        node.orelse = reachable(node.orelse, known)
+    return [_Chosen(known).visit(node)]
+
+
 def used_statements(body: list[ast.stmt]) -> tuple[list[ast.stmt], set[str]]:
-    """Statements without those whose results nobody reads, and the names that are read."""
+    """Statements whose results are read, and the names that are read."""
     used: set[str] = set()
-    while used != (now := names_in(body, ast.Load)):
-        used = now
+    read = names_in(body, ast.Load)
+    while read != used:
+        used = read
         body = _read(body, used)
+        read = names_in(body, ast.Load)
     return body, used
 
 
 def _read(body: Iterable[ast.stmt], used: set[str]) -> list[ast.stmt]:
-    """Statements that store a name that is read, return or branch; expressions have no other effect."""
+    """Statements that store a name that is read, return or branch.
+
+    Expressions have no other effect.
+    """
     kept = []
     for node in body:
         if isinstance(node, ast.If | ast.For):
-            node.body, node.orelse = _read(node.body, used), _read(node.orelse, used)
+            node.body = _read(node.body, used)
+            node.orelse = _read(node.orelse, used)
         has_effect = isinstance(node, ast.Return | ast.If)
-        if has_effect or names_in([node], ast.Store) & used:
+        stored = names_in([node], ast.Store)
+        if has_effect or stored & used:
             kept.append(node)
     return kept
 
 
 def names_in(body: Iterable[ast.AST], context: type[ast.expr_context]) -> set[str]:
     """Names that are read or written in statements."""
-    found = set()
+    names = set()
     for statement in body:
         for node in ast.walk(statement):
             if isinstance(node, ast.Name) and isinstance(node.ctx, context):
-                found.add(node.id)
-    return found
+                names.add(node.id)
+    return names

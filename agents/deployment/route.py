@@ -1,4 +1,4 @@
-"""A route of waypoints for track control: where a ship is along it, and which turns lie ahead."""
+"""A route of waypoints: position of a ship along it, and the turns ahead."""
 
 from math import copysign, degrees, fabs
 from pathlib import Path as File
@@ -37,8 +37,8 @@ class Route:
         Radius of the arcs, m.
     """
 
-    #: Inputs of an autopilot (`variables.toml`) that a route provides, beside the
-    #: direction of the path as set-point.
+    #: Inputs of an autopilot that a route provides, beside the direction of the path as
+    #: set-point.
     GIVES = (
         "cross_track",
         "next_turn_distance",
@@ -48,8 +48,9 @@ class Route:
     )
 
     def __init__(self, waypoints: Floats, radius: float) -> None:
-        self.origin = float(waypoints[0, 0]), float(waypoints[0, 1])
-        north, east = local_metres(waypoints[:, 0], waypoints[:, 1], self.origin)
+        latitudes, longitudes = waypoints.T
+        self.origin = float(latitudes[0]), float(longitudes[0])
+        north, east = local_metres(latitudes, longitudes, self.origin)
         path = Path(np.column_stack([north, east]))
         farthest_km = float(np.abs(path.waypoints).max()) / 1e3
         if farthest_km > 100.0:  # too far for a plane
@@ -65,7 +66,10 @@ class Route:
 
     @classmethod
     def from_csv(cls, path: str | File, radius: float) -> Self:
-        """Read waypoints in degrees from the columns `latitude` and `longitude`; InputError names the row."""
+        """Read waypoints in degrees from the columns `latitude` and `longitude`.
+
+        Raises InputError, which names the row.
+        """
         table = read_csv(path)
         columns = []
         for name, largest in {"latitude": 89.0, "longitude": 180.0}.items():
@@ -87,7 +91,10 @@ class Route:
             return cls(np.column_stack(columns), radius)
 
     def given(self, latitude: float, longitude: float) -> dict[str, float]:
-        """Direction of the path beside the ship, distance from it and turns ahead; position in rad."""
+        """Direction of the path beside a ship, distance from it, and turns ahead.
+
+        `latitude`, `longitude`: rad.
+        """
         here = self._fix(latitude, longitude)
         leg = self.leg
         self.ended = leg.turn == 0.0 and here.along_track >= leg.turn_at
@@ -102,14 +109,17 @@ class Route:
         }
 
     def _fix(self, latitude: float, longitude: float) -> Fix:
-        """Position on the leg or arc that the ship is on, after any turns that are over."""
+        """Position on the leg or arc of the ship, after any turns that are over."""
         scale = self.scale
-        north, east = local_metres(
-            np.array(degrees(latitude)), np.array(degrees(longitude)), self.origin
-        )
-        position = float(north), float(east)
-        here = fix(*position, self.leg, scale, scale)
-        while turn_is_over(self.leg, here.along_track, scale.turn_radius):
-            self.leg = leg_after(self.leg, scale.turn_radius, self.plan)
-            here = fix(*position, self.leg, scale, scale)
+        radius = scale.turn_radius
+        latitude_deg = np.array(degrees(latitude))
+        longitude_deg = np.array(degrees(longitude))
+        north, east = local_metres(latitude_deg, longitude_deg, self.origin)
+        x = float(north)
+        y = float(east)
+
+        here = fix(x, y, self.leg, scale, scale)
+        while turn_is_over(self.leg, here.along_track, radius):
+            self.leg = leg_after(self.leg, radius, self.plan)
+            here = fix(x, y, self.leg, scale, scale)
         return here

@@ -14,7 +14,7 @@ ANGLES = ("heading", "course", "leg", "to_steer", "rudder", "waypoint_bearing")
 
 @dataclass(frozen=True)
 class Limits:
-    """When an autopilot hands over to the helmsman, or warns him, and its largest rudder.
+    """Limits beyond which an autopilot warns or hands over, and its largest rudder.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class HelmSensors:
     expected: float | None = None
 
     def take(self, reading: NmeaReading, now: float) -> None:
-        """Keep a reading; the first talker of a quantity is the one that is steered by."""
+        """Keep a reading; the first talker of a quantity is steered by."""
         talkers = self.newest.setdefault(reading.quantity, {})
         talkers[reading.talker] = (reading.value, now)
 
@@ -88,7 +88,7 @@ class HelmSensors:
         return None
 
     def numbers(self, needed: Iterable[str], now: float) -> dict[str, float | None]:
-        """Values by quantity; speeds over ground if no log measures those through the water."""
+        """Values by quantity; speeds over ground if there is no log."""
         values = {quantity: self.value(quantity, now) for quantity in needed}
         course = self.value("course", now)
         speed = self.value("speed", now)
@@ -104,19 +104,17 @@ class HelmSensors:
         return values
 
     def fault(self, order: float, step: float, now: float) -> str:
-        """Two talkers that differ, or a rudder that does not follow its order, for too long; else empty.
+        """Describe a fault that has lasted too long; empty without one.
 
-        `order`: rudder order, rad; `step`: time since the last call, s.
+        A fault is that two talkers differ, or that the rudder does not follow its
+        order, rad. `step`: time since the last call, s.
         """
         return self._disagreement(now) or self._rudder_fault(order, step, now)
 
     def _disagreement(self, now: float) -> str:
-        for quantity, talkers in self.newest.items():
-            fresh = {
-                talker: value
-                for talker, (value, time) in talkers.items()
-                if self._is_fresh(time, now)
-            }
+        """Describe two talkers of one quantity that differ."""
+        for quantity in self.newest:
+            fresh = self._fresh(quantity, now)
             if not fresh:
                 continue
             first = next(iter(fresh))
@@ -132,8 +130,16 @@ class HelmSensors:
                     return f"{name} of {first} and {talker} disagree"
         return ""
 
+    def _fresh(self, quantity: str, now: float) -> dict[str, float]:
+        """Newest values of a quantity by talker, without those that are too old."""
+        fresh = {}
+        for talker, (value, time) in self.newest[quantity].items():
+            if self._is_fresh(time, now):
+                fresh[talker] = value
+        return fresh
+
     def _rudder_fault(self, order: float, step: float, now: float) -> str:
-        """Compare the rudder with where it should be by now, at the slowest, and its order."""
+        """Compare the rudder with its order, and where a slow gear would have it."""
         rudder = self.value("rudder", now) or 0.0
         if self.expected is None:
             self.expected = rudder
@@ -157,4 +163,5 @@ class HelmSensors:
         if not is_wrong:
             self.since.pop(what, None)
             return False
-        return now - self.since.setdefault(what, now) > self.limits.persistence_s
+        begin = self.since.setdefault(what, now)
+        return now - begin > self.limits.persistence_s

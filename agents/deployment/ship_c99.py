@@ -1,19 +1,13 @@
-"""Ship models as C99, their equations translated from the functions that the environments compile."""
+"""Ship models as C99, translated from the functions that the environments compile."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.deployment.autopilot import VARIABLES
-from agents.deployment.c99 import (
-    Source,
-    Variable,
-    Variables,
-    checked_name,
-    comment,
-    render,
-)
+from agents.deployment.c99 import Source, checked_name, comment, render
 from agents.deployment.translator import Translator
+from agents.deployment.variables import SHIP_INPUTS, SHIP_STATES, Variables
 from shipgym import InputError, ShipModel, Weather, Wind
 from shipgym.arrays import Floats
 from shipgym.engine.mathematics import sin_cos
@@ -25,7 +19,7 @@ from shipgym.ships.simulate import LONGEST_STEP
 
 
 class ShipInput(NamedTuple):
-    """What is given to a ship, held over a step (`variables.toml`)."""
+    """Input of a ship, held over a step (`SHIP_INPUTS`)."""
 
     rudder: float
     shaft: float
@@ -39,83 +33,67 @@ def advance(
     motion: Motion, given: ShipInput, h: float, c: Any, ship: Ship, p: SeaParameters
 ) -> Motion:
     """State after a step in a steady current and wind, as `simulate` sails it."""
-    sine, cosine = sin_cos(given.wind_from)
-    north, east, zero = given.current_north, given.current_east, 0.0
-    sea = Sea(
-        zero,
-        zero,
-        cosine,
-        sine,
-        1.0,
-        zero,
-        north,
-        east,
-        given.wind_speed,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-    )
-    pushed = (
-        push(motion, sea, p)
-        if given.wind_speed > 0.0
-        else Push(zero, zero, zero, zero, north, east)
-    )
+    north = given.current_north
+    east = given.current_east
+    pushed = Push(u=0.0, v=0.0, r=0.0, p=0.0, north=north, east=east)
+    if given.wind_speed > 0.0:
+        pushed = push(motion, steady_sea(given), p)
     return sail(motion, given.rudder, given.shaft, h, pushed, c, ship)
+
+
+def steady_sea(given: ShipInput) -> Sea:
+    """Sea of a steady current and wind, without waves or gusts."""
+    sine, cosine = sin_cos(given.wind_from)
+    return Sea(
+        mean_north=0.0,
+        mean_east=0.0,
+        wind_north=cosine,
+        wind_east=sine,
+        waves_north=1.0,
+        waves_east=0.0,
+        current_north=given.current_north,
+        current_east=given.current_east,
+        gust=given.wind_speed,
+        drift=0.0,
+        heading_displacement=0.0,
+        heading_velocity=0.0,
+        roll_displacement=0.0,
+        roll_velocity=0.0,
+        psi_wave=0.0,
+        r_wave=0.0,
+        phi_wave=0.0,
+        p_wave=0.0,
+    )
 
 
 def ship_source(
     model: ShipModel, name: str | None = None, water_depth: float = np.inf
 ) -> Source:
-    """Write a ship model as C99, by default under the model's name, in water of a depth in m.
+    """Write a ship model as C99, by default under the model's name.
 
-    A ship with too few particulars for wind forces is written without them, as
-    `Source.notes` says. Raises InputError for a name that C does not take, shallow
-    water that the model does not know, and equations of one's own that use more than
-    arithmetic.
+    `water_depth`: m. A ship with too few particulars for wind forces is written without
+    them, as `Source.notes` says. Raises InputError for a name that C does not take,
+    shallow water that the model does not know, and equations of one's own that use more
+    than arithmetic.
     """
     name = checked_name(name or model.name)
     longest = LONGEST_STEP * model.travel_time
     weather, note = _weather(model, water_depth)
-    inputs, outputs = _variables(model, windy=not note)
-
-    coefficients = model.compiled.coefficients
-    c = Translator({**model.compiled.hooks(), **sea_functions(True)}, name)
-    c.structures.types |= {Motion: f"{name}_state", ShipInput: f"{name}_input"}
-    kinds = {"SHIP": Ship, "COEFFICIENTS": coefficients, "SEA": SeaParameters}
-    numbers = iter([*model.ship_numbers(water_depth, longest), *weather])
-    constants = {
-        constant: (c.structures.type(kind), c.structures.initialiser(kind, numbers))
-        for constant, kind in kinds.items()
-    }
-    step = c.function(
-        advance, Motion, ShipInput, float, coefficients, Ship, SeaParameters
-    )
-    has_lost = c.function(lost, Motion, Ship)
-
-    start = _start(model)
+    inputs = _inputs(model, windy=not note)
+    outputs = _outputs(model)
     data = {
         "title": comment(f"Ship model '{model.name}'"),
         "inputs": inputs,
         "outputs": outputs,
-        "variables": VARIABLES,
+        "all_inputs": SHIP_INPUTS,
+        "all_states": SHIP_STATES,
         "step": longest,
         "speed": model.particulars["speed"],
-        "shaft": start["shaft"],
+        "shaft": _start(model)["shaft"],
         "limit": model.steering.limit,
-        "begin": c.structures.initialiser(
-            Motion, iter([start.get(one, 0.0) for one in Motion._fields])
+        **_translated(
+            model, name, [*model.ship_numbers(water_depth, longest), *weather]
         ),
-        "constants": constants,
-        "structures": c.structures.texts,
-        "functions": c.functions,
-        "advance": step.name,
-        "lost": has_lost.name,
     }
     return Source(
         name=name,
@@ -129,8 +107,50 @@ def ship_source(
     )
 
 
+def _translated(
+    model: ShipModel, name: str, numbers: Sequence[float]
+) -> dict[str, Any]:
+    """Functions, structures and constants of a ship in C, for the templates.
+
+    `numbers`: those of the ship, her coefficients and her sea, in order.
+    """
+    c = Translator({**model.compiled.hooks(), **sea_functions(True)}, name)
+    structures = c.structures
+    structures.types |= {Motion: f"{name}_state", ShipInput: f"{name}_input"}
+
+    coefficients = model.compiled.coefficients
+    kinds = {"SHIP": Ship, "COEFFICIENTS": coefficients, "SEA": SeaParameters}
+    left = iter(numbers)
+    constants = {}
+    for constant, kind in kinds.items():
+        type_name = structures.type(kind)
+        constants[constant] = (type_name, structures.initialiser(kind, left))
+
+    step = c.function(
+        advance,
+        Motion,
+        ShipInput,
+        float,
+        coefficients,
+        Ship,
+        SeaParameters,
+    )
+    has_lost = c.function(lost, Motion, Ship)
+
+    start = _start(model)
+    at_start = [start.get(state, 0.0) for state in Motion._fields]
+    return {
+        "begin": structures.initialiser(Motion, iter(at_start)),
+        "constants": constants,
+        "structures": structures.texts,
+        "functions": c.functions,
+        "advance": step.name,
+        "lost": has_lost.name,
+    }
+
+
 def _weather(model: ShipModel, water_depth: float) -> tuple[Floats, str]:
-    """Numbers of a weather whose wind is given later; why there is none, where there is none."""
+    """Numbers of a weather whose wind comes later, and a note if it has no wind."""
     wind = Weather(wind=Wind(1.0, 0.0, gust=False))
     note = ""
     try:
@@ -149,20 +169,24 @@ def _start(model: ShipModel) -> dict[str, float]:
     return {"n": shaft, "shaft": shaft, **dict(states)}
 
 
-def _variables(model: ShipModel, windy: bool) -> tuple[Variables, Variables]:
-    """Inputs that have an effect on a ship, and states that she has or is ordered."""
+def _inputs(model: ShipModel, windy: bool) -> Variables:
+    """Inputs that have an effect on a ship, with their values at the beginning."""
     without = set() if windy else {"wind_speed", "wind_from"}
     if "n" not in model.command_names:
         without.add("shaft")
+    return _started(model, SHIP_INPUTS.keys() - without, SHIP_INPUTS)
+
+
+def _outputs(model: ShipModel) -> Variables:
+    """States that a ship has or is ordered, with their values at the beginning."""
+    return _started(model, {*model.state_names, *model.command_names}, SHIP_STATES)
+
+
+def _started(model: ShipModel, names: set[str], variables: Variables) -> Variables:
+    """Variables of these names, with their values at the beginning."""
     start = _start(model)
-    inputs = {
-        name: Variable(unit, meaning, start.get(name, 0.0))
-        for name, (unit, meaning) in VARIABLES["ship_input"].items()
-        if name not in without
-    }
-    outputs = {
-        name: Variable(unit, meaning, start.get(name, 0.0))
-        for name, (unit, meaning) in VARIABLES["ship_state"].items()
-        if name in (*model.state_names, *model.command_names)
-    }
-    return inputs, outputs
+    started = {}
+    for name, variable in variables.items():
+        if name in names:
+            started[name] = variable._replace(start=start.get(name, 0.0))
+    return started

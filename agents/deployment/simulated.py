@@ -1,4 +1,4 @@
-"""`shipgym simulate`: a ship model with the instruments of a ship, to steer over NMEA 0183."""
+"""`shipgym simulate`: a ship model with instruments, to steer over NMEA 0183."""
 
 import asyncio
 from collections.abc import Mapping
@@ -66,10 +66,15 @@ class SimulatedShip:
 
     def advance(self) -> None:
         """Simulate one step; InputError if the ship runs away."""
+        passage = self.passage
         order = np.array([[self.order, self.model.service_shaft_speed]])
-        simulate = self.passage.loop("simulate")
+        simulate = passage.loop("simulate")
         is_sound = simulate(
-            self.states, order, self.step, *self.passage.sea, self.passage.numbers
+            self.states,
+            order,
+            self.step,
+            *passage.sea,
+            passage.numbers,
         )
         if not is_sound:
             seconds = self.steps * self.step
@@ -85,9 +90,14 @@ class SimulatedShip:
         return dict(zip(self.model.state_names, self.states[0].tolist(), strict=False))
 
     def measured(self) -> dict[str, float]:
-        """Readings of instruments and plotter by quantity of `shipgym/trials/nmea.toml`, SI units and radians."""
+        """Readings by quantity of `shipgym/trials/nmea.toml`, SI units and radians."""
+        return {**self._of_instruments(), **self._of_plotter()}
+
+    def _of_instruments(self) -> dict[str, float]:
+        """Readings of compass, gyro, rudder, log and GNSS receiver."""
         state = self.now
         psi = state["psi"]
+        surge = state["u"]
         sway = state["v"] * cos(state.get("phi", 0.0))  # in the horizontal plane
 
         sea = np.zeros(len(SEA_CHANNELS))
@@ -96,25 +106,33 @@ class SimulatedShip:
         # the first-order motion that compass and gyro feel, and the current
         psi_wave, r_wave, _, _, current_north, current_east = sea[:6].tolist()
 
-        north = current_north + state["u"] * cos(psi) - sway * sin(psi)
-        east = current_east + state["u"] * sin(psi) + sway * cos(psi)
+        north = current_north + surge * cos(psi) - sway * sin(psi)
+        east = current_east + surge * sin(psi) + sway * cos(psi)
         latitude = START[0] + state["x"] / MINUTE / 60.0
         longitude = START[1] + state["y"] / MINUTE / 60.0 / cos(radians(latitude))
-        waypoint_m = 10.0 * MINUTE  # along the leg
-        north_to_go = waypoint_m * cos(self.leg) - state["x"]
-        east_to_go = waypoint_m * sin(self.leg) - state["y"]
         return {
             "heading": psi + psi_wave,
             "yaw_rate": state["r"] + r_wave,
             "rudder": state["delta"],
-            "surge": state["u"],
+            "surge": surge,
             "sway": state["v"],
             "course": atan2(east, north),
             "speed": hypot(north, east),
             "latitude": radians(latitude),
             "longitude": radians(longitude),
-            "cross_track": state["y"] * cos(self.leg) - state["x"] * sin(self.leg),
-            "leg": self.leg,
+        }
+
+    def _of_plotter(self) -> dict[str, float]:
+        """Readings of the chart plotter: the leg, and a waypoint ten miles along it."""
+        x = self.now["x"]
+        y = self.now["y"]
+        leg = self.leg
+        waypoint_m = 10.0 * MINUTE
+        north_to_go = waypoint_m * cos(leg) - x
+        east_to_go = waypoint_m * sin(leg) - y
+        return {
+            "cross_track": y * cos(leg) - x * sin(leg),
+            "leg": leg,
             "waypoint_bearing": atan2(east_to_go, north_to_go),
             "waypoint_distance": hypot(north_to_go, east_to_go),
         }
@@ -123,26 +141,33 @@ class SimulatedShip:
         """Sentences that her instruments send now."""
         steps_of_slow = 10  # between two of the log, the GNSS receiver and the plotter
         known: dict[str, Any] = self.measured()
-        minutes, seconds = divmod(self.steps * self.step, 60.0)
-        hours, minutes = divmod(int(minutes), 60)
+        off_miles = abs(known["cross_track"]) / MINUTE
+        miles_to_go = known["waypoint_distance"] / MINUTE
         text = render(
             "instruments.nmea.j2",
             **known,
             slow=self.steps % steps_of_slow == 0,
-            off=f"{abs(known['cross_track']) / MINUTE:.5f}",
+            off=f"{off_miles:.5f}",
             side="L" if known["cross_track"] >= 0.0 else "R",
-            miles=f"{known['waypoint_distance'] / MINUTE:.4f}",
+            miles=f"{miles_to_go:.4f}",
             north=_degrees_and_minutes(known["latitude"], 2),
             east=_degrees_and_minutes(known["longitude"], 3),
-            time=f"{hours % 24:02d}{minutes:02d}{seconds:05.2f}",
+            time=self._time(),
         )
         return sentences(text)
+
+    def _time(self) -> str:
+        """Time of day as HHMMSS.SS; she begins at midnight."""
+        minutes, seconds = divmod(self.steps * self.step, 60.0)
+        hours, minutes = divmod(int(minutes), 60)
+        return f"{hours % 24:02d}{minutes:02d}{seconds:05.2f}"
 
 
 def _degrees_and_minutes(angle: float, digits: int) -> str:
     """A latitude or longitude, rad, as 5430.5000 with so many digits of degrees."""
     value = degrees(angle)
-    return f"{int(value):0{digits}d}{value % 1 * 60:07.4f}"
+    minutes = value % 1 * 60
+    return f"{int(value):0{digits}d}{minutes:07.4f}"
 
 
 async def simulate_ship(
@@ -172,21 +197,31 @@ async def simulate_ship(
     """
     check_number(speed_up, "speed_up", above=0.0)
     dropped = dict(drop or {})
-    types = sorted({_type(line) for line in ship.sentences().splitlines()})
-    check_keys(dropped, types, "drop")
+    types = {_type(line) for line in ship.sentences().splitlines()}
+    check_keys(dropped, sorted(types), "drop")
 
     loop = asyncio.get_running_loop()
     link = Link(ship.hear)
     await link.open(address, serve=True)
     begin = loop.time()
     with closing(link), suppress(asyncio.CancelledError):  # an interruption ends it
-        while ship.steps * ship.step < duration:
-            now = ship.steps * ship.step
-            await asyncio.sleep(max(0.0, begin + now / speed_up - loop.time()))
-            lines = ship.sentences().splitlines(keepends=True)
-            sent = [line for line in lines if now < dropped.get(_type(line), inf)]
-            link.send("".join(sent))
+        now = ship.steps * ship.step
+        while now < duration:
+            due = begin + now / speed_up
+            await asyncio.sleep(max(0.0, due - loop.time()))
+            link.send(_still_sent(ship.sentences(), dropped, now))
             ship.advance()
+            now = ship.steps * ship.step
+
+
+def _still_sent(text: str, dropped: Mapping[str, float], now: float) -> str:
+    """Sentences without those that have fallen silent by now."""
+    sent = []
+    for line in text.splitlines(keepends=True):
+        silent_from = dropped.get(_type(line), inf)
+        if now < silent_from:
+            sent.append(line)
+    return "".join(sent)
 
 
 def _type(line: str) -> str:

@@ -1,4 +1,4 @@
-"""Plain functions on numbers and records, as `shipgym.engine` compiles them, written as C99.
+"""Plain functions on numbers and records, as the engine compiles them, written as C99.
 
 A function is translated for the kinds of its arguments, with all that it calls, hooks
 filled as `shipgym.engine.specialise` fills them. Nothing but checked names and numbers
@@ -39,7 +39,7 @@ class Translator:
         self._translated: dict[Any, Translated | None] = {}
 
     def function(self, function: Any, *kinds: Kind) -> Translated:
-        """Write a function for arguments of these kinds, one of which may be a function itself.
+        """Write a function for arguments of these kinds, functions among them.
 
         Raises InputError, naming function and line, for what cannot be written as C.
         """
@@ -48,15 +48,22 @@ class Translator:
         return translated
 
     def call(self, function: Any, *kinds: Kind) -> Translated | None:
-        """A function that another one calls; None if it is the one that is being written."""
+        """A function that another one calls; None if it is still being written."""
         key = (function, kinds)
-        if key not in self._translated:
-            self._translated[key] = None
-            name = self.structures.free_name(function.__name__)
-            writer = FunctionWriter(
-                function, kinds, self.hooks, self.structures, self.call
-            )
-            text, returns = writer.written(name)
-            self.functions.append(text)
-            self._translated[key] = Translated(name, returns)
-        return self._translated[key]
+        if key in self._translated:
+            return self._translated[key]
+
+        self._translated[key] = None
+        name = self.structures.free_name(function.__name__)
+        writer = FunctionWriter(
+            function,
+            kinds=kinds,
+            hooks=self.hooks,
+            structures=self.structures,
+            translate=self.call,
+        )
+        text, returns = writer.written(name)
+        self.functions.append(text)
+        translated = Translated(name, returns)
+        self._translated[key] = translated
+        return translated

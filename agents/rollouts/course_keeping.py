@@ -1,4 +1,4 @@
-"""Episodes of course keeping and step responses of one controller on many ships at once."""
+"""Episodes of course keeping and step responses of one controller on many ships."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -65,7 +65,7 @@ class Episodes:
 
 
 class StepResponses(NamedTuple):
-    """Responses to a step of the set-point; a ship that is lost stays where it was lost.
+    """Responses to a step of the set-point; a lost ship stays where it was lost.
 
     Attributes
     ----------
@@ -117,19 +117,21 @@ def sail(
     asked = task or course_keeping_task()
     check_fits(controller, asked, ships[0], f"model '{ships[0].name}'")
 
-    one_ship = len(ships) == 1
-    episodes = numbers.reshape(len(ships), -1)
+    flat = numbers.ravel()
+    per_ship = numbers.size // len(ships)
     groups = []
     for first in range(0, numbers.size, AT_ONCE):
-        group = range(first, min(first + AT_ONCE, numbers.size))
-        rows, columns = np.divmod(group, episodes.shape[1])
+        some = flat[first : first + AT_ONCE]
+        models_of_group = ships
+        if len(ships) > 1:
+            lanes = first + np.arange(len(some))
+            models_of_group = [ships[lane // per_ship] for lane in lanes]
         engine = Engine(
-            ships if one_ship else [ships[row] for row in rows],
-            len(group),
+            models_of_group,
+            len(some),
             asked,
             allow_unstable=allow_unstable,
         )
-        some = episodes[rows, columns]
         run = rollout(controller, engine, some, record=RECORDED)
         groups.append(_figures(run))
 
@@ -202,7 +204,10 @@ def step_response(
     ships = _ships(models)
     first = ships[0]
     check_number(
-        step_deg, "step_deg", at_least=-LARGEST_STEP_DEG, at_most=LARGEST_STEP_DEG
+        step_deg,
+        "step_deg",
+        at_least=-LARGEST_STEP_DEG,
+        at_most=LARGEST_STEP_DEG,
     )
     if duration is None:
         duration = STEP_LENGTHS * first.travel_time
@@ -229,13 +234,13 @@ def step_response(
 
 
 def _continued(history: Floats, n_samples: int) -> Floats:
-    """History of each ship, shape (n_ships, n_samples); the last value lasts to the end."""
+    """History of each ship, shape (n_ships, n_samples), filled up by the last value."""
     missing = n_samples - len(history)
     return np.pad(history, ((0, missing), (0, 0)), mode="edge").T
 
 
 class _NewCourse:
-    """Shows ships a course that is a step, rad, away from the one they keep in an engine."""
+    """Shows ships a course that is a step, rad, away from the one they keep."""
 
     def __init__(self, engine: Engine, step: float) -> None:
         self.engine = engine

@@ -18,13 +18,10 @@ SAMPLES = 300  # of a history at most
 
 
 class Recorded(NamedTuple):
-    """Episodes of one policy: what happened, None where not even one sample, and what each cost.
+    """Episodes of one policy."""
 
-    What an episode cost in which the policy failed is not known here: NaN.
-    """
-
-    episodes: list[Episode | None]
-    costs: Floats
+    episodes: list[Episode | None]  # None for one without a sample
+    costs: Floats  # NaN where the policy failed
 
 
 def recorded(
@@ -36,12 +33,14 @@ def recorded(
     several control intervals, in which rewards are summed. The last one is filled up:
     the ship stays where her episode ended.
     """
-    engine = task.engine(len(seeds))
+    n = len(seeds)
+    engine = task.engine(n)
     run = rollout(policy, engine, np.asarray(seeds), record=True, tolerant=True)
     stride = math.ceil(task.task.episode_steps / samples)
     episodes = []
-    for lane in range(len(seeds)):
-        episodes.append(episode_of(run, task, lane, engine, stride))
+    for lane in range(n):
+        episode = episode_of(run, task, lane, engine, stride)
+        episodes.append(episode)
 
     costs = np.where(run.failed, np.nan, run.costs)
     return Recorded(episodes, costs)
@@ -58,7 +57,8 @@ class _Lane:
         n_intervals = math.ceil(self.steps / stride)
         if self.failed:  # she drifts on after that
             n_intervals = self.steps // stride
-        self.samples = np.minimum(stride * np.arange(n_intervals + 1), self.steps)
+        samples = stride * np.arange(n_intervals + 1)
+        self.samples = np.minimum(samples, self.steps)
 
     def at_samples(self, histories: Mapping[str, Floats]) -> dict[str, Floats]:
         """Histories that are finite throughout, each of shape (n_samples,)."""
@@ -71,16 +71,17 @@ class _Lane:
 
     def summed(self, per_step: Floats) -> Floats:
         """Sums between the samples of what each step of a rollout has."""
-        running = np.cumsum(per_step[: self.steps, self.lane])
-        return np.diff(np.append(0.0, running)[self.samples])
+        own = per_step[: self.steps, self.lane]
+        running = np.append(0.0, np.cumsum(own))
+        return np.diff(running[self.samples])
 
     def success(self) -> bool | None:
-        """Whether the episode was a success; None if its task knows none."""
+        """Return True if the episode was a success; None if its task knows none."""
         infos = self.run.infos
         for name in SUCCESS:
             if name in infos:
-                flags = infos[name][: self.steps + 1, self.lane]
-                return bool(np.any(flags[1:] > 0.0))
+                flags = infos[name][1 : self.steps + 1, self.lane]
+                return bool(np.any(flags > 0.0))
         return None
 
 
@@ -96,12 +97,14 @@ def episode_of(
     if len(history.samples) < 2:
         return None
 
-    parts = task.task.reward_parts
-    infos = {
-        name: values
-        for name, values in run.infos.items()
-        if name not in parts and name not in SUCCESS
-    }
+    parts = {}
+    for name in task.task.reward_parts:
+        parts[name] = history.summed(run.infos[name][1:])
+    infos = {}
+    for name, values in run.infos.items():
+        if name not in parts and name not in SUCCESS:
+            infos[name] = values
+
     states = history.at_samples(run.states)
     commands = {}
     for name in ship.command_names:
@@ -119,7 +122,7 @@ def episode_of(
         actions=run.actions[history.samples[:-1], lane],
         rewards=history.summed(run.rewards),
         commands=commands,
-        reward_parts={name: history.summed(run.infos[name][1:]) for name in parts},
+        reward_parts=parts,
         info=history.at_samples(infos),
         waypoints=engine.waypoints(lane),
         corridor=engine.path_metres("corridor"),

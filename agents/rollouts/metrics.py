@@ -1,4 +1,4 @@
-"""What an episode comes to: figures of rollouts, one number an episode.
+"""Figures of rollouts, one number an episode.
 
 Intervals in which an episode was over do not count. A figure that an episode does not
 have (nothing sailed, no course change, no path) is NaN.
@@ -54,7 +54,7 @@ def recorded_for_metrics(task: Task) -> tuple[str, ...]:
 
 
 def worst_step_cost(task: Task) -> float:
-    """Cost of each step that is left of an episode in which control is lost, as the tasks have it."""
+    """Cost of each step that is left of an episode in which control is lost."""
     return float(asked(task.definition.worst_cost, task.settings))
 
 
@@ -82,12 +82,14 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         reached, else whether control was kept.
     """
     nowhere = np.full(len(run.seeds), np.nan)
+    undefined = dict.fromkeys((*CourseChange._fields, *OF_PATHS), nowhere)
     own = task_figures(run)
-    lost = run.terminated & ~(own["success"] > 0.0)
+    succeeded = own["success"] > 0.0
+    lost = run.terminated & ~succeeded
     return {
         **costs(run),
         **steering(run),
-        **dict.fromkeys((*CourseChange._fields, *OF_PATHS), nowhere),
+        **undefined,
         **own,
         "fuel": fuel_per_distance(run),
         "extrapolating": mean(run, "extrapolating"),
@@ -134,24 +136,23 @@ def costs(run: Rollout) -> dict[str, Floats]:
 
 def steering(run: Rollout) -> dict[str, Floats]:
     """Heading error and rudder activity of each episode, see `metrics`."""
+    heading_rmse = np.full(len(run.seeds), np.nan)
+    if _keeps_course(run.task):
+        heading_rmse = root_mean_square(run, "heading_error")
+
     minutes = run.steps * run.dt / 60.0
     rudder = run.states["delta"]
     moved = np.abs(np.diff(rudder, axis=0))
     travel = total(np.where(run.sailing, moved, 0.0))
-    turns = reversals(rudder, run.sailing)
-
-    heading_rmse = np.full(len(run.seeds), np.nan)
-    if _keeps_course(run.task):
-        heading_rmse = root_mean_square(run, "heading_error")
     return {
         "heading_rmse_deg": np.degrees(heading_rmse),
         "rudder_travel_deg_min": ratio(np.degrees(travel), minutes),
-        "rudder_reversals_min": ratio(turns, minutes),
+        "rudder_reversals_min": ratio(reversals(rudder, run.sailing), minutes),
     }
 
 
 def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Floats:
-    """How often an angle turns round, by more than a dead band each time.
+    """Count how often an angle turns round by more than a dead band.
 
     `angle`: rad, shape (n_steps + 1, n); `counts`: intervals that count, the first ones
     of each, shape (n_steps, n); `dead_band`: rad; a smaller return does not count.
@@ -159,24 +160,30 @@ def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Flo
     """
     lowest = angle[0]  # since the last turn
     highest = angle[0]
-    direction = np.zeros(angle.shape[1])  # -1, 0 or 1
-    number: Floats = np.zeros(angle.shape[1])
+    direction = np.zeros_like(lowest)  # -1, 0 or 1
+    number: Floats = np.zeros_like(lowest)
 
     for now, counted in zip(angle[1:], counts, strict=True):
-        rises = (direction <= 0.0) & (now > lowest + dead_band)
-        falls = (direction >= 0.0) & (now < highest - dead_band)
+        is_up = now > lowest + dead_band
+        is_down = now < highest - dead_band
+        rises = is_up & (direction <= 0.0)
+        falls = is_down & (direction >= 0.0)
         turns = rises | falls
 
         # the first movement of all is no reversal
-        number += counted & turns & (direction != 0.0)
+        has_moved = direction != 0.0
+        number += counted & turns & has_moved
         direction = np.select([rises, falls], [1.0, -1.0], default=direction)
-        lowest = np.where(turns, now, np.minimum(lowest, now))
-        highest = np.where(turns, now, np.maximum(highest, now))
+
+        lowest = np.minimum(lowest, now)
+        highest = np.maximum(highest, now)
+        lowest[turns] = now[turns]
+        highest[turns] = now[turns]
     return number
 
 
 def course_changes(run: Rollout) -> dict[str, Floats]:
-    """Overshoot and settling after the course changes of an episode, means over its changes.
+    """Overshoot and settling after course changes, means over those of an episode.
 
     A change begins with a new set-point at least 5 degrees from the heading, and lasts
     until the next or the end of the episode. Its overshoot is the largest heading error
@@ -186,11 +193,14 @@ def course_changes(run: Rollout) -> dict[str, Floats]:
     Returns the fields of `CourseChange`, each of shape (n,).
     """
     figures = CourseChange._fields
-    means = np.full((len(figures), len(run.seeds)), np.nan)
-    for episode, steps in enumerate(run.steps):
-        last = int(steps) + 1
-        course = run.states["set_point"][:last, episode]
-        heading = run.states["psi"][:last, episode]
+    n_episodes = len(run.seeds)
+    means = np.full((len(figures), n_episodes), np.nan)
+    courses = run.states["set_point"].T
+    headings = run.states["psi"].T
+    for episode in range(n_episodes):
+        n_samples = int(run.steps[episode]) + 1
+        course = courses[episode, :n_samples]
+        heading = headings[episode, :n_samples]
         changes = changes_of_course(course, heading, run.dt)
         if changes:
             means[:, episode] = np.mean(changes, axis=0)
@@ -205,10 +215,12 @@ def changes_of_course(course: Floats, heading: Floats, dt: float) -> list[Course
     error = wrapped(course - heading)
     last = len(course) - 1
     altered = 1 + np.flatnonzero(np.diff(course[:last]))
+    limits = [0, *altered.tolist(), last]
 
     changes = []
-    for begin, end in pairwise([0, *altered.tolist(), last]):
-        if begin == end or abs(error[begin]) < SMALLEST_CHANGE:
+    for begin, end in pairwise(limits):
+        is_small = abs(error[begin]) < SMALLEST_CHANGE
+        if is_small or begin == end:
             continue
         # the error at the end may already be that against the next course
         next_course = course[end] != course[begin]
@@ -229,28 +241,31 @@ def step_figures(error: Floats, dt: float) -> CourseChange:
 
     band = max(SETTLED_SHARE * change, SETTLED_LEAST)
     outside = np.flatnonzero(np.abs(error) > band)
+    last_outside = int(outside[-1])
     last = len(error) - 1
-    settled = min(int(outside[-1]) + 1, last)
+    settled = min(last_outside + 1, last)
     return CourseChange(
         overshoot_percent=100.0 * overshoot / change,
         settling_s=settled * dt,
-        unsettled=float(outside[-1] == last),
+        unsettled=float(last_outside == last),
     )
 
 
 def fuel_per_distance(run: Rollout) -> Floats:
-    """Fuel for each mile made good, that of straight running at service speed in calm water being 1.
+    """Fuel for each mile made good.
 
-    Power is proportional to the cube of the shaft speed (propeller law). The distance
-    counts the speed lost to rudder and drift, the way lengthened by yawing, and the
-    weather. It is no consumption: how the engine answers to load is not modelled. NaN
-    where no way was made good, or the task has neither path nor course, shape (n,).
+    That of straight running at service speed in calm water is 1. Power is proportional
+    to the cube of the shaft speed (propeller law). The distance counts the speed lost
+    to rudder and drift, the way lengthened by yawing, and the weather. It is no
+    consumption: how the engine answers to load is not modelled. NaN where no way was
+    made good, or the task has neither path nor course, shape (n,).
     """
     if not (_on_path(run.task) or _keeps_course(run.task)):
         return np.full(len(run.seeds), np.nan)
+    model = run.model
     service = 0.0
-    if "n" in run.model.state_names:
-        service = run.model.service_shaft_speed
+    if "n" in model.state_names:
+        service = model.service_shaft_speed
 
     # power over that at service speed
     power = run.sailing.astype(np.float64)
@@ -258,19 +273,24 @@ def fuel_per_distance(run: Rollout) -> Floats:
         power = (during(run, "n") / service) ** 3
 
     spent = total(power) * run.dt
-    in_calm_water = distance_made_good(run) / run.model.particulars["speed"]
+    in_calm_water = distance_made_good(run) / model.particulars["speed"]
     return ratio(spent, np.maximum(in_calm_water, 0.0))
 
 
 def distance_made_good(run: Rollout) -> Floats:
-    """Distance along the path, over ground, or along the ordered course, through the water, m, shape (n,)."""
+    """Distance made good, m, shape (n,).
+
+    It is along the path and over ground, or along the ordered course and through the
+    water.
+    """
     if _on_path(run.task):
         distance = during(run, "distance_made_good")
         return np.asarray(distance.max(axis=0, initial=0.0))
     error = during(run, "heading_error")
-    ahead = during(run, "u") * np.cos(error)
-    aside = during(run, "v") * np.sin(error)
-    return total(ahead + aside) * run.dt
+    surge = during(run, "u")
+    sway = during(run, "v")
+    along_course = surge * np.cos(error) + sway * np.sin(error)
+    return total(along_course) * run.dt
 
 
 def path_following(run: Rollout) -> dict[str, Floats]:
@@ -293,9 +313,12 @@ def _ever(run: Rollout, name: str) -> Floats:
 
 
 def during(run: Rollout, name: str) -> Floats:
-    """State or entry of `info` after each interval, 0 where the episode was over, shape (n_steps, n)."""
-    history = run.infos[name] if name in run.infos else run.states[name]
-    return np.where(run.sailing, history[1:], 0.0)
+    """State or entry of `info` after each interval, shape (n_steps, n).
+
+    It is 0 where the episode was over.
+    """
+    histories = run.infos if name in run.infos else run.states
+    return np.where(run.sailing, histories[name][1:], 0.0)
 
 
 def mean(run: Rollout, name: str) -> Floats:
@@ -311,7 +334,7 @@ def root_mean_square(run: Rollout, name: str) -> Floats:
 
 
 def total(values: Floats | Flags) -> Floats:
-    """Sum over the first axis, always in its order: it does not depend on how many episodes there are."""
+    """Sum over the first axis in its order, whatever the number of episodes."""
     sums: Floats = np.cumsum(values, axis=0, dtype=np.float64)
     return sums[-1] if len(sums) else np.zeros(values.shape[1:])
 
@@ -324,9 +347,9 @@ def ratio(above: Floats, below: Floats) -> Floats:
 
 
 class Evaluation(NamedTuple):
-    """Figures of each episode by name, each of shape (n,), and the rollout that they are of."""
+    """Figures of episodes, and the rollout that they are of."""
 
-    figures: dict[str, Floats]
+    figures: dict[str, Floats]  # by name, each of shape (n,)
     run: Rollout
 
 
@@ -336,13 +359,15 @@ def evaluate(
     seeds: ArrayLike | None = None,
     model: ShipModel | None = None,
 ) -> Evaluation:
-    """Sail the episodes of a task, all at once, whatever the policy does (`rollout`, tolerant).
+    """Sail the episodes of a task, all at once, whatever the policy does.
 
-    `policy`: anything with `predict`; it is given the observations of all ships
-    together; `task`: of a suite; `seeds`: by default those that are scored, shape (n,);
-    `model`: another ship than the task's own.
+    See `rollout`, tolerant. `policy`: anything with `predict`; it is given the
+    observations of all ships together; `task`: of a suite; `seeds`: by default those
+    that are scored, shape (n,); `model`: another ship than the task's own.
     """
-    numbers = np.asarray(task.seeds if seeds is None else seeds, dtype=np.int64)
+    if seeds is None:
+        seeds = task.seeds
+    numbers = np.asarray(seeds, dtype=np.int64)
     run = rollout(
         policy,
         task.engine(len(numbers), model),

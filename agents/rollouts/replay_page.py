@@ -1,4 +1,4 @@
-"""The replay page: recorded episodes in one HTML file that needs neither network nor installation."""
+"""The replay page: recorded episodes in one HTML file that works offline."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -30,19 +30,25 @@ def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
     """
     target = Path(out)
     check_page(target)
-    titles = names([Path(path) for path in paths])
+    files = [Path(path) for path in paths]
+    titles = names(files)
     episodes = {}
-    for title, path in zip(titles, paths, strict=True):
+    for title, path in zip(titles, files, strict=True):
         episodes[title] = Episode.load(path)
-    write_text(replay_page(episodes), target)
+
+    page = replay_page(episodes)
+    write_text(page, target)
 
 
 def replay_page(episodes: Mapping[str, Episode]) -> str:
-    """HTML that loads nothing, of episodes by what the legend calls them; InputError if there is none."""
+    """HTML that loads nothing, of episodes by their titles; InputError without any."""
     if not episodes:
         raise InputError("episodes: expected at least one, got none")
-    runs = [run(name, episode) for name, episode in episodes.items()]
-    models = dict.fromkeys(episode.model for episode in episodes.values())
+    runs = []
+    models: dict[str, None] = {}  # each once, in their order
+    for title, episode in episodes.items():
+        runs.append(run(title, episode))
+        models[episode.model] = None
     return render(
         PLAYER,
         title=f"Replay: {', '.join(models)}",
@@ -51,9 +57,10 @@ def replay_page(episodes: Mapping[str, Episode]) -> str:
 
 
 def names(paths: Sequence[Path]) -> list[str]:
-    """Titles of episode files: names without ending, with as many folders as needed to be different.
+    """Titles of episode files that are different.
 
-    A file that is given twice is numbered.
+    They are names without ending, with as many folders as are needed. A file that is
+    given twice is numbered.
     """
     stems = [path.absolute().with_suffix("").parts for path in paths]
     n_files = len(set(stems))
@@ -66,6 +73,6 @@ def names(paths: Sequence[Path]) -> list[str]:
     for stem in stems:
         title = str(PurePosixPath(*stem[-depth:]))
         times[title] += 1
-        number = f" ({times[title]})" if times[title] > 1 else ""
-        titles.append(title + number)
+        number = times[title]
+        titles.append(title if number == 1 else f"{title} ({number})")
     return titles

@@ -1,4 +1,4 @@
-"""What the replay page shows of an episode: its states in the units in which they are read."""
+"""Series that the replay page shows of an episode, in the units of a reader."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
@@ -56,9 +56,9 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
     `name`: what the legend calls it. Returns what it is, the ship to draw, the path,
     series of n + 1 values each, and under `other` what was recorded besides, SI units.
     """
-    parts = {
-        part: np.append(0.0, values) for part, values in episode.reward_parts.items()
-    }
+    parts = {}
+    for part, values in episode.reward_parts.items():
+        parts[part] = np.append(0.0, values)
     seed = None if episode.seed is None else str(episode.seed)
     return {
         "name": name,
@@ -93,7 +93,11 @@ def _other(episode: Episode) -> dict[str, Floats]:
     order = _first(COURSE_ORDERS, recorded)
     cross_track = _first(CROSS_TRACK, recorded)
     shown = {*SHOWN, order, cross_track}
-    return {name: values for name, values in recorded.items() if name not in shown}
+    other = {}
+    for name, values in recorded.items():
+        if name not in shown:
+            other[name] = values
+    return other
 
 
 def series(episode: Episode) -> dict[str, Floats]:
@@ -126,21 +130,25 @@ def _angles(states: Mapping[str, Floats]) -> dict[str, Floats]:
     Headings go through north without a jump, from one within 0 to 360 degrees at the
     start.
     """
+    full_turn = 2.0 * np.pi
     heading = np.unwrap(states["psi"])
-    whole_turns = np.floor(heading[0] / (2.0 * np.pi))
-    heading = heading - 2.0 * np.pi * whole_turns
+    whole_turns = np.floor(heading[0] / full_turn)
+    heading = heading - full_turn * whole_turns
 
     radians = {"psi": heading, "delta": states["delta"]}
-    if "r" in states:
-        radians["yaw_rate"] = states["r"]
-    if "phi" in states:
-        radians["heel"] = states["phi"]
+    for name, state in {"yaw_rate": "r", "heel": "phi"}.items():
+        if state in states:
+            radians[name] = states[state]
     order = _first(COURSE_ORDERS, states)
     if order is not None:
         error = wrapped(states[order] - heading)
         radians["heading_error"] = error
         radians["course_order"] = heading + error  # without a jump from the heading
-    return {name: np.degrees(values) for name, values in radians.items()}
+
+    in_degrees = {}
+    for name, values in radians.items():
+        in_degrees[name] = np.degrees(values)
+    return in_degrees
 
 
 def _orders(episode: Episode) -> dict[str, Floats]:
@@ -172,11 +180,13 @@ def _weather(states: Mapping[str, Floats]) -> dict[str, Floats]:
 
     north = states.get("current_north")
     east = states.get("current_east")
-    if north is not None and east is not None:
-        drift = np.hypot(north, east)
-        if np.any(drift):
-            found["current_speed"] = drift
-            found["current_towards"] = np.degrees(np.arctan2(east, north)) % 360.0
+    if north is None or east is None:
+        return found
+    drift = np.hypot(north, east)
+    if np.any(drift):
+        towards = np.arctan2(east, north)
+        found["current_speed"] = drift
+        found["current_towards"] = np.degrees(towards) % 360.0
     return found
 
 
@@ -218,11 +228,12 @@ def _rounded_all(histories: Mapping[str, Floats]) -> dict[str, list[Any]]:
 def rounded(values: Floats) -> list[Any]:
     """Numbers with the digits that the page keeps."""
     array = np.asarray(values, dtype=np.float64)
-    size = np.maximum(np.abs(array), np.finfo(np.float64).tiny)
+    smallest = np.finfo(np.float64).tiny  # zero has no logarithm
+    size = np.maximum(np.abs(array), smallest)
     before_point = 1.0 + np.floor(np.log10(size))
     decimals = np.clip(DIGITS - before_point, 0.0, MOST_DECIMALS)
 
     factor = 10.0**decimals
-    kept = np.round(array * factor) / factor
-    short: list[Any] = kept.tolist()
+    scaled = np.round(array * factor)
+    short: list[Any] = (scaled / factor).tolist()
     return short

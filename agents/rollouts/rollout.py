@@ -1,4 +1,4 @@
-"""The one loop in which a policy steers ships through episodes of a task, side by side."""
+"""The loop in which a policy steers ships through episodes of a task, side by side."""
 
 import time
 from collections.abc import Callable, Collection
@@ -129,13 +129,12 @@ def check_fits(policy: Any, task: Task, ship: ShipModel, where: str) -> None:
     message. Raises InputError naming the first difference.
     """
     check = getattr(policy, "check_fits", None)
-    if check is not None:
-        shown = task.observed(ship)
-        check(
-            [quantity.name for quantity in shown],
-            [quantity.scale for quantity in shown],
-            where,
-        )
+    if check is None:
+        return
+    shown = task.observed(ship)
+    names = [quantity.name for quantity in shown]
+    scales = [quantity.scale for quantity in shown]
+    check(names, scales, where)
 
 
 class _Command(NamedTuple):
@@ -161,24 +160,28 @@ class _Helmsman:
     def steer(
         self, seen: Any, starts: Flags, sailing: Flags, engine: Engine
     ) -> _Command:
-        """Commands for what is seen; InputError if one is missing and that is no failure."""
-        where = f"step {self.n_calls}: "
+        """Commands for what is seen; InputError for a failure that is not tolerated."""
+        where = f"step {self.n_calls}"
         self.n_calls += 1
         self.n_commands += int(sailing.sum())
 
         actions, error = self._answer(seen, starts)
         shape = (engine.num_envs, len(engine.command))
         command = _checked_command(actions, shape, sailing)
-        if command.fault:
-            if not self.tolerant:
-                name = type(self.policy).__name__
-                raise InputError(f"{name}.predict: {where}{command.fault}")
-            self.failure = self.failure or where + (error or command.fault)
+        if not command.fault:
+            return command
+
+        if not self.tolerant:
+            name = type(self.policy).__name__
+            raise InputError(f"{name}.predict: {where}: {command.fault}")
+        if not self.failure:
+            self.failure = f"{where}: {error or command.fault}"
         return command
 
     def _answer(self, seen: Any, starts: Flags) -> tuple[Any, str]:
         """Actions, None after an error that is tolerated, and this error."""
-        actions, failure = None, ""
+        actions = None
+        failure = ""
         began = time.process_time()
         try:
             actions, self.memory = self.policy.predict(seen, self.memory, starts, True)
@@ -203,7 +206,8 @@ def _checked_command(actions: Any, shape: tuple[int, int], sailing: Flags) -> _C
         fault = f"expected actions of shape {shape}, got {values.shape}"
         return nothing._replace(fault=fault)
 
-    missing = sailing & ~np.isfinite(values).all(axis=1)
+    is_finite = np.isfinite(values).all(axis=1)
+    missing = sailing & ~is_finite
     fault = ""
     if missing.any():
         first = int(np.argmax(missing))
@@ -306,7 +310,10 @@ class _Log:
 
 def _stacked(records: list[dict[str, Floats]]) -> dict[str, Floats]:
     """Histories by name, each of shape (n_records, n)."""
+    if not records:
+        return {}
     histories = {}
-    for name in records[0] if records else ():
-        histories[name] = np.array([record[name] for record in records])
+    for name in records[0]:
+        values = [record[name] for record in records]
+        histories[name] = np.array(values)
     return histories

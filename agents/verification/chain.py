@@ -1,4 +1,4 @@
-"""The whole chain: recorded trials in; a model, its certainty, verified autopilots and a report out."""
+"""From recorded trials to a model, its certainty, verified autopilots and a report."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def build_autopilot(
     progress: Progress | None = None,
     where: JobEngine = HERE,
 ) -> AutopilotResult:
-    """Identify a ship from its trials, design autopilots, verify them, write the report.
+    """Identify a ship from trials, design and verify autopilots, write the report.
 
     The folder holds `report.html`, `metrics.json`, `model.json` and a file of each
     autopilot, such as `lq.json`; where the model is unstable or refused only the first
@@ -103,7 +103,7 @@ def build_autopilot(
 
 @contextmanager
 def stage(tell: Progress, name: str) -> Iterator[None]:
-    """Work of one unit: `tell` is called when it begins and when it is done, and for its parts."""
+    """Work of one unit; `tell` hears of its beginning, its parts and its end."""
     tell(name, 0, 1)
     before = PROGRESS.set(tell)
     try:
@@ -175,16 +175,17 @@ def check_guest(guest: Agent, model: ShipModel, where: str) -> None:
 
 
 def with_standards(found: Verification, model: ShipModel) -> Verification:
-    """A verification with what the standards ask of its best heading and its first path autopilot."""
+    """A verification with the standards of its best heading and path autopilot."""
     from agents.verification.standards import standards
 
-    best, *_ = (
-        pilot.design
-        for pilot in found.pilots
-        if pilot.design is not None and pilot.key not in found.refused
-    )
+    designs = []
+    for pilot in found.pilots:
+        if pilot.design is not None and pilot.key not in found.refused:
+            designs.append(pilot.design)
+    best = designs[0]
     tracks = [track for track in found.tracks if track.key not in found.refused]
-    return replace(found, standards=tuple(standards(model, best, tracks)))
+    requirements = standards(model, best, tracks)
+    return replace(found, standards=tuple(requirements))
 
 
 def write_result(result: AutopilotResult, folder: Path) -> None:
@@ -195,11 +196,12 @@ def write_result(result: AutopilotResult, folder: Path) -> None:
     found = result.verification
     if found is not None:
         result.model.save(folder / "model.json")
-        controllers: dict[str, Any] = {
-            pilot.key: pilot.design for pilot in found.pilots
-        }
-        controllers |= {track.key: track.controller for track in found.tracks}
-        for key, controller in controllers.items():
-            if isinstance(controller, Controller) and key not in found.refused:
-                controller.save(folder / f"{key}.json")
+        agents: dict[str, Any] = {}
+        for pilot in found.pilots:
+            agents[pilot.key] = pilot.controller
+        for track in found.tracks:
+            agents[track.key] = track.controller
+        for key, agent in agents.items():
+            if isinstance(agent, Controller) and key not in found.refused:
+                agent.save(folder / f"{key}.json")
     write_report(result, folder / "report.html")

@@ -65,16 +65,18 @@ def band(t: Floats, values: Floats, name: str, colour: str, **more: Any) -> Any:
 
 
 def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
-    """Each criterion of every draw as a share of its limit, one row each, the limit at 100 per cent."""
+    """Criteria of every draw in per cent of their limits, a row each."""
     jitter = np.random.default_rng(0)
     traces = []
-    for row, criterion in enumerate(criteria.values()):
+    names = []
+    for row, (name, criterion) in enumerate(criteria.items()):
         traces.append(_draws_of(criterion, row, jitter))
         traces += _marks_of(criterion, row)
+        names.append(criterion_name(name, criterion))
     ends = [-0.5, len(criteria) - 0.5]
-    traces.append(line([100.0, 100.0], ends, "IMO limit", LIMIT, 1.8, line_dash="dash"))
+    limit = line([100.0, 100.0], ends, "IMO limit", LIMIT, 1.8, line_dash="dash")
+    traces.append(limit)
 
-    names = [criterion_name(name, one) for name, one in criteria.items()]
     names_axis = axis(
         tickvals=list(range(len(names))),
         ticktext=names,
@@ -82,8 +84,8 @@ def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
         showgrid=False,
     )
     shares_axis = axis("per cent of the limit", rangemode="tozero", ticksuffix=" %")
-    height = 46 * len(criteria) + 100
     panel = Panel(traces, shares_axis, names_axis)
+    height = 46 * len(criteria) + 100
     return panels([panel], height, left=190, hovermode="closest")
 
 
@@ -91,8 +93,9 @@ def _draws_of(criterion: Criterion, row: int, jitter: np.random.Generator) -> An
     """A dot for each draw that has a value, scattered only to separate them."""
     values = np.empty(0)
     if criterion.drawn is not None:
-        values = criterion.drawn.values[np.isfinite(criterion.drawn.values)]
-    shares = 100.0 * values / criterion.limit
+        values = criterion.drawn.values
+    finite = values[np.isfinite(values)]
+    shares = 100.0 * finite / criterion.limit
     heights = row + jitter.uniform(-0.22, 0.22, len(shares))
     return points(
         shares,
@@ -106,19 +109,21 @@ def _draws_of(criterion: Criterion, row: int, jitter: np.random.Generator) -> An
 
 def _marks_of(criterion: Criterion, row: int) -> list[Any]:
     """A line for what was measured and one for the identified model."""
-    marks = []
-    for name, value, colour in (
+    known = [
         ("measured", criterion.measured, RUDDER),
         ("identified model", criterion.value, MEASURED),
-    ):
+    ]
+    marks = []
+    for name, value, colour in known:
         if value is not None:
             share = 100.0 * value / criterion.limit
-            marks.append(line([share] * 2, [row - 0.32, row + 0.32], name, colour, 2.2))
+            heights = [row - 0.32, row + 0.32]
+            marks.append(line([share, share], heights, name, colour, 2.2))
     return marks
 
 
 def manoeuvres_figure(found: ManoeuvreUncertainty, length: float) -> Figure:
-    """20/20 zigzag and turning circle of the identified model, over those of the draws."""
+    """20/20 zigzag and turning circle of the identified model, over the draws'."""
     headings = _zigzag_lines(found.zigzag, found.zigzag_headings)
     left = Panel(headings, "time, s", "heading change and rudder, deg", "20/20 zigzag")
 
@@ -129,18 +134,20 @@ def manoeuvres_figure(found: ManoeuvreUncertainty, length: float) -> Figure:
 
 
 def _zigzag_lines(run: Trial, headings: Floats) -> list[Any]:
-    lines = [
-        line(run.t, np.degrees(run["delta"]), "rudder", RUDDER, 1.2),
-        line(run.t, np.degrees(run["psi"]), "identified model", MODEL, 2.0),
-    ]
+    """Heading and rudder of the model over the band of the draws' headings."""
+    lines = []
     if len(headings):
-        lines.insert(0, band(run.t, np.degrees(headings), "95 % of draws", MODEL))
+        lines.append(band(run.t, np.degrees(headings), "95 % of draws", MODEL))
+    rudder = np.degrees(run["delta"])
+    heading = np.degrees(run["psi"])
+    lines.append(line(run.t, rudder, "rudder", RUDDER, 1.2))
+    lines.append(line(run.t, heading, "identified model", MODEL, 2.0))
     return lines
 
 
 def _circle_lines(run: Trial, paths: Sequence[Floats], length: float) -> list[Any]:
-    east, north = run["y"] / length, run["x"] / length
-    lines = [line(east, north, "identified model", MODEL, 2.0)]
+    """Circle of the model over those of the draws, in ship lengths."""
+    lines = []
     if paths:
         gap = np.full((1, 2), np.nan)
         parts = []
@@ -148,7 +155,10 @@ def _circle_lines(run: Trial, paths: Sequence[Floats], length: float) -> list[An
             parts += [path / length, gap]
         north, east = np.concatenate(parts).T
         pale = translucent(MODEL, 0.22)
-        lines.insert(0, line(east, north, "single draws", pale, 1.0))
+        lines.append(line(east, north, "single draws", pale, 1.0))
+    north = run["x"] / length
+    east = run["y"] / length
+    lines.append(line(east, north, "identified model", MODEL, 2.0))
     return lines
 
 
@@ -166,18 +176,22 @@ def steps_figure(
     shape (1 + n_draws, n_samples), rad, the identified model first; `step_deg`: the
     change of course, degrees.
     """
-    headings, rudders = list[Any](), list[Any]()
+    headings: list[Any] = []
+    rudders: list[Any] = []
     for (name, response), colour in zip(responses.items(), PILOT_COLOURS, strict=False):
         heading, rudder = response
         headings += _step_lines(t, np.degrees(heading), name, colour)
         rudders += _step_lines(t, np.degrees(rudder), name, colour)
+
     ends = [t[0], t[-1]]
-    headings.append(
-        line(ends, [step_deg] * 2, "set course", MUTED, 1.2, line_dash="dot")
-    )
+    course = [step_deg, step_deg]
+    set_course = line(ends, course, "set course", MUTED, 1.2, line_dash="dot")
+    headings.append(set_course)
+
+    rudder_axis = axis("rudder, deg", zero=True)
     shown = [
         Panel(headings, "", "heading change, deg"),
-        Panel(rudders, "time, s", axis("rudder, deg", zero=True)),
+        Panel(rudders, "time, s", rudder_axis),
     ]
     grid = {"shared_xaxes": True, "vertical_spacing": 0.06, "row_heights": [0.58, 0.42]}
     return panels(shown, 500, grid=grid)
@@ -189,21 +203,22 @@ def _step_lines(t: Floats, angles: Floats, name: str, colour: str) -> list[Any]:
     drawn = angles[1:]
     if not len(drawn):
         return [own]
-    return [band(t, drawn, name, colour, showlegend=False), own]
+    of_draws = band(t, drawn, name, colour, showlegend=False)
+    return [of_draws, own]
 
 
 def tracks_figure(tracks: Mapping[str, Track], length: float) -> Figure:
-    """Tracks sailed by the identified model under each path autopilot, and the distance from them."""
+    """Tracks of the identified model under each path autopilot, and their errors."""
     first = next(iter(tracks.values()))
     north, east = first.waypoints.T / length
     paths = [line(east, north, "waypoints", MUTED, 1.2, line_dash="dot")]
     errors = []
     for (name, track), colour in zip(tracks.items(), PILOT_COLOURS, strict=False):
-        positions = track.positions / length
-        steps = np.hypot(*np.diff(positions, axis=0).T)
+        north, east = track.positions.T / length
+        paths.append(line(east, north, name, colour, 2.0))
+
+        steps = np.hypot(np.diff(north), np.diff(east))
         sailed = np.append(0.0, np.cumsum(steps))
-        x, y = positions.T
-        paths.append(line(y, x, name, colour, 2.0))
         errors.append(line(sailed, track.cross_track, name, colour, 1.6))
 
     north_axis = axis("north, ship lengths", scaleanchor="x", scaleratio=1)
@@ -214,7 +229,10 @@ def tracks_figure(tracks: Mapping[str, Track], length: float) -> Figure:
 
 
 def costs_figure(costs: Mapping[str, Floats]) -> Figure:
-    """Box plot of the cost of each autopilot, shape (n_draws,), over the models drawn."""
+    """Box plot of the cost of each autopilot over the models drawn.
+
+    `costs`: by autopilot, of shape (n_draws,).
+    """
     boxes = []
     for (name, values), colour in zip(costs.items(), PILOT_COLOURS, strict=False):
         box = graph_objects().Box(

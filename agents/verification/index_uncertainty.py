@@ -1,4 +1,4 @@
-"""Manoeuvres of many models drawn from one covariance: how certain are the indices and criteria."""
+"""Uncertainty of manoeuvre indices and criteria, by models drawn from a covariance."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -63,13 +63,22 @@ class SailedDraws(NamedTuple):
 
 
 def nominal_runs(model: ShipModel) -> NominalRuns:
-    """20/20 zigzag and turning circle of a model; raises UnstableModelError if it runs away."""
+    """20/20 zigzag and turning circle of a model.
+
+    Raises UnstableModelError if it runs away.
+    """
     travel = float(model.particulars["length"] / model.particulars["speed"])
     dt = travel / SAMPLES_PER_LENGTH
-    zigzag_s = 25.0 * SAMPLES_PER_LENGTH * dt
-    circle_s = 30.0 * SAMPLES_PER_LENGTH * dt
-    run = zigzag(model, 20.0, 20.0, duration=zigzag_s, dt=dt, must_reverse=False)
-    circle = turning_circle(model, full_rudder_deg(model), circle_s, dt)
+    run = zigzag(
+        model,
+        20.0,
+        20.0,
+        duration=25.0 * SAMPLES_PER_LENGTH * dt,
+        dt=dt,
+        must_reverse=False,
+    )
+    duration = 30.0 * SAMPLES_PER_LENGTH * dt
+    circle = turning_circle(model, full_rudder_deg(model), duration, dt)
     return NominalRuns(run, circle)
 
 
@@ -78,67 +87,79 @@ def sail_draws(model: ShipModel, draws: Sequence[ShipModel]) -> SailedDraws:
     needed = imo_manoeuvres(model)
     no_indices = {name: test.no_indices for name, test in needed.items()}
     evaluations = {name: test.evaluate for name, test in needed.items()}
-    found = intervals_of(no_indices, draws, evaluations)
-
-    values, ran_away = {}, {}
-    for name, indices in found.items():
+    intervals = intervals_of(no_indices, draws, evaluations)
+    values = {}
+    ran_away = {}
+    for name, indices in intervals.items():
         values[name] = {index: one.values for index, one in indices.items()}
-        ran_away[name] = next(iter(indices.values())).ran_away
+        first = next(iter(indices.values()))
+        ran_away[name] = first.ran_away
 
-    headings, paths = list[Floats](), list[Floats]()
-    lost = np.zeros(len(draws), dtype=bool)
-    for k, draw in enumerate(draws):
+    headings: list[Floats] = []
+    paths: list[Floats] = []
+    lost = np.zeros(len(draws), dtype=np.bool_)
+    for i, draw in enumerate(draws):
         try:
             runs = nominal_runs(draw)
         except UnstableModelError:
-            lost[k] = True
-        else:
-            headings.append(runs.zigzag["psi"])
-            paths.append(np.column_stack([runs.circle["x"], runs.circle["y"]]))
-    return SailedDraws(values, ran_away, lost, headings, paths)
+            lost[i] = True
+            continue
+        circle = runs.circle
+        headings.append(runs.zigzag["psi"])
+        paths.append(np.column_stack([circle["x"], circle["y"]]))
+    return SailedDraws(
+        values=values,
+        ran_away=ran_away,
+        lost=lost,
+        headings=headings,
+        paths=paths,
+    )
 
 
 def joined(parts: Iterable[SailedDraws]) -> SailedDraws:
     """What became of all draws, from parts in their order."""
-    first, *others = parts
-    values = {
-        name: {
-            index: np.concatenate([own, *(part.values[name][index] for part in others)])
-            for index, own in indices.items()
-        }
-        for name, indices in first.values.items()
-    }
-    ran_away = {
-        name: np.concatenate([own, *(part.ran_away[name] for part in others)])
-        for name, own in first.ran_away.items()
-    }
-    whole = (first, *others)
+    parts = list(parts)
+    values: dict[str, dict[str, Floats]] = {}
+    ran_away = {}
+    for name, indices in parts[0].values.items():
+        values[name] = {}
+        for index in indices:
+            of_parts = [part.values[name][index] for part in parts]
+            values[name][index] = np.concatenate(of_parts)
+        flags = [part.ran_away[name] for part in parts]
+        ran_away[name] = np.concatenate(flags)
+
+    headings: list[Floats] = []
+    paths: list[Floats] = []
+    for part in parts:
+        headings += part.headings
+        paths += part.paths
     return SailedDraws(
-        values,
-        ran_away,
-        lost=np.concatenate([part.lost for part in whole]),
-        headings=[heading for part in whole for heading in part.headings],
-        paths=[path for part in whole for path in part.paths],
+        values=values,
+        ran_away=ran_away,
+        lost=np.concatenate([part.lost for part in parts]),
+        headings=headings,
+        paths=paths,
     )
 
 
 def uncertainty_of(
     model: ShipModel, nominal: NominalRuns, sailed: SailedDraws
 ) -> ManoeuvreUncertainty:
-    """Intervals and criteria from the runs of the model itself and what became of its draws."""
-    found = {}
+    """Intervals and criteria from the runs of a model and of its draws."""
+    intervals: dict[str, dict[str, IndexInterval]] = {}
     for name, indices in own_indices(model, imo_manoeuvres(model)).items():
-        found[name] = {
-            index: IndexInterval(
-                value, sailed.values[name][index], sailed.ran_away[name]
-            )
-            for index, value in indices.items()
-        }
-    criteria = {
-        name: criterion
-        for name, criterion in imo_criteria(model, found).items()
-        if criterion.drawn is not None
-    }
+        values = sailed.values[name]
+        ran_away = sailed.ran_away[name]
+        intervals[name] = {}
+        for index, value in indices.items():
+            interval = IndexInterval(value, values[index], ran_away)
+            intervals[name][index] = interval
+
+    criteria = {}
+    for name, criterion in imo_criteria(model, intervals).items():
+        if criterion.drawn is not None:
+            criteria[name] = criterion
     return with_paths(criteria, nominal, sailed)
 
 
@@ -151,11 +172,13 @@ def with_paths(
         if criterion.drawn is not None:
             unstable |= criterion.drawn.ran_away
     stable = ~unstable[~sailed.lost]  # of those that were kept
+    headings = np.array(sailed.headings)
+    paths = np.array(sailed.paths)[stable]
     return ManoeuvreUncertainty(
-        criteria,
-        unstable,
+        criteria=criteria,
+        unstable=unstable,
         zigzag=nominal.zigzag,
-        zigzag_headings=np.array(sailed.headings)[stable],
+        zigzag_headings=headings[stable],
         circle=nominal.circle,
-        circle_paths=tuple(np.array(sailed.paths)[stable][:PATHS_KEPT]),
+        circle_paths=tuple(paths[:PATHS_KEPT]),
     )

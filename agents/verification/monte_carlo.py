@@ -1,4 +1,4 @@
-"""Monte Carlo: manoeuvres and episodes of models drawn from the estimated covariance of one ship.
+"""Monte Carlo: manoeuvres and episodes of models drawn from a ship's covariance.
 
 Draws are shared out in jobs of 25, always the same ones: the results do not depend on
 where they are done.
@@ -52,7 +52,7 @@ def monte_carlo(
     where: JobEngine = HERE,
     progress: Callable[[int], None] | None = None,
 ) -> MonteCarlo:
-    """Sail the standard manoeuvres and an episode of course keeping with models drawn from the covariance.
+    """Sail standard manoeuvres and episodes with models drawn from the covariance.
 
     `controllers`: each steers every draw, draw i with seed + i, the same episodes for
     all; `model`: with a covariance; `draws`: models drawn, at least 2; `seed`: of the
@@ -74,13 +74,17 @@ def monte_carlo(
 
     jobs = draw_jobs(controllers, model, drawn, seed)
     parts = run_jobs(do_draws, jobs, where, on_progress)
-    sailed = joined(SailedDraws(**part["sailed"]) for part in parts)
-    by_controller = zip(*(part["episodes"] for part in parts), strict=True)
+    sailed = joined([SailedDraws(**part["sailed"]) for part in parts])
+    course_unstable = [part["course_unstable"] for part in parts]
+    episodes = []
+    for i in range(len(controllers)):
+        of_parts = [part["episodes"][i] for part in parts]
+        episodes.append(_joined_episodes(of_parts))
     return MonteCarlo(
         draws=tuple(drawn),
         manoeuvres=uncertainty_of(model, nominal, sailed),
-        course_unstable=np.concatenate([part["course_unstable"] for part in parts]),
-        episodes=tuple(_joined_episodes(episodes) for episodes in by_controller),
+        course_unstable=np.concatenate(course_unstable),
+        episodes=tuple(episodes),
     )
 
 
@@ -98,7 +102,10 @@ def draw_jobs(
     drawn: Sequence[ShipModel],
     seed: int,
 ) -> list[dict[str, Any]]:
-    """The jobs: coefficients as drawn here, since another computer may draw others in the last digit."""
+    """Jobs of some draws each, with their coefficients.
+
+    These are drawn here: another computer may draw others in the last digit.
+    """
     own = replace(model, covariance=None).to_dict()
     pilots = [controller.to_dict() for controller in controllers]
     jobs = []
@@ -127,16 +134,18 @@ def do_draws(job: dict[str, Any]) -> dict[str, Any]:
     episodes = []
     for content in job["controllers"]:
         controller = read_controller(content, "controller")
-        episodes.append(asdict(sail(controller, draws, seeds=seeds)))
+        sailed = sail(controller, draws, seeds=seeds)
+        episodes.append(asdict(sailed))
+    course_unstable = [not keeps_course(draw) for draw in draws]
     return {
         "sailed": sail_draws(model, draws)._asdict(),
-        "course_unstable": np.array([not keeps_course(draw) for draw in draws]),
+        "course_unstable": np.array(course_unstable),
         "episodes": episodes,
     }
 
 
 def keeps_course(model: ShipModel) -> bool:
-    """Whether the ship keeps a straight course with the rudder fixed; not if there is none at all."""
+    """Return True if a ship keeps a straight course with the rudder fixed."""
     try:
         return is_course_stable(model)
     except InputError:

@@ -25,22 +25,21 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
     model's own. `result`: what the chain found; `path`: the HTML file. Raises
     InputError if plotly is not installed.
     """
-    found, provenance = result.verification, result.model.provenance or {}
-    fit = fit_view(result.identification)
-    view = cheaper = None
-    drawn = dict[str, Any]()
+    found = result.verification
+    view = None
+    cheaper = None
+    drawn: dict[str, Any] = {}
     if found is not None:
         length = float(result.model.particulars["length"])
         view = verification_view(found, length)
         cheaper = cheaper_sentence(view)
         drawn = trial_figures(result.identification)
         drawn |= verification_figures(found, length)
-    how = [provenance.get(key, NONE) for key in ("structure", "method", "samples")]
     verdict, kind = verdict_of(result)
     page = render(
         "agents.verification/report.html",
         ship=result.ship.particulars.name,
-        fit=fit,
+        fit=fit_view(result.identification),
         found=view,
         cheaper=cheaper,
         figures=drawn,
@@ -48,43 +47,61 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
         verdict_kind=kind,
         refusal=result.refusal,
         step_deg=STEP_DEG,
-        origin={
-            "software": provenance.get("software", f"shipgym {shipgym.__version__}"),
-            "ship file": result.ship.path.name,
-            "structure, method, samples": ", ".join(str(part) for part in how),
-        },
+        origin=_origin(result),
         trials=result.trials,
     )
     write_text(page, Path(path))
 
 
+def _origin(result: AutopilotResult) -> dict[str, str]:
+    """Where the model comes from, by what the page calls it."""
+    provenance = result.model.provenance or {}
+    how = []
+    for key in ("structure", "method", "samples"):
+        how.append(str(provenance.get(key, NONE)))
+    own_version = f"shipgym {shipgym.__version__}"
+    return {
+        "software": provenance.get("software", own_version),
+        "ship file": result.ship.path.name,
+        "structure, method, samples": ", ".join(how),
+    }
+
+
 def verdict_of(result: AutopilotResult) -> tuple[str, str]:
     """The sentence on top of the page, and whether it is good, a warning or bad."""
+    if result.instability is not None:
+        return (
+            f"The identified model is unstable: {result.instability}. It must not be"
+            " used, and no coefficients, predictions, manoeuvres or autopilots are"
+            " given."
+        ), "bad"
+
     found = result.verification
-    held_out = held_out_error(result.identification)
-    refused = f"No autopilot is given: {result.refusal}. " if result.refusal else ""
+    sentences = [held_out_error(result.identification)]
+    kind = "warn"
     if found is not None:
-        kind = "good" if is_certain(found) else "warn"
-        return f"{refused}{held_out} {headline(found)}", "bad" if refused else kind
-    if refused:
-        return f"{refused}{held_out}", "bad"
-    return (
-        f"The identified model is unstable: {result.instability}. It must not be used,"
-        " and no coefficients, predictions, manoeuvres or autopilots are given."
-    ), "bad"
+        sentences.append(headline(found))
+        if is_certain(found):
+            kind = "good"
+    if result.refusal:
+        sentences.insert(0, f"No autopilot is given: {result.refusal}.")
+        kind = "bad"
+    return " ".join(sentences), kind
 
 
 def verification_figures(found: Verification, length: float) -> dict[str, Any]:
     """Figures of a verification by name."""
-    by_name = found.by_name
-    responses = {
-        pilot.name: (pilot.step.heading, pilot.step.rudder) for pilot in by_name
-    }
-    costs = {pilot.name: pilot.episodes.cost for pilot in by_name}
+    responses = {}
+    costs = {}
+    for pilot in found.by_name:
+        step = pilot.step
+        responses[pilot.name] = (step.heading, step.rudder)
+        costs[pilot.name] = pilot.episodes.cost
     t = found.pilots[0].step.t
+    manoeuvres = found.manoeuvres
     shown = {
-        "criteria": figures.criteria_figure(found.manoeuvres.criteria),
-        "manoeuvres": figures.manoeuvres_figure(found.manoeuvres, length),
+        "criteria": figures.criteria_figure(manoeuvres.criteria),
+        "manoeuvres": figures.manoeuvres_figure(manoeuvres, length),
         "steps": figures.steps_figure(t, responses, STEP_DEG),
         "costs": figures.costs_figure(costs),
     }

@@ -1,4 +1,4 @@
-"""Why no autopilot is given: models that contradict their trials, and designs that lose control."""
+"""Refusals: models that contradict their trials, and designs that lose control."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -26,27 +26,33 @@ class Steering(NamedTuple):
 
     @property
     def steady_side(self) -> float:
-        """A number with the sign of the yaw rate to which a steady rudder to starboard leads."""
+        """A number with the sign of the yaw rate for a steady rudder to starboard."""
         A, B = self.A, self.B
         return float(A[1, 0] * B[0, 0] - A[0, 0] * B[1, 0])
 
 
 def why_refused(fit: Fit) -> str | None:
-    """Why nothing may be designed on a stable model, with the trial that would help; None where it may.
+    """Reason against designs on a stable model, with the trial that would help.
 
     Its steering at low frequency has another sign than in the trials, or a damping
-    derivative has, significantly, a sign that no ship has.
+    derivative has, significantly, a sign that no ship has. None if there is no reason.
     """
     model = fit.model
     try:
-        models = [model, *model.sample(60, 0)]
-        drawn = [Steering(*steering_state_space(one)) for one in models]
+        drawn = []
+        for ship in (model, *model.sample(60, 0)):
+            A, B = steering_state_space(ship)
+            drawn.append(Steering(A, B))
     except InputError:  # no straight course: the designs say so
         return None
+
     why = _steers_to_other_side(fit, drawn[0])
-    if why is None and "v" in getattr(model.dynamics, "equations", ("v",)):
+    equations = getattr(model.dynamics, "equations", ("v",))
+    if why is None and "v" in equations:
         why = why_driven(drawn)
-    return None if why is None else f"{why}; run {helpful_trial(fit)}"
+    if why is None:
+        return None
+    return f"{why}; run {helpful_trial(fit)}"
 
 
 def _steers_to_other_side(fit: Fit, steering: Steering) -> str | None:
@@ -62,7 +68,7 @@ def _steers_to_other_side(fit: Fit, steering: Steering) -> str | None:
 
 
 def why_driven(drawn: Sequence[Steering]) -> str | None:
-    """Which damping has the wrong sign in 97.5 % of models; None for a ship as there are."""
+    """Damping of the wrong sign in 97.5 % of models; None without one."""
     for row, name in enumerate(("sway damping (Y_v)", "yaw damping (N_r)")):
         driven = [steering.A[row, row] > 0.0 for steering in drawn]
         share = float(np.mean(driven))
@@ -84,15 +90,15 @@ def rudder_effect(trials: Sequence[Trial], model: ShipModel) -> float:
     parts = [_changes(trial, window) for trial in trials]
     X = np.concatenate([part.features for part in parts])
     y = np.concatenate([part.changes for part in parts])
-    n_rows, n_terms = X.shape
-    if n_rows <= n_terms:
+    freedom = len(y) - X.shape[1]
+    if freedom <= 0:
         return 0.0
 
     coefficients, *_ = np.linalg.lstsq(X, y, rcond=None)
     residuals = y - X @ coefficients
-    variance = float(residuals @ residuals) / (n_rows - n_terms)
+    variance = float(residuals @ residuals) / freedom
     covariance = variance * np.linalg.pinv(X.T @ X)
-    rudder = 1
+    rudder = 1  # its column
     error = float(np.sqrt(covariance[rudder, rudder]))
     if error == 0.0:
         return 0.0
@@ -107,17 +113,21 @@ class _Changes(NamedTuple):
 
 
 def _changes(trial: Trial, window: float) -> _Changes:
-    edges = np.arange(trial.t[0], trial.t[-1], window)
-    first = np.searchsorted(trial.t, edges)
+    """Changes and means over windows of a length, s."""
+    t = trial.t
+    edges = np.arange(t[0], t[-1], window)
+    first = np.searchsorted(t, edges)
     counts = np.diff(first)[:-1]
 
     def means(channel: str) -> Floats:
         sums = np.add.reduceat(trial[channel], first[:-1])[:-1]
         return np.asarray(sums / counts)
 
-    features = np.column_stack([means("r"), means("delta"), np.ones(len(counts))])
-    rates = np.interp(edges, trial.t, trial["r"])
-    return _Changes(features, np.diff(rates)[: len(counts)])
+    constant = np.ones(len(counts))
+    features = np.column_stack([means("r"), means("delta"), constant])
+    rates = np.interp(edges, t, trial["r"])
+    changes = np.diff(rates)
+    return _Changes(features, changes[: len(counts)])
 
 
 def helpful_trial(fit: Fit) -> str:
@@ -133,28 +143,32 @@ def helpful_trial(fit: Fit) -> str:
 def simpler_structures(
     ranking: Sequence[Mapping[str, Any]], structure: str
 ) -> list[str]:
-    """The next best two structures with fewer coefficients than the one that was chosen, or fewer than two.
+    """The next best structures, two at most, with fewer coefficients than the chosen.
 
     `ranking`: of `structure = "auto"`, as `Ranking.to_dict` has it. Where the trials
     leave coefficients open, some of the models drawn run away whatever steers them.
     """
-    counts = [fit["coefficients"] for fit in ranking if fit["structure"] == structure]
-    fewest = min(counts, default=0)
-    names = list[str]()
+    own_counts = []
     for fit in ranking:
-        steady = fit["stable"] and not fit["ran_away"]
-        new = fit["structure"] not in names
-        if new and steady and fit["coefficients"] < fewest:
-            names.append(fit["structure"])
-    return names[:2]
+        if fit["structure"] == structure:
+            own_counts.append(fit["coefficients"])
+    fewest = min(own_counts, default=0)
+
+    simpler: dict[str, None] = {}  # each once, in the order of the ranking
+    for fit in ranking:
+        is_steady = fit["stable"] and not fit["ran_away"]
+        if is_steady and fit["coefficients"] < fewest:
+            simpler[fit["structure"]] = None
+    return list(simpler)[:2]
 
 
 def lost_control(terminated: Flags, most_lost: float = MOST_LOST) -> str | None:
-    """Why an autopilot that loses control of too many models drawn is refused; None where it is not."""
+    """Reason to refuse an autopilot that loses control of too many models, or None."""
+    lost = int(np.sum(terminated))
+    n_models = len(terminated)
     if np.mean(terminated) <= most_lost:
         return None
-    lost = int(np.sum(terminated))
-    return f"it loses control of {lost} of {len(terminated)} models drawn"
+    return f"it loses control of {lost} of {n_models} models drawn"
 
 
 class Refusals(NamedTuple):
@@ -169,7 +183,7 @@ def refused_designs(
 ) -> Refusals:
     """The designs that lose control of too many models drawn, and what would help."""
     designed = [pilot for pilot in found.pilots if pilot.design is not None]
-    lost = dict[str, str]()
+    lost = {}
     for pilot in designed:
         why = lost_control(pilot.episodes.terminated, most_lost)
         if why is not None:
@@ -181,10 +195,12 @@ def refused_designs(
     refused = {key: f"{why}; run {remedy}" for key, why in lost.items()}
     if len(lost) < len(designed):
         return Refusals(refused, None)
+
     for track in found.tracks:
         refused[track.key] = "what steers on its course loses control"
-    names = ", ".join(key.upper() for key in lost)
-    return Refusals(refused, f"{names}: {lost[designed[0].key]}; run {remedy}")
+    names = ", ".join([key.upper() for key in lost])
+    of_first = refused[designed[0].key]
+    return Refusals(refused, f"{names}: {of_first}")
 
 
 def _remedy(fit: Fit) -> str:
@@ -192,7 +208,7 @@ def _remedy(fit: Fit) -> str:
     remedy = helpful_trial(fit)
     ranking = fit.metrics.get("selection", {}).get("ranking", ())
     structure = (fit.model.provenance or {}).get("structure", "")
-    simpler = simpler_structures(ranking, structure)
+    simpler = " or ".join(simpler_structures(ranking, structure))
     if simpler:
-        remedy += f", or try --structure {' or '.join(simpler)}"
+        remedy += f", or try --structure {simpler}"
     return remedy

@@ -1,4 +1,4 @@
-"""What the whole chain found out: the model, its certainty, the autopilots and what they cost."""
+"""Result of the whole chain: the model, its certainty and its autopilots."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Verification:
 
     @property
     def by_name(self) -> list[Pilot]:
-        """Autopilots in an order that does not change with the ranking, for their colours."""
+        """Autopilots in an order apart from the ranking, for their colours."""
         return sorted(self.pilots, key=lambda pilot: pilot.name, reverse=True)
 
 
@@ -100,12 +100,15 @@ class AutopilotResult:
     def metrics(self) -> dict[str, Any]:
         """The contents of metrics.json."""
         fit = self.identification
+        diagnostics = {}
+        for quantity, diagnosis in fit.diagnostics.items():
+            diagnostics[quantity] = diagnosis.to_dict()
         metrics: dict[str, Any] = {
             **fit.metrics,
             "stable": self.stable,
             "instability": self.instability,
             "refusal": self.refusal,
-            "diagnostics": {q: found.to_dict() for q, found in fit.diagnostics.items()},
+            "diagnostics": diagnostics,
         }
         if self.verification is not None:
             metrics |= verification_metrics(self.verification)
@@ -137,34 +140,43 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
 
 
 def track_metrics(track: Track) -> dict[str, Any]:
-    """Cross-track errors of one path autopilot: on the identified model, and on the models drawn."""
-    own, drawn = track.largest[0], track.largest[1:]
+    """Cross-track errors of one path autopilot on the identified and drawn models."""
+    own = track.largest[0]
+    drawn = track.largest[1:]
     if not len(drawn):
         drawn = track.largest
+    not_arrived = ~track.arrived[1:]
     return {
         "gains": _floats(track.controller.gains),
         "cross_track_largest_m": float(own),
         "cross_track_rmse_m": float(track.rms[0]),
         "cross_track_largest_m_quantile_95": upper_95(drawn),
         "arrived": bool(track.arrived[0]),
-        "not_arrived": int(np.sum(~track.arrived[1:])),
+        "not_arrived": int(not_arrived.sum()),
     }
 
 
 def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
-    """Gains and margins of one autopilot, null if it is learned, and its episodes over the models drawn."""
-    episodes, design = pilot.episodes, pilot.design
-    gains = margins = None
+    """Gains and margins of one autopilot, and its episodes over the models drawn.
+
+    Gains and margins are null if it is learned.
+    """
+    gains = None
+    margins = None
+    design = pilot.design
     if design is not None:
         gains = _floats(design.gains)
         margins = _finite(asdict(design.margins))
+
+    episodes = pilot.episodes
+    rmse_deg = episodes.heading_rmse_deg
     return {
         "gains": gains,
         "margins": margins,
         "cost_mean": float(np.mean(episodes.cost)),
         "cost_quantile_95": upper_95(episodes.cost),
-        "heading_rmse_deg_mean": float(np.mean(episodes.heading_rmse_deg)),
-        "heading_rmse_deg_quantile_95": upper_95(episodes.heading_rmse_deg),
+        "heading_rmse_deg_mean": float(np.mean(rmse_deg)),
+        "heading_rmse_deg_quantile_95": upper_95(rmse_deg),
         "rudder_travel_deg_min_mean": float(np.mean(episodes.rudder_travel_deg_min)),
         "extrapolating_mean": float(np.mean(episodes.extrapolating)),
         "lost_control": int(np.sum(episodes.terminated)),

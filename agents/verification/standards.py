@@ -1,7 +1,7 @@
-"""What a simulation shows of the standards of heading control (ISO 11674) and track control (IEC 62065).
+"""Simulations of what standards of heading and track control ask for.
 
-Topics, and the limits that are used, stand in `standards.toml`. No type approval
-follows from it.
+The standards are ISO 11674 (heading control) and IEC 62065 (track control). Topics, and
+the limits that are used, stand in `standards.toml`. No type approval follows from it.
 """
 
 from collections.abc import Sequence
@@ -63,7 +63,7 @@ class Requirement:
 def standards(
     model: ShipModel, pilot: Controller, tracks: Sequence[Track]
 ) -> list[Requirement]:
-    """Each requirement for a heading autopilot, and for the first of the path autopilots on a ship.
+    """Each requirement for a heading autopilot and for the first path autopilot.
 
     What the ship's particulars do not allow, such as waves, has no value.
     """
@@ -99,19 +99,23 @@ def heading_values(
     A turn, the same with a limit to the rudder, a straight course, and one on which the
     heading falls silent.
     """
-    on_course = abs(small.error[-1]) < 1.0
-    off = turn.unwarned(np.abs(turn.error), "off heading")
+    unwarned = turn.unwarned(np.abs(turn.error), "off heading")
+    off_course = np.abs(settled(straight.error))
+    overshoot = -float(turn.error.min())
+    largest_order = np.inf
+    if abs(small.error[-1]) < 1.0:  # she has come to the new heading
+        largest_order = np.abs(small.order).max()
     return {
-        "heading_calm": float(np.abs(settled(straight.error)).max()),
-        "overshoot": max(0.0, float(-turn.error.min())),
-        "rudder_limit": float(np.abs(small.order).max()) if on_course else np.inf,
-        "off_heading": off - Limits().off_heading_deg,
+        "heading_calm": float(off_course.max()),
+        "overshoot": max(0.0, overshoot),
+        "rudder_limit": float(largest_order),
+        "off_heading": unwarned - Limits().off_heading_deg,
         "heading_lost": silent.alarm_at - LOST_S,
     }
 
 
 def heading_control_in_waves(model: ShipModel, pilot: Controller) -> dict[str, float]:
-    """Values of heading control in a seaway; none where the particulars do not tell what waves do."""
+    """Values of heading control in a seaway; none if the particulars do not suffice."""
     wave = 2.0 * np.pi / sea_states()["moderate"].peak_period
     north_east = radians(45.0)
     met = encounter_frequency(wave, model.particulars["speed"], north_east)
@@ -125,9 +129,9 @@ def heading_control_in_waves(model: ShipModel, pilot: Controller) -> dict[str, f
         without = LQG.from_model(model, wave_period=None)
     except InputError:
         return {}
-    values["sea_state"] = _rudder_travel(model, with_filter) / _rudder_travel(
-        model, without
-    )
+    filtered = _rudder_travel(model, with_filter)
+    unfiltered = _rudder_travel(model, without)
+    values["sea_state"] = filtered / unfiltered
     return values
 
 
@@ -156,9 +160,11 @@ def track_control(model: ShipModel, track: Track) -> dict[str, float]:
     aside = steer_along(model, track, limits, aside=3.0 * OFF_TRACK_M)
     silent = steer_along(model, track, limits, lost=("latitude", "longitude"))
     length = model.particulars["length"]
+    own_error = float(track.largest[0])
+    drawn_error = upper_95(track.largest[1:])
     return {
-        "cross_track": float(track.largest[0]) / length,
-        "cross_track_drawn": upper_95(track.largest[1:]) / length,
+        "cross_track": own_error / length,
+        "cross_track_drawn": drawn_error / length,
         **track_values(track.controller, along, aside, silent),
     }
 
@@ -191,24 +197,28 @@ def _end_of_track(guide: Controller, along: SteeredRun) -> float:
 
 
 def _shortest_lead(guide: Controller, along: SteeredRun) -> float:
-    """Shortest time from the announcement of a course change to wheel-over, s; 0 without any."""
-    announced = np.array(["course change ahead" in w for w in along.warnings])
+    """Shortest time from the announcement of a turn to wheel-over, s; 0 without any."""
+    quiet = ["course change ahead" not in given for given in along.warnings]
     leads = []
     for turn in _wheel_overs(guide, along):
-        quiet = np.flatnonzero(~announced[:turn])
-        if len(quiet):
-            leads.append(along.t[turn] - along.t[quiet[-1]])
+        quiet_before = np.flatnonzero(quiet[:turn])
+        if len(quiet_before):
+            last = quiet_before[-1]
+            leads.append(along.t[turn] - along.t[last])
     return min(leads, default=0.0)
 
 
 def _wheel_overs(guide: Controller, along: SteeredRun) -> Integers:
-    """Intervals in which the next turn comes within reach; the end of the route is no turn."""
+    """Intervals in which the next turn comes within reach.
+
+    The end of the route is no turn.
+    """
     reach = guide.gains["turn_reach"]
-    to_go: Floats = np.array(
-        [
-            given["next_turn_distance"] if given["next_turn_angle"] else np.nan
-            for given in along.given
-        ]
-    )
-    passed = (to_go[:-1] > reach) & (to_go[1:] <= reach)
-    return np.flatnonzero(passed) + 1
+    distances = [given["next_turn_distance"] for given in along.given]
+    angles = [given["next_turn_angle"] for given in along.given]
+    is_turn = np.array(angles) != 0.0
+    to_go: Floats = np.where(is_turn, distances, np.nan)
+
+    was_far = to_go[:-1] > reach
+    is_near = to_go[1:] <= reach
+    return 1 + np.flatnonzero(was_far & is_near)

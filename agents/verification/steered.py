@@ -1,6 +1,6 @@
-"""A simulated ship steered as `shipgym steer` would, by readings of her instruments instead of sentences."""
+"""A simulated ship steered as by `shipgym steer`, by readings instead of sentences."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from math import radians
 from typing import Any, NamedTuple
 
@@ -49,36 +49,55 @@ def settled(values: Floats) -> Floats:
 def steer(
     helm: Helm, ship: SimulatedShip, seconds: float, lost: Collection[str] = ()
 ) -> SteeredRun:
-    """Steer a ship until the autopilot hands over; the quantities in `lost` fall silent after `LOST_S`."""
+    """Steer a ship until the autopilot hands over.
+
+    The quantities in `lost` fall silent after `LOST_S`.
+    """
     dt = helm.pilot.dt
-    rows = list[tuple[float, ...]]()
-    given, warnings = list[dict[str, Any]](), list[list[str]]()
-    while len(rows) * dt < seconds:
-        now = len(rows) * dt
+    rows: list[list[float]] = []
+    given: list[dict[str, Any]] = []
+    warnings: list[list[str]] = []
+    now = 0.0
+    while now < seconds:
         measured = ship.measured()
-        for quantity, value in measured.items():
-            if quantity not in lost or now < LOST_S:
-                helm.sensors.take(NmeaReading(quantity, value, "II"), now)
+        silent = () if now < LOST_S else lost
+        show(helm, measured, silent, now)
         helm.watch(dt, now)
         helm.steer(now)
         if helm.alarm:
             break
 
-        off = (helm.heading or 0.0) - measured["heading"]
-        angles_deg = np.degrees([off, measured["rudder"], helm.order])
-        error_deg, rudder_deg, order_deg = angles_deg.tolist()
-        rows.append((now, error_deg, measured["yaw_rate"], rudder_deg, order_deg))
+        error = (helm.heading or 0.0) - measured["heading"]
+        rows.append([now, error, measured["yaw_rate"], measured["rudder"], helm.order])
         given.append(helm.inputs(now))
         warnings.append(helm.warnings)
         ship.order = helm.order
         for _ in range(PER_INTERVAL):
             ship.advance()
+        now = len(rows) * dt
 
-    t, error, yaw_rate, rudder, order = np.array(rows).T
-    alarm_at = len(rows) * dt if helm.alarm else np.inf
+    times, errors, yaw_rates, rudders, orders = np.array(rows).T
     return SteeredRun(
-        t, error, yaw_rate, rudder, order, given, warnings, helm.alarm, alarm_at
+        t=times,
+        error=np.degrees(errors),
+        yaw_rate=yaw_rates,
+        rudder=np.degrees(rudders),
+        order=np.degrees(orders),
+        given=given,
+        warnings=warnings,
+        alarm=helm.alarm,
+        alarm_at=now if helm.alarm else np.inf,
     )
+
+
+def show(
+    helm: Helm, measured: Mapping[str, float], silent: Collection[str], now: float
+) -> None:
+    """Show an autopilot what is measured, but for quantities that are silent."""
+    for quantity, value in measured.items():
+        if quantity not in silent:
+            reading = NmeaReading(quantity, value, talker="II")
+            helm.sensors.take(reading, now)
 
 
 def steer_to_heading(
@@ -90,12 +109,26 @@ def steer_to_heading(
     rate: float | None = None,
     lost: Collection[str] = (),
 ) -> SteeredRun:
-    """Steer a ship from straight running to a heading, deg, or at a rate of turn, rad/s."""
+    """Steer a ship from straight running to a heading, or at a rate of turn.
+
+    `heading`: deg; `rate`: rad/s.
+    """
     step = pilot.design["dt"] / PER_INTERVAL
     ship = SimulatedShip(model, weather=sea, seed=1, step=step)
     set_point = radians(heading) if rate is None else None
     helm = Helm(pilot, set_point, limits or Limits(), rate=rate)
     return steer(helm, ship, LENGTHS * model.travel_time, lost)
+
+
+def positions(places: Floats) -> Floats:
+    """Latitude and longitude, degrees, of places north and east of the start, m.
+
+    `places` and result: shape (n, 2).
+    """
+    north, east = places.T / MINUTE / 60.0  # degrees of latitude
+    latitude = START[0] + north
+    longitude = START[1] + east / np.cos(np.radians(latitude))
+    return np.column_stack([latitude, longitude])
 
 
 def steer_along(
@@ -107,14 +140,13 @@ def steer_along(
 ) -> SteeredRun:
     """Keep a ship to a track, from a distance to starboard of where it begins, m."""
     pilot = track.controller
-    north, east = track.waypoints.T / MINUTE / 60.0  # degrees of latitude
-    latitude = START[0] + north
-    longitude = START[1] + east / np.cos(np.radians(latitude))
-    places = np.column_stack([latitude, longitude])
-    route = Route(places, pilot.gains["path_radius"])
+    route = Route(positions(track.waypoints), pilot.gains["path_radius"])
 
     step = pilot.design["dt"] / PER_INTERVAL
-    ship = SimulatedShip(model, weather=track_task(model).weather, step=step)
-    ship.states[0, model.state_names.index("y")] = aside
-    helm = Helm(pilot, None, limits, route)
-    return steer(helm, ship, 3.0 * LENGTHS * model.travel_time, lost)
+    weather = track_task(model).weather
+    ship = SimulatedShip(model, weather=weather, step=step)
+    y = model.state_names.index("y")
+    ship.states[0, y] = aside
+    helm = Helm(pilot, heading=None, limits=limits, route=route)
+    seconds = 3.0 * LENGTHS * model.travel_time
+    return steer(helm, ship, seconds, lost)

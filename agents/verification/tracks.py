@@ -1,7 +1,7 @@
-"""Track keeping: path autopilots along one track with turns to both sides, in a current across it.
+"""Track keeping: path autopilots along one track with turns to both sides.
 
-Straight legs joined by arcs, as track control systems have them (IEC 62065:2014); the
-track is our own.
+A current sets across its first leg. Straight legs joined by arcs, as track control
+systems have them (IEC 62065:2014); the track is our own.
 """
 
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ RECORDED = (
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """How one path autopilot kept to the track: the identified model first, then the models drawn."""
+    """Ships under one path autopilot: the identified model, then the models drawn."""
 
     key: str  # its kind
     controller: Controller
@@ -51,11 +51,12 @@ class Track:
 
 
 def track_task(model: ShipModel) -> Task:
-    """The track for a ship, with a current of a tenth of her speed across the first leg."""
+    """The track for a ship, in a current of a tenth of her speed."""
     courses = np.radians(np.cumsum([0.0, *TURNS_DEG]))
     directions = np.column_stack([np.cos(courses), np.sin(courses)])
     legs = LEG_LENGTHS * model.particulars["length"] * directions
-    waypoints = np.vstack([np.zeros(2), np.cumsum(legs, axis=0)])
+    ends = np.cumsum(legs, axis=0)
+    waypoints = np.vstack([np.zeros(2), ends])
     current = Current(0.1 * model.particulars["speed"], towards_deg=90.0)
     return Task.of(
         "PathFollowing",
@@ -74,17 +75,21 @@ def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:
     figures = path_following(run)
 
     settled = SETTLED_LENGTHS * models[0].particulars["length"]
-    counts = run.sailing & (run.infos["distance_made_good"][1:] > settled)
-    off = np.abs(run.infos["cross_track"][1:])
-    samples = int(run.steps[0]) + 1  # of the identified model
-    x, y = run.states["x"][:samples, 0], run.states["y"][:samples, 0]
+    made_good = run.infos["distance_made_good"][1:]
+    cross_track = run.infos["cross_track"]
+    counts = run.sailing & (made_good > settled)
+    counted = np.where(counts, np.abs(cross_track[1:]), 0.0)
+
+    own_samples = int(run.steps[0]) + 1
+    x = run.states["x"][:own_samples, 0]
+    y = run.states["y"][:own_samples, 0]
     return Track(
         key=guide.kind,
         controller=guide,
         waypoints=np.reshape(task.settings.waypoints[1:], (-1, 2)),
         positions=np.column_stack([x, y]),
-        cross_track=run.infos["cross_track"][:samples, 0],
-        largest=np.where(counts, off, 0.0).max(axis=0),
+        cross_track=cross_track[:own_samples, 0],
+        largest=counted.max(axis=0),
         rms=figures["cross_track_rmse_m"],
         arrived=figures["success"] > 0.0,
     )

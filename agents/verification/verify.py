@@ -1,7 +1,8 @@
-"""Autopilots designed on a model, and what becomes of them over models drawn from its covariance."""
+"""Autopilots designed on a model, and run over models drawn from its covariance."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,7 @@ import numpy as np
 from agents.controllers.controller import Controller
 from agents.controllers.registry import controller_class
 from agents.jobs import HERE, JobEngine
-from agents.rollouts.course_keeping import sail, step_response
+from agents.rollouts.course_keeping import Episodes, sail, step_response
 from agents.verification.monte_carlo import monte_carlo
 from agents.verification.result import STEP_DEG, Pilot, Verification
 from agents.verification.tracks import Track, keep_track, track_task
@@ -36,7 +37,7 @@ def verify(
     guests: Sequence[Agent] = (),
     designs: Sequence[str] = DESIGNS,
 ) -> Verification:
-    """Design autopilots on a model and run them, and guests, over models drawn from its covariance.
+    """Design autopilots on a model and run them over models drawn from its covariance.
 
     `model`: with a covariance; `draws`, `seed`, `where`, `designs`: see
     `build_autopilot`; `tell`: called with the progress; `guests`: further autopilots.
@@ -57,20 +58,12 @@ def verify(
     for guest in guests:
         episodes.append(sail(guest, found.draws, seeds=seed + np.arange(draws)))
 
-    unstable = found.manoeuvres.unstable
-    stable = [
-        draw for draw, lost in zip(found.draws, unstable, strict=True) if not lost
-    ]
-    ships = [model, *stable]
+    ships = [model]
+    for draw, is_lost in zip(found.draws, found.manoeuvres.unstable, strict=True):
+        if not is_lost:
+            ships.append(draw)
     autopilots = [*designed.controllers, *guests]
-    keys = unique_keys([str(autopilot.name) for autopilot in autopilots])
-    pilots = []
-    for done, (key, autopilot) in enumerate(zip(keys, autopilots, strict=True)):
-        tell("step responses", done, len(autopilots))
-        step = step_response(autopilot, ships, STEP_DEG)
-        pilots.append(Pilot(key, autopilot, episodes[done], step))
-    tell("step responses", len(autopilots), len(autopilots))
-
+    pilots = run_pilots(autopilots, episodes, ships, tell)
     tracks, late = kept_tracks(designed.guides, ships)
     return Verification(
         draws=draws,
@@ -82,6 +75,29 @@ def verify(
         refused={**designed.refused, **late},
         tracks=tracks,
     )
+
+
+def run_pilots(
+    autopilots: Sequence[Any],
+    episodes: Sequence[Episodes],
+    ships: Sequence[ShipModel],
+    tell: Progress,
+) -> list[Pilot]:
+    """Autopilots with the episodes of each and its step responses on ships."""
+    n = len(autopilots)
+    keys = unique_keys([str(autopilot.name) for autopilot in autopilots])
+    pilots = []
+    for i, key in enumerate(keys):
+        tell("step responses", i, n)
+        pilot = Pilot(
+            key=key,
+            controller=autopilots[i],
+            episodes=episodes[i],
+            step=step_response(autopilots[i], ships, STEP_DEG),
+        )
+        pilots.append(pilot)
+    tell("step responses", n, n)
+    return pilots
 
 
 def _mean_cost(pilot: Pilot) -> float:
@@ -99,7 +115,7 @@ class Designed:
 
 
 def design_autopilots(model: ShipModel, designs: Sequence[str]) -> Designed:
-    """Autopilots of some kinds; InputError if none that keeps a heading can be designed."""
+    """Autopilots of some kinds; InputError if none of them keeps a heading."""
     found = Designed()
     for kind in dict.fromkeys(designs):
         made: Any = controller_class(kind)
@@ -124,20 +140,28 @@ def design_autopilots(model: ShipModel, designs: Sequence[str]) -> Designed:
 def kept_tracks(
     guides: Sequence[Controller], ships: Sequence[ShipModel]
 ) -> tuple[tuple[Track, ...], dict[str, str]]:
-    """The track of each path autopilot, and why one is refused that does not arrive on the first ship."""
-    tracks = tuple(keep_track(guide, ships) for guide in guides)
-    late = {
-        track.key: "it does not reach the end of the track on the identified model"
-        for track in tracks
-        if not track.arrived[0]
-    }
-    return tracks, late
+    """The track of each path autopilot, and reasons to refuse those that fail.
+
+    One fails that does not arrive on the first ship.
+    """
+    tracks = []
+    late = {}
+    for guide in guides:
+        track = keep_track(guide, ships)
+        tracks.append(track)
+        if not track.arrived[0]:
+            late[track.key] = (
+                "it does not reach the end of the track on the identified model"
+            )
+    return tuple(tracks), late
 
 
 def unique_keys(names: Sequence[str]) -> list[str]:
     """Names, those that were there before with a number."""
+    times: Counter[str] = Counter()
     keys = []
-    for place, name in enumerate(names):
-        number = names[: place + 1].count(name)
+    for name in names:
+        times[name] += 1
+        number = times[name]
         keys.append(name if number == 1 else f"{name}-{number}")
     return keys

@@ -1,4 +1,4 @@
-"""What the report's template shows of a verification: sentences, cards and rows of tables."""
+"""Sentences, cards and rows of tables that the report shows of a verification."""
 
 from __future__ import annotations
 
@@ -143,15 +143,22 @@ def verification_view(found: Verification, length: float) -> VerificationView:
 
 
 def is_certain(found: Verification) -> bool:
-    """Whether all criteria are met and no model drawn runs away or is lost by the best autopilot."""
-    passed = [criterion.passed for criterion in found.manoeuvres.criteria.values()]
-    lost = found.pilots[0].episodes.terminated.any()
-    return bool(all(passed) and not found.manoeuvres.unstable.any() and not lost)
+    """Return True if all criteria are met and no model drawn is lost.
+
+    One is lost that runs away in a manoeuvre, or of which the best autopilot loses
+    control.
+    """
+    for criterion in found.manoeuvres.criteria.values():
+        if not criterion.passed:
+            return False
+    lost = found.pilots[0].episodes.terminated
+    return not found.manoeuvres.unstable.any() and not lost.any()
 
 
 def headline(found: Verification) -> str:
     """The verdict in two or three sentences."""
-    missed, undecided = list[str](), list[str]()
+    missed: list[str] = []
+    undecided: list[str] = []
     for name, criterion in found.manoeuvres.criteria.items():
         words = criterion_name(name, criterion).lower()
         if criterion.passed is False:
@@ -195,22 +202,27 @@ def _unstable_note(found: Verification) -> str:
 
 
 def _criteria_card(criteria: Mapping[str, Criterion]) -> Card:
-    verdicts = Counter(criterion.passed for criterion in criteria.values())
-    met, missed, undecided = verdicts[True], verdicts[False], verdicts[None]
-    detail = f"met; {missed} missed, {undecided} not decided by these trials"
-    return Card("IMO criteria", f"{met} of {len(criteria)}", detail)
+    verdicts = Counter([criterion.passed for criterion in criteria.values()])
+    met = verdicts[True]
+    missed = verdicts[False]
+    undecided = verdicts[None]
+    return Card(
+        "IMO criteria",
+        f"{met} of {len(criteria)}",
+        f"met; {missed} missed, {undecided} not decided by these trials",
+    )
 
 
 def _best_card(found: Verification, metrics: Mapping[str, dict[str, Any]]) -> Card:
     best = found.pilots[0]
     own = metrics[best.name]
-    parts = [f"mean cost {number(own['cost_mean'])}"]
-    rmse = f"heading rmse {number(own['heading_rmse_deg_mean'], 2)}°"
+    cost = number(own["cost_mean"])
+    rmse_deg = number(own["heading_rmse_deg_mean"], 2)
+    detail = f"heading rmse {rmse_deg}°"
     if best.design is not None:
-        margin = number(best.design.margins.phase_margin_deg, 2)
-        rmse = f"phase margin {margin}°, {rmse}"
-    parts.append(rmse)
-    return Card("Best autopilot", best.name, "; ".join(parts))
+        margin_deg = number(best.design.margins.phase_margin_deg, 2)
+        detail = f"phase margin {margin_deg}°, {detail}"
+    return Card("Best autopilot", best.name, f"mean cost {cost}; {detail}")
 
 
 def _criterion_row(name: str, criterion: Criterion) -> CriterionRow:
@@ -238,21 +250,21 @@ def _criterion_row(name: str, criterion: Criterion) -> CriterionRow:
 
 def _introduction(found: Verification, designed: Mapping[str, Controller]) -> str:
     """How the autopilots were made, and the model in its first-order form."""
-    learned = [pilot.name for pilot in found.by_name if pilot.design is None]
+    names = ", ".join(designed)
     sentences = [
-        f"{', '.join(designed)} are designed on the identified model, linearised about"
-        " straight running."
+        f"{names} are designed on the identified model, linearised about straight"
+        " running."
     ]
+    learned = [pilot.name for pilot in found.by_name if pilot.design is None]
     if learned:
+        names = " and ".join(learned)
         verb = "was" if len(learned) == 1 else "were"
         sentences.append(
-            f"{' and '.join(learned)} {verb} trained earlier, on another model, and used"
-            " unchanged."
+            f"{names} {verb} trained earlier, on another model, and used unchanged."
         )
-    K, T = found.nomoto.K, found.nomoto.T
-    sentences.append(
-        f"First-order form (Nomoto): K = {number(K)} 1/s, T = {number(T)} s."
-    )
+    K = number(found.nomoto.K)
+    T = number(found.nomoto.T)
+    sentences.append(f"First-order form (Nomoto): K = {K} 1/s, T = {T} s.")
     return " ".join(sentences)
 
 
@@ -276,36 +288,32 @@ def _design_notes(designed: Mapping[str, Controller]) -> list[str]:
     """Remarks on the gains of designs that are more than gains on signals."""
     notes = []
     for name, design in designed.items():
-        if design.kind == "lq-scheduled":
-            speeds = design.speeds  # type: ignore[attr-defined]
-            notes.append(
-                f"{name}: gains at service speed; the file has those from"
-                f" {number(speeds[0])} to {number(speeds[-1])} m/s."
-            )
-    for name, design in designed.items():
-        if design.kind == "turn-rate":
-            gains = design.gains
-            per_minute = np.degrees(60 * gains["rate"])
-            notes.append(
-                f"{name} steers a rate of turn: {number(gains['proportional'])} rad per"
-                f" rad/s of its error, {number(gains['integral'])} per rad of its"
-                " integral, and the rudder of the steady turn; it changes courses at"
-                f" {fixed(per_minute, 1)}°/min."
-            )
+        if design.kind != "turn-rate":
+            continue
+        proportional = number(design.gains["proportional"])
+        integral = number(design.gains["integral"])
+        per_minute = np.degrees(60 * design.gains["rate"])
+        notes.append(
+            f"{name} steers a rate of turn: {proportional} rad per rad/s of its error,"
+            f" {integral} per rad of its integral, and the rudder of the steady turn;"
+            f" it changes courses at {fixed(per_minute, 1)}°/min."
+        )
     return notes
 
 
 def _margin_rows(designs: Sequence[Controller]) -> list[MarginRow]:
     rows = []
     for field, (name, unit) in MARGINS.items():
-        values = [getattr(design.margins, field) for design in designs]
-        shown = ["∞" if value == np.inf else number(value) for value in values]
+        shown = []
+        for design in designs:
+            value = getattr(design.margins, field)
+            shown.append("∞" if value == np.inf else number(value))
         rows.append(MarginRow(name, unit, shown))
     return rows
 
 
 def _cheaper(found: Verification) -> dict[str, float]:
-    """Share of the models on which the best autopilot costs less than each other one."""
+    """Share of the models on which the best autopilot costs less than others."""
     best, *others = found.pilots
     shares = {}
     for other in others:
@@ -315,9 +323,10 @@ def _cheaper(found: Verification) -> dict[str, float]:
 
 
 def cheaper_sentence(view: VerificationView) -> str:
-    """How often the best autopilot costs less than each other one; empty without others."""
-    parts = [
-        f"{view.best} costs less than {other} on {percent(share)} of the models"
-        for other, share in view.cheaper.items()
-    ]
-    return f"{'; '.join(parts)}." if parts else ""
+    """Sentence on how often the best autopilot costs less than others; may be empty."""
+    parts = []
+    for other, share in view.cheaper.items():
+        often = percent(share)
+        parts.append(f"{view.best} costs less than {other} on {often} of the models")
+    sentence = "; ".join(parts)
+    return f"{sentence}." if sentence else ""

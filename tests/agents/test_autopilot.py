@@ -66,7 +66,7 @@ def test_metrics_tell_probabilities_margins_and_ranking(chain):
 
 
 def test_wheel_over_keeps_to_the_track_in_a_current_on_every_model_drawn(chain):
-    """Within half a ship length; with a quarter of the turn's reach it leaves it by more."""
+    """Within half a ship length; with a quarter of the turn's reach by more."""
     _, result, _ = chain
     (track,), length = result.verification.tracks, result.model.particulars["length"]
     assert track.arrived.all()
@@ -289,7 +289,7 @@ def test_a_ship_with_complex_steering_poles_has_no_nomoto_time_constants():
 
 
 def test_an_autopilot_that_cannot_be_designed_is_said_and_the_others_fly():
-    """With T3 > T1 + T2 the first-order form that the PID is placed on has no meaning."""
+    """With T3 > T1 + T2 the first-order form of the PID design has no meaning."""
     metrics = verified(N_v=2e-3)
     assert metrics["ranking"] == ["lq"]
     assert "closed loop is unstable" in metrics["refused"]["pid"]

@@ -1,4 +1,4 @@
-"""Exported C does what the library does, and what cannot be written as C is refused by name."""
+"""Exported C does what the library does; what C cannot say is refused by name."""
 
 import ctypes
 import json
@@ -25,10 +25,11 @@ from agents import (
 from agents.cli import app
 from agents.controllers.guided import TURNS, bend
 from agents.controllers.law import Turns
-from agents.deployment.autopilot import VARIABLES, Autopilot, BridgeInput
+from agents.deployment.autopilot import Autopilot, BridgeInput
 from agents.deployment.autopilot_c99 import autopilot_source
 from agents.deployment.c99 import checked_name, degrees, heading, knots, single
 from agents.deployment.ship_c99 import ShipInput, advance, ship_source
+from agents.deployment.variables import AUTOPILOT_INPUTS
 from shipgym.engine.motion import Motion
 from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
@@ -206,7 +207,7 @@ SIZES = {
 
 
 def orders(agent, name, folder, steps):
-    """Orders of an autopilot in C and in the library, for the same numbers at random."""
+    """Orders of an autopilot in C and in the library, for the same random numbers."""
     source, bridge = autopilot_source(agent, name), Autopilot(agent)
     library = built(folder, name, source.header, source.source)
     state = ctypes.create_string_buffer(10_000)
@@ -269,7 +270,7 @@ def test_an_autopilot_orders_what_the_controller_commands_in_the_environment(age
 
 @pytest.mark.parametrize("kind", [WheelOver, MPC, IntegralLineOfSight])
 def test_guidance_orders_what_it_commands_along_a_path(kind):
-    """Its inputs are those of a bridge: the direction of the path, and the course over ground."""
+    """Its inputs are those of a bridge: path direction and course over ground."""
     env = gym.make("shipgym/PathFollowing-v0", model="mariner", max_turn_deg=60.0)
     agent = kind.from_model(MARINER, task=env.unwrapped.task)
     seen, _ = env.reset(seed=3)
@@ -293,7 +294,7 @@ def test_guidance_orders_what_it_commands_along_a_path(kind):
 
 
 def test_every_input_has_its_unit_and_meaning():
-    assert list(BridgeInput._fields) == list(VARIABLES["autopilot_input"])
+    assert list(BridgeInput._fields) == list(AUTOPILOT_INPUTS)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Controller files: read back as they were, and refused with the field at fault named."""
+"""Controller files are read back as they were, or the field at fault is named."""
 
 import json
 import math
@@ -31,7 +31,7 @@ SCALES = list(DESIGNS["pid"].observation_scales)
 
 
 def changed(kind, tmp_path, changes):
-    """A file of a kind with fields changed, `outer__inner`; a field that becomes None is taken away."""
+    """A file of a kind with fields `outer__inner` changed; None takes one away."""
     content = json.loads(CORPUS[kind].read_text())
     for field, value in changes.items():
         *parents, name = field.split("__")
@@ -76,7 +76,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing_behind(tmp_path):
 SWAPPED = [*NAMES[:2], NAMES[3], NAMES[2], *NAMES[4:]]
 #: Kind of file, what is changed in it, and what the message says.
 BAD_FILES = [
-    ("pid", {"format": 2}, "this version of shipgym reads format 1"),
+    ("pid", {"format": 2}, "expected format 1"),
     ("pid", {"kind": None}, "field 'kind' is missing"),
     ("pid", {"kind": "pdi"}, "kind: .*Did you mean 'pid'"),
     ("pid", {"kind": "learned"}, "policy|field"),
@@ -149,7 +149,7 @@ def test_a_filter_has_three_states_or_five(n_states, message, tmp_path):
             b'{"format": 1, "kind": "pid", "gai',
             "broken JSON .*line 1 column 30.*cut short",
         ),
-        (b"\x89PNG\xff\xfe", "binary content.*expected a controller file"),
+        (b"\x89PNG\xff\xfe", "expected a controller file.*binary content"),
         (b"[1, 2]", "expected a table"),
         (b"{}", "field 'format' is missing"),
     ],

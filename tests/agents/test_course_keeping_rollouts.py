@@ -1,4 +1,4 @@
-"""Rollouts over many ships: complete, repeatable, and clear about controllers that do not answer."""
+"""Rollouts over many ships: complete, repeatable, clear about missing answers."""
 
 from dataclasses import replace
 
@@ -139,7 +139,7 @@ def test_step_responses_of_many_ships_are_those_of_each():
 
 
 def test_a_step_response_is_the_environments_own_turn():
-    """Without noise the ship cannot tell a set-point of the task from the one shown to it here."""
+    """Without noise a set-point of the task is the same as the one shown here."""
     from shipgym.envs.engine import Engine
 
     engine = Engine(MARINER, 1)

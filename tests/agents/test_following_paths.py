@@ -1,4 +1,4 @@
-"""Course autopilots follow paths as they are: they steer by the heading error to the line of sight."""
+"""Course autopilots follow paths by the heading error to the line of sight."""
 
 import gymnasium
 import numpy as np
@@ -9,7 +9,7 @@ from shipgym import InputError, load_model
 
 
 def sailed(controller, model, n=64, **options):
-    """Shares of episodes with success, of those aground, and of the time within the corridor."""
+    """Shares of episodes with success, of those aground, of time in the corridor."""
     env = gymnasium.make_vec(
         "shipgym/PathFollowing-v0",
         num_envs=n,

@@ -111,7 +111,7 @@ def test_the_rudder_ordered_is_limited_and_the_helmsman_is_warned():
     assert found.warnings == ["off heading", "course change ahead"]
 
 
-def test_a_course_change_is_ahead_by_the_time_to_where_the_turn_is_begun_or_to_the_waypoint():
+def test_a_course_change_is_announced_by_the_time_to_turn_or_waypoint():
     found = Helm(
         WHEEL_OVER,
         None,

@@ -1,4 +1,4 @@
-"""Line of sight over heading autopilots: what a current does, and what integral and adaptive forms undo."""
+"""Line of sight over heading autopilots; integral and adaptive forms in a current."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_a_steady_current_leaves_no_error(law):
     assert np.abs(errors[-100:]).max() < 1e-4 * LENGTH
 
 
-def test_without_integral_the_ship_is_set_off_by_the_lookahead_times_the_tangent_of_the_crab_angle():
+def test_without_integral_the_offset_is_the_lookahead_times_the_tangent_of_crab():
     errors, _ = cross_track(LineOfSight.from_model(MARINER), STRAIGHT)
     assert errors[-1] == pytest.approx(
         2.5 * LENGTH * np.tan(np.arcsin(CURRENT / SPEED)), rel=0.02

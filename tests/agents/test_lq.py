@@ -1,4 +1,4 @@
-"""LQ autopilot: optimal for the environment's cost on the linear ship, and near it on the real one."""
+"""LQ autopilot: optimal for the environment's cost on the linear ship."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ from tests.agents.mariners import (
 
 
 def linear_cost(ship, gain, cost, n=4000):
-    """Cost of a step of 1 rad on the sampled linear ship, summed step by step as the environment does."""
+    """Cost of a step of 1 rad on the sampled linear ship, summed step by step."""
     x, total = np.array([0.0, 0.0, 1.0, 0.0, 0.0]), 0.0
     for _ in range(n):
         before = x[3]
@@ -107,7 +107,7 @@ def test_the_integral_removes_what_a_wrong_neutral_rudder_leaves(kind):
 
 
 def test_a_ship_of_second_order_is_steered_without_seeing_her_memory():
-    """Mariner in Nomoto's form of second order: no sway to feed back; the margins are of the exact loop."""
+    """Nomoto's form of second order has no sway to feed back; margins are exact."""
     ship = nomoto2_ship(nomoto(MARINER), MARINER.particulars, MARINER.steering)
     controller = LQ.from_model(ship)
     assert controller.gains["sway"] == 0.0
@@ -118,7 +118,7 @@ def test_a_ship_of_second_order_is_steered_without_seeing_her_memory():
 
 
 def test_the_model_seven_metres_long_is_steered_as_its_ship():
-    """Gains are similar in units of ship length and speed where the gears are similar too."""
+    """Gains are similar in units of ship length and speed if the gears are similar."""
     p, scale = MARINER.particulars, 7.0 / 160.93
     time = np.sqrt(scale)
     small = replace(

@@ -1,4 +1,4 @@
-"""LQG autopilot: the filter is Kalman's, the loop LQ's and the filter's, and noise moves the rudder less."""
+"""LQG autopilot: LQ with a Kalman filter, and noise moves the rudder less."""
 
 from dataclasses import replace
 
@@ -48,7 +48,7 @@ def test_the_kalman_gain_is_that_of_python_control_and_of_the_recursion():
 
 @pytest.mark.parametrize("model", [MARINER, UNSTABLE], ids=["stable", "unstable"])
 def test_poles_of_the_loop_are_those_of_lq_and_of_the_filter(model):
-    """Separation; up to the mean of the measured rudder that the filter takes for what was held."""
+    """Separation, but for the mean of the measured rudder that the filter takes."""
     lqg, ship = LQG.from_model(model), sample_ship(model, control_interval(model))
     poles = np.linalg.eigvals(lqg.loop().closed_loop(ship))
     regulator = np.linalg.eigvals(LQ.from_model(model).loop().closed_loop(ship))
@@ -77,7 +77,7 @@ def test_the_wave_model_keeps_its_deviation_and_period():
 
 
 def test_noise_makes_a_new_course_once_in_years():
-    """Six deviations of the innovation, whose covariance is (1 - C K)^-1 R: once in 16 years of seconds."""
+    """Six deviations of the innovation, whose covariance is (1 - C K)^-1 R."""
     lqg = LQG.from_model(MARINER, noise=3.0)
     noise = np.diag(
         (3.0 * np.array([SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise])) ** 2
@@ -183,7 +183,7 @@ def test_the_state_is_that_of_as_many_ships():
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("wave_period", 1.0, "expected a number > 2; two control intervals"),
+        ("wave_period", 1.0, "expected a number > 2 \\(two control intervals"),
         ("noise", 0.0, "expected a number > 0"),
         ("wave_heading_deg", 0.0, "expected a number > 0"),
         ("disturbance_deg", 0.0, "expected a number > 0"),

@@ -1,4 +1,4 @@
-"""Margins and bandwidth of linear loops: against poles, python-control's meaning, and hand-made responses."""
+"""Margins and bandwidth of linear loops against poles and python-control."""
 
 from dataclasses import replace
 

@@ -46,7 +46,7 @@ def test_a_ship_on_the_arc_is_on_the_path_and_beyond_it_on_the_next_leg(side):
 
 @pytest.mark.parametrize(("x", "opposite"), [(90.0, 0.0), (102.0, 2.0), (110.0, 10.0)])
 def test_far_inside_of_an_arc_the_way_stays_finite_and_forward(x, opposite):
-    """A ship beyond the middle of the circle, from where every direction would be the arc's."""
+    """A ship beyond the middle of the circle, where all directions would be the arc."""
     ahead = PathAhead(turns(100.0, 1.0, 9e3, 0.5), 300.0)
     along = ahead.fix(np.array([x]), np.array([320.0])).along_track[0]
     expected = x if x < 100.0 else 100.0 + 300.0 * np.arctan(opposite / 30.0)

@@ -115,7 +115,7 @@ def test_lines_come_in_any_portions_and_an_endless_one_is_forgotten():
 
 
 class Wire:
-    """A transport that keeps what is sent, of datagrams if it may be sent to someone."""
+    """A transport that keeps what is sent; of datagrams if it has `sendto`."""
 
     def __init__(self, connected=None, datagrams=True, broken=False):
         self.sent, self.connected, self.broken, self.closed = (
@@ -161,7 +161,7 @@ def test_a_datagram_holds_whole_lines():
     assert heard == ["$A,1", "$B,2", "$C,3"]
 
 
-def test_all_that_are_connected_are_told_though_one_line_is_broken_and_closed_at_the_end():
+def test_all_connected_ends_are_sent_to_though_one_is_broken():
     link = Link(lambda line: None)
     wires = [Wire(datagrams=False, broken=k == 0) for k in range(3)]
     lines = [link.line() for _ in wires]

@@ -1,4 +1,4 @@
-"""Files that a user may receive run no code, whatever they hold: models, ships, runs, agents, suites."""
+"""Files that a user may receive run no code: models, ships, runs, agents, suites."""
 
 import json
 import linecache
@@ -56,8 +56,8 @@ LINE = re.compile(
     r"(    )?(def accelerations\(motion, c, ship\):|return udot, vdot, rdot( \+"
     r" motion\.q)?, pdot, qdot"
     r"|\w+ = ([-+*/()"
-    r" ]|\b(motion|ship)\.[a-z]+|\bc\.c[0-9]+|\b[10]\.0\b|\b(abs_)?(u|v|r|p|n|phi|delta|du|dn"
-    r"|s|U|per_U|fabs|sqrt)_?\b)+)",
+    r" ]|\b(motion|ship)\.[a-z]+|\bc\.c[0-9]+|\b[10]\.0\b"
+    r"|\b(abs_)?(u|v|r|p|n|phi|delta|du|dn|s|U|per_U|fabs|sqrt)_?\b)+)",
     re.ASCII,
 )
 SMALL = {
@@ -88,7 +88,7 @@ SMALL = {
 
 @pytest.fixture(autouse=True)
 def elsewhere(tmp_path, monkeypatch):
-    """Code that ran would leave a file in the working folder; and what becomes code is fixed words."""
+    """Code that ran would leave a file; what becomes code is fixed words."""
     made = []
 
     def execute(code, namespace):
@@ -324,7 +324,7 @@ def test_what_is_no_sum_of_terms_is_not_made_a_function(line):
 
 @pytest.fixture
 def evil(tmp_path):
-    """A model file whose texts are code, and a Python file that says whether it was run."""
+    """A model file whose texts are code, and a Python file that tells if it ran."""
     model = load_model("mariner-tls-svm").to_dict()
     for path in (
         ("structure", "name"),

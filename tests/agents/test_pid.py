@@ -1,4 +1,4 @@
-"""PID autopilot: where its poles are, what its design makes up for, and what it commands."""
+"""PID autopilot: its poles, what its design makes up for, and its commands."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def test_poles_of_the_nomoto_loop_are_where_they_were_asked_for():
 
 
 def test_without_price_on_the_rudder_rate_the_optimal_poles_have_the_textbook_damping():
-    """Double integrator K/T with cost e^2 + 0.1 delta^2: frequency (K/T)^(1/2) 10^(1/4), damping 0.71."""
+    """K/s^2, cost e^2 + 0.1 delta^2: frequency (K/T)^(1/2) 10^(1/4), damping 0.71."""
     response = Nomoto(K=2e3, T1=1e6, T2=0.0, T3=0.0, T=1e6)
     frequency, damping = optimal_poles(response, rate_weight=1e-9)
     assert damping == pytest.approx(np.sqrt(0.5), rel=1e-3)
@@ -38,7 +38,7 @@ def test_without_price_on_the_rudder_rate_the_optimal_poles_have_the_textbook_da
 
 
 def test_poles_that_do_not_oscillate_are_the_two_slowest_of_the_three():
-    """1 / T a hundred times the rudder's effect: s1 s2 = (K / T) 10^(1/2), s1^2 + s2^2 = 1 / T^2."""
+    """1 / T = 100 K / T: s1 s2 = (K / T) 10^(1/2), s1^2 + s2^2 = 1 / T^2."""
     response = Nomoto(K=0.01, T1=1.0, T2=0.0, T3=0.0, T=1.0)
     product = 0.01 * np.sqrt(10.0)
     frequency = np.sqrt(product)
@@ -63,7 +63,7 @@ def test_half_of_the_gears_lag_and_of_an_interval_is_made_up_for():
     ids=["weak rudder", "slow gear"],
 )
 def test_it_is_as_quick_as_a_weak_rudder_and_a_slow_gear_allow(model, other, most):
-    """A weak rudder would have it slower, a slow gear quicker: so they would save 5 % and 3 % at most."""
+    """A weak rudder asks for less, a slow gear for more; it saves 5 % at most."""
     pid = PID.from_model(model)
     otherwise = PID.from_model(model, frequency=other * pid.design["frequency"])
     ours, theirs = (

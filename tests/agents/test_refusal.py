@@ -1,4 +1,4 @@
-"""Designs that are refused: no controller file, the reason and the trial that would help."""
+"""Refused designs: no controller file, the reason and the trial that would help."""
 
 import json
 from dataclasses import replace

@@ -48,7 +48,7 @@ def page(tmp_path_factory):
 
 @pytest.fixture
 def opened(browser, page):
-    """The page at its beginning; after each test it must have kept quiet and stayed offline."""
+    """The page at its beginning; after each test it must be quiet and offline."""
     browser.resize(1000, 700)
     browser.open("about:blank")
     browser.open(page)
@@ -59,7 +59,7 @@ def opened(browser, page):
 
 
 def ship(browser, run=0):
-    """Where the ship of a run stands on the chart, east, south and heading, as the drawing has it."""
+    """Position and heading of the ship of a run on the chart: east, south, heading."""
     script = f"chart.ships[{run}].ship.getAttribute('transform')"
     return [
         float(number)

@@ -1,4 +1,4 @@
-"""A route as an autopilot is given it: legs, arcs between them, and what is no route."""
+"""A route for an autopilot: legs, arcs between them, and what is no route."""
 
 import math
 
@@ -23,7 +23,7 @@ def given(path, north, east):
 
 
 def test_on_a_leg_distance_is_to_starboard_and_the_turns_ahead_are_told():
-    """Arcs begin R tan(turn / 2) before the waypoint: 300 m where she turns by 90 degrees."""
+    """Arcs begin R tan(turn / 2) before the waypoint: 300 m for 90 degrees."""
     path = route((0, 0), (3000, 0), (3000, 2000), (0, 2000))
     found = given(path, 1000.0, 20.0)
     assert found["set_point"] == pytest.approx(0.0, abs=1e-9)

@@ -138,9 +138,10 @@ def test_a_turn_counts_where_it_ends_within_a_degree_of_the_course(
     [([], 1.0), ([3, 4, 5], 2.0), ([1, 2, 3], 4.0), ([0, 1, 2, 3], 0.0)],
 )
 def test_a_turn_is_announced_from_the_last_quiet_interval_on(warned, lead, track):
-    """Begun where the reach is passed, in the fifth interval; one that was never quiet tells no lead.
+    """A turn begins where the reach is passed, in the fifth interval.
 
-    The route ends four intervals after the last, of 10 m each.
+    One that was never quiet tells no lead. The route ends four intervals after the
+    last, of 10 m each.
     """
     guide = track.controller
     to_go = guide.gains["turn_reach"] + 10.0 * np.array([4.0, 3.0, 2.0, 1.0, 0.0, -1.0])

@@ -1,4 +1,4 @@
-"""The live loop: a simulated ship that is steered over NMEA 0183, and the two commands."""
+"""The live loop: a simulated ship steered over NMEA 0183, and the two commands."""
 
 import asyncio
 import json
@@ -75,7 +75,7 @@ def sailed(agent, kind=SimulatedShip, seconds=120.0, drop=None, **more):
 
 
 def test_instruments_show_where_the_ship_is_and_sentences_tell_it():
-    """6 miles north and half a mile east of 54 N, 7.5 E, in waves and a current, at a moment of hour 27."""
+    """6 miles north and half a mile east of 54 N, 7.5 E, in waves and a current."""
     ship = SimulatedShip(MARINER, leg=0.3, weather="moderate", step=0.5)
     state = {
         "x": 6 * 1852.0,
@@ -375,7 +375,7 @@ def test_the_command_steers_with_what_it_is_told_and_fails_after_an_alarm(
 
 
 def test_the_command_simulates_the_ship_that_is_asked_for_and_drops_sentences():
-    """Ten steps of 0.1 s; from 0.45 s on no HDT is heard, in whatever case it is named."""
+    """Ten steps of 0.1 s; from 0.45 s on no HDT is heard."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as hears:
         hears.bind(("127.0.0.1", 0))
         asked = [

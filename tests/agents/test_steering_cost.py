@@ -1,4 +1,4 @@
-"""Neither design costs more than 1.15 times the best gains that a direct search finds for it."""
+"""Neither design costs more than 1.15 times the best gains of a direct search."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ TANKER = load_model("tanker")  # unstable on its course
 
 
 def best_cost(controller, model, task):
-    """Least mean cost over the same gains: drawn about the best of those before, all sailed side by side."""
+    """Least mean cost over the same gains, drawn about the best of those before."""
     random = np.random.default_rng(0)
     names, n_gains = list(controller.gains), len(controller.gains)
     seeds, engine = np.tile(SEEDS, TRIED), Engine(model, TRIED * len(SEEDS), task)

@@ -1,4 +1,4 @@
-"""Each construct of Python is the same in C, and what C has no words for is refused with its line."""
+"""Each construct of Python is the same in C, or refused with its line."""
 
 import ctypes
 import math
@@ -177,7 +177,9 @@ def test_tables_are_interpolated_as_numpy_does(tmp_path):
     curve = Curve(np.array([-1.0, 0.2, 1.5]), np.array([3.0, -1.0, 0.5]), 0.25)
     kind, c = kind_of(curve), Translator({}, "it")
     name = c.function(on_a_curve, float, kind).name
-    constant = f"static const {c.structures.type(kind)} CURVE = {c.structures.initialiser(kind, numbers_of(curve))};"
+    type_name = c.structures.type(kind)
+    value = c.structures.initialiser(kind, numbers_of(curve))
+    constant = f"static const {type_name} CURVE = {value};"
     head = "double f(double x)"
     public = [f"{head};", f"{head} {{ return {name}(x, CURVE); }}"]
     text = [

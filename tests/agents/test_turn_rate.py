@@ -1,4 +1,4 @@
-"""Rate-of-turn autopilot: what it holds in a turn, how it comes to a heading, and its limits."""
+"""Rate-of-turn autopilot: turns, changes of heading, and limits."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ STILL = Signals(*np.zeros(len(Signals._fields)))
 
 
 def turned(agent, model, rate, seconds):
-    """Yaw rates, rad/s, and rudder orders of a ship that is ordered a rate of turn, from straight running."""
+    """Yaw rates, rad/s, and rudder orders of a ship that is ordered a rate of turn."""
     dt, state = agent.design["dt"], model.service_state.copy()
     memory = TurnRateMemory(0.0, 0.0, 0.0)
     yaw_rate = model.state_names.index("r")
@@ -71,7 +71,7 @@ def test_a_course_is_changed_at_its_rate_without_overshoot(model):
 
 @pytest.mark.parametrize("model", [MARINER, TANKER], ids=["mariner", "tanker"])
 def test_a_rate_is_hardly_overshot_and_a_heading_damped_by_seven_tenths(model):
-    """Of s^2 + (1 / T + p K / T) s + i K / T, around which the heading closes a loop; 0.15 % of overshoot."""
+    """Of s^2 + (1 / T + p K / T) s + i K / T, inside the loop of the heading."""
     agent = TurnRate.from_model(model)
     gains, design = agent.gains, agent.design
     time, effect = design["nomoto_T"], design["nomoto_K"] / design["nomoto_T"]
@@ -96,7 +96,7 @@ def test_a_rate_is_hardly_overshot_and_a_heading_damped_by_seven_tenths(model):
     ],
     ids=["mariner", "tanker"],
 )
-def test_courses_are_changed_at_the_largest_tabulated_rate_of_three_tenths_of_the_rudder(
+def test_courses_are_changed_at_the_rate_of_three_tenths_of_the_rudder(
     model,
 ):
     agent, most = TurnRate.from_model(model), 0.3 * model.steering.limit
@@ -132,7 +132,7 @@ def test_it_is_a_controller_with_margins_and_a_file(tmp_path):
         TurnRate.from_model(MARINER, rate_deg_min=1000.0)
 
 
-def test_a_ship_that_three_tenths_of_the_rudder_do_not_turn_changes_courses_at_the_least_rate():
+def test_a_ship_that_hardly_turns_changes_courses_at_the_least_rate():
     """A fiftieth of speed over length."""
     table = SteadyTurns(np.array([-0.01, 0.0, 0.01]), np.radians([-15.0, 0.0, 15.0]))
     rate = course_rate(MARINER, table, neutral=0.0)

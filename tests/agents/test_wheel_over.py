@@ -27,8 +27,8 @@ def test_the_course_of_a_path_bends_by_its_arcs(distance, course):
     assert bend(distance, ahead, 200.0) == pytest.approx(course)
 
 
-def test_an_arc_is_seen_as_far_ahead_as_heading_and_drift_lag_and_a_quarter_of_a_length():
-    """In a turn with a twentieth of a degree of rudder, to both sides: heading and way lag by that."""
+def test_an_arc_is_seen_ahead_by_the_lag_and_a_quarter_of_a_length():
+    """In a turn with a twentieth of a degree of rudder heading and way lag by that."""
     pilot, neutral = LQ.from_model(MARINER), straight_running(MARINER)
     side, turns = np.radians(0.05), []
     for rudder in (side, -side):
