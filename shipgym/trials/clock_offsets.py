@@ -1,4 +1,4 @@
-"""Offsets between the clocks of sensors: yaw rate against heading, rudder against yaw acceleration.
+"""Offsets between clocks: yaw rate against heading, rudder against yaw acceleration.
 
 Each is the delay at which one channel explains the other best, by least squares over
 windows of some seconds, which is a band-pass: slower than that both are bound by the
@@ -56,7 +56,7 @@ class _DelayFit(NamedTuple):
 def clock_offset(
     t: Floats, target: Floats, late: Floats, others: Mapping[str, Floats]
 ) -> ClockOffset | None:
-    """How late a channel is against the change of a target; None where nothing can be said.
+    """Delay of a channel against the change of a target; None where it cannot be found.
 
     Parameters
     ----------
@@ -110,7 +110,10 @@ def clock_offset(
 
 
 def _windows(t: Floats) -> _Windows | None:
-    """Windows a sample apart, within the record however late a channel is; None of too few or many."""
+    """Windows one sample apart, inside the record for every delay.
+
+    None where there are too few or too many.
+    """
     length = 5.0
     margin = LONGEST_DELAY_S + length
     first, last = t[0] + margin, t[-1] - margin
@@ -123,7 +126,7 @@ def _windows(t: Floats) -> _Windows | None:
 
 
 def _known_directions(windows: _Windows, others: Mapping[str, Floats]) -> Floats:
-    """Orthonormal basis of what a constant and other channels explain, shape (n_windows, n)."""
+    """Orthonormal basis of a constant and other channels, shape (n_windows, n)."""
     columns = [np.ones(windows.centres.size)]
     for values in others.values():
         total = integral(windows.t, values)
@@ -162,7 +165,10 @@ def _independent_samples(fit: _DelayFit) -> float:
 
 
 def rudder_clock_offset(t: Floats, r: Floats, delta: Floats) -> ClockOffset | None:
-    """How late the rudder is against the yaw acceleration, given yaw rate and the history of both."""
+    """Delay of the rudder against the yaw acceleration.
+
+    Yaw rate and the history of both explain the rest of the acceleration.
+    """
     history = {
         "r, 20 s": _remembered(t, r, memory=20.0),
         "delta, 20 s": _remembered(t, delta, memory=20.0),
@@ -185,7 +191,10 @@ def _remembered(t: Floats, values: Floats, memory: float) -> Floats:
 
 
 def reverses(values: Floats, least: float = 0.0) -> bool:
-    """Tell whether a channel goes there and back as in zigzags, three times or more: one step shows no delay."""
+    """Tell whether a channel goes there and back three times or more, as in zigzags.
+
+    A single step shows no delay.
+    """
     low, high = np.quantile(values, [0.02, 0.98])
     span = high - low
     from_middle = values - 0.5 * (low + high)

@@ -1,4 +1,4 @@
-"""Which column of a file holds which channel, in which unit, and where its values stand in the file."""
+"""Columns of a file by channel, their units, and the place of each value."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -17,7 +17,7 @@ _EXPECTED = (
 
 
 class Stretch(NamedTuple):
-    """A part of a log, from one moment to another, in seconds of its time or by the clock."""
+    """A part of a log between two moments, in seconds of its time or by the clock."""
 
     first: float | str
     last: float | str
@@ -76,7 +76,7 @@ def _span(log: Log) -> str:
 
 
 def _seconds(moment: float | str, log: Log, where: str) -> float:
-    """A moment on the time of the log, s; a time of the day is that next to its beginning."""
+    """A moment on the log's time, s; a time of the day is the one next to its start."""
     if not isinstance(moment, str):
         return float(moment)
     try:

@@ -9,7 +9,7 @@ from shipgym.arrays import Floats
 
 
 def time_derivative(t: Floats, values: Floats) -> Floats:
-    """Differentiate a sampled signal, in units per second; smoothed as far as its noise asks for.
+    """Differentiate a sampled signal by a spline that smooths its noise.
 
     Quintic splines are fitted by least squares with a knot at every second, third,
     fifth, ... sample. While the knots resolve the motion, the residual is the noise and
@@ -44,7 +44,7 @@ def time_derivative(t: Floats, values: Floats) -> Floats:
 
 
 def _smoothed(samples: Floats, values: Floats, spacing: int) -> tuple[Any, float]:
-    """Quintic spline with a knot at every so many samples, and the noise that it leaves."""
+    """Quintic spline with a knot every `spacing` samples, and the noise it leaves."""
     from scipy.interpolate import make_lsq_spline
 
     degree = 5

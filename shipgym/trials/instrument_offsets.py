@@ -1,4 +1,4 @@
-"""What heading and rudder show where the truth is zero, by the straight parts of a log."""
+"""Offsets of heading and rudder, estimated from the straight parts of a log."""
 
 import math
 from collections.abc import Mapping
@@ -34,7 +34,7 @@ class HeadingOffset(NamedTuple):
 
 
 def straight_parts(t: Floats, channels: Mapping[str, Floats]) -> Flags:
-    """Which samples lie amid a straight steady part, where heading and rudder hardly change."""
+    """Flags of samples amid a straight steady part, shape (n_samples,)."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     width = math.ceil(STRAIGHT_S / usual_step(t)) + 1
@@ -87,7 +87,7 @@ def heading_offset(
 def rudder_offset(
     t: Floats, channels: Mapping[str, Floats], straight: Flags
 ) -> float | None:
-    """Mean rudder, rad, of the straight parts; None without any in which the heading is straight.
+    """Mean rudder, rad, of the straight parts; None if no heading in them is straight.
 
     At an overshoot the heading hardly changes either, and the rudder is held, but the
     heading is bent. Of several angles held the one counts at which it is bent least, by
@@ -119,7 +119,7 @@ def _bend(psi: Floats, rows: npt.NDArray[np.intp], half: int) -> float:
 
 
 def correct_offsets(log: Log, installation: Installation) -> None:
-    """Take the offsets of heading and rudder, given or estimated, out of the channels of a log.
+    """Remove given or estimated offsets from heading and rudder of a log.
 
     Raises InputError where one cannot be estimated.
     """

@@ -1,4 +1,4 @@
-"""Late yaw rate and rudder in a log, and a rudder of the wrong sign: found, refused or to be corrected."""
+"""Late yaw rate and rudder in a log, and a rudder of the wrong sign."""
 
 import math
 from typing import NamedTuple
@@ -106,7 +106,9 @@ def _rate_offset(log: Log) -> ClockOffset | None:
 
 
 def _rudder_offset(log: Log, rate: ClockOffset | None) -> ClockOffset | None:
-    """How late the rudder is against the yaw rate on the clock of the heading, where a log tells it.
+    """Delay of the rudder against the yaw rate, on the clock of the heading.
+
+    None where the log does not show it.
 
     InputError for a rudder of the wrong sign.
     """
@@ -137,7 +139,7 @@ def _is_against(offset: ClockOffset | None) -> bool:
 
 
 def check_circle(log: Log) -> None:
-    """Refuse a rudder that stays on one side and turns the ship to the other, as in a circle."""
+    """Refuse a rudder held to one side while the ship turns to the other."""
     if "psi" not in log.channels:
         return
     psi, delta = log.channels["psi"], log.channels["delta"]

@@ -1,4 +1,4 @@
-"""From what a log holds to the project's frame and origin: velocities in the body frame, at midship."""
+"""From a log's frame and origin to velocities in the body frame, at midship."""
 
 import math
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from shipgym.trials.units import KNOT
 
 
 def to_project_conventions(log: Log, conventions: Conventions) -> None:
-    """Convert frame and origin of a log, and derive the channels that follow from others.
+    """Convert frame and origin of a log, and derive channels that follow from others.
 
     The channels are in the file's frame, the heading without jumps, the rudder positive
     to starboard. The yaw rate is derived from the heading, surge and sway from velocity
@@ -49,7 +49,7 @@ def _needs_moving(log: Log, installation: Installation) -> bool:
 
 
 def _derive_turning(log: Log) -> None:
-    """Derive the yaw rate from the heading, or, without positions, the heading from the yaw rate."""
+    """Derive yaw rate from heading or, without positions, heading from yaw rate."""
     if log.has("psi"):
         if not log.has("r"):
             log.derive("r", time_derivative(log.t, log.channels["psi"]))
@@ -90,7 +90,10 @@ def _earth_to_body(log: Log) -> None:
 
 
 def _cg_to_midship(log: Log, xg: float) -> None:
-    """Move position, sway and yaw moment from the centre of gravity, `xg` forward of midship, to midship."""
+    """Move position, sway and yaw moment from the centre of gravity to midship.
+
+    The centre of gravity is `xg` m forward of midship.
+    """
     needed = {"v": "r", "x": "psi", "y": "psi", "N": "Y"}
     for name, other in needed.items():
         if log.has(name) and not log.has(other):
@@ -110,7 +113,7 @@ def _cg_to_midship(log: Log, xg: float) -> None:
 
 
 def to_midship(log: Log, installation: Installation) -> None:
-    """Move positions and velocities of GNSS to midship and make surge and sway of what was logged.
+    """Move GNSS positions and velocities to midship and derive surge and sway.
 
     Velocity over ground gives u and v, else positions; a speed through the water takes
     the place of u, and the current that it shows is taken out of v. Raises InputError
@@ -209,7 +212,7 @@ class SetAndDrift(NamedTuple):
 def set_and_drift(
     psi: Floats, water: Floats, surge: Floats, sway: Floats
 ) -> SetAndDrift:
-    """Current that a speed through the water shows against surge and sway over ground, m/s.
+    """Current, m/s, from speed through the water and velocity over ground.
 
     It explains best the difference of both along the ship; on nearly one course the
     part across is taken from the mean sway, as if there were no leeway.

@@ -1,4 +1,4 @@
-"""Missing values of a log: refused, or filled where no hole is too long; and time that goes on."""
+"""Missing values of a log, refused or filled, and the check that time increases."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -17,7 +17,7 @@ REPAIR = ("repair", "interpolate")
 
 
 class FilledChannels(NamedTuple):
-    """Channels without missing values, SI units, of the rows from the first whole one to the last."""
+    """Channels without missing values, SI units, between first and last whole row."""
 
     t: Floats
     channels: dict[str, Floats]
@@ -84,7 +84,7 @@ def fill_missing(
 def _check_present(
     t: Floats, channels: Mapping[str, Floats], locator: Locator, repair: str | None
 ) -> None:
-    """Refuse missing times, and without `repair` every missing value, naming the first."""
+    """Refuse missing times and, without `repair`, every missing value."""
     table = {"t": t, **channels}
     values = np.column_stack(list(table.values()))
     is_missing = ~np.isfinite(values)
@@ -107,7 +107,7 @@ def _check_present(
 def _whole_rows(
     channels: Mapping[str, Floats], locator: Locator
 ) -> npt.NDArray[np.intp]:
-    """Rows that lack no value; InputError where they are less than half, or less than three."""
+    """Rows without missing values; InputError if less than half, or less than three."""
     present = [np.isfinite(values) for values in channels.values()]
     is_whole = np.all(present, axis=0)
     rows = np.flatnonzero(is_whole)

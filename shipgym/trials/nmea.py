@@ -1,6 +1,6 @@
-"""Sentences of NMEA 0183, for logs and for the helm: the table `nmea.toml`, and the numbers in a line.
+"""Sentences of NMEA 0183, for logs and for the helm.
 
-A sentence is ``$`` or nothing, two letters of the talker, three of the kind, fields
+The table `nmea.toml` says which numbers stand where. A sentence is ``$`` or nothing, two letters of the talker, three of the kind, fields
 after commas, and ``*`` with the checksum: the exclusive or of all characters between.
 """
 
@@ -145,7 +145,7 @@ def parse_sentence(line: str) -> Sentence:
 
 
 def steering_numbers(sentence: Sentence) -> dict[str, float]:
-    """Numbers of a sentence that an autopilot may steer by, in SI units and radians, by quantity.
+    """Numbers that an autopilot may steer by, in SI units and radians, by quantity.
 
     Nothing for a kind that is not known, a status that is not valid, an empty field, or
     a number beyond any sensor's range. Raises ValueError, KeyError or IndexError where
@@ -195,7 +195,10 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
 
 
 def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float | None:
-    """One number in SI units; None where its field is empty or the letters needed are not there."""
+    """One number in SI units.
+
+    None where its field is empty or the letters needed are not there.
+    """
     for at, letters in needed.items():
         if fields[at] not in letters:
             return None

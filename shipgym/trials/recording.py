@@ -1,4 +1,4 @@
-"""From a table's columns to channels in SI units, each with its time: one file of a log."""
+"""From a table's columns to channels in SI units, each on its clock."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -78,7 +78,7 @@ def read_recording(
     *,
     part: bool = False,
 ) -> Recording:
-    """Read the chosen columns of a table, check them, and fill what is missing where that is asked for.
+    """Read the chosen columns of a table, checked and, if asked for, repaired.
 
     `columns` and `part` are as :func:`.columns.choose_columns` takes them. Anything
     wrong with a file is an InputError that names line, column, value and remedy.
@@ -129,7 +129,10 @@ def _read_numbers(locator: Locator) -> dict[str, Floats]:
 def _signals(
     t: Floats, channels: dict[str, Floats], locator: Locator, repair: str | None
 ) -> tuple[Signals, Locator, dict[str, int]]:
-    """Channels on the clock of the rows, what is missing filled and counted, or each on a clock of its own."""
+    """Signals of channels, their locator, and counts of values filled in.
+
+    The channels are on the clock of the rows, or each on a clock of its own.
+    """
     filled: dict[str, int] = {}
     table = {"t": t, **channels}
     is_whole = all(np.isfinite(values).all() for values in table.values())
@@ -185,7 +188,7 @@ def _read_times(table: LogTable, column: Column) -> _Times:
 
 
 def _read_clock_cells(table: LogTable, column: Column, cells: list[str]) -> Floats:
-    """Seconds since 1970 or of the day; InputError names the first cell that is no time."""
+    """Seconds since 1970 or of the day; InputError for the first invalid cell."""
     try:
         return read_clock(cells).seconds
     except ValueError as error:
@@ -216,7 +219,10 @@ def _read_position(locator: Locator, channel: str) -> Floats:
 
 
 def _local_track(locator: Locator, t: Floats, repair: str | None) -> _Track:
-    """Positions by north and east of the first one; outliers are refused unless they are to be filled."""
+    """Positions by north and east of the first one.
+
+    Outliers are refused unless they are to be filled.
+    """
     lat = _read_position(locator, "lat")
     lon = _read_position(locator, "lon")
     check_ranges({"lat": lat, "lon": lon}, locator)

@@ -1,4 +1,4 @@
-"""Channels that were logged at different rates, each on a clock of its own, and one clock for all of them."""
+"""Channels that were logged on clocks of their own, and one clock for all."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -26,7 +26,7 @@ Signals = dict[str, Signal]  # by channel
 
 @dataclass
 class Log:
-    """The channels of one log on one clock, in SI units; corrections change it in place.
+    """Channels of one log on one clock, in SI units; corrections change it in place.
 
     Attributes
     ----------
@@ -144,7 +144,10 @@ def _resampled(signals: Mapping[str, Signal], where: str) -> Log:
 
 
 def _motion_clocks(signals: Mapping[str, Signal]) -> dict[str, Floats]:
-    """Clocks of the channels of the motion, so that nothing of it is invented between samples; else all."""
+    """Clocks of the motion's channels, between whose samples nothing is invented.
+
+    Those of all channels where there is none of the motion.
+    """
     motion = {"x", "ground_north", "u", "psi", "r", "delta"}
     clocks = {name: signal.t for name, signal in signals.items()}
     of_motion = {name: clock for name, clock in clocks.items() if name in motion}

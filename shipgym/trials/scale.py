@@ -12,7 +12,7 @@ from shipgym.trials.units import KNOT
 
 
 def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
-    """Refuse what no ship of this size and speed does: the trial is another ship's, or in another unit.
+    """Refuse a trial that cannot be of a ship of this size and speed.
 
     These are yaw rates and speeds of another scale, and a propeller's tip beyond 100
     m/s. Service speed and propeller diameter count where they are given; `where` begins
@@ -37,7 +37,7 @@ def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
 
 
 def _largest(values: Floats) -> float:
-    """The size that 95 per cent of the values do not exceed: the others may be outliers."""
+    """Size that 95 per cent of the values do not exceed; the others may be outliers."""
     return float(np.quantile(np.abs(values), 0.95))
 
 

@@ -1,4 +1,4 @@
-"""Measurement errors of a ship's sensors: noise, resolution, outliers, gaps, delay and drift."""
+"""Errors of a ship's sensors: noise, resolution, outliers, gaps, delay and drift."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -61,7 +61,7 @@ class Sensor:
     def read(
         self, times: Floats, t: Floats, signal: Floats, rng: np.random.Generator
     ) -> Floats:
-        """Readings at some times of a signal known at times t, straight between them; all times in s."""
+        """Readings at `times` of a signal given at `t`, linear in between; all in s."""
         n = times.size
         reading: Floats = np.interp(times - self.latency_s, t, signal)
         if self.drift:
@@ -78,7 +78,7 @@ class Sensor:
 def gauss_markov(
     t: Floats, correlation_time_s: float, rng: np.random.Generator
 ) -> Floats:
-    """First-order Gauss-Markov process of unit variance at times in s, stationary from the first sample on.
+    """First-order Gauss-Markov process of unit variance, stationary; times in s.
 
     Its autocorrelation is exp(-|lag| / correlation time), whatever the steps (Gelb
     1974, Applied Optimal Estimation, 3.8).
@@ -116,7 +116,9 @@ SEA_TRIAL: Mapping[str, Sensor] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Sensors:
-    """The sensors of a ship and her logger; InputError for an unknown channel, or a number out of range.
+    """The sensors of a ship and her logger.
+
+    Raises InputError for an unknown channel or a number out of range.
 
     Attributes
     ----------
@@ -228,7 +230,7 @@ def _random(seed: int, channel: str) -> np.random.Generator:
 
 
 def _measurable(trial: Trial) -> dict[str, Floats]:
-    """Channels that there are to measure: first-order motion in waves added, the weather left out."""
+    """Channels that can be measured: with motion in waves, without the weather."""
     measurable = {}
     for name, values in trial.channels.items():
         if name in SEA_CHANNELS:  # known of a simulation, to no instrument
@@ -241,6 +243,6 @@ def _measurable(trial: Trial) -> dict[str, Floats]:
 
 
 def orders_at(times: Floats, t: Floats, orders: Floats) -> Floats:
-    """Orders, each given at a time t and held until the next, at other times; all in s."""
+    """Orders at some times, each held from its time t to the next; all in s."""
     last = np.searchsorted(t, times + 1e-9, side="right") - 1
     return np.asarray(orders[last])

@@ -1,4 +1,4 @@
-"""One recorded manoeuvre: its channels in SI units and the project's signs, from CSV and back."""
+"""One recorded manoeuvre, in SI units and the project's signs; CSV in and out."""
 
 from __future__ import annotations
 
@@ -74,8 +74,9 @@ class Trial:
         Values of each channel.
     name : str, optional
         Name of the trial; for a file its file name.
-    kind : {"zigzag", "turning-circle", "spiral", "pull-out", "straight", "captive", "random"}, optional
-        The manoeuvre, where known.
+    kind : str, optional
+        The manoeuvre, where known, as in `KINDS`: "zigzag", "turning-circle", "spiral",
+        "pull-out", "straight", "captive" or "random".
     use : {"fit", "validate", "skip"}, optional
         What the trial is for.
     derived : collection of str, optional
@@ -173,7 +174,7 @@ class Trial:
 
     @property
     def sha256(self) -> str:
-        """Hash of time and channels, independent of the file's formatting and of name, kind and use."""
+        """Hash of time and channels, independent of formatting, name, kind and use."""
         digest = hashlib.sha256()
         for channel in ("t", *sorted(self.channels)):
             values = self[channel].astype("<f8")
@@ -229,7 +230,7 @@ class Trial:
         }
 
     def with_(self, **changes: Any) -> Trial:
-        """Return a copy with another ``name``, ``kind``, ``use``, ``length`` or ``over_ground``."""
+        """Return a copy with a changed name, kind, use, length or ``over_ground``."""
         known = ("name", "kind", "use", "length", "over_ground")
         unknown = sorted(changes.keys() - set(known))
         if unknown:
@@ -261,7 +262,7 @@ class Trial:
         return Trial(times, changed, **settings)
 
     def part(self, rows: slice, name: str | None = None) -> Trial:
-        """Trial of some of the samples, which are no manoeuvre any more, by the same name or another."""
+        """Trial of some samples, without kind and use, by the same or another name."""
         channels = {}
         for channel, values in self.channels.items():
             channels[channel] = values[rows]
@@ -345,15 +346,15 @@ class Trial:
         columns: Mapping[str, str | Mapping[str, str]] | None = None,
         **settings: Any,
     ) -> Trial:
-        """Read a trial from a pandas frame; an index that is no plain count of rows is a column.
+        """Read a trial from a pandas frame.
 
-        `columns` and the other keywords are those of :meth:`from_csv`. Raises
-        InputError as that does.
+        An index that is no plain count of rows is a column. `columns` and the other
+        keywords are those of :meth:`from_csv`. Raises InputError as that does.
         """
         return cls.from_csv(read_frame(frame), columns, **settings)
 
     def to_csv(self, path: str | Path) -> None:
-        """Write time and all channels in SI units; :meth:`from_csv` reads back the very same numbers.
+        """Write time and channels in SI units; :meth:`from_csv` reads the same numbers.
 
         The file, replaced where it exists, is never there in part. InputError if it
         cannot be written.
@@ -370,7 +371,7 @@ class Trial:
 
 
 def trial_of(log: Log, name: str, samples: slice = slice(None), **facts: Any) -> Trial:
-    """Make the trial in some of the samples of a log; `facts` are its kind, use and length."""
+    """Trial of some samples of a log; `facts` are its kind, use and length."""
     channels = {}
     for channel, values in log.channels.items():
         channels[channel] = values[samples]
@@ -387,7 +388,7 @@ def trial_of(log: Log, name: str, samples: slice = slice(None), **facts: Any) ->
 
 
 def cut_trials(cut: Any, log: Log, name: str, where: str, **facts: Any) -> list[Trial]:
-    """Make the trials into which a log is cut (:func:`.cut_log`), each named by its seconds."""
+    """Trials of the stretches of a cut log (:func:`.cut_log`), named by seconds."""
     trials = []
     for samples in cut_log(cut, log, where):
         trial = trial_of(log, name, samples, **facts)

@@ -1,4 +1,4 @@
-"""From the tables of one log to channels in SI units with the project's signs, frame and origin."""
+"""From the tables of a log to channels in SI units, at midship."""
 
 from collections.abc import Mapping, Sequence
 
@@ -107,7 +107,7 @@ def _turn_rudder(signals: Signals) -> None:
 def _check_motion(
     log: Log, recordings: Sequence[Recording], conventions: Conventions
 ) -> list[str]:
-    """Remarks on rudder, time and motion over ground; InputError for what cannot be right."""
+    """Remarks on rudder, time and motion over ground, refused where impossible."""
     locator = recordings[0].locator
     has_positions = any("lat" in one.locator.columns for one in recordings)
     remarks = []
@@ -151,7 +151,7 @@ def _corrected(
 
 
 def _complete(log: Log, recordings: Sequence[Recording]) -> None:
-    """Put the channels into their order, and add clock and count of what was filled in."""
+    """Order the channels, and add the clock and the counts of values filled in."""
     channels = {}
     for name in QUANTITIES:
         if name in log.channels:

@@ -61,7 +61,7 @@ LARGEST_MAGNITUDES: dict[str, float] = {
 
 
 def check_channel(name: str, where: str, *, time: bool = True) -> str:
-    """Return `name`, which must be a channel of a file, ``t`` included, or of a trial where not `time`."""
+    """Return `name`, a channel of a file or, without `time`, of a trial."""
     # time is a column of a file, and no channel of a trial
     known = tuple(QUANTITIES) if time else CHANNELS
     if name not in known:

@@ -1,4 +1,4 @@
-"""Logs as bridges make them become trials in SI units at midship; what is wrong in them is named."""
+"""Logs as bridges make them become trials in SI units; faults are named."""
 
 import math
 from pathlib import Path
@@ -21,7 +21,7 @@ LAT, LON = 57.687, 11.74
 
 
 def sail(n=1201, step=0.5, current=(0.3, -0.4)):
-    """A ship of 150 m in zigzags on two courses with straight parts, in a current, at midship."""
+    """A ship of 150 m in zigzags on two courses with straight parts, in a current."""
     t = step * np.arange(n)
     order = (
         15
@@ -85,7 +85,10 @@ COLUMNS = {
 
 
 def bridge_log(path, keep=lambda row: row, gyro=1.0):
-    """ISO time, decimal comma, Latin-1; GNSS at 1 Hz, gyro and rudder (to port, half degrees) at 2 Hz."""
+    """ISO time, decimal comma, Latin-1.
+
+    GNSS at 1 Hz, gyro and rudder (to port, half degrees) at 2 Hz.
+    """
     lines = ["Zeit;Breite;Länge;SOG [kn];COG [°];Gyro [°];Ruder [°]"]
     for k, t in enumerate(SAILED["t"]):
         here = ["", "", "", ""]
@@ -239,7 +242,7 @@ def nmea_log(path, rudder=True, end=600):
 
 
 def test_an_nmea_log_becomes_a_trial(tmp_path):
-    """The gyro's heading, not the compass's; speed through the water as u, the current out of sway."""
+    """The gyro's heading, not the compass's; log speed as u; sway without current."""
     trial = Trial.from_csv(nmea_log(tmp_path / "log.nmea"), sensors=ANTENNA)
     assert error(trial, "psi") < 0.5 * DEGREE
     assert error(trial, "delta") < 1.0 * DEGREE
@@ -360,7 +363,7 @@ def test_rows_that_are_unusually_far_apart_are_a_remark(tmp_path):
 
 
 def test_a_circle_away_from_the_rudder_is_named(tmp_path):
-    """In a turning circle nothing goes there and back; its side alone tells the sign of the rudder."""
+    """In a turning circle only its side tells the sign of the rudder."""
     t = np.arange(0.0, 400.0, 1.0)
     circle = {
         "psi": 0.01 * t,
@@ -467,7 +470,7 @@ def test_the_zero_of_the_rudder_is_estimated_from_straight_parts(tmp_path):
 @pytest.mark.parametrize("name", ["kvlcc2", "mariner", "container"])
 @pytest.mark.parametrize("angle", [5.0, 10.0])
 def test_overshoots_are_not_taken_for_straight_parts(name, angle):
-    """Heading and rudder hardly change at an overshoot: only a log with a straight approach has a zero."""
+    """At an overshoot heading and rudder hardly change: only straight runs count."""
     trial = zigzag(load_model(name), angle, angle, dt=1.0)
     noise = np.random.default_rng(0).normal(0.0, 0.1 * DEGREE, (2, len(trial) + 60))
     psi = np.append(np.full(60, trial["psi"][0]), trial["psi"]) + noise[0]

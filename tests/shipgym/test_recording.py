@@ -44,7 +44,7 @@ def files(folder):
 
 
 def test_what_an_agent_did_is_identified_again(tmp_path):
-    """Random rudders that hold for 40 s each: the identified ship answers as the one that was sailed."""
+    """Random rudders held for 40 s: the identified ship answers as the one sailed."""
     from identification import identify
 
     ship = load_model("mariner")

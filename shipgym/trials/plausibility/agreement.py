@@ -104,7 +104,7 @@ def _other_units(channel: str, locator: Locator) -> dict[str, float]:
 
 
 def check_velocity(log: Log, frame: str, locator: Locator) -> None:
-    """Refuse velocities u and v that cannot be those of the positions, by their frame or their size.
+    """Refuse velocities that do not follow the positions, by frame or size.
 
     The channels are in SI units, the heading without jumps; `frame`, "body" or "earth",
     is the declared one of u and v.
@@ -172,7 +172,7 @@ def _at_windows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 def _without_trend(t: Floats, values: Floats) -> Floats:
-    """The values at the windows' edges without their straight line: a rate sensor has a bias."""
+    """Values at the windows' edges without their line: a rate sensor has a bias."""
     time = _at_windows(t - t[0])
     ends = _at_windows(values)
     line = np.polyfit(time, ends, 1)
@@ -181,7 +181,7 @@ def _without_trend(t: Floats, values: Floats) -> Floats:
 
 
 def _fit_changes(regressor: npt.NDArray[Any], target: npt.NDArray[Any]) -> GainFit:
-    """Fit the changes of a target from window to window, as gain times those of the regressor."""
+    """Fit changes between windows of a target by gain times those of the regressor."""
     known, sought = np.diff(regressor), np.diff(target)
     power = np.vdot(known, known).real
     size = np.linalg.norm(sought)

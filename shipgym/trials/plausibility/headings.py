@@ -64,7 +64,7 @@ def _evidence(t: Floats, logged: Floats, wrong: Flags, locator: Locator) -> str:
 
 
 def _likelier_unit(t: Floats, logged: Floats, locator: Locator) -> Proposal:
-    """Another unit of time where the heading stays within a turn, else of the heading."""
+    """Another unit of time if the heading stays within a turn, else of the heading."""
     units = list(likelier_time_units(t, locator))
     if units and np.ptp(logged) < _TURN_AND_JUMP:
         return Proposal("t", units[0])

@@ -1,4 +1,4 @@
-"""Heading against the course over ground: a ship at berth, a heading that is none, a compass with an offset."""
+"""Heading against course over ground: ships at berth, wrong columns, compasses."""
 
 import math
 
@@ -16,7 +16,7 @@ from shipgym.trials.units import DEGREE
 
 
 def velocity_over_ground(log: Log) -> npt.NDArray[np.complex128]:
-    """North + i east velocity, m/s, as GNSS tells it by speed and course, or by positions."""
+    """North + i east velocity, m/s, by speed and course over ground or positions."""
     channels = log.channels
     if "ground_north" in channels:
         return channels["ground_north"] + 1j * channels["ground_east"]
@@ -57,7 +57,7 @@ def check_over_ground(
 def check_course(
     psi: Floats, course: Floats, locator: Locator, *, offset_is_known: bool = False
 ) -> None:
-    """Refuse a heading that is the course over ground, turns the other way, or is far from it.
+    """Refuse a heading that copies, mirrors or is far from the course over ground.
 
     Both are in rad, of shape (n_samples,).
     """
@@ -97,7 +97,7 @@ def check_course(
 
 
 def check_compass(log: Log, locator: Locator) -> list[str]:
-    """Remark on a heading that shows too much on every course, or is magnetic by its name."""
+    """Remark on a heading with a constant offset, or a magnetic one by its name."""
     straight = straight_parts(log.t, log.channels)
     found = heading_offset(log.channels, straight)
     if found is not None and found.is_certain:

@@ -1,4 +1,4 @@
-"""Positions that no ship reaches from those before and after, and tracks of two ships in one log."""
+"""Positions that no ship reaches, and tracks of two ships in one log."""
 
 import numpy as np
 
@@ -23,7 +23,10 @@ def find_outliers(t: Floats, x: Floats, y: Floats) -> Flags:
 
 
 def check_track(t: Floats, x: Floats, y: Floats, locator: Locator) -> None:
-    """Refuse a track that jumps so often that two ships must be in the log; units as in `find_outliers`."""
+    """Refuse a track that jumps so often that two ships must be in the log.
+
+    Units are those of `find_outliers`.
+    """
     too_fast = _too_fast(t, x, y)
     count = np.count_nonzero(too_fast)
     if too_fast.size < 2 or count <= 0.1 * too_fast.size:
@@ -58,7 +61,7 @@ def check_outliers(
 
 
 def _too_fast(t: Floats, x: Floats, y: Floats) -> Flags:
-    """Steps between positions that are faster than any ship, shape (n_positions - 1,)."""
+    """Flags of steps that are faster than any ship, shape (n_positions - 1,)."""
     fastest = 50.0  # m/s
     shortest_step = 0.1  # s, in which receivers write their times
     distance = np.hypot(np.diff(x), np.diff(y))

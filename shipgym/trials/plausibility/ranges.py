@@ -13,7 +13,7 @@ from shipgym.trials.units import LARGEST_MAGNITUDES, QUANTITIES, UNITS, si_facto
 
 
 def check_ranges(channels: Mapping[str, Floats], locator: Locator) -> None:
-    """Refuse values beyond `LARGEST_MAGNITUDES`, with the units that would make them plausible.
+    """Refuse values beyond `LARGEST_MAGNITUDES`; propose units that fit.
 
     The channels are in SI units, of shape (n_samples,), nan where there is none.
     """
@@ -48,7 +48,7 @@ def _out_of_range(
 
 
 def _smaller_units(channel: str, declared: str, size: float) -> list[Proposal]:
-    """Units in which the largest value of a channel is no larger than that of a ship."""
+    """Units in which the largest value of a channel can be a ship's."""
     own = si_factor(channel, declared)
     largest_ratio = LARGEST_MAGNITUDES[channel] / size
     proposals = []
@@ -60,7 +60,7 @@ def _smaller_units(channel: str, declared: str, size: float) -> list[Proposal]:
 
 
 def _spelled(value: float, channel: str, unit: str) -> str:
-    """A value in SI units as the file has it, with degrees in brackets where that is in radians."""
+    """A value in SI units as the file has it; radians in degrees too, in brackets."""
     number = value / si_factor(channel, unit)
     text = f"{number:g} {unit}"
     if unit not in ("rad", "rad/s"):

@@ -7,7 +7,7 @@ from shipgym.trials.units import UNITS, si_factor
 
 
 def likelier_time_units(t: Floats, locator: Locator) -> dict[str, float]:
-    """Units of time, by how much longer they are, with which unusual steps become usual ones.
+    """Units of time that make unusual steps usual, and how much longer they are.
 
     None where the steps of the times, s, are usual already.
     """

@@ -12,9 +12,9 @@ from shipgym.trials.readers.log_table import LogTable, is_number
 
 
 def read_csv(path: str | Path) -> LogTable:
-    """Read a CSV file in UTF-8 or Latin-1 with one header line; delimiter comma, semicolon or tab.
+    """Read a CSV file with one header line, its delimiter comma, semicolon or tab.
 
-    Raises InputError for a missing file, a folder, an empty or binary file, repeated or
+    The encoding is UTF-8 or Latin-1. Raises InputError for a missing file, a folder, an empty or binary file, repeated or
     no names in the header, and a row with more or fewer cells than the header.
     """
     path = Path(path)
@@ -55,7 +55,7 @@ def _has_text(numbered: tuple[int, str]) -> bool:
 
 
 def read_lines(path: Path, what: str) -> list[str]:
-    """Lines of a text file, at most a million; `what` is expected there, as "CSV file"."""
+    """Lines of a text file, at most a million; `what` names the file's kind."""
     text = read_text(path, what, LARGEST_CSV, latin=True)
     text = text.replace("\r\n", "\n")
     text = text.replace("\r", "\n")

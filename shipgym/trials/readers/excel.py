@@ -20,7 +20,7 @@ from shipgym.trials.readers.log_table import LogTable
 
 
 def read_excel(path: Path) -> LogTable:
-    """Read the first sheet of a workbook (.xlsx); its first row has the names of the columns.
+    """Read the first sheet of a workbook (.xlsx), whose first row names the columns.
 
     Blank rows and columns are left out. Raises InputError for a damaged or large file,
     for merged cells, and where a name is missing or repeated.
@@ -40,7 +40,10 @@ def read_excel(path: Path) -> LogTable:
 
 
 def _sheet(path: Path, content: bytes, parts: zipfile.ZipFile) -> Any:
-    """Cells of the first sheet as a pandas frame; InputError for too many or merged ones."""
+    """Cells of the first sheet as a pandas frame.
+
+    Raises InputError for too many or merged ones.
+    """
     openpyxl = import_module("openpyxl")
     pandas = import_module("pandas")
     book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)

@@ -89,7 +89,7 @@ def read_matlab(path: Path) -> LogTable:
 
 
 def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:
-    """Contents of the matrices of a file, unpacked; `order` is that of its bytes, "<" or ">"."""
+    """Contents of the matrices of a file, unpacked; `order` is "<" or ">"."""
     most = 10_000  # a file of zeros holds millions of empty ones
     unpacked = 0
     for number, element in enumerate(_elements(content, order)):

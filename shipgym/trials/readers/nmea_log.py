@@ -1,6 +1,6 @@
-"""Logs of NMEA 0183: position, speeds, heading, rate of turn, rudder, shaft and wind, of any talkers.
+"""Logs of NMEA 0183, of any talkers: position, motion, rudder, shaft and wind.
 
-Which sentences say what stands in `shipgym/trials/nmea.toml`; those that hold no channel
+The sentences stand in `shipgym/trials/nmea.toml`; those without a channel
 (AIS, depth, satellites) are passed over.
 """
 
@@ -76,7 +76,7 @@ class _Heard:
 
 
 def read_nmea(path: Path) -> LogTable:
-    """Read the channels of a log: SI units, positions in degrees, nan where a row has none.
+    """Read a log's channels: SI units, positions in degrees, nan where absent.
 
     Of several sources of a channel the best is taken, and a note names the others.
     Raises InputError for a damaged log and one without time or channels.
@@ -126,7 +126,7 @@ def _listen(lines: list[str]) -> _Heard:
 
 
 def _time(sentence: Sentence) -> float:
-    """Seconds since 1970 where a sentence has a date, else of the day; nan without a time."""
+    """Seconds since 1970 with a date, else of the day; nan without a time."""
     kind = NMEA_SENTENCES[sentence.kind]
     match = _TIME.fullmatch(_field(sentence, kind.time))
     if match is None:
@@ -142,14 +142,14 @@ def _time(sentence: Sentence) -> float:
 
 
 def _field(sentence: Sentence, at: int | None) -> str:
-    """The field at a place; empty where the sentence ends before, or has no such field."""
+    """The field at a place; empty where a sentence is shorter or has no such field."""
     if at is None or at >= len(sentence.fields):
         return ""
     return sentence.fields[at]
 
 
 def _channel_values(sentence: Sentence) -> dict[str, float]:
-    """Values by channel, positions in degrees; winds are still from the bow, by quantity."""
+    """Values by channel, positions in degrees; winds from the bow by quantity."""
     numbers = logged_numbers(sentence)
     if "compass_heading" in numbers:
         numbers["compass_heading"] += numbers.get("deviation", 0.0)
@@ -232,7 +232,7 @@ def _main_clock(times: _BySource) -> _Track:
 
 
 def _track(values: list[_Value], clock: _Track) -> _Track:
-    """Values of a source at their own times, else at those of the lines between which they stand."""
+    """Values of a source at their own times, else at those of their lines."""
     lines, own_time, numbers = np.array(values).T
     by_line = np.interp(lines, clock.lines, clock.t)
     # a time of the day is that of the day on which its line stands
@@ -249,7 +249,7 @@ def _track(values: list[_Value], clock: _Track) -> _Track:
 def _wind_over_ground(
     winds: dict[str, _Track], tracks: dict[str, _Track]
 ) -> dict[str, _Track]:
-    """The wind over ground, of that from the bow, where the velocity is known or not needed."""
+    """Wind over ground from that off the bow; empty where the velocity is missing."""
     if {"wind_angle", "wind_speed"} <= winds.keys():
         angle = winds["wind_angle"]
         wind_from = angle.values + _angle_at(angle.t, tracks["psi"])

@@ -10,7 +10,10 @@ from shipgym.trials.readers.log_table import LogTable
 
 
 def read_parquet(path: Path) -> LogTable:
-    """Read a Parquet file; InputError for a damaged one, or one that unpacks to too much."""
+    """Read a Parquet file.
+
+    Raises InputError for a damaged one, or one that unpacks to too much.
+    """
     content = read_bytes(path, "Parquet file", LARGEST_CSV)
     with damage_reported(path, "Parquet", "it may be cut short: write it again"):
         arrow = import_module("pyarrow")
