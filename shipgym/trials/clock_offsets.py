@@ -41,7 +41,8 @@ class _Windows:
         middle = self.centres + delay
         begin = np.interp(middle - self.half, self.t, values)
         end = np.interp(middle + self.half, self.t, values)
-        slope: Floats = (end - begin) / (2.0 * self.half)
+        length = 2.0 * self.half
+        slope: Floats = (end - begin) / length
         return slope
 
 
@@ -84,17 +85,18 @@ def clock_offset(
     delays = np.arange(-LONGEST_DELAY_S, LONGEST_DELAY_S + 0.1, step)
     squares = np.array([fit(delay).squares for delay in delays])
     k = int(np.argmin(squares))
-    if k in (0, delays.size - 1):
+    is_at_end = k in (0, delays.size - 1)
+    if is_at_end:
         return None
 
     # the parabola through the least squares and those before and after
     around = slice(k - 1, k + 2)
-    half_curvature, slope, _ = np.polyfit(
-        delays[around] - delays[k], squares[around], 2
-    )
+    from_least = delays[around] - delays[k]
+    half_curvature, slope, _ = np.polyfit(from_least, squares[around], 2)
     curvature = 2.0 * float(half_curvature)
     power = float(change @ change)
-    if curvature * step**2 <= 1e-12 * power:  # no more than rounding
+    rounding = 1e-12 * power
+    if curvature * step**2 <= rounding:
         return None
 
     delay = float(delays[k] - slope / curvature)
@@ -116,27 +118,32 @@ def _windows(t: Floats) -> _Windows | None:
     """
     length = 5.0
     margin = LONGEST_DELAY_S + length
-    first, last = t[0] + margin, t[-1] - margin
+    first = t[0] + margin
+    last = t[-1] - margin
     step = max(usual_step(t), 0.5)
     count = (last - first) / step
     if not 60.0 < count < 200_000.0:
         return None
-    centres = np.arange(first, last, step)
-    return _Windows(t, centres, half=max(0.5 * length, step))
+    return _Windows(
+        t=t,
+        centres=np.arange(first, last, step),
+        half=max(0.5 * length, step),
+    )
 
 
 def _known_directions(windows: _Windows, others: Mapping[str, Floats]) -> Floats:
     """Orthonormal basis of a constant and other channels, shape (n_windows, n)."""
+    smallest = 0.02  # singular value; what is less follows from the others
     columns = [np.ones(windows.centres.size)]
     for values in others.values():
         total = integral(windows.t, values)
-        columns.append(windows.slope(total))
+        slope = windows.slope(total)
+        columns.append(slope)
     directions = np.column_stack(columns)
     directions /= np.linalg.norm(directions, axis=0)
     basis, sizes, _ = np.linalg.svd(directions, full_matrices=False)
-    smallest = 0.02  # what is less follows from the others
-    kept: Floats = basis[:, sizes > smallest]
-    return kept
+    is_independent = sizes > smallest
+    return np.asarray(basis[:, is_independent])
 
 
 def _unexplained(values: Floats, directions: Floats) -> Floats:
@@ -152,13 +159,19 @@ def _fit(change: Floats, regressor: Floats) -> _DelayFit:
     gain = float(regressor @ change) / max(power, tiny)
     residual = change - gain * regressor
     squares = float(residual @ residual)
-    return _DelayFit(gain, residual, max(squares, tiny))
+    return _DelayFit(
+        gain=gain,
+        residual=residual,
+        squares=max(squares, tiny),
+    )
 
 
 def _independent_samples(fit: _DelayFit) -> float:
     """Number of independent residuals, by the correlation of each with the next."""
     residual = fit.residual
-    covariance = float(residual[1:] @ residual[:-1])
+    before = residual[:-1]
+    after = residual[1:]
+    covariance = float(after @ before)
     correlation = max(covariance / fit.squares, 0.0)
     share = (1.0 - correlation) / (1.0 + correlation)
     return max(residual.size * share, 2.0)
@@ -169,13 +182,15 @@ def rudder_clock_offset(t: Floats, r: Floats, delta: Floats) -> ClockOffset | No
 
     Yaw rate and the history of both explain the rest of the acceleration.
     """
-    history = {
+    explained = {
+        "r": r,
+        "r^3": r**3,
         "r, 20 s": _remembered(t, r, memory=20.0),
         "delta, 20 s": _remembered(t, delta, memory=20.0),
         "r, 80 s": _remembered(t, r, memory=80.0),
         "delta, 80 s": _remembered(t, delta, memory=80.0),
     }
-    return clock_offset(t, r, delta, {"r": r, "r3": r**3, **history})
+    return clock_offset(t, target=r, late=delta, others=explained)
 
 
 def _remembered(t: Floats, values: Floats, memory: float) -> Floats:
@@ -186,7 +201,11 @@ def _remembered(t: Floats, values: Floats, memory: float) -> Floats:
     step = even[1] - even[0]
     decay = math.exp(-step / memory)
     resampled = np.interp(even, t, values)
-    lagged = lfilter([1.0 - decay], [1.0, -decay], resampled)
+    lagged = lfilter(
+        b=[1.0 - decay],
+        a=[1.0, -decay],
+        x=resampled,
+    )
     return np.interp(t, even, lagged)
 
 
@@ -197,8 +216,9 @@ def reverses(values: Floats, least: float = 0.0) -> bool:
     """
     low, high = np.quantile(values, [0.02, 0.98])
     span = high - low
-    from_middle = values - 0.5 * (low + high)
+    middle = 0.5 * (low + high)
+    from_middle = values - middle
     is_far = np.abs(from_middle) > 0.25 * span
     sides = np.sign(from_middle[is_far])
-    reversals = np.diff(sides) != 0.0
-    return bool(span > least and reversals.sum() >= 3)
+    reversals = np.count_nonzero(np.diff(sides))
+    return bool(span > least and reversals >= 3)

@@ -50,12 +50,16 @@ def _needs_moving(log: Log, installation: Installation) -> bool:
 
 def _derive_turning(log: Log) -> None:
     """Derive yaw rate from heading or, without positions, heading from yaw rate."""
-    if log.has("psi"):
-        if not log.has("r"):
-            log.derive("r", time_derivative(log.t, log.channels["psi"]))
+    if log.has("psi", "r"):
         return
-    if log.has("r") and not log.has("x") and not log.has("y"):
-        log.derive("psi", _heading_from_start(log))
+    if log.has("psi"):
+        rate = time_derivative(log.t, log.channels["psi"])
+        log.derive("r", rate)
+        return
+    has_position = log.has("x") or log.has("y")
+    if log.has("r") and not has_position:
+        heading = _heading_from_start(log)
+        log.derive("psi", heading)
 
 
 def _heading_from_start(log: Log) -> Floats:
@@ -101,15 +105,20 @@ def _cg_to_midship(log: Log, xg: float) -> None:
                 f'{log.where}: origin = "cg": expected {other} to move {name} to'
                 " midship, got none; name its column"
             )
+
     channels = log.channels
+    moved = {}
     if log.has("v"):
-        channels["v"] = channels["v"] - xg * channels["r"]
+        moved["v"] = channels["v"] - xg * channels["r"]
     if log.has("x"):
-        channels["x"] = channels["x"] - xg * np.cos(channels["psi"])
+        north = xg * np.cos(channels["psi"])
+        moved["x"] = channels["x"] - north
     if log.has("y"):
-        channels["y"] = channels["y"] - xg * np.sin(channels["psi"])
+        east = xg * np.sin(channels["psi"])
+        moved["y"] = channels["y"] - east
     if log.has("N"):
-        channels["N"] = channels["N"] + xg * channels["Y"]
+        moved["N"] = channels["N"] + xg * channels["Y"]
+    channels |= moved
 
 
 def to_midship(log: Log, installation: Installation) -> None:
@@ -120,7 +129,8 @@ def to_midship(log: Log, installation: Installation) -> None:
     for GNSS without a heading.
     """
     is_elsewhere = not installation.is_at_midship
-    if not log.has("psi") and (is_elsewhere or log.has("ground_north")):
+    needs_heading = is_elsewhere or log.has("ground_north")
+    if needs_heading and not log.has("psi"):
         raise InputError(
             f"{log.where}: expected a column psi, the heading, with positions or"
             " velocities of GNSS, got none"
@@ -165,10 +175,15 @@ def _velocity(log: Log, installation: Installation) -> tuple[Floats, Floats] | N
     if log.has("ground_north"):
         north = channels.pop("ground_north")
         east = channels.pop("ground_east")
-        r = channels["r"]
         u, v = rotate_to_body(north, east, channels["psi"])
-        return u + installation.starboard * r, v - installation.forward * r
-    if log.has("u", "v") or not log.has("x", "y", "psi"):
+        # of the antenna, which the yaw rate moves too
+        r = channels["r"]
+        surge = u + installation.starboard * r
+        sway = v - installation.forward * r
+        return surge, sway
+
+    are_logged = log.has("u", "v")
+    if are_logged or not log.has("x", "y", "psi"):
         return None
     north = time_derivative(log.t, channels["x"])
     east = time_derivative(log.t, channels["y"])
@@ -201,7 +216,8 @@ class SetAndDrift(NamedTuple):
         speed = math.hypot(self.north, self.east)
         knots = speed / KNOT
         direction = math.atan2(self.east, self.north)
-        toward = math.degrees(direction) % 360.0
+        toward = math.degrees(direction)
+        toward %= 360.0
         return (
             f"set and drift by the speed log against the ground: {speed:.2f} m/s"
             f" ({knots:.2f} kn) toward {toward:03.0f} deg, {self.unexplained:.2f} m/s"
@@ -218,7 +234,8 @@ def set_and_drift(
     part across is taken from the mean sway, as if there were no leeway.
     """
     # along the ship, and on one course across her too
-    c, s = np.cos(psi), np.sin(psi)
+    c = np.cos(psi)
+    s = np.sin(psi)
     rows = np.column_stack([c, s])
     values = surge - water
     if np.ptp(psi) < DISTINCT_COURSES:
@@ -227,9 +244,10 @@ def set_and_drift(
         values = np.concatenate([values, sway])
 
     current, *_ = np.linalg.lstsq(rows, values, rcond=None)
+    north, east = current.tolist()
     left = values - rows @ current
     return SetAndDrift(
-        north=float(current[0]),
-        east=float(current[1]),
+        north=north,
+        east=east,
         unexplained=float(np.std(left)),
     )

@@ -28,10 +28,13 @@ def local_metres(
     across_meridian = _EQUATOR / math.sqrt(curvature)
 
     turned_north = (lat - origin_lat) * DEGREE
-    turned_east = (lon - origin_lon + 180.0) % 360.0 - 180.0
+    from_antimeridian = lon - origin_lon + 180.0
+    turned_east = from_antimeridian % 360.0 - 180.0
     middle = phi + 0.5 * turned_north
     parallel = across_meridian * np.cos(middle)
-    return along_meridian * turned_north, parallel * turned_east * DEGREE
+    north = along_meridian * turned_north
+    east = parallel * turned_east * DEGREE
+    return north, east
 
 
 def rotate_to_body(north: Any, east: Any, psi: Any) -> tuple[Any, Any]:

@@ -72,22 +72,22 @@ class NmeaQuantity:
 def _with_letters(entry: Mapping[str, Any]) -> dict[str, Any]:
     """An entry of the table whose tables of letters are by place."""
     fields = dict(entry)
-    of_letters = {"valid", "degraded", "letters", "only_if"}
-    for key in of_letters & entry.keys():
+    for name in ("valid", "degraded", "letters", "only_if"):
+        if name not in entry:
+            continue
         by_place = {}
-        for at, letters in entry[key].items():
-            place = int(at)
-            by_place[place] = frozenset(letters)
-        fields[key] = by_place
+        for at, letters in entry[name].items():
+            by_place[int(at)] = frozenset(letters)
+        fields[name] = by_place
     return fields
 
 
 def _sentence_kind(entry: Mapping[str, Any]) -> SentenceKind:
-    kind = _with_letters(entry)
     numbers = {}
     for quantity, place in entry["fields"].items():
         place = _with_letters(place)
         numbers[quantity] = NumberField(**place)
+    kind = _with_letters(entry)
     kind["fields"] = numbers
     return SentenceKind(**kind)
 
@@ -136,7 +136,8 @@ def parse_sentence(line: str) -> Sentence:
         raise ValueError(f"expected the checksum {expected}, got {found}")
 
     address = match["address"]
-    letters = 1 if address.startswith("P") else 2
+    is_proprietary = address.startswith("P")
+    letters = 1 if is_proprietary else 2
     return Sentence(
         talker=address[:letters],
         kind=address[letters:],
@@ -155,12 +156,14 @@ def steering_numbers(sentence: Sentence) -> dict[str, float]:
     if kind is None or kind.log_only:
         return {}
     numbers = {}
-    for quantity, place in kind.fields.items():
+    for name, place in kind.fields.items():
         needed = {**kind.valid, **place.letters, **place.only_if}
         value = _number(place, sentence.fields, needed)
-        largest = NMEA_QUANTITIES[quantity].largest
-        if value is not None and abs(value) <= largest:
-            numbers[quantity] = value
+        if value is None:
+            continue
+        quantity = NMEA_QUANTITIES[name]
+        if abs(value) <= quantity.largest:
+            numbers[name] = value
     return numbers
 
 
@@ -172,7 +175,8 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
     large. Raises ValueError where one is broken.
     """
     kind = NMEA_SENTENCES[sentence.kind]
-    fields = sentence.fields + [""] * 20  # those at the end may be missing
+    absent = [""] * 20  # those at the end may be missing
+    fields = [*sentence.fields, *absent]
     valid = dict(kind.valid)
     for at, letters in kind.degraded.items():
         valid[at] |= letters
@@ -215,7 +219,8 @@ def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float
         unit = _SPEED_UNITS[letter]
     if unit == "ddmm.mm":  # 5430.5 is 54 degrees and 30.5 minutes
         degrees, minutes = divmod(value, 100.0)
-        value, unit = degrees + minutes / 60.0, "deg"
+        value = degrees + minutes / 60.0
+        unit = "deg"
     value *= _TO_SI[unit]
 
     if place.side is None:

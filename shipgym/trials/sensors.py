@@ -65,13 +65,16 @@ class Sensor:
         n = times.size
         reading: Floats = np.interp(times - self.latency_s, t, signal)
         if self.drift:
-            reading += self.drift * gauss_markov(times, self.drift_time_s, rng)
+            wander = gauss_markov(times, self.drift_time_s, rng)
+            reading += self.drift * wander
         reading += self.noise * rng.standard_normal(n)
+
         is_outlier = rng.random(n) < self.outlier_probability
-        error = self.outlier_size * rng.standard_normal(n)
-        reading += np.where(is_outlier, error, 0.0)
+        outlier = self.outlier_size * rng.standard_normal(n)
+        reading += np.where(is_outlier, outlier, 0.0)
         if self.resolution:
-            reading = np.round(reading / self.resolution) * self.resolution
+            steps = np.round(reading / self.resolution)
+            reading = steps * self.resolution
         return reading
 
 
@@ -85,11 +88,11 @@ def gauss_markov(
     """
     decay = np.exp(-np.diff(t) / correlation_time_s)
     spread = np.sqrt(1.0 - decay**2)
-    shocks = rng.standard_normal(t.size)
-    process = shocks.copy()
-    for k in range(t.size - 1):
-        kept = decay[k] * process[k]
-        process[k + 1] = kept + spread[k] * shocks[k + 1]
+    # the first value has the stationary distribution
+    process = rng.standard_normal(t.size)
+    process[1:] *= spread
+    for k in range(1, t.size):
+        process[k] += decay[k - 1] * process[k - 1]
     return process
 
 
@@ -215,12 +218,13 @@ class Sensors:
     def _outside_gaps(self, count: int, seed: int) -> Flags:
         """Which samples are not in a gap."""
         rng = _random(seed, SEA_CHANNELS[0])
-        logged = np.ones(count, dtype=bool)
         is_start = rng.random(count) < self.dropout_probability
         starts = np.flatnonzero(is_start)
         lengths = rng.geometric(1.0 / self.dropout_samples, starts.size)
-        for start, length in zip(starts, lengths, strict=True):
-            logged[start : start + length] = False
+        ends = starts + lengths
+        logged = np.ones(count, dtype=bool)
+        for start, end in zip(starts, ends, strict=True):
+            logged[start:end] = False
         return logged
 
 

@@ -42,14 +42,15 @@ def si_factor(channel: str, unit: str, where: str = "unit") -> float:
     fitting = UNITS[quantity]
     if isinstance(unit, str) and unit in fitting:
         return fitting[unit]
+
+    expected = quoted(fitting)
     hint = did_you_mean(str(unit), fitting)
     for other, units in UNITS.items():
         if str(unit) in units:
             hint = f" '{unit}' is a unit of {other}"
             break
     raise InputError(
-        f"{where}: expected a unit of {quantity} ({quoted(fitting)}), got"
-        f" {unit!r}.{hint}"
+        f"{where}: expected a unit of {quantity} ({expected}), got {unit!r}.{hint}"
     )
 
 
@@ -65,8 +66,9 @@ def check_channel(name: str, where: str, *, time: bool = True) -> str:
     # time is a column of a file, and no channel of a trial
     known = tuple(QUANTITIES) if time else CHANNELS
     if name not in known:
+        names = quoted(known)
         hint = did_you_mean(str(name), known)
         raise InputError(
-            f"{where}: unknown channel {name!r}.{hint} Known channels: {quoted(known)}"
+            f"{where}: unknown channel {name!r}.{hint} Known channels: {names}"
         )
     return name

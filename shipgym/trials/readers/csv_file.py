@@ -21,8 +21,11 @@ def read_csv(path: str | Path) -> LogTable:
     lines = read_lines(path, "CSV file")
     _check_lines(path, lines)
     numbered = enumerate(lines, start=1)
-    header_at, header_line = next(filter(_has_text, numbered), (0, ""))
-    if not header_line:
+    for number, line in numbered:
+        if line.strip():
+            header_at, header_line = number, line
+            break
+    else:
         raise InputError(
             f"{path}: expected a header line with column names and rows below, got an"
             " empty file"
@@ -47,11 +50,6 @@ def read_csv(path: str | Path) -> LogTable:
         place_words="line {line} (data row {row})",
         decimal_comma=delimiter != ",",
     )
-
-
-def _has_text(numbered: tuple[int, str]) -> bool:
-    _, line = numbered
-    return bool(line.strip())
 
 
 def read_lines(path: Path, what: str) -> list[str]:
@@ -118,10 +116,10 @@ def _check_header(path: Path, header: list[str], line: int) -> None:
 
 
 def _check_rows(path: Path, rows: Mapping[int, list[str]], expected: int) -> None:
-    for k, (line, row) in enumerate(rows.items(), start=1):
-        count = len(row)
+    for data_row, (line, cells) in enumerate(rows.items(), start=1):
+        count = len(cells)
         if count != expected:
             raise InputError(
-                f"{path}: line {line} (data row {k}): expected {expected} cells as in"
-                f" the header, got {count}; complete or remove the row"
+                f"{path}: line {line} (data row {data_row}): expected {expected} cells"
+                f" as in the header, got {count}; complete or remove the row"
             )

@@ -64,10 +64,11 @@ class LogTable:
     def column(self, name: str) -> Any:
         """Cells of a column; InputError if there is none of this name."""
         if name not in self.cells:
+            hint = did_you_mean(name, self.header)
+            present = quoted(self.header)
             raise InputError(
-                f"{self.path}: column '{name}' not"
-                f" found.{did_you_mean(name, self.header)} Columns present:"
-                f" {quoted(self.header)}. Name the column in [columns] (or columns=...)"
+                f"{self.path}: column '{name}' not found.{hint} Columns present:"
+                f" {present}. Name the column in [columns] (or columns=...)"
             )
         return self.cells[name]
 
@@ -86,8 +87,9 @@ class LogTable:
         Raises InputError for other text.
         """
         cells = self.column(name)
-        if isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub":
-            return cells.astype(np.float64)
+        kind = cells.dtype.kind if isinstance(cells, np.ndarray) else None
+        if kind in ("f", "i", "u", "b"):
+            return np.asarray(cells, dtype=np.float64)
         try:
             return plain_numbers(cells)
         except (ValueError, TypeError):
@@ -106,8 +108,9 @@ class LogTable:
             if self.decimal_comma and "." not in text:
                 text = text.replace(",", ".")
             if not is_number(text):
+                place = self.cell(row, name)
                 raise InputError(
-                    f"{self.cell(row, name)}: expected a number, got '{texts[row]}';"
+                    f"{place}: expected a number, got '{texts[row]}';"
                     " correct the cell, or leave it empty where the value is missing"
                     ' and import with repair = "interpolate"'
                 )

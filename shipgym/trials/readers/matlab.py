@@ -58,14 +58,16 @@ def read_matlab(path: Path) -> LogTable:
     vectors, and complex numbers.
     """
     content = read_bytes(path, "MATLAB file", LARGEST_PACKED)
-    if content[:8] == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in content[:_HEADER_BYTES]:
+    header = content[:_HEADER_BYTES]
+    is_hdf5 = content.startswith(b"\x89HDF\r\n\x1a\n")
+    if is_hdf5 or b"MATLAB 7.3" in header:
         raise InputError(
             f"{path}: expected a MATLAB file of version 5 to 7, got MATLAB 7.3 (HDF5);"
             " save(..., '-v7')"
         )
     remedy = "save the vectors again with save(..., '-v7')"
     with damage_reported(path, "MATLAB (.mat)", remedy):
-        order = "<" if content[126:_HEADER_BYTES] == b"IM" else ">"
+        order = "<" if header.endswith(b"IM") else ">"
         vectors: dict[str, Floats] = {}
         for matrix in _matrices(path, content[_HEADER_BYTES:], order):
             vectors |= _vector(path, matrix, order)
@@ -100,8 +102,8 @@ def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:
             )
         if element.type == _COMPRESSED:
             unpacker = zlib.decompressobj()
-            rest = LARGEST_UNPACKED + 1 - unpacked
-            inner = unpacker.decompress(element.content, rest)
+            just_too_many = LARGEST_UNPACKED + 1 - unpacked
+            inner = unpacker.decompress(element.content, just_too_many)
             unpacked += len(inner)
             check_unpacked(path, unpacked)
             element = next(_elements(inner, order))
@@ -112,13 +114,17 @@ def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:
 def _vector(path: Path, matrix: bytes, order: str) -> dict[str, Floats]:
     """Numbers of a matrix by its name, where it is a numeric vector."""
     parts = list(islice(_elements(matrix, order), 4))
-    if len(parts) < 4 or parts[-1].type not in _NUMBER_TYPES:
+    if len(parts) < 4:
         return {}
     flags, shape, name, numbers = parts
+    if numbers.type not in _NUMBER_TYPES:
+        return {}
+
     number_type = order + _NUMBER_TYPES[numbers.type]
     values = np.frombuffer(numbers.content, number_type)
     sizes = np.frombuffer(shape.content, f"{order}i4")
-    is_vector = np.count_nonzero(sizes != 1) == 1 and sizes.max() == values.size
+    long_sizes = sizes[sizes != 1]
+    is_vector = long_sizes.tolist() == [values.size]
     (about,) = struct.unpack(f"{order}I", flags.content[:4])
     is_numeric = (about & _CLASS) >= _FIRST_NUMERIC
     if not is_vector or not is_numeric:
@@ -142,7 +148,8 @@ def _elements(content: bytes, order: str) -> Iterator[Element]:
         small_size = kind >> 16  # of an element within its own tag
         if small_size:
             begin = at + 4
-            yield Element(kind & 0xFFFF, content[begin : begin + min(small_size, 4)])
+            end = begin + min(small_size, 4)
+            yield Element(kind & 0xFFFF, content[begin:end])
             at += tag_bytes
             continue
         begin = at + tag_bytes

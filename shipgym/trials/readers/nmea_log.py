@@ -95,7 +95,11 @@ def read_nmea(path: Path) -> LogTable:
         if others:
             left_out = ", ".join(others)
             notes.append(f"{channel} is from {best}; {left_out} left out")
-    winds = {name: tracks.pop(name) for name in _WINDS if name in tracks}
+
+    winds = {}
+    for name in _WINDS:
+        if name in tracks:
+            winds[name] = tracks.pop(name)
     if winds and "psi" in tracks:
         tracks |= _wind_over_ground(winds, tracks)
     return _table(path, tracks, notes)
@@ -131,13 +135,14 @@ def _time(sentence: Sentence) -> float:
     match = _TIME.fullmatch(_field(sentence, kind.time))
     if match is None:
         return np.nan
-    hours, minutes, seconds = match.groups()
-    of_day = 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds)
+    hours, minutes, seconds = map(float, match.groups())
+    of_day = 3600.0 * hours + 60.0 * minutes + seconds
 
     date = _field(sentence, kind.date)
     if not date:
         return of_day
-    midnight = datetime.strptime(date, "%d%m%y").replace(tzinfo=UTC)
+    midnight = datetime.strptime(date, "%d%m%y")
+    midnight = midnight.replace(tzinfo=UTC)
     return midnight.timestamp() + of_day
 
 
@@ -204,11 +209,13 @@ class _Rank(NamedTuple):
 
 
 def _rank(source: str, values: list[_Value]) -> _Rank:
+    kind = source[2:]
     moments = set()
     for one in values:
-        moments.add(one.line if np.isnan(one.time) else one.time)
+        moment = one.line if np.isnan(one.time) else one.time
+        moments.add(moment)
     return _Rank(
-        preference=_PREFERENCE.get(source[2:], 0),
+        preference=_PREFERENCE.get(kind, 0),
         is_dated=values[0].time > 2.0 * DAY,
         is_original=not source.startswith("II"),
         moments=len(moments),
@@ -221,7 +228,11 @@ def _best_source(sources: _BySource) -> str:
 
 def _main_clock(times: _BySource) -> _Track:
     """Times of the best source, s, which never go back, and go on at midnight."""
-    best = max(times, key=lambda source: _rank(source, times[source]))
+
+    def rank(source: str) -> _Rank:
+        return _rank(source, times[source])
+
+    best = max(times, key=rank)
     lines, clock, _ = np.array(times[best]).T
     is_dated = clock[0] > 2.0 * DAY
     if not is_dated:
@@ -237,13 +248,16 @@ def _track(values: list[_Value], clock: _Track) -> _Track:
     by_line = np.interp(lines, clock.lines, clock.t)
     # a time of the day is that of the day on which its line stands
     days = np.round((by_line - own_time) / DAY)
-    t = own_time + DAY * days
-    has_none = np.isnan(own_time)
-    t[has_none] = by_line[has_none]
+    with_day = own_time + DAY * days
+    t = np.where(np.isnan(own_time), by_line, with_day)
 
     milliseconds = np.round(t, 3)
     t, first = np.unique(milliseconds, return_index=True)
-    return _Track(t, lines[first], numbers[first])
+    return _Track(
+        t=t,
+        lines=lines[first],
+        values=numbers[first],
+    )
 
 
 def _wind_over_ground(
@@ -252,19 +266,24 @@ def _wind_over_ground(
     """Wind over ground from that off the bow; empty where the velocity is missing."""
     if {"wind_angle", "wind_speed"} <= winds.keys():
         angle = winds["wind_angle"]
-        wind_from = angle.values + _angle_at(angle.t, tracks["psi"])
+        heading = _angle_at(angle.t, tracks["psi"])
         return {
-            "wind_from": angle._replace(values=wind_from),
+            "wind_from": angle._replace(values=angle.values + heading),
             "wind_speed": winds["wind_speed"],
         }
-    is_apparent = {"apparent_wind_angle", "apparent_wind_speed"} <= winds.keys()
-    if not is_apparent or not {"sog", "cog"} <= tracks.keys():
+    has_wind = {"apparent_wind_angle", "apparent_wind_speed"} <= winds.keys()
+    has_velocity = {"sog", "cog"} <= tracks.keys()
+    if not has_wind or not has_velocity:
         return {}
+
+    # complex: north + i east
     angle = winds["apparent_wind_angle"]
-    bearing = angle.values + _angle_at(angle.t, tracks["psi"])
+    heading = _angle_at(angle.t, tracks["psi"])
+    bearing = np.exp(1j * (angle.values + heading))
+    apparent = winds["apparent_wind_speed"].values * bearing
+    over_ground = tracks["sog"]
+    speed = np.interp(angle.t, over_ground.t, over_ground.values)
     course = _angle_at(angle.t, tracks["cog"])
-    speed = np.interp(angle.t, tracks["sog"].t, tracks["sog"].values)
-    apparent = winds["apparent_wind_speed"].values * np.exp(1j * bearing)
     wind = apparent - speed * np.exp(1j * course)
     return {
         "wind_from": angle._replace(values=np.angle(wind)),
@@ -279,8 +298,8 @@ def _angle_at(t: Floats, track: _Track) -> Floats:
 
 def _table(path: Path, tracks: dict[str, _Track], notes: list[str]) -> LogTable:
     """One row for each time at which some channel has a value."""
-    times = [track.t for track in tracks.values()]
-    t = np.unique(np.concatenate(times))
+    clocks = [track.t for track in tracks.values()]
+    t = np.unique(np.concatenate(clocks))
     columns = {"t": t}
     lines = np.zeros(t.size, dtype=int)
     for channel, track in tracks.items():
