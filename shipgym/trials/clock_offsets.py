@@ -216,9 +216,11 @@ def reverses(values: Floats, least: float = 0.0) -> bool:
     """
     low, high = np.quantile(values, [0.02, 0.98])
     span = high - low
+    if span <= least:
+        return False
     middle = 0.5 * (low + high)
     from_middle = values - middle
     is_far = np.abs(from_middle) > 0.25 * span
     sides = np.sign(from_middle[is_far])
-    reversals = np.count_nonzero(np.diff(sides))
-    return bool(span > least and reversals >= 3)
+    changes = np.diff(sides)
+    return bool(np.count_nonzero(changes) >= 3)

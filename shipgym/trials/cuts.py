@@ -27,9 +27,11 @@ def check_cut(cut: Any, where: str) -> None:
     """Refuse a cut that is neither "rudder" nor a list of pairs of numbers or texts."""
     if cut == "rudder":
         return
-    is_list = isinstance(cut, list) and len(cut) > 0
-    if not is_list or not all(map(_is_stretch, cut)):
-        raise InputError(f"{where} cut: {_EXPECTED}, got {shown(cut)}")
+    pairs = cut if isinstance(cut, list) and cut else [None]
+    for pair in pairs:
+        if not _is_stretch(pair):
+            found = shown(cut)
+            raise InputError(f"{where} cut: {_EXPECTED}, got {found}")
 
 
 def _is_stretch(pair: Any) -> bool:
@@ -58,15 +60,15 @@ def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
 def _samples(stretch: Stretch, log: Log, where: str) -> slice:
     first = _seconds(stretch.first, log, where)
     last = _seconds(stretch.last, log, where)
-    begin = np.searchsorted(log.t, first)
-    end = np.searchsorted(log.t, last, side="right")
+    begin = int(np.searchsorted(log.t, first))
+    end = int(np.searchsorted(log.t, last, side="right"))
     if end - begin < FEWEST_SAMPLES:
         span = _span(log)
         raise InputError(
             f"{where} cut: expected stretches of the log, which goes from {span},"
             f" got {stretch.first} to {stretch.last}, which holds no trial"
         )
-    return slice(int(begin), int(end))
+    return slice(begin, end)
 
 
 def _span(log: Log) -> str:

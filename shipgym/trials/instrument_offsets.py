@@ -125,9 +125,10 @@ def rudder_offset(
 def _bend(psi: Floats, rows: npt.NDArray[np.intp], half: int) -> float:
     """Mean second difference of the heading over so many samples to both sides."""
     before = psi[rows - half]
+    here = psi[rows]
     after = psi[rows + half]
-    bends = before - 2.0 * psi[rows] + after
-    return abs(float(bends.mean()))
+    second_difference = before - 2.0 * here + after
+    return abs(float(second_difference.mean()))
 
 
 def correct_offsets(log: Log, installation: Installation) -> None:

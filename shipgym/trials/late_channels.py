@@ -155,15 +155,14 @@ def check_circle(log: Log) -> None:
     """Refuse a rudder held to one side while the ship turns to the other."""
     if not log.has("psi"):
         return
+    psi = log.channels["psi"]
     delta = log.channels["delta"]
     rudder = np.median(delta)
     side = np.sign(rudder)
     is_laid = abs(rudder) > 8.0 * DEGREE
     stays_there = np.quantile(side * delta, 0.1) > 0.0
-
-    psi = log.channels["psi"]
-    turned = side * (psi[-1] - psi[0])
-    turns_away = turned < -60.0 * DEGREE
+    turned = psi[-1] - psi[0]
+    turns_away = side * turned < -60.0 * DEGREE
     if is_laid and stays_there and turns_away:
         raise _wrong_sign(log, "a ship that turns away from the rudder,")
 

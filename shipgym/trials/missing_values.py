@@ -40,10 +40,12 @@ def check_time(t: Floats, locator: Locator) -> None:
 
 
 def _refuse_time(t: Floats, row: int, locator: Locator) -> None:
-    earlier = locator.in_file("t", t[row - 1], digits=10)
-    later = locator.in_file("t", t[row], digits=10)
+    before = t[row - 1]
+    after = t[row]
+    earlier = locator.in_file("t", before, digits=10)
+    later = locator.in_file("t", after, digits=10)
     change = f"stands still at {later}"
-    if t[row] < t[row - 1]:
+    if after < before:
         change = f"goes back from {earlier} to {later}"
     place = locator.place(row, "t")
     raise InputError(

@@ -84,7 +84,8 @@ def read_recording(
     wrong with a file is an InputError that names line, column, value and remedy.
     """
     chosen = choose_columns(table, columns, part=part)
-    _check_pairs(table, chosen)
+    if _PAIRS.keys() & chosen.keys():
+        _check_pairs(table, chosen)
     times = _read_times(table, chosen["t"])
     chosen["t"] = replace(chosen["t"], unit=times.unit)
     locator = Locator(
@@ -131,10 +132,11 @@ def _read_numbers(locator: Locator) -> dict[str, Floats]:
     """Channels that are numbers in the file, in SI units."""
     channels = {}
     for channel, column in locator.columns.items():
-        if channel not in ("t", "lat", "lon"):
-            numbers = locator.table.numbers(column.name)
-            factor = si_factor(channel, column.unit)
-            channels[channel] = factor * numbers
+        if channel in ("t", "lat", "lon"):
+            continue
+        numbers = locator.table.numbers(column.name)
+        factor = si_factor(channel, column.unit)
+        channels[channel] = factor * numbers
     return channels
 
 

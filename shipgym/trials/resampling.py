@@ -163,12 +163,13 @@ def _motion_clocks(signals: Mapping[str, Signal]) -> dict[str, Floats]:
     Those of all channels where there is none of the motion.
     """
     motion = {"x", "ground_north", "u", "psi", "r", "delta"}
-    known = motion & signals.keys() or signals.keys()
-    clocks = {}
+    all_clocks = {}
+    of_motion = {}
     for name, signal in signals.items():
-        if name in known:
-            clocks[name] = signal.t
-    return clocks
+        all_clocks[name] = signal.t
+        if name in motion:
+            of_motion[name] = signal.t
+    return of_motion or all_clocks
 
 
 def _inside(t: Floats, clock: Floats, is_hole: Flags) -> Flags:

@@ -99,10 +99,12 @@ class ShipFile:
         """
         if use is not None:
             check_choice(use, USES, f"{self.path}: trials(use)")
+        wanted = [use]
+        if use is None:
+            wanted = [name for name in USES if name != "skip"]
         trials = []
         for entry in self.entries:
-            is_wanted = entry.use != "skip" if use is None else entry.use == use
-            if is_wanted:
+            if entry.use in wanted:
                 trials += self._read(entry)
         return trials
 
@@ -110,8 +112,9 @@ class ShipFile:
         """Read one trial by its ``file``, whatever its use; of a cut log the first."""
         files = [entry.file for entry in self.entries]
         check_choice(file, files, f"{self.path}: trial")
-        entry = self.entries[files.index(file)]
-        return self._read(entry)[0]
+        number = files.index(file)
+        first, *_ = self._read(self.entries[number])
+        return first
 
     def _read(self, entry: TrialEntry) -> list[Trial]:
         """Trials of a log: one, or those that it is cut into."""

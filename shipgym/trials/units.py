@@ -1,6 +1,7 @@
 """Channels of a trial and the units in which a file may hold them."""
 
 import math
+from typing import Any
 
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
@@ -42,14 +43,18 @@ def si_factor(channel: str, unit: str, where: str = "unit") -> float:
     fitting = UNITS[quantity]
     if isinstance(unit, str) and unit in fitting:
         return fitting[unit]
+    raise _no_such_unit(unit, quantity, where)
 
+
+def _no_such_unit(unit: Any, quantity: str, where: str) -> InputError:
+    fitting = UNITS[quantity]
     expected = quoted(fitting)
     hint = did_you_mean(str(unit), fitting)
     for other, units in UNITS.items():
         if str(unit) in units:
             hint = f" '{unit}' is a unit of {other}"
             break
-    raise InputError(
+    return InputError(
         f"{where}: expected a unit of {quantity} ({expected}), got {unit!r}.{hint}"
     )
 

@@ -97,9 +97,9 @@ def unit_by_size(values: Floats | None, channel: str) -> UnitGuess:
         return UnitGuess(unit, "from its content")
     known = values[np.isfinite(values)]
     largest = np.abs(known).max(initial=0.0)
-    limit, other = _BY_SIZE.get(channel) or _BY_SIZE.get(
-        QUANTITIES[channel], (np.inf, "")
-    )
+    limit, other = _BY_SIZE.get(QUANTITIES[channel], (np.inf, ""))
+    if channel in _BY_SIZE:
+        limit, other = _BY_SIZE[channel]
     if largest > limit:
         unit = other
     if unit == "unix" and largest > _MILLISECONDS:

@@ -81,22 +81,22 @@ def _nearest_units(gain: float, t: Floats, locator: Locator) -> list[Proposal]:
     Where none does and the unit of time is in doubt, that comes first: two units are
     wrong.
     """
-    gains = {}
+    gains = {}  # that are left with a unit
     for unit, ratio in _other_units("psi", locator).items():
-        heading_unit = Proposal("psi", unit)
-        gains[heading_unit] = gain * ratio
+        proposal = Proposal("psi", unit)
+        gains[proposal] = gain * ratio
     for unit, ratio in _other_units("r", locator).items():
-        rate_unit = Proposal("r", unit)
-        gains[rate_unit] = gain / ratio
+        proposal = Proposal("r", unit)
+        gains[proposal] = gain / ratio
     time_units = []
-    for unit, scale in likelier_time_units(t, locator).items():
-        time_unit = Proposal("t", unit)
-        gains[time_unit] = gain / scale
-        time_units.append(time_unit)
+    for unit, ratio in likelier_time_units(t, locator).items():
+        proposal = Proposal("t", unit)
+        gains[proposal] = gain / ratio
+        time_units.append(proposal)
 
     distances = {}
-    for proposal, gain_with_it in gains.items():
-        distances[proposal] = abs(math.log(gain_with_it))
+    for proposal, left in gains.items():
+        distances[proposal] = abs(math.log(left))
     nearest = min(distances.values())
     far = 0.5  # logarithm of the ratio of two rates that are not the same
     if time_units and nearest > far:
@@ -195,17 +195,19 @@ def _other_speed(gain: float, t: Floats, locator: Locator) -> InputError:
 def _at_windows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """The values at the edges of at most 30 windows."""
     most_windows = 30
-    edges = np.linspace(0, values.size - 1, most_windows + 1)
-    samples = np.unique(edges.round().astype(int))
-    return values.take(samples)
+    last = values.size - 1
+    edges = np.linspace(0, last, most_windows + 1)
+    samples = np.rint(edges).astype(int)
+    return values.take(np.unique(samples))
 
 
 def _without_trend(t: Floats, values: Floats) -> Floats:
     """Values at the windows' edges without their line: a rate sensor has a bias."""
     time = _at_windows(t - t[0])
-    ends = _at_windows(values)
-    line = np.polyfit(time, ends, 1)
-    left: Floats = ends - np.polyval(line, time)
+    at_edges = _at_windows(values)
+    line = np.polyfit(time, at_edges, deg=1)
+    trend = np.polyval(line, time)
+    left: Floats = at_edges - trend
     return left
 
 

@@ -3,12 +3,13 @@
 import csv
 import re
 from collections import Counter
-from collections.abc import Mapping
 from pathlib import Path
 
 from shipgym.errors import InputError
 from shipgym.files import LARGEST_CSV, read_text
 from shipgym.trials.readers.log_table import LogTable, is_number
+
+_LONGEST_LINE = 100_000  # characters
 
 
 def read_csv(path: str | Path) -> LogTable:
@@ -19,7 +20,10 @@ def read_csv(path: str | Path) -> LogTable:
     """
     path = Path(path)
     lines = read_lines(path, "CSV file")
-    _check_lines(path, lines)
+    for number, line in enumerate(lines, start=1):
+        if "\0" in line or len(line) > _LONGEST_LINE:
+            raise _no_text(path, number, line)
+
     numbered = enumerate(lines, start=1)
     for number, line in numbered:
         if line.strip():
@@ -39,9 +43,16 @@ def read_csv(path: str | Path) -> LogTable:
     rows = {}  # by the number of their line
     blank = delimiter + " \t"
     for number, line in numbered:
-        if line.strip(blank):
-            rows[number] = _split(line, delimiter)
-    _check_rows(path, rows, len(header))
+        if not line.strip(blank):
+            continue
+        cells = _split(line, delimiter)
+        rows[number] = cells
+        if len(cells) != len(header):
+            raise InputError(
+                f"{path}: line {number} (data row {len(rows)}): expected"
+                f" {len(header)} cells as in the header, got {len(cells)}; complete or"
+                " remove the row"
+            )
     columns = zip(*rows.values(), strict=True) if rows else [()] * len(header)
     return LogTable(
         path=path,
@@ -74,19 +85,15 @@ def _split(line: str, delimiter: str) -> list[str]:
     return line.split(delimiter)
 
 
-def _check_lines(path: Path, lines: list[str]) -> None:
-    """Refuse zero bytes, and lines that are too long for a table."""
-    longest = 100_000
-    for number, line in enumerate(lines, start=1):
-        if "\0" not in line and len(line) <= longest:
-            continue
+def _no_text(path: Path, number: int, line: str) -> InputError:
+    """Error of a line with zero bytes, or too long for a table."""
+    fault = f"{len(line)} characters"
+    if "\0" in line:
         fault = "binary content (a zero byte)"
-        if "\0" not in line:
-            fault = f"{len(line)} characters"
-        raise InputError(
-            f"{path}: line {number}: expected text of at most {longest}"
-            f" characters, got {fault}; save the table as comma-separated text in UTF-8"
-        )
+    return InputError(
+        f"{path}: line {number}: expected text of at most {_LONGEST_LINE}"
+        f" characters, got {fault}; save the table as comma-separated text in UTF-8"
+    )
 
 
 def _check_header(path: Path, header: list[str], line: int) -> None:
@@ -113,13 +120,3 @@ def _check_header(path: Path, header: list[str], line: int) -> None:
             f"{where}: expected a header with column names such as t,psi,u,v,r,delta,"
             " got only numbers"
         )
-
-
-def _check_rows(path: Path, rows: Mapping[int, list[str]], expected: int) -> None:
-    for data_row, (line, cells) in enumerate(rows.items(), start=1):
-        count = len(cells)
-        if count != expected:
-            raise InputError(
-                f"{path}: line {line} (data row {data_row}): expected {expected} cells"
-                f" as in the header, got {count}; complete or remove the row"
-            )
