@@ -1,4 +1,6 @@
-"""Draw the pictures of `docs/architecture.md` from the code: rooms with their imports, and a step.
+"""Draw the pictures of `docs/architecture.md` from the code.
+
+They are the rooms with their imports, and a step.
 
 `python scripts/draw_architecture.py`; a test compares the pictures with what this
 draws.
@@ -85,7 +87,7 @@ def modules() -> dict[str, Path]:
 
 
 def imports() -> Edges:
-    """Which file imports which, imports within functions and for type checking counted."""
+    """Imports between files, those in functions and for type checking included."""
     files = modules()
     return {
         (name, other)
@@ -222,7 +224,7 @@ def _box(name: str, place: tuple[float, float]) -> Iterator[str]:
 def _arrows_down(
     short: Edges, both: Edges, places: Mapping[str, tuple[float, float]]
 ) -> Iterator[str]:
-    """Arrows from the lower side of a box to the upper side of another, spread over the sides."""
+    """Arrows from a box's lower side to another's upper side, spread over the sides."""
     for a, b in sorted(short):
         (xa, ya), (xb, yb) = places[a], places[b]
         if ya == yb:
@@ -303,7 +305,7 @@ RAISED = {
 
 
 def stages() -> dict[str, tuple[str, list[tuple[str, str]]]]:
-    """What a step does, in order: docstring of each function, and what it calls, with the givers."""
+    """A step in order: docstring and calls of each function, with the givers."""
     functions = {}
     for name in STEP_FILES:
         functions |= _functions(ENGINE / name)

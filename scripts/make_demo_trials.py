@@ -1,4 +1,4 @@
-"""Write the demo's recorded manoeuvres: the Mariner class ship with the sensors of a sea trial.
+"""Write the demo's trials: the Mariner class ship with the sensors of a sea trial.
 
 The reference ship is steered through zigzags and a turning circle by a helmsman who
 reads the noisy compass, and what the ship's sensors would have logged is written as CSV
@@ -42,12 +42,16 @@ YAW_RATE_NOISE = 0.02  # rate gyro, deg/s
 SURGE_NOISE, SWAY_NOISE = 0.03, 0.02  # Doppler log, m/s
 RUDDER_RESOLUTION = 0.1  # feedback, deg
 
-HEADER = "time_s,gnss_north_m,gnss_east_m,compass_deg,log_ahead_kn,log_starboard_kn,gyro_deg_s,rudder_deg"
+HEADER = (
+    "time_s,gnss_north_m,gnss_east_m,compass_deg,log_ahead_kn,log_starboard_kn,"
+    "gyro_deg_s,rudder_deg"
+)
 FORMATS = ("%.1f", "%.2f", "%.2f", "%.2f", "%.3f", "%.3f", "%.3f", "%.1f")
 
 SHIP_FILE = """\
-# The demo: sea trials of a Mariner class cargo ship, simulated with realistic sensor noise by
-# scripts/make_demo_trials.py. Added masses are not given, as in most ships: they are estimated.
+# The demo: sea trials of a Mariner class cargo ship, simulated with realistic sensor
+# noise by scripts/make_demo_trials.py. Added masses are not given, as in most ships:
+# they are estimated.
 
 [ship]
 name = "Mariner class cargo ship"

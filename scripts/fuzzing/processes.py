@@ -1,4 +1,4 @@
-"""Chunks of inputs in several processes; one that dies is replaced, and the input at fault reported."""
+"""Chunks of inputs in several processes; a dead one is replaced and reported."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def _stop(worker: Worker) -> None:
 
 
 def _answer(worker: Worker, ready: bool) -> Report | None:
-    """What a worker reports; the chunk stays with one that died or is stuck, without the input at fault."""
+    """Report of a worker; a dead or stuck one's chunk stays without that input."""
     chunk = worker.chunk
     assert chunk is not None
     if ready:

@@ -1,4 +1,4 @@
-"""Two methods of others beside ours on the papers' cases: an extended Kalman filter and a neural network.
+"""Two other methods on the papers' cases: an extended Kalman filter, a network.
 
 The filter carries the coefficients as states that do not change and starts them from
 zero. The network learns the change of the velocities over a sample from velocities and
@@ -62,7 +62,9 @@ def kalman_history(
     noise: Floats,
     deviation: Floats,
 ) -> Floats:
-    """Coefficients after each sample, by an extended Kalman filter that estimates them with the states.
+    """Coefficients after each sample by an extended Kalman filter.
+
+    The filter estimates them together with the states.
 
     Parameters
     ----------
@@ -102,7 +104,7 @@ def kalman_history(
 
 
 def _advanced(rate: Rate, points: Floats, m: int, delta: Floats, h: float) -> Floats:
-    """Runge-Kutta over one interval, the rudder linear in between; coefficients stay."""
+    """Runge-Kutta over an interval, the rudder linear in it, coefficients constant."""
     x, theta, middle = points[:m], points[m:], 0.5 * float(delta.sum())
     a = rate(x, theta, float(delta[0]))
     b = rate(x + 0.5 * h * a, theta, middle)
@@ -113,7 +115,7 @@ def _advanced(rate: Rate, points: Floats, m: int, delta: Floats, h: float) -> Fl
 
 @cache
 def nomoto_history(structure: str, start: float = START) -> Floats:
-    """Hual Trooper's coefficients from yaw rate and heading as instruments show them (`song2020.trial`)."""
+    """Hual Trooper's coefficients from measured yaw rate and heading."""
     trial = song2020.trial(structure, noisy=True)
     r, delta = trial["r"], trial["delta"]
     columns = [r, delta] if structure == "nomoto" else [r, r**3, delta]
@@ -134,7 +136,7 @@ def nomoto_history(structure: str, start: float = START) -> Floats:
 
 @cache
 def mariner_history(start: float = START) -> Floats:
-    """The six parameters of Table 7.3.2 from the noisy record (`recursive_start.zigzag_trial`)."""
+    """The six parameters of Table 7.3.2 from the noisy zigzag record."""
     trial, length = recursive_start.zigzag_trial(noisy=True), recursive_start.LENGTH
     units = np.array(
         [1 / length, 1.0, 1 / length, 1 / length**2, 1 / length, 1 / length**2]
@@ -160,7 +162,7 @@ def mariner_history(start: float = START) -> Floats:
 
 
 class Network(NamedTuple):
-    """A network that steps velocities on, and the means and sizes that standardise it."""
+    """A network that predicts changes of velocities, and its standardisation."""
 
     weights: Sequence[tuple[Floats, Floats]]
     inputs: tuple[Floats, Floats]
@@ -181,7 +183,7 @@ class Network(NamedTuple):
 
 
 def trained(trials: Sequence[Trial], states: Sequence[str], seed: int) -> Network:
-    """A network of two hidden layers on the changes of some velocities over a sample."""
+    """A network of two hidden layers on the changes of velocities over a sample."""
     X = np.concatenate(
         [
             np.column_stack([trial[c] for c in (*states, "delta")])[:-1]
@@ -274,7 +276,7 @@ def sampled_turn(rudder_deg: float) -> Trial:
 
 
 def filter_rows() -> Iterator[Row]:
-    """Table 7.3.2 of Zhu and section 3.1 of Song by the filter, from three certainties of the start."""
+    """Zhu's Table 7.3.2 and Song's section 3.1 by the filter, from three starts."""
     best = recursive_start.errors(recursive_start.at_best())
     ends = [recursive_start.errors(mariner_history(start)[-1]) for start in STARTS]
     for k, name in enumerate(recursive_start.NAMES):

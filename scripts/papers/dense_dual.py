@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 def dense_dual_solution(
     X: ArrayLike, y: ArrayLike, C: float, fit_intercept: bool = True
 ) -> tuple[Floats, float]:
-    """Coefficients from the dual system as printed, [[0, 1'], [1, X X' + I/C]] [b; alpha] = [0; y].
+    """Coefficients by the dual system [[0, 1'], [1, X X' + I/C]] [b; alpha] = [0; y].
 
     O(n^3) in the number of samples and less accurate than `LSSVM`: an oracle for tests
     and benchmarks.
@@ -43,7 +43,7 @@ def dense_dual_solution(
 def dense_dual_multipliers(
     X: ArrayLike, y: ArrayLike, C: float
 ) -> tuple[Floats, float]:
-    """Lagrange multipliers of the dual system as printed; by it the errors are multipliers / C.
+    """Lagrange multipliers of the dual system; the errors are multipliers / C.
 
     Parameters
     ----------

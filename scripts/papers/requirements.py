@@ -1,4 +1,4 @@
-"""Zhu's requirements R1 to R8 (Zhu 2018, chapter 2): why each holds, and what it measures.
+"""Zhu's requirements R1 to R8 (Zhu 2018, chapter 2): reasons and measurements.
 
 On the thesis' own case: the container ship's 10/10 zigzag, 1800 samples of 0.5 s, for
 steering of four terms (row 6 of Tables 7.4.9 and 7.4.10), and a straight line with
@@ -408,7 +408,7 @@ def start_rows() -> Iterator[Row]:
 
 
 def duality_gap(X: Floats, y: Floats, weight: float) -> float:
-    """Primal less dual value at the solution, by the primal one: 0 only at the global minimum."""
+    """Duality gap by the primal value: 0 only at the global minimum."""
     estimator = LSSVM(C=weight, scale=False).fit(X, y)
     error = y - estimator.predict(X)
     primal = 0.5 * float(estimator.coef_ @ estimator.coef_) + 0.5 * weight * float(

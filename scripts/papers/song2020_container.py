@@ -87,7 +87,7 @@ def recorded(angle: float, heading: float) -> Trial:
 
 
 def thrust_and_rudder(u: Any, v: Any, r: Any, delta: Any, n: Any) -> tuple[Any, Any]:
-    """Thrust and normal force of the rudder, prime system, from velocities in SI units."""
+    """Rudder thrust and normal force, prime system, from velocities in SI units."""
     L, U = own.LENGTH, np.hypot(u, v)
     u_, v_, r_ = u / U, v / U, r * L / U
     u_P = u_ * (
@@ -116,7 +116,7 @@ def thrust_and_rudder(u: Any, v: Any, r: Any, delta: Any, n: Any) -> tuple[Any, 
 def regressors(
     motion: Mapping[str, Any], hull: Mapping[str, str] = HULL
 ) -> dict[str, list[Any]]:
-    """Equation 4-2 by equation of motion, prime system; the rudder stands last, before it in surge thrust.
+    """Terms of equation 4-2, prime system: rudder last, in surge after the thrust.
 
     The paper's F_N is positive for a positive rudder angle, the container ship's is its
     opposite.
@@ -153,7 +153,7 @@ def _product(values: Mapping[str, Any], powers: tuple[tuple[str, int], ...]) -> 
 
 
 def known_forces(motion: Mapping[str, Any]) -> dict[str, Any]:
-    """What equation 4-5 takes for known: centripetal forces and the righting moment, prime system."""
+    """Known part of equation 4-5: centripetal forces and righting moment, prime."""
     U, L = np.hypot(motion["u"], motion["v"]), own.LENGTH
     u, v, r = motion["u"] / U, motion["v"] / U, motion["r"] * L / U
     righting = own.WEIGHT / (0.5 * L * L) * own.GM / L / U**2
@@ -166,7 +166,10 @@ def known_forces(motion: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def inertia_matrix() -> Floats:
-    """From accelerations in surge, sway, yaw and roll, times length of the angular ones, to prime forces."""
+    """From accelerations in surge, sway, yaw and roll to prime forces.
+
+    Angular accelerations are times length.
+    """
     ship, L = load_model("container"), own.LENGTH
     matrix = np.zeros((4, 4))
     matrix[:3] = inertia(ship) / (0.5 * 1025.0 * L**3) / np.array([1.0, 1.0, L, L])
@@ -178,7 +181,7 @@ def inertia_matrix() -> Floats:
 def regression(
     trial: Trial, hull: Mapping[str, str] = HULL
 ) -> dict[str, tuple[Floats, Floats]]:
-    """Equation 4-8: regressors and what is left of the forces, accelerations by central differences."""
+    """Equation 4-8: regressors and remaining forces, by central differences."""
     motion = {name: trial[name] for name in CHANNELS}
     speed = np.hypot(trial["u"], trial["v"])
     lengths = np.array([1.0, 1.0, own.LENGTH, own.LENGTH])
@@ -210,7 +213,7 @@ def fitted(fit: Fit) -> dict[str, Floats]:
 
 
 def predicted(theta: Mapping[str, Floats], trial: Trial) -> Trial:
-    """The trial's rudder and shaft speed through the identified equations, from its first state."""
+    """Response of the identified equations to a trial's inputs from its first state."""
     from scipy.integrate import solve_ivp
 
     matrix = np.linalg.inv(inertia_matrix())
@@ -258,7 +261,7 @@ def off(found: Trial, truth: Trial, channel: str) -> float:
 
 
 def coefficient_rows() -> Iterator[Row]:
-    """Table 4-2: the numbers of propeller and rudder, which alone have a counterpart."""
+    """Table 4-2: propeller and rudder, the only numbers with a counterpart."""
     yield Row(
         "Table 4-2",
         "41 hull coefficients of Yukun",
@@ -337,7 +340,7 @@ def prediction_rows() -> Iterator[Row]:
 
 
 def polynomial_rows() -> Iterator[Row]:
-    """The same without data of propeller and rudder, by `identify` with the structure `mmg4dof`."""
+    """The same by `identify` with `mmg4dof`, without data of propeller and rudder."""
     ship, truth = load_model("container"), recorded(20, 20)
     trials = [recorded(10, 20), truth.with_(use="validate")]
     found = identify(trials, "mmg4dof", particulars=ship.particulars).predictions[

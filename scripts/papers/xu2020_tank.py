@@ -1,4 +1,4 @@
-"""The captive tests of Xu et al. 2020 in a virtual tank, and their reduction of 38 terms step by step.
+"""The captive tests of Xu et al. 2020 in a virtual tank, and their reduction.
 
 The ship is Table 11's; her mass, the amplitudes and periods of the tests and the noise
 are not printed. The steps are those of section 5: by type of test the terms to start
@@ -131,7 +131,7 @@ class Step:
 
 
 def _step(table: int, force: str, kinds: str, printed: str) -> Step:
-    """A step from its table: term, old and revised error, separated by spaces, `-` where dropped."""
+    """A step from its table: term, old and revised error, `-` where dropped."""
     words = printed.split()
     errors = {
         f"{force}_{term}": (float(old), None if revised == "-" else float(revised))
@@ -189,7 +189,7 @@ STEPS = (
 
 
 def xu_ship(particulars: Particulars) -> ShipModel:
-    """The ship of Table 11, which has neither rudder nor propeller; the paper prints no particulars."""
+    """The ship of Table 11, without rudder, propeller and printed particulars."""
     source = {"source": PMM18.source.replace("equations 39 to 41", "Table 11")}
     return ShipModel(
         "xu-2020", "pmm18", particulars, SteeringGear(), TABLE_11, provenance=source
@@ -231,7 +231,7 @@ def truth(names: tuple[str, ...]) -> Floats:
 
 
 def noise_sizes() -> Floats:
-    """Standard deviation of the noise of X, Y and N, prime system, for `NOISE` 1, shape (3,)."""
+    """Standard deviations of noise of X, Y and N at `NOISE` 1, prime, shape (3,)."""
     regression = full_regression()
     squares = [
         np.mean(regression.targets[regression.equation == i] ** 2)
@@ -242,7 +242,7 @@ def noise_sizes() -> Floats:
 
 
 def measured(sizes: Floats, seed: int = SEED) -> Floats:
-    """The forces with white noise of the given standard deviations of X, Y and N, shape (n_rows,)."""
+    """Forces with white noise of given deviations of X, Y and N, shape (n_rows,)."""
     regression = full_regression()
     noise = np.random.default_rng(seed).standard_normal(len(regression))
     forces: Floats = regression.targets + sizes[regression.equation] * noise
@@ -250,7 +250,7 @@ def measured(sizes: Floats, seed: int = SEED) -> Floats:
 
 
 def rows_of(force: str, kinds: tuple[str, ...]) -> NDArray[np.int64]:
-    """Rows of one force in tests of the given types, in the order of time within the tests.
+    """Rows of one force in tests of given types, in order of time within tests.
 
     So that each of the stretches that an elimination holds out has its part of every
     test.

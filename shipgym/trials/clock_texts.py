@@ -40,8 +40,9 @@ def zone_seconds(zone: str, where: str) -> float:
 def read_clock(texts: Sequence[str]) -> Clock:
     """Read dates and times in any usual form, or times of the day.
 
-    Times of the day go on at midnight. Where day and month may be exchanged, that order is taken with which the texts span
-    the shorter time. Raises ValueError, with the text, where one is no time.
+    Times of the day go on at midnight. Where day and month may be exchanged, that order
+    is taken with which the texts span the shorter time. Raises ValueError, with the
+    text, where one is no time.
     """
     first = next((text for text in texts if text), "")
     of_day = _TIME_OF_DAY.fullmatch(first) is not None

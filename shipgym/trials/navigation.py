@@ -17,9 +17,9 @@ def local_metres(
 ) -> tuple[Floats, Floats]:
     """North and east of an origin, m, of latitudes and longitudes in degrees.
 
-    Valid across the date line too. By the radii of curvature of WGS 84 along the meridian and across it (Fossen 2011,
-    Handbook of Marine Craft Hydrodynamics and Motion Control, 2.3): within 1 part in
-    10,000 up to 30 km away.
+    Valid across the date line too. By the radii of curvature of WGS 84 along the
+    meridian and across it (Fossen 2011, Handbook of Marine Craft Hydrodynamics and
+    Motion Control, 2.3): within 1 part in 10,000 up to 30 km away.
     """
     origin_lat, origin_lon = origin
     phi = origin_lat * DEGREE

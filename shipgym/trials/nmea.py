@@ -1,7 +1,8 @@
 """Sentences of NMEA 0183, for logs and for the helm.
 
-The table `nmea.toml` says which numbers stand where. A sentence is ``$`` or nothing, two letters of the talker, three of the kind, fields
-after commas, and ``*`` with the checksum: the exclusive or of all characters between.
+The table `nmea.toml` says which numbers stand where. A sentence is ``$`` or nothing,
+two letters of the talker, three of the kind, fields after commas, and ``*`` with the
+checksum: the exclusive or of all characters between.
 """
 
 import re

@@ -217,9 +217,9 @@ def nmea_log(path, rudder=True, end=600):
         clock = f"09{30 + k // 120:02d}{k // 2 % 60:02d}"
         lat, lon = ((abs(GNSS[name][k]) % 1) * 60 for name in ("lat", "lon"))
         place = f"57{lat:07.4f},N,011{lon:07.4f},E"
-        lines.append(
-            f"GPRMC,{clock}.00,A,{place},{GNSS['sog'][k] / KNOT:.2f},{GNSS['cog'][k] / DEGREE:.1f},310524,,,A"
-        )
+        knots = GNSS["sog"][k] / KNOT
+        course = GNSS["cog"][k] / DEGREE
+        lines.append(f"GPRMC,{clock}.00,A,{place},{knots:.2f},{course:.1f},310524,,,A")
         lines.append(f"IIGGA,{clock}.00,{place},1,08,1.0,20.0,M,,M,,")
         for j in (k, k + 1):
             heading = SAILED["psi"][j] / DEGREE % 360
@@ -327,7 +327,7 @@ def test_a_yaw_rate_or_heading_of_the_wrong_sign_is_not_taken_for_the_rudders(tm
         path = written(tmp_path / "run.csv", **changed)
         with pytest.raises(
             InputError,
-            match=r"'psi' \(heading\) and 'r' \(yaw rate\) to be positive .* opposite signs",
+            match=r"\(heading\) and 'r' \(yaw rate\) to be positive .* opposite signs",
         ):
             Trial.from_csv(path)
 
@@ -542,9 +542,7 @@ def test_a_log_is_cut_into_trials_by_rudder_by_seconds_and_by_the_clock(tmp_path
     assert trial.t[[0, -1]] == pytest.approx([60.0, 240.0])
     with pytest.raises(
         InputError,
-        match=(
-            r"2024-05-31 09:30:00 to 2024-05-31 09:40:00, got 11:00 to 11:10, which holds"
-        ),
+        match="2024-05-31 09:30:00 to 2024-05-31 09:40:00, got 11:00 to 11:10",
     ):
         ship_file(
             tmp_path,

@@ -138,7 +138,7 @@ def straight_line(use: str) -> Trial:
 
 
 def surge_terms(trial: Trial) -> Floats:
-    """Terms of equation 5.8: surge speed above 8 m/s, its cube, shaft order above 80 rpm.
+    """Terms of equation 5.8: surge speed above 8 m/s and its cube, order over 80 rpm.
 
     The thesis does not say whether it took order or shaft speed; with the order come
     its coefficients.
@@ -154,7 +154,7 @@ def surge_fit(trial: Trial, estimator: LSSVM | TunedLSSVM) -> Difference:
 
 
 def surge(fit: Difference, trial: Trial) -> dict[str, Floats]:
-    """Predict surge from the first sample and the shaft orders; infinite from where the ship runs away."""
+    """Predict surge from the first sample and orders; infinite after running away."""
     faster = np.full(len(trial), np.inf)
     x = float(trial["u"][0]) - SPEED
     for k, quicker in enumerate(surge_terms(trial)[:, 2].tolist()):
@@ -194,7 +194,7 @@ def best_surge() -> ShipModel:
 
 @cache
 def best_steering(rudder_limit_deg: float = 35.0) -> ShipModel:
-    """Four terms with the instantaneous speed in sway and yaw, from spline samples of the 10/10 zigzag."""
+    """Four terms with instantaneous speed in sway and yaw, from 10/10 splines."""
     columns = {"u": SURGE_IN_TURNS, "v": FOUR_WITH_SPEED, "r": FOUR_WITH_SPEED}
     return spline_fit(
         zigzag_trial(10, rudder_limit_deg), ship(rudder_limit_deg), columns
@@ -277,7 +277,7 @@ def weight_rows() -> Iterator[Row]:
 
 
 def condition() -> float:
-    """Condition number of the seven terms of the 10/10 zigzag, each by its standard deviation."""
+    """Condition number of the seven standardised terms of the 10/10 zigzag."""
     terms = steering_terms(zigzag_trial(10))
     return float(np.linalg.cond((terms - terms.mean(axis=0)) / terms.std(axis=0)))
 

@@ -74,7 +74,7 @@ def first_samples(trial: Trial, count: int) -> Trial:
 
 
 def search(method: str, equation: str, most: float | None = None) -> TunedLSSVM:
-    """LS-SVR of which C is searched for by one of the thesis' methods, on columns as they are."""
+    """LS-SVR on columns as they are, with C found by a method of the thesis."""
     optimiser, objective = SEARCHES[method]
     bounds = (LEAST_C, MOST_C[equation] if most is None else most)
     return TunedLSSVM(
@@ -162,7 +162,7 @@ def steering_fit(
 
 
 def steer(sway: Difference, yaw: Difference, trial: Trial) -> dict[str, Floats]:
-    """Predict a trial from its first sample and its rudder; infinite from where the ship runs away."""
+    """Predict a trial from its first sample and rudder; infinite after running away."""
     path = np.full((2, len(trial)), np.inf)
     v, r = float(trial["v"][0]), float(trial["r"][0])
     for k, delta in enumerate(trial["delta"].tolist()):
@@ -177,7 +177,10 @@ def steer(sway: Difference, yaw: Difference, trial: Trial) -> dict[str, Floats]:
 def mean_square(
     predicted: Mapping[str, Floats] | Trial | None, trial: Trial, channel: str
 ) -> float:
-    """Mean squared error of a channel, of yaw rate in deg^2/s^2 as printed; infinite after running away."""
+    """Mean squared error of a channel; infinite after running away.
+
+    Of yaw rate in deg^2/s^2, as printed.
+    """
     if predicted is None:
         return float("inf")
     error = predicted[channel] - trial[channel]
@@ -198,7 +201,7 @@ def spline_samples(trial: Trial, ship: ShipModel) -> Samples:
 def spline_fit(
     trial: Trial, ship: ShipModel, columns: Mapping[str, Sequence[int]]
 ) -> ShipModel:
-    """A model with the instantaneous speed in its terms, by least squares on spline samples.
+    """A model with instantaneous speed in its terms, by least squares on splines.
 
     Parameters
     ----------

@@ -73,7 +73,7 @@ STAND_IN = "the log is not published: a stand-in, means over 20 logs"
 
 @dataclass(frozen=True)
 class Form:
-    """Nomoto's form T rdot + r + a r^3 = K delta, with r in rad/s, and what goes with it as a constant."""
+    """Nomoto's T rdot + r + a r^3 = K delta, r in rad/s, and the thesis' constant."""
 
     K: float
     T: float
@@ -142,7 +142,7 @@ def as_printed(trial: Trial, method: str, form: str) -> Form:
 
 
 def at_best(trial: Trial, form: str) -> Form:
-    """A form by the weighted LS-SVM after repair, with what the rudder does between the samples."""
+    """A form by weighted LS-SVM after repair, with the rudder between samples."""
     model = identify(
         [trial],
         "nomoto" if form == "linear" else "norrbin",
@@ -181,7 +181,10 @@ def mean_error(forms: tuple[Form, ...], name: str) -> float:
 
 
 def residuals(form: Form, trial: Trial) -> Floats:
-    """Yaw rate of a log less that predicted from its rudder, straight between the samples, rad/s."""
+    """Yaw rate of a log less that predicted from its rudder, rad/s.
+
+    The rudder is straight between the samples.
+    """
     steps = round(float(trial.t[1] - trial.t[0]) / SMALL_STEP)
     times = np.linspace(trial.t[0], trial.t[-1], steps * (len(trial) - 1) + 1)
     path, now = np.empty(len(times)), float(trial["r"][0])
@@ -259,7 +262,7 @@ def robust_rows() -> Iterator[Row]:
 
 
 def residual_measures(method: str, form: str) -> dict[str, float]:
-    """Means over the logs of what Figures 7.2.3 and 7.2.5 show of the residuals of the 30/30 zigzag."""
+    """Means over logs of the residuals in Figures 7.2.3 and 7.2.5, 30/30 zigzag."""
     found = []
     for seed, fit in zip(SEEDS, fitted(method, form), strict=True):
         trial = log(ASSESSED, len(SEEDS) + seed)

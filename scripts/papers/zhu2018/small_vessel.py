@@ -135,7 +135,7 @@ def at_best(trial: Trial) -> ShipModel:
 
 @cache
 def errors() -> tuple[dict[tuple[str, float], float], dict[tuple[str, float], float]]:
-    """Mean squared errors by equation and zigzag, to the ship's own motion: as the thesis, and at best."""
+    """Mean squared errors by equation and zigzag: as the thesis, and at best."""
     ours: dict[tuple[str, float], list[float]] = {key: [] for key in PRINTED}
     best: dict[tuple[str, float], list[float]] = {key: [] for key in PRINTED}
     for seed in SEEDS:

@@ -15,8 +15,9 @@ _LONGEST_LINE = 100_000  # characters
 def read_csv(path: str | Path) -> LogTable:
     """Read a CSV file with one header line, its delimiter comma, semicolon or tab.
 
-    The encoding is UTF-8 or Latin-1. Raises InputError for a missing file, a folder, an empty or binary file, repeated or
-    no names in the header, and a row with more or fewer cells than the header.
+    The encoding is UTF-8 or Latin-1. Raises InputError for a missing file, a folder, an
+    empty or binary file, repeated or no names in the header, and a row with more or
+    fewer cells than the header.
     """
     path = Path(path)
     lines = read_lines(path, "CSV file")
