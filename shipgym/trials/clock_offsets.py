@@ -54,6 +54,13 @@ class _DelayFit(NamedTuple):
     squares: float  # of the residual, never zero
 
 
+class _Minimum(NamedTuple):
+    """Minimum of a parabola through three values."""
+
+    at: float
+    curvature: float
+
+
 def clock_offset(
     t: Floats, target: Floats, late: Floats, others: Mapping[str, Floats]
 ) -> ClockOffset | None:
@@ -81,33 +88,41 @@ def clock_offset(
         regressor = _unexplained(windows.slope(channel, delay), known)
         return _fit(change, regressor)
 
-    step = 0.25
-    delays = np.arange(-LONGEST_DELAY_S, LONGEST_DELAY_S + 0.1, step)
+    delays = np.arange(-LONGEST_DELAY_S, LONGEST_DELAY_S + 0.1, 0.25)
     squares = np.array([fit(delay).squares for delay in delays])
-    k = int(np.argmin(squares))
-    is_at_end = k in (0, delays.size - 1)
-    if is_at_end:
-        return None
-
-    # the parabola through the least squares and those before and after
-    around = slice(k - 1, k + 2)
-    from_least = delays[around] - delays[k]
-    half_curvature, slope, _ = np.polyfit(from_least, squares[around], 2)
-    curvature = 2.0 * float(half_curvature)
     power = float(change @ change)
-    rounding = 1e-12 * power
-    if curvature * step**2 <= rounding:
+    least = _minimum(delays, squares, rounding=1e-12 * power)
+    if least is None:
         return None
 
-    delay = float(delays[k] - slope / curvature)
-    best = fit(delay)
+    best = fit(least.at)
     free = _independent_samples(best)
+    variance = 2.0 * best.squares / free / least.curvature
     explained = max(power / best.squares - 1.0, 0.0)
     return ClockOffset(
-        late=delay,
-        error=math.sqrt(2.0 * best.squares / free / curvature),
+        late=least.at,
+        error=math.sqrt(variance),
         gain=best.gain,
         certainty=math.sqrt(free * explained),
+    )
+
+
+def _minimum(x: Floats, y: Floats, rounding: float) -> _Minimum | None:
+    """Minimum of values at evenly spaced x; None at either end, or of a flat curve."""
+    k = int(np.argmin(y))
+    is_at_end = k in (0, x.size - 1)
+    if is_at_end:
+        return None
+    around = slice(k - 1, k + 2)
+    from_least = x[around] - x[k]
+    half_curvature, slope, _ = np.polyfit(from_least, y[around], deg=2)
+    curvature = 2.0 * float(half_curvature)
+    step = float(x[1] - x[0])
+    if curvature * step**2 <= rounding:
+        return None
+    return _Minimum(
+        at=float(x[k] - slope / curvature),
+        curvature=curvature,
     )
 
 

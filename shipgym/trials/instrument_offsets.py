@@ -65,15 +65,7 @@ def heading_offset(
     north = channels["ground_north"][straight]
     east = channels["ground_east"][straight]
     ground = np.concatenate([north, east])
-
-    # unknown are U cos(o), U sin(o) and the current to north and east
-    c = np.cos(psi)
-    s = np.sin(psi)
-    zero = np.zeros(psi.size)
-    one = np.ones(psi.size)
-    to_north = np.column_stack([c, s, one, zero])
-    to_east = np.column_stack([s, -c, zero, one])
-    rows = np.vstack([to_north, to_east])
+    rows = _ground_velocity_regressors(psi)
     fitted, *_ = np.linalg.lstsq(rows, ground, rcond=None)
 
     # samples of one straight part say the same
@@ -87,6 +79,20 @@ def heading_offset(
         offset=math.atan2(across, along),
         error=across_error / speed,
     )
+
+
+def _ground_velocity_regressors(psi: Floats) -> Floats:
+    """Regressors of north and then east velocity over ground, shape (2 n_samples, 4).
+
+    Unknown are U cos(o), U sin(o), and the current to north and east.
+    """
+    c = np.cos(psi)
+    s = np.sin(psi)
+    zero = np.zeros(psi.size)
+    one = np.ones(psi.size)
+    to_north = np.column_stack([c, s, one, zero])
+    to_east = np.column_stack([s, -c, zero, one])
+    return np.vstack([to_north, to_east])
 
 
 def rudder_offset(

@@ -105,10 +105,11 @@ def _rate_offset(log: Log) -> ClockOffset | None:
     """How late the yaw rate is against the heading, where a log tells it."""
     if not log.has("psi", "r"):
         return None
+    psi = log.channels["psi"]
     r = log.channels["r"]
     if not reverses(r):
         return None
-    return clock_offset(log.t, target=log.channels["psi"], late=r, others={})
+    return clock_offset(log.t, target=psi, late=r, others={})
 
 
 def _rudder_offset(log: Log, rate: ClockOffset | None) -> ClockOffset | None:
@@ -139,7 +140,8 @@ def _rate_on_heading_clock(log: Log, rate: ClockOffset | None) -> Floats:
     """Yaw rate with its own delay taken out, rad/s."""
     t = log.t
     if not log.has("r"):
-        return time_derivative(t, log.channels["psi"])
+        psi = log.channels["psi"]
+        return time_derivative(t, psi)
     r = log.channels["r"]
     if rate is None:
         return r

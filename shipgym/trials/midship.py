@@ -53,7 +53,8 @@ def _derive_turning(log: Log) -> None:
     if log.has("psi", "r"):
         return
     if log.has("psi"):
-        rate = time_derivative(log.t, log.channels["psi"])
+        psi = log.channels["psi"]
+        rate = time_derivative(log.t, psi)
         log.derive("r", rate)
         return
     has_position = log.has("x") or log.has("y")
@@ -216,8 +217,7 @@ class SetAndDrift(NamedTuple):
         speed = math.hypot(self.north, self.east)
         knots = speed / KNOT
         direction = math.atan2(self.east, self.north)
-        toward = math.degrees(direction)
-        toward %= 360.0
+        toward = math.degrees(direction) % 360.0
         return (
             f"set and drift by the speed log against the ground: {speed:.2f} m/s"
             f" ({knots:.2f} kn) toward {toward:03.0f} deg, {self.unexplained:.2f} m/s"
@@ -245,7 +245,8 @@ def set_and_drift(
 
     current, *_ = np.linalg.lstsq(rows, values, rcond=None)
     north, east = current.tolist()
-    left = values - rows @ current
+    explained = rows @ current
+    left = values - explained
     return SetAndDrift(
         north=north,
         east=east,

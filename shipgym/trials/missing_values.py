@@ -101,7 +101,8 @@ def _check_present(
         return
 
     row, column = np.argwhere(refused)[0]
-    name = list(table)[column]
+    names = list(table)
+    name = names[column]
     place = locator.place(row, name)
     found = values[row, column]
     lacking = np.count_nonzero(is_missing.any(axis=1))

@@ -18,7 +18,9 @@ from shipgym.files import shipped_toml
 from shipgym.trials.units import UNITS
 
 _SENTENCE = re.compile(
-    r"\s*\$?(?P<text>(?P<address>\w+),(?P<fields>[^*]*))\*(?P<checksum>[0-9A-Fa-f]{2})\s*"
+    r"\s*\$?"
+    r"(?P<text>(?P<talker>P|\w{1,2})(?P<kind>\w*),(?P<fields>[^*]*))"
+    r"\*(?P<checksum>[0-9A-Fa-f]{2})\s*"
 )
 _QUANTITIES_IN_SI = ("length", "angle", "angular rate", "speed", "shaft speed")
 _SPEED_UNITS = {"N": "knots", "K": "km/h", "M": "m/s"}
@@ -136,13 +138,11 @@ def parse_sentence(line: str) -> Sentence:
     if expected != found.upper():
         raise ValueError(f"expected the checksum {expected}, got {found}")
 
-    address = match["address"]
-    is_proprietary = address.startswith("P")
-    letters = 1 if is_proprietary else 2
+    fields = match["fields"]
     return Sentence(
-        talker=address[:letters],
-        kind=address[letters:],
-        fields=match["fields"].split(","),
+        talker=match["talker"],
+        kind=match["kind"],
+        fields=fields.split(","),
     )
 
 

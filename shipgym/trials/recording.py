@@ -130,11 +130,12 @@ def _check_pairs(table: LogTable, chosen: Mapping[str, Column]) -> None:
 
 def _read_numbers(locator: Locator) -> dict[str, Floats]:
     """Channels that are numbers in the file, in SI units."""
+    table = locator.table
     channels = {}
     for channel, column in locator.columns.items():
         if channel in ("t", "lat", "lon"):
             continue
-        numbers = locator.table.numbers(column.name)
+        numbers = table.numbers(column.name)
         factor = si_factor(channel, column.unit)
         channels[channel] = factor * numbers
     return channels

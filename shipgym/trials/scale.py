@@ -66,7 +66,8 @@ def _check_speed(fastest: float, ship: Particulars, where: str) -> None:
     service_speed = ship.speed
     if service_speed is None or "speed" in ship.estimated:
         return
-    froude = service_speed / math.sqrt(9.81 * ship.length)
+    wave_speed = math.sqrt(9.81 * ship.length)
+    froude = service_speed / wave_speed
     is_fast = froude > 0.3  # for a ship that displaces water
     in_knots = service_speed * KNOT
     excess = fastest / in_knots - 1.0

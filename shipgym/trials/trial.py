@@ -262,7 +262,8 @@ class Trial:
         settings = self._settings()
         settings["raw"] = self
         if repaired:
-            settings["repaired"] = Counter(self.repaired) + Counter(repaired)
+            before = Counter(self.repaired)
+            settings["repaired"] = before + Counter(repaired)
         times = self.t if t is None else t
         changed = {**self.channels, **channels}
         return Trial(times, changed, **settings)

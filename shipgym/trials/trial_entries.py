@@ -125,7 +125,8 @@ def _read_entry(table: Any, folder: Path, where: str, shared: _Shared) -> TrialE
     if "columns" in table:
         columns = {**columns, **parse_columns(table["columns"], f"{where} columns")}
     conventions = shared.conventions
-    if not table.keys().isdisjoint((*_CONVENTIONS, "sensors")):
+    own = {*_CONVENTIONS, "sensors"} & table.keys()
+    if own:
         conventions = _own_conventions(table, where, shared)
     return TrialEntry(
         file=" + ".join(files),

@@ -151,7 +151,9 @@ def check_velocity(log: Log, frame: str, locator: Locator) -> None:
 
 def _fit_track(log: Log, velocity: npt.NDArray[np.complex128]) -> GainFit:
     """Fit the change of position, north + i east, by that which a velocity gives."""
-    position = log.channels["x"] + 1j * log.channels["y"]
+    north = log.channels["x"]
+    east = log.channels["y"]
+    position = north + 1j * east
     sailed = integral(log.t, velocity)
     return _fit_changes(
         regressor=_at_windows(sailed),

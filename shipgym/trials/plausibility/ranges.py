@@ -58,7 +58,7 @@ def _smaller_units(channel: str, declared: str, size: float) -> list[Proposal]:
     proposals = []
     for unit, factor in UNITS[quantity].items():
         ratio = factor / own
-        if ratio < 1.0 and ratio <= largest_ratio:
+        if ratio <= largest_ratio:
             proposal = Proposal(channel, unit)
             proposals.append(proposal)
     return proposals

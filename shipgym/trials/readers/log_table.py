@@ -77,8 +77,9 @@ class LogTable:
         texts = []
         for cell in self.column(name):
             text = str(cell).strip()
-            is_missing = text.lower() in _MISSING_WORDS
-            texts.append("" if is_missing else text)
+            if text.lower() in _MISSING_WORDS:
+                text = ""
+            texts.append(text)
         return texts
 
     def numbers(self, name: str) -> Floats:

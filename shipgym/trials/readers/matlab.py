@@ -5,7 +5,7 @@ MathWorks, MAT-File Format, "Level 5 MAT-File Format".
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -71,7 +71,11 @@ def read_matlab(path: Path) -> LogTable:
         vectors: dict[str, Floats] = {}
         for matrix in _matrices(path, content[_HEADER_BYTES:], order):
             vectors |= _vector(path, matrix, order)
+    return _table(path, vectors)
 
+
+def _table(path: Path, vectors: Mapping[str, Floats]) -> LogTable:
+    """Table of the vectors of the commonest length; InputError for none."""
     lengths = [values.size for values in vectors.values()]
     length = max(lengths, key=lengths.count, default=0)
     if not length:
