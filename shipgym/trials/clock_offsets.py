@@ -81,7 +81,8 @@ def clock_offset(
     if windows is None:
         return None
     known = _known_directions(windows, others)
-    change = _unexplained(windows.slope(target), known)
+    slope = windows.slope(target)
+    change = _unexplained(slope, known)
     channel = integral(t, late)
 
     def fit(delay: float) -> _DelayFit:

@@ -93,16 +93,14 @@ def _check_present(
     t: Floats, channels: Mapping[str, Floats], locator: Locator, repair: str | None
 ) -> None:
     """Refuse missing times and, without `repair`, every missing value."""
-    table = {"t": t, **channels}
-    values = np.column_stack(list(table.values()))
+    values = np.column_stack([t, *channels.values()])
     is_missing = ~np.isfinite(values)
     refused = is_missing if repair is None else is_missing[:, :1]
     if not refused.any():
         return
 
     row, column = np.argwhere(refused)[0]
-    names = list(table)
-    name = names[column]
+    name = ["t", *channels][column]
     place = locator.place(row, name)
     found = values[row, column]
     lacking = np.count_nonzero(is_missing.any(axis=1))

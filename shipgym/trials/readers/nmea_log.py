@@ -91,10 +91,7 @@ def read_nmea(path: Path) -> LogTable:
     for channel, sources in heard.channels.items():
         best = _best_source(sources)
         tracks[channel] = _track(sources[best], clock)
-        others = sorted(sources.keys() - {best})
-        if others:
-            left_out = ", ".join(others)
-            notes.append(f"{channel} is from {best}; {left_out} left out")
+        notes += _note_others(channel, best, sources)
 
     winds = {}
     for name in _WINDS:
@@ -224,6 +221,14 @@ def _rank(source: str, values: list[_Value]) -> _Rank:
 
 def _best_source(sources: _BySource) -> str:
     return max(sorted(sources), key=lambda source: _rank(source, sources[source]))
+
+
+def _note_others(channel: str, best: str, sources: _BySource) -> list[str]:
+    others = sorted(sources.keys() - {best})
+    if not others:
+        return []
+    left_out = ", ".join(others)
+    return [f"{channel} is from {best}; {left_out} left out"]
 
 
 def _main_clock(times: _BySource) -> _Track:
