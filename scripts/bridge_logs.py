@@ -184,14 +184,17 @@ def logs_of(ship: ShipModel, seed: int) -> tuple[list[Trial], Weather]:
 
     A ship without a shaft logs a steady shaft speed.
     """
-    towards, wind_from = np.random.default_rng(seed).uniform(0.0, 360.0, 2)
-    runs = sailed(ship, CURRENT, towards, WIND, wind_from, 100 * seed)
-    logs = [logged(run, 1000 * seed + k) for k, run in enumerate(runs)]
+    rng = np.random.default_rng(seed)
+    towards, wind_from = rng.uniform(0.0, 360.0, 2)
     weather = Weather(Current(CURRENT, towards), Wind(WIND, wind_from))
-    return [
-        log if "n" in log else log.with_channels({"n": np.ones(len(log))})
-        for log in logs
-    ], weather
+    runs = sailed(ship, CURRENT, towards, WIND, wind_from, 100 * seed)
+    logs = []
+    for k, run in enumerate(runs):
+        log = logged(run, 1000 * seed + k)
+        if "n" not in log:
+            log = log.with_channels({"n": np.ones(len(log))})
+        logs.append(log)
+    return logs, weather
 
 
 def current_case(ship: ShipModel, seed: int) -> tuple[np.ndarray, np.ndarray, bool]:
@@ -201,11 +204,13 @@ def current_case(ship: ShipModel, seed: int) -> tuple[np.ndarray, np.ndarray, bo
     """
     logs, weather = logs_of(ship, seed)
     towards = np.radians(weather.current.towards_deg)
-    _, found = in_still_water(logs, ship.particulars)
-    row = found["currents"][logs[0].name]
     truth = CURRENT * np.array([np.cos(towards), np.sin(towards)])
-    error = np.array([row["north"], row["east"]]) - truth
-    return error, np.array(row["standard_errors"]), row["taken_out"]
+    _, found = in_still_water(logs, ship.particulars)
+    first = logs[0]
+    row = found["currents"][first.name]
+    estimate = np.array([row["north"], row["east"]])
+    standard_errors = np.array(row["standard_errors"])
+    return estimate - truth, standard_errors, row["taken_out"]
 
 
 def heading_error(result: IdentificationResult) -> float:

@@ -85,18 +85,26 @@ def kalman_history(
     -------
     array of shape (n_samples, n_coefficients)
     """
-    m, n = len(noise), len(noise) + len(deviation)
+    m = len(noise)
+    deviations = np.concatenate([noise, deviation])
     state = np.concatenate([measured[0], np.zeros(len(deviation))])
-    covariance = np.diag(np.concatenate([noise, deviation]) ** 2)
-    step = STEP * np.concatenate([noise, deviation])
+    covariance = np.diag(deviations**2)
+    noise_covariance = np.diag(noise**2)
+    # the state itself, and with a small change of each of its components
+    step = STEP * deviations
+    changes = np.column_stack([np.zeros(len(step)), np.diag(step)])
     history = np.zeros((len(measured), len(deviation)))
     for k in range(1, len(measured)):
-        points = state[:, None] + np.column_stack([np.zeros(n), np.diag(step)])
+        points = state[:, None] + changes
         moved = _advanced(rate, points, m, delta[k - 1 : k + 1], interval)
-        jacobian = (moved[:, 1:] - moved[:, :1]) / step
+        predicted = moved[:, 0]
+        jacobian = (moved[:, 1:] - predicted[:, None]) / step
         covariance = jacobian @ covariance @ jacobian.T
-        gain = np.linalg.solve(covariance[:m, :m] + np.diag(noise**2), covariance[:m]).T
-        state = moved[:, 0] + gain @ (measured[k] - moved[:m, 0])
+
+        innovation = measured[k] - predicted[:m]
+        innovation_covariance = covariance[:m, :m] + noise_covariance
+        gain = np.linalg.solve(innovation_covariance, covariance[:m]).T
+        state = predicted + gain @ innovation
         covariance = covariance - gain @ covariance[:m]
         covariance = 0.5 * (covariance + covariance.T)
         history[k] = state[m:]
@@ -105,12 +113,17 @@ def kalman_history(
 
 def _advanced(rate: Rate, points: Floats, m: int, delta: Floats, h: float) -> Floats:
     """Runge-Kutta over an interval, the rudder linear in it, coefficients constant."""
-    x, theta, middle = points[:m], points[m:], 0.5 * float(delta.sum())
-    a = rate(x, theta, float(delta[0]))
+    x = points[:m]
+    theta = points[m:]
+    first, last = delta.tolist()
+    middle = 0.5 * (first + last)
+    a = rate(x, theta, first)
     b = rate(x + 0.5 * h * a, theta, middle)
     c = rate(x + 0.5 * h * b, theta, middle)
-    d = rate(x + h * c, theta, float(delta[1]))
-    return np.concatenate([x + h / 6.0 * (a + 2.0 * b + 2.0 * c + d), theta])
+    d = rate(x + h * c, theta, last)
+    mean_rate = a + 2.0 * b + 2.0 * c + d
+    moved = x + h / 6.0 * mean_rate
+    return np.concatenate([moved, theta])
 
 
 @cache

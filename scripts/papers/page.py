@@ -103,13 +103,21 @@ def page(results: Mapping[str, Sequence[Row]]) -> str:
 def _overview(results: Mapping[str, Sequence[Row]]) -> list[str]:
     """Verdicts, agreement and aims of each paper, a line each."""
     words = (CONFIRMED, CONTRADICTED, NOT_TESTABLE)
-    lines = ["| | " + " | ".join((*words, "agree with print", "aims met")) + " |"]
-    lines.append("| --- " + "| ---: " * (len(words) + 2) + "|")
+    headings = (*words, "agree with print", "aims met")
+    lines = [
+        "| | " + " | ".join(headings) + " |",
+        "| --- " + "| ---: " * len(headings) + "|",
+    ]
     for name, rows in results.items():
-        verdicts = [one.verdict(rows) for one in get_paper(name).conclusions]
-        counts = [str(verdicts.count(word)) if verdicts else "" for word in words]
-        cells = (*counts, _share(*_agreement(rows)), _share(*aims(rows)))
-        lines.append(f"| [{name}](#{name}) | " + " | ".join(cells) + " |")
+        paper = get_paper(name)
+        verdicts = [one.verdict(rows) for one in paper.conclusions]
+        cells = [f"[{name}](#{name})"]
+        for word in words:
+            count = verdicts.count(word)
+            cells.append(str(count) if verdicts else "")
+        cells.append(_share(*_agreement(rows)))
+        cells.append(_share(*aims(rows)))
+        lines.append("| " + " | ".join(cells) + " |")
     return [*lines, ""]
 
 

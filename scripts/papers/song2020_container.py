@@ -88,29 +88,31 @@ def recorded(angle: float, heading: float) -> Trial:
 
 def thrust_and_rudder(u: Any, v: Any, r: Any, delta: Any, n: Any) -> tuple[Any, Any]:
     """Rudder thrust and normal force, prime system, from velocities in SI units."""
-    L, U = own.LENGTH, np.hypot(u, v)
-    u_, v_, r_ = u / U, v / U, r * L / U
-    u_P = u_ * (
-        1.0 - own.PUBLISHED.wp + own.PUBLISHED.tau * (v_ + own.PUBLISHED.xp * r_) ** 2
-    )
-    J = u_P * U / (n * own.DIAMETER)
+    ship = own.PUBLISHED
+    L = own.LENGTH
+    D = own.DIAMETER
+    U = np.hypot(u, v)
+    u_ = u / U
+    v_ = v / U
+    r_ = r * L / U
+    u_P = u_ * (1.0 - ship.wp + ship.tau * (v_ + ship.xp * r_) ** 2)
+    J = u_P * U / (n * D)
     K_T = 0.527 - 0.455 * J
-    thrust = 2.0 * own.DIAMETER**4 / (L * L) * K_T * n * np.abs(n) / U**2
+    thrust = 2.0 * D**4 / (L * L) * K_T * n * np.abs(n) / U**2
+
     v_R = (
-        own.PUBLISHED.gamma * v_
-        + own.PUBLISHED.c_Rr * r_
-        + own.PUBLISHED.c_Rrrr * r_**3
-        + own.PUBLISHED.c_Rrrv * r_**2 * v_
+        ship.gamma * v_
+        + ship.c_Rr * r_
+        + ship.c_Rrrr * r_**3
+        + ship.c_Rrrv * r_**2 * v_
     )
-    u_R = (
-        u_P
-        * own.PUBLISHED.epsilon
-        * np.sqrt(1.0 + 8.0 * own.PUBLISHED.kappa / np.pi * K_T / J**2)
-    )
-    lift = (
-        6.13 * own.ASPECT_RATIO / (own.ASPECT_RATIO + 2.25) * own.RUDDER_AREA / (L * L)
-    )
-    return thrust, -lift * (u_R**2 + v_R**2) * np.sin(delta + np.arctan2(v_R, u_R))
+    race = np.sqrt(1.0 + 8.0 * ship.kappa / np.pi * K_T / J**2)
+    u_R = u_P * ship.epsilon * race
+    aspect = own.ASPECT_RATIO
+    lift = 6.13 * aspect / (aspect + 2.25) * own.RUDDER_AREA / (L * L)
+    inflow = np.arctan2(v_R, u_R)
+    normal = -lift * (u_R**2 + v_R**2) * np.sin(delta + inflow)
+    return thrust, normal
 
 
 def regressors(
@@ -154,14 +156,18 @@ def _product(values: Mapping[str, Any], powers: tuple[tuple[str, int], ...]) -> 
 
 def known_forces(motion: Mapping[str, Any]) -> dict[str, Any]:
     """Known part of equation 4-5: centripetal forces and righting moment, prime."""
-    U, L = np.hypot(motion["u"], motion["v"]), own.LENGTH
-    u, v, r = motion["u"] / U, motion["v"] / U, motion["r"] * L / U
+    L = own.LENGTH
+    U = np.hypot(motion["u"], motion["v"])
+    u = motion["u"] / U
+    v = motion["v"] / U
+    r = motion["r"] * L / U
+    hull = own.PUBLISHED
     righting = own.WEIGHT / (0.5 * L * L) * own.GM / L / U**2
     return {
-        "u": (own.PUBLISHED.m + own.PUBLISHED.my) * v * r,
-        "v": -(own.PUBLISHED.m + own.PUBLISHED.mx) * u * r,
+        "u": (hull.m + hull.my) * v * r,
+        "v": -(hull.m + hull.mx) * u * r,
         "r": 0.0 * r,
-        "p": own.PUBLISHED.mx * own.PUBLISHED.lx * u * r - righting * motion["phi"],
+        "p": hull.mx * hull.lx * u * r - righting * motion["phi"],
     }
 
 
@@ -170,11 +176,14 @@ def inertia_matrix() -> Floats:
 
     Angular accelerations are times length.
     """
-    ship, L = load_model("container"), own.LENGTH
+    L = own.LENGTH
+    prime_mass = 0.5 * 1025.0 * L**3
+    lengths = np.array([1.0, 1.0, L, L])
     matrix = np.zeros((4, 4))
-    matrix[:3] = inertia(ship) / (0.5 * 1025.0 * L**3) / np.array([1.0, 1.0, L, L])
+    matrix[:3] = inertia(load_model("container")) / prime_mass / lengths
     matrix[2] /= L
-    matrix[3, :3], matrix[3, 3] = matrix[:3, 3], own.PUBLISHED.Ix + own.PUBLISHED.Jx
+    matrix[3, :3] = matrix[:3, 3]
+    matrix[3, 3] = own.PUBLISHED.Ix + own.PUBLISHED.Jx
     return matrix
 
 

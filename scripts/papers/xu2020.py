@@ -180,16 +180,22 @@ class Moments:
 @cache
 def yaw_problem(n_samples: int) -> tuple[Floats, Floats, Floats, Floats]:
     """Raw columns and yaw moments of so many samples of some tests, and of others."""
-    fitted, whole = usual_fit(), full_regression()
+    fitted = usual_fit()
+    whole = full_regression()
     rows = np.flatnonzero(whole.equation == FORCES.index("N"))
+    columns = whole.features[rows]
+    number = {name: i for i, name in enumerate(whole.names)}
+
+    # without what the coefficients of X and Y contribute to the moment
     shared = {name: value for name, value in fitted.stepwise.items() if name[0] != "N"}
-    column = {name: i for i, name in enumerate(whole.names)}
-    moment = fitted.forces[rows] - whole.features[rows][
-        :, [column[name] for name in shared]
-    ] @ np.array(list(shared.values()))
-    features = whole.features[rows][:, [column[name] for name in LSSVM_TABLE_2]]
+    known = columns[:, [number[name] for name in shared]]
+    moment = fitted.forces[rows] - known @ np.array(list(shared.values()))
+    features = columns[:, [number[name] for name in LSSVM_TABLE_2]]
+
     seen = np.isin(whole.trial[rows], TRAINING)
-    picked = np.flatnonzero(seen)[np.linspace(0, seen.sum() - 1, n_samples).astype(int)]
+    in_training = np.flatnonzero(seen)
+    evenly = np.linspace(0, in_training.size - 1, n_samples)
+    picked = in_training[evenly.astype(int)]
     return features[picked], moment[picked], features[~seen], moment[~seen]
 
 

@@ -191,10 +191,14 @@ def study(tests: Captive, force: str) -> Found:
 def combined(tests: Captive, force: str, terms: Sequence[str]) -> float:
     """R2 of the tests with drift and rudder, which are then not fitted."""
     kept = [names(force).index(name) for name in terms]
-    X, y = tests.features(force)[:, kept], tests.targets(force)
+    X = tests.features(force)[:, kept]
+    y = tests.targets(force)
     apart = (tests.v != 0.0) & (tests.d != 0.0)
-    X = X[:, X[~apart].any(axis=0)]  # terms of both are 0 in all other tests
-    return r_squared(y[apart], X[apart] @ truncated(X[~apart], y[~apart]))
+    fitted = ~apart
+    X = X[:, X[fitted].any(axis=0)]  # terms of both are 0 in all other tests
+    coefficients = truncated(X[fitted], y[fitted])
+    predicted = X[apart] @ coefficients
+    return r_squared(y[apart], predicted)
 
 
 def run(data: Data) -> Section:

@@ -131,9 +131,12 @@ def zigzag_trial(angle_deg: float, rudder_limit_deg: float = 35.0) -> Trial:
 @cache
 def straight_line(use: str) -> Trial:
     """A straight line with varying shaft orders as sampled; `learned` or `verified`."""
-    held = round(DURATION / len(ORDERS[use]) / STEP)
-    shaft = np.repeat(np.array(ORDERS[use]) * RPM, held)
-    trial = ship().simulate(np.column_stack([np.zeros_like(shaft), shaft]), STEP)
+    orders = np.array(ORDERS[use]) * RPM
+    held = round(DURATION / len(orders) / STEP)
+    shaft = np.repeat(orders, held)
+    rudder = np.zeros_like(shaft)
+    commands = np.column_stack([rudder, shaft])
+    trial = ship().simulate(commands, STEP)
     return every(trial, round(INTERVAL / STEP), f"straight line {use}")
 
 
@@ -180,10 +183,15 @@ def as_printed(method: str) -> dict[str, Difference]:
 
 def predicted_errors(fits: dict[str, Difference]) -> dict[str, float]:
     """Mean squared errors of the second straight line and the 20/20 zigzag."""
-    line, turns = straight_line("verified"), zigzag_trial(20)
+    line = straight_line("verified")
+    turns = zigzag_trial(20)
+    driven = surge(fits["u"], line)
     steered = steer(fits["v"], fits["r"], turns)
-    errors = {q: mean_square(steered, turns, q) for q in ("v", "r")}
-    return {"u": mean_square(surge(fits["u"], line), line, "u")} | errors
+    return {
+        "u": mean_square(driven, line, "u"),
+        "v": mean_square(steered, turns, "v"),
+        "r": mean_square(steered, turns, "r"),
+    }
 
 
 @cache
@@ -204,10 +212,15 @@ def best_steering(rudder_limit_deg: float = 35.0) -> ShipModel:
 @cache
 def best_errors() -> dict[str, float]:
     """What the best models here reach in the thesis' predictions."""
-    line, turns = straight_line("verified"), zigzag_trial(20)
-    sailed = predict(best_steering(), turns)
-    errors = {q: mean_square(sailed, turns, q) for q in ("v", "r")}
-    return {"u": mean_square(predict(best_surge(), line), line, "u")} | errors
+    line = straight_line("verified")
+    turns = zigzag_trial(20)
+    driven = predict(best_surge(), line)
+    steered = predict(best_steering(), turns)
+    return {
+        "u": mean_square(driven, line, "u"),
+        "v": mean_square(steered, turns, "v"),
+        "r": mean_square(steered, turns, "r"),
+    }
 
 
 @cache

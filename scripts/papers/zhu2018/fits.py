@@ -6,6 +6,7 @@ and predicts by stepping that difference equation.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -84,10 +85,18 @@ def search(method: str, equation: str, most: float | None = None) -> TunedLSSVM:
 
 def steering_terms(trial: Trial) -> Floats:
     """The seven terms of equation 7.1, SI units, shape (n_samples, 7)."""
-    v, r, delta = trial["v"], trial["r"], trial["delta"]
-    return np.column_stack(
-        [v, np.abs(v) * v, np.abs(r) * v, r, np.abs(v) * r, np.abs(r) * r, delta]
-    )
+    v = trial["v"]
+    r = trial["r"]
+    terms = [
+        v,
+        np.abs(v) * v,
+        np.abs(r) * v,
+        r,
+        np.abs(v) * r,
+        np.abs(r) * r,
+        trial["delta"],
+    ]
+    return np.column_stack(terms)
 
 
 def term_columns(structure: str, equation: str) -> list[int]:
@@ -163,15 +172,19 @@ def steering_fit(
 
 def steer(sway: Difference, yaw: Difference, trial: Trial) -> dict[str, Floats]:
     """Predict a trial from its first sample and rudder; infinite after running away."""
-    path = np.full((2, len(trial)), np.inf)
-    v, r = float(trial["v"][0]), float(trial["r"][0])
+    sways = np.full(len(trial), np.inf)
+    rates = np.full(len(trial), np.inf)
+    v = float(trial["v"][0])
+    r = float(trial["r"][0])
     for k, delta in enumerate(trial["delta"].tolist()):
-        path[:, k] = v, r
+        sways[k] = v
+        rates[k] = r
         terms = (v, abs(v) * v, abs(r) * v, r, abs(v) * r, abs(r) * r, delta)
-        v, r = sway.step(v, terms), yaw.step(r, terms)
+        v = sway.step(v, terms)
+        r = yaw.step(r, terms)
         if not (abs(v) < RAN_AWAY and abs(r) < RAN_AWAY):
             break
-    return {"v": path[0], "r": path[1]}
+    return {"v": sways, "r": rates}
 
 
 def mean_square(
@@ -182,14 +195,12 @@ def mean_square(
     Of yaw rate in deg^2/s^2, as printed.
     """
     if predicted is None:
-        return float("inf")
+        return math.inf
     error = predicted[channel] - trial[channel]
+    if not np.isfinite(error).all():
+        return math.inf
     unit = np.degrees(1.0) if channel == "r" else 1.0
-    return (
-        float(unit**2 * np.mean(error**2))
-        if np.all(np.isfinite(error))
-        else float("inf")
-    )
+    return float(unit**2 * np.mean(error**2))
 
 
 @lru_cache(maxsize=2)
