@@ -352,10 +352,13 @@ def givers() -> dict[str, str]:
 
 def _called(function: ast.FunctionDef) -> list[str]:
     """Names of the functions that a function calls, in the order of its lines."""
-    calls = [node.func for node in ast.walk(function) if isinstance(node, ast.Call)]
-    names = [call for call in calls if isinstance(call, ast.Name)]
+    names = []
+    for node in ast.walk(function):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            names.append(node.func)
     names.sort(key=lambda name: (name.lineno, name.col_offset))
-    return list(dict.fromkeys(name.id for name in names))
+    distinct = dict.fromkeys(name.id for name in names)
+    return list(distinct)
 
 
 def _given(

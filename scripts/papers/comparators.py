@@ -183,15 +183,18 @@ class Network(NamedTuple):
 
     def run(self, trial: Trial, states: Sequence[str]) -> dict[str, Floats]:
         """The velocities of a trial from its first sample and its rudder."""
-        x, delta = np.array([trial[name][0] for name in states]), trial["delta"]
+        mean, size = self.inputs
+        middle, change = self.changes
+        *hidden, (last_matrix, last_offset) = self.weights
+        x = np.array([trial[name][0] for name in states])
         path = np.empty((len(trial), len(states)))
-        for k in range(len(trial)):
+        for k, rudder in enumerate(trial["delta"]):
             path[k] = x
-            layer = (np.append(x, delta[k]) - self.inputs[0]) / self.inputs[1]
-            for i, (matrix, offset) in enumerate(self.weights):
-                layer = layer @ matrix + offset
-                layer = np.tanh(layer) if i < len(self.weights) - 1 else layer
-            x = x + self.changes[0] + self.changes[1] * layer
+            layer = (np.append(x, rudder) - mean) / size
+            for matrix, offset in hidden:
+                layer = np.tanh(layer @ matrix + offset)
+            output = layer @ last_matrix + last_offset
+            x = x + middle + change * output
         return dict(zip(states, path.T, strict=True))
 
 

@@ -201,10 +201,14 @@ def steering(structure: str = "steering5") -> IdentificationResult:
 def straight_line(seed: int, use: str) -> Trial:
     """Rudder amidships, a new shaft speed every 150 s."""
     ship = load_model("container")
-    steps = round(150.0 / 0.1)
-    orders = np.random.default_rng(seed).uniform(0.6, 1.4, 6) * ship.service_shaft_speed
-    commands = np.column_stack([np.zeros(6 * steps), np.repeat(orders, steps)])
-    return recorded(ship.simulate(commands, 0.1), f"straight line {seed}", use)
+    dt = 0.1
+    steps = round(150.0 / dt)
+    rng = np.random.default_rng(seed)
+    orders = rng.uniform(0.6, 1.4, 6) * ship.service_shaft_speed
+    shaft = np.repeat(orders, steps)
+    rudder = np.zeros(shaft.size)
+    run = ship.simulate(np.column_stack([rudder, shaft]), dt)
+    return recorded(run, f"straight line {seed}", use)
 
 
 @cache

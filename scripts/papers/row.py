@@ -53,10 +53,12 @@ class Row:
         if self.printed is None or self.as_paper is None:
             return None
         mantissa, _, power = f"{self.printed:.4g}".partition("e")
-        hidden = 0.5 * 10.0 ** (int(power or 0) - len(mantissa.partition(".")[2]))
-        return abs(self.as_paper - self.printed) <= max(
-            AGREEMENT * abs(self.printed), hidden
-        )
+        _, _, decimals = mantissa.partition(".")
+        last_digit = int(power or 0) - len(decimals)
+        hidden = 0.5 * 10.0**last_digit
+        tolerance = AGREEMENT * abs(self.printed)
+        difference = abs(self.as_paper - self.printed)
+        return difference <= max(tolerance, hidden)
 
     @property
     def figure(self) -> object:

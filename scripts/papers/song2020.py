@@ -151,16 +151,18 @@ def gradient_history(
     largest : float
         The largest |omega e|, which tells whether the tanh bends.
     """
-    size = np.sqrt(np.mean(X**2, axis=0)) if scale else np.ones(X.shape[1])
-    theta, total, largest, history = np.zeros(X.shape[1]), 0.0, 0.0, np.empty(X.shape)
+    n_terms = X.shape[1]
+    size = np.sqrt(np.mean(X**2, axis=0)) if scale else np.ones(n_terms)
+    theta = np.zeros(n_terms)
+    total = 0.0  # sum of squares of the regressors so far
+    largest = 0.0
+    history = np.empty(X.shape)
     for k, (phi, target) in enumerate(zip(X / size, y.tolist(), strict=True)):
         error = target - float(phi @ theta)
         total += float(phi @ phi)
         if total > 0.0:
-            theta = (
-                theta
-                + gain * (np.tanh(omega * error) if omega else error) / total * phi
-            )
+            innovation = np.tanh(omega * error) if omega else error
+            theta = theta + gain * innovation / total * phi
             largest = max(largest, abs(omega * error))
         history[k] = theta / size
     return history, largest
@@ -192,9 +194,11 @@ def at_best(structure: str, noisy: bool = False) -> dict[str, float]:
 
 def indices(coefficients: Mapping[str, float]) -> dict[str, float]:
     """K and T of the linear equation; alpha and beta of the other."""
-    c_r, c_d = coefficients["c_r"], coefficients["c_d"]
+    c_r = coefficients["c_r"]
+    c_d = coefficients["c_d"]
     if "c_r3" in coefficients:
-        return {"alpha": -c_r / c_d, "beta": -coefficients["c_r3"] / c_d}
+        c_r3 = coefficients["c_r3"]
+        return {"alpha": -c_r / c_d, "beta": -c_r3 / c_d}
     return {"K": -c_d / c_r, "T": -1.0 / c_r}
 
 

@@ -230,18 +230,22 @@ def predicted(theta: Mapping[str, Floats], trial: Trial) -> Trial:
 
     def rates(t: float, state: Floats) -> list[float]:
         motion = dict(zip(STATE, state.tolist(), strict=True))
-        motion |= {
-            name: float(np.interp(t, trial.t, trial[name])) for name in ("delta", "n")
-        }
-        columns, known = regressors(motion), known_forces(motion)
-        forces = [float(theta[q] @ np.array(columns[q])) + known[q] for q in EQUATIONS]
-        u, v, psi = motion["u"], motion["v"], motion["psi"]
+        for name in ("delta", "n"):
+            motion[name] = float(np.interp(t, trial.t, trial[name]))
+        columns = regressors(motion)
+        known = known_forces(motion)
+        forces = []
+        for q in EQUATIONS:
+            identified = float(theta[q] @ np.array(columns[q]))
+            forces.append(identified + known[q])
+
+        u = motion["u"]
+        v = motion["v"]
+        psi = motion["psi"]
+        north = u * np.cos(psi) - v * np.sin(psi)
+        east = u * np.sin(psi) + v * np.cos(psi)
         accelerations = (matrix @ forces) * (u * u + v * v) / lengths
-        over_ground = (
-            u * np.cos(psi) - v * np.sin(psi),
-            u * np.sin(psi) + v * np.cos(psi),
-        )
-        return [*over_ground, motion["r"], *accelerations.tolist(), motion["p"]]
+        return [north, east, motion["r"], *accelerations.tolist(), motion["p"]]
 
     start = [trial[name][0] for name in STATE]
     found = solve_ivp(

@@ -133,10 +133,12 @@ class Step:
 def _step(table: int, force: str, kinds: str, printed: str) -> Step:
     """A step from its table: term, old and revised error, `-` where dropped."""
     words = printed.split()
-    errors = {
-        f"{force}_{term}": (float(old), None if revised == "-" else float(revised))
-        for term, old, revised in zip(words[::3], words[1::3], words[2::3], strict=True)
-    }
+    triples = zip(words[::3], words[1::3], words[2::3], strict=True)
+    errors: dict[str, tuple[float, float | None]] = {}
+    for term, old, revised in triples:
+        is_dropped = revised == "-"
+        new_error = None if is_dropped else float(revised)
+        errors[f"{force}_{term}"] = (float(old), new_error)
     return Step(table, force, tuple(kinds.split()), errors)
 
 
@@ -257,9 +259,9 @@ def rows_of(force: str, kinds: tuple[str, ...]) -> NDArray[np.int64]:
     """
     regression = full_regression()
     wanted = np.array([kind in kinds for kind, _ in captive_tests()])
-    rows = np.flatnonzero(
-        (regression.equation == FORCES.index(force)) & wanted[regression.trial]
-    )
+    is_force = regression.equation == FORCES.index(force)
+    is_wanted = wanted[regression.trial]
+    rows = np.flatnonzero(is_force & is_wanted)
     counts = np.bincount(regression.trial[rows])
     clock = np.concatenate([np.arange(n) / n for n in counts if n])
     return rows[np.argsort(clock, kind="stable")]

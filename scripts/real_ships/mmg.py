@@ -58,16 +58,20 @@ MARGIN = 0.1  # by which the error held out may exceed the least for a stronger 
 
 def overshoot_errors(model: ShipModel, trial: Trial) -> Floats:
     """Errors of two overshoots, rudder reversed at the measured headings, degrees."""
-    heading, length = switch_heading_deg(trial), model.particulars.length
-    measured, sailed = zigzag_indices(trial, length, heading), closed_loop(model, trial)
+    heading = switch_heading_deg(trial)
+    length = model.particulars.length
+    measured = zigzag_indices(trial, length, heading)
+    sailed = closed_loop(model, trial)
+    errors = np.full(2, np.nan)
     if sailed is None:
-        return np.full(2, np.nan)
+        return errors
     found = zigzag_indices(sailed, length, heading)
-    names = ("overshoot_1_deg", "overshoot_2_deg")
-    pairs = [(getattr(measured, name), getattr(found, name)) for name in names]
-    return np.array(
-        [np.nan if None in pair else abs(pair[0] - pair[1]) for pair in pairs]
-    )
+    for k, name in enumerate(("overshoot_1_deg", "overshoot_2_deg")):
+        true = getattr(measured, name)
+        ours = getattr(found, name)
+        if true is not None and ours is not None:
+            errors[k] = abs(true - ours)
+    return errors
 
 
 def all_errors(model: ShipModel, trial: Trial) -> Floats:
@@ -89,8 +93,10 @@ def circle(model: ShipModel, side: float) -> tuple[float | None, ...]:
     except UnstableModelError:
         return (None,) * len(TURN)
     found = turning_indices(run, ship.length)
-    drift = float(np.degrees(np.arctan2(-run["v"][-1], run["u"][-1]))) * side
-    speed = float(np.hypot(run["u"][-1], run["v"][-1])) / ship["speed"]
+    u = run["u"][-1]
+    v = run["v"][-1]
+    drift = float(np.degrees(np.arctan2(-v, u))) * side
+    speed = float(np.hypot(u, v)) / ship["speed"]
     return found.advance_lengths, found.tactical_diameter_lengths, drift, speed
 
 

@@ -138,8 +138,10 @@ def chosen_strength(
         Held out, deg/s, by strength.
     """
     errors = {strength: held_out_error(ship, names, strength) for strength in STRENGTHS}
-    most = (1.0 + TOLERANCE) * min(errors.values())
-    return max(strength for strength, error in errors.items() if error <= most), errors
+    least = min(errors.values())
+    most = (1.0 + TOLERANCE) * least
+    tolerable = [strength for strength, error in errors.items() if error <= most]
+    return max(tolerable), errors
 
 
 def fitted(ship: MeasuredShip, names: Sequence[str]) -> ShipModel:

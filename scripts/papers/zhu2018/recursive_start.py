@@ -121,15 +121,18 @@ def parameters(sway: Floats, yaw: Floats) -> Floats:
 @cache
 def euler_trial(noisy: bool) -> Trial:
     """The ship by Euler's rule at the samples' interval, under the same rudder."""
-    trial, record = zigzag_trial(False), zigzag_trial(noisy)
-    v, r = np.zeros(len(trial)), np.zeros(len(trial))
-    sway, yaw = (
-        TRUTH * INTERVAL / np.array([LENGTH, 1.0, LENGTH, LENGTH**2, LENGTH, LENGTH**2])
-    ).reshape(2, 3)
+    trial = zigzag_trial(False)
+    record = zigzag_trial(noisy)
+    units = np.array([LENGTH, 1.0, LENGTH, LENGTH**2, LENGTH, LENGTH**2])
+    per_step = TRUTH * INTERVAL / units
+    sway, yaw = per_step.reshape(2, 3)
+    v = np.zeros(len(trial))
+    r = np.zeros(len(trial))
     for k, delta in enumerate(-trial["delta"][:-1]):
         U = np.hypot(SPEED, v[k])
         terms = np.array([v[k] * U, r[k] * U, delta * U**2])
-        v[k + 1], r[k + 1] = v[k] + sway @ terms, r[k] + yaw @ terms
+        v[k + 1] = v[k] + sway @ terms
+        r[k + 1] = r[k] + yaw @ terms
     channels = {
         "u": np.full(len(trial), SPEED),
         "v": v,
