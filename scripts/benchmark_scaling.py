@@ -1,4 +1,4 @@
-"""How work grows and is shared out: draws, episodes and ships, with one and two workers.
+"""Growth of work and its sharing out: draws, episodes and ships, one and two workers.
 
     python scripts/benchmark_scaling.py [monte-carlo] [environments] [benchmark] [tasks]
 
@@ -28,7 +28,7 @@ WORKERS = (1, 2)
 
 
 def used() -> tuple[float, float, float]:
-    """Processor time of this process and of the workers that have ended, and the clock's, s."""
+    """Processor time of this process and its ended workers, and the clock's, s."""
     own, others = (
         resource.getrusage(resource.RUSAGE_SELF),
         resource.getrusage(resource.RUSAGE_CHILDREN),
@@ -66,7 +66,7 @@ def head(title: str) -> None:
 
 
 def monte_carlo_table() -> None:
-    """Manoeuvres, course stability, and PID and LQ in one episode each, over models drawn."""
+    """Work per model drawn: manoeuvres, course stability, an episode of PID and LQ."""
     from agents import LQ, PID
     from agents.jobs import JobEngine
     from agents.verification.monte_carlo import monte_carlo

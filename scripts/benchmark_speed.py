@@ -1,4 +1,4 @@
-"""How fast shipgym is, as ratios against named alternatives in the same run, on one core.
+"""Speed of shipgym against named alternatives in the same run, on one core.
 
 python scripts/benchmark_speed.py              a table
 python scripts/benchmark_speed.py physics      a part of it

@@ -4,10 +4,10 @@
     python scripts/best_known.py results
     python scripts/best_known.py results --room 6    # the table of docs/benchmark.md
 
-`zero` is the mean cost of `wheel-over`, designed on the model without tuning. Lower costs
-come from results that are complete; costs that are kept already stay if they are lower.
-Some of those were reached by a search of the rudder on the true ship, its state and the
-weather to come known: they stand in the file as `search`.
+`zero` is the mean cost of `wheel-over`, designed on the model without tuning. Lower
+costs come from results that are complete; costs that are kept already stay if they are
+lower. Some of those were reached by a search of the rudder on the true ship, its state
+and the weather to come known: they stand in the file as `search`.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def lowest(
 def room_table(
     known: dict[str, Any], result: BenchmarkResult, n_episodes: int
 ) -> list[str]:
-    """Return rows of tasks with the room between the best baseline and the best known."""
+    """Rows of tasks with the room between the best baseline and the best known."""
     lines = [
         "| task | best baseline | its cost | best known | room |",
         "| --- | --- | --- | --- | --- |",

@@ -1,4 +1,4 @@
-"""Logs as ships make them: currents, models and autopilots identified from them in current and wind.
+"""Currents, models and autopilots from logs as ships make them, in current and wind.
 
     python scripts/bridge_logs.py [--seeds 8] [--models 2] [--ships kcs,tanker]
     python scripts/bridge_logs.py --wind
@@ -104,7 +104,7 @@ def sailed(
     wind_from: float,
     seed: int,
 ) -> list[Trial]:
-    """Zigzags and a turn of a ship, each begun on another heading, and a turn to the other side."""
+    """Zigzags and a turn, each on another heading, and a turn to the other side."""
     travel = ship.particulars["length"] / ship.particulars["speed"]
     rng = np.random.default_rng(seed)
     runs = []
@@ -143,7 +143,7 @@ def sailed(
 
 
 def logged(run: Trial, seed: int) -> Trial:
-    """What a bridge log holds of a run: GNSS positions at 1 Hz, gyro at 2 Hz, rudder in half degrees."""
+    """Bridge log of a run: GNSS at 1 Hz, gyro at 2 Hz, rudder in half degrees."""
     antenna = run.with_channels(
         {
             "x": run["x"] + ANTENNA * np.cos(run["psi"]),
@@ -180,30 +180,41 @@ def logged(run: Trial, seed: int) -> Trial:
 
 
 def logs_of(ship: ShipModel, seed: int) -> tuple[list[Trial], Weather]:
-    """The logs of a ship and the weather that they were made in; a ship without a shaft logs a steady one."""
-    towards, wind_from = np.random.default_rng(seed).uniform(0.0, 360.0, 2)
-    runs = sailed(ship, CURRENT, towards, WIND, wind_from, 100 * seed)
-    logs = [logged(run, 1000 * seed + k) for k, run in enumerate(runs)]
+    """Logs of a ship and the weather that they were made in.
+
+    A ship without a shaft logs a steady shaft speed.
+    """
+    rng = np.random.default_rng(seed)
+    towards, wind_from = rng.uniform(0.0, 360.0, 2)
     weather = Weather(Current(CURRENT, towards), Wind(WIND, wind_from))
-    return [
-        log if "n" in log else log.with_channels({"n": np.ones(len(log))})
-        for log in logs
-    ], weather
+    runs = sailed(ship, CURRENT, towards, WIND, wind_from, 100 * seed)
+    logs = []
+    for k, run in enumerate(runs):
+        log = logged(run, 1000 * seed + k)
+        if "n" not in log:
+            log = log.with_channels({"n": np.ones(len(log))})
+        logs.append(log)
+    return logs, weather
 
 
 def current_case(ship: ShipModel, seed: int) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Error of the current, north and east, its standard errors, and whether it was found to be one."""
+    """Error of the current, its standard errors, and whether it was found.
+
+    North and east.
+    """
     logs, weather = logs_of(ship, seed)
     towards = np.radians(weather.current.towards_deg)
-    _, found = in_still_water(logs, ship.particulars)
-    row = found["currents"][logs[0].name]
     truth = CURRENT * np.array([np.cos(towards), np.sin(towards)])
-    error = np.array([row["north"], row["east"]]) - truth
-    return error, np.array(row["standard_errors"]), row["taken_out"]
+    _, found = in_still_water(logs, ship.particulars)
+    first = logs[0]
+    row = found["currents"][first.name]
+    estimate = np.array([row["north"], row["east"]])
+    standard_errors = np.array(row["standard_errors"])
+    return estimate - truth, standard_errors, row["taken_out"]
 
 
 def heading_error(result: IdentificationResult) -> float:
-    """Of the turn that was held out, open loop, deg rms; infinite where the model runs away."""
+    """Error of the turn held out, open loop, deg rms; infinite if it runs away."""
     error = result.metrics["trials"][UNSEEN]["rmse"]["psi"]
     return float("inf") if error is None else float(np.degrees(error))
 
@@ -211,7 +222,7 @@ def heading_error(result: IdentificationResult) -> float:
 def autopilots(
     result: IdentificationResult, ship: ShipModel, weather: Weather
 ) -> dict[str, float | str]:
-    """Heading error, deg rms, of the autopilots that are written, on the ship herself in the same weather."""
+    """Heading error, deg rms, of autopilots on the ship herself in the same weather."""
     refused = why_unstable(result) or why_refused(result)
     if refused:
         return {"PID": "refused", "LQ": "refused"}
@@ -321,7 +332,7 @@ def model_table(names: Sequence[str], seeds: range, recipes: Sequence[str]) -> s
 
 
 def wind_table(recipes: Sequence[str]) -> str:
-    """Esso Osaka's zigzags, each predicted from the five others, without and with her wind."""
+    """Esso Osaka's zigzags, each predicted from the five others, with wind or not."""
     ship = ShipFile.load(ROOT / "tests/ships/esso_osaka_3m.toml")
     particulars = replace(ship.particulars, frontal_area=0.135, lateral_area=0.520)
     names = ("t", "u", "v", "r", "psi", "n", "delta")

@@ -1,4 +1,4 @@
-"""Identify the models in the box again, from trials in the repository or simulated with sensor noise.
+"""Identify the models in the box, from recorded or simulated noisy trials.
 
     python scripts/build_models.py [name ...]     write to shipgym/ships/library
     python scripts/build_models.py --check        compare with what is there
@@ -84,7 +84,7 @@ class Recipe:
     shaft: bool = False
 
     def identify(self, name: str) -> IdentificationResult:
-        """The model with how it came about, the ship behind its trials named in its provenance."""
+        """The model with its origin and the ship behind its trials as provenance."""
         known: Any = shipgym.load_model(self.ship)
         shaft = {"service_shaft_speed": known.service_shaft_speed} if self.shaft else {}
         if self.ship == "mariner":
@@ -112,19 +112,19 @@ def mariner_trials() -> tuple[Trial, ...]:
 
 @cache
 def kvlcc2_trials() -> tuple[Trial, ...]:
-    """Zigzags of 10 and 20 degrees to both sides, as the sensors of a sea trial log them."""
+    """Zigzags of 10 and 20 degrees to both sides, logged by sea-trial sensors."""
     return _logged(_zigzags("kvlcc2", IMO_ZIGZAGS, DURATION), 2019)
 
 
 @cache
 def container_trials() -> tuple[Trial, ...]:
-    """Zigzags from 10 degrees to the limit of the rudder, as the sensors of a sea trial log them."""
+    """Zigzags from 10 degrees to the rudder's limit, logged by sea-trial sensors."""
     return _logged(_zigzags("container", CONTAINER_ZIGZAGS, DURATION), 2018)
 
 
 @cache
 def two_zigzags() -> tuple[Trial, ...]:
-    """All that is known of the container ship by a short trial: 10/10 to starboard, 20/20 to port."""
+    """A short trial of the container ship: 10/10 to starboard and 20/20 to port."""
     return _logged(_zigzags("container", (IMO_ZIGZAGS[0], IMO_ZIGZAGS[3])), 300)
 
 
@@ -132,7 +132,7 @@ def two_zigzags() -> tuple[Trial, ...]:
 def sea_trials(
     name: str, shaft_steps: bool = True, turns: bool = True, hard: bool = True
 ) -> tuple[Trial, ...]:
-    """Zigzags 10/10 and 20/20 and turns at 20 degrees to both sides, and steps of the shaft speed.
+    """Zigzags 10/10 and 20/20, turns at 20 degrees, and steps of the shaft speed.
 
     A zigzag 35/30 besides for the ships of `HARD`.
     """
@@ -274,7 +274,7 @@ REJECTED: dict[str, Recipe] = {
 
 
 def standard_errors_apart(model: ShipModel, shipped: ShipModel) -> float:
-    """Largest difference of a coefficient from the shipped one, in its standard errors."""
+    """Largest difference of a coefficient from the shipped one, in standard errors."""
     differences = [
         value - shipped.coefficients[name] for name, value in model.coefficients.items()
     ]
@@ -285,7 +285,7 @@ def standard_errors_apart(model: ShipModel, shipped: ShipModel) -> float:
 def errors(
     model: ShipModel, turns_deg: Sequence[float], *zigzags_deg: Sequence[float]
 ) -> tuple[float, ...]:
-    """Largest errors of a model beside the ship behind it, in turning circles to both sides and in zigzags.
+    """Largest errors of a model in turning circles and zigzags, against its ship.
 
     Of advance and tactical diameter in per cent; then, for each set of angles, of the
     first two overshoots in degrees.
@@ -326,7 +326,7 @@ def _overshoots(model: ShipModel, angle_deg: float, port: bool) -> np.ndarray:
 
 
 def coverage(model: ShipModel) -> tuple[str, str, str]:
-    """How many true derivatives and indices lie inside a model's 95 % intervals, and draws that run away."""
+    """Counts of true values inside a model's 95 % intervals, and of draws that fail."""
     ship = shipgym.truth_of(model)
     deviations = np.sqrt(np.diag(model.covariance))
     alike = model.structure == ship.structure or (model.structure, ship.structure) == (
@@ -373,7 +373,7 @@ def tables(names: Sequence[str]) -> None:
 
 
 def candidates() -> None:
-    """Print by what was chosen, and what the candidates that were not chosen are like."""
+    """Print the criterion of choice, and the candidates that were not chosen."""
     print(
         "| candidate | turns at 28, at 35, % | 5/5, deg | 12/12 to 22/22, deg | holds"
         " her course |\n| --- | --- | --- | --- | --- |"

@@ -1,4 +1,4 @@
-"""How often the 95 % intervals of the standard indices hold the truth, on ships of other equations.
+"""Coverage of the 95 % intervals of standard indices, on ships of other equations.
 
     python scripts/certainty.py [--seeds 3] [--draws 40] [--ships kcs,tanker]
 
@@ -125,7 +125,7 @@ def sea_trials(ship: ShipModel, kind: str, seed: int) -> list[Trial]:
 
 
 def compared(ship: ShipModel) -> dict[str, Manoeuvre]:
-    """The manoeuvres whose indices are compared: the standard ones, and others within the same envelope."""
+    """Manoeuvres of the comparison: the standard ones and others of the envelope."""
     duration, dt = standard_time(ship)
     turn, weave = (
         partial(turning_circle, duration=duration, dt=dt),
@@ -177,7 +177,7 @@ def true_indices(ship: ShipModel) -> Key[float]:
 
 
 def index_intervals(model: ShipModel, draws: int, seed: int = 1) -> Key[IndexInterval]:
-    """The same indices of a model, with their intervals over models drawn from its covariance."""
+    """The same indices of a model, with intervals over draws from its covariance."""
     tests = compared(model)
     own = {run: one.no_indices for run, one in tests.items()}
     found = intervals_of(
@@ -207,7 +207,7 @@ def holds(found: Key[IndexInterval], truth: Key[float]) -> Key[bool]:
 def fitted(
     ship: ShipModel, structure: str, trials: list[Trial]
 ) -> IdentificationResult:
-    """A ship identified by a structure, or `grey-box:SHIP`, which is RM-SVM on a reference ship."""
+    """A ship identified by a structure, or `grey-box:SHIP`: RM-SVM on that ship."""
     table, _, reference = structure.partition(":")
     grey = {"reference_model": reference, "method": "rm-svm"} if reference else {}
     return identify(
@@ -216,7 +216,7 @@ def fitted(
 
 
 def without_fitted(error: dict[str, object]) -> float:
-    """The factor that a model would have if errors on the trials that it was fitted to did not count."""
+    """The factor of a model if errors on the fitted trials did not count."""
     if "fitted" not in error:
         return float(error["factor"])
     sizes = [error[name] for name in ("motion", "indices") if name in error]
@@ -228,7 +228,10 @@ def without_fitted(error: dict[str, object]) -> float:
 
 
 def coverage(ship: ShipModel, model: ShipModel, draws: int) -> dict[str, object]:
-    """Whether the intervals of a model hold a ship's indices: by noise, by trials left out, and by all."""
+    """Flags of intervals that hold a ship's indices.
+
+    By noise, by trials left out, and by all.
+    """
     error = model.provenance["model_error"]
     row: dict[str, object] = {"factor": (factor := error["factor"])}
     truth = true_indices(ship)
@@ -256,7 +259,7 @@ def coverage(ship: ShipModel, model: ShipModel, draws: int) -> dict[str, object]
 def case(
     name: str, structure: str, kind: str, seed: int, draws: int
 ) -> dict[str, object]:
-    """Coverage of one case without and with model error: lists of whether an interval holds the truth."""
+    """Coverage of one case without and with model error, as lists of flags."""
     warnings.simplefilter("ignore")
     ship = ship_of(name)
     result = fitted(ship, structure, sea_trials(ship, kind, seed))
@@ -272,7 +275,7 @@ def case(
 
 
 def share(rows: Sequence[dict[str, object]], label: str, part: str = "") -> str:
-    """Per cent of the intervals that hold the truth, of standard manoeuvres whose name begins so."""
+    """Per cent of the intervals that hold the truth, of manoeuvres with such a name."""
     held = [
         one
         for row in rows

@@ -1,4 +1,4 @@
-"""What `structure = "auto"` chooses, and what it predicts of manoeuvres that it has not seen.
+"""Choices of `structure = "auto"`, and their predictions of unseen manoeuvres.
 
     python scripts/choose_structure.py [--ships kcs,seiun-maru] [--seeds 1]
 

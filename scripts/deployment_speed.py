@@ -1,4 +1,4 @@
-"""Measure what docs/deployment.md publishes: C on this computer and on ARM, an FMU, the live loop.
+"""Measure the figures of docs/deployment.md: C here and on ARM, an FMU, the live loop.
 
 `python scripts/deployment_speed.py [--seconds 60]`; needs gcc and the extras fmu and
 nmea.
@@ -48,7 +48,8 @@ int main(void) {{
         input.{first} = 0.1 * (k % 7);
         sum += {call};
     }}
-    printf("%.4f us a step (%.17g)\\n", (double)(clock() - begin) / CLOCKS_PER_SEC / {steps} * 1e6, sum);
+    double seconds = (double)(clock() - begin) / CLOCKS_PER_SEC;
+    printf("%.4f us a step (%.17g)\\n", seconds / {steps} * 1e6, sum);
     return 0;
 }}
 """
@@ -90,7 +91,7 @@ def timed(source: Source, compiler: str, steps: int, runner: str | None = None) 
 
 
 def real_time_factor(source: Source, version: str) -> float:
-    """Seconds simulated in one by FMPy's loop, at communication steps of the longest step."""
+    """Seconds simulated in one by FMPy, at communication steps of the longest step."""
     import fmpy
 
     with tempfile.TemporaryDirectory() as folder:
@@ -135,7 +136,7 @@ class TimedLQ(LQ):
 
 
 def periods(seconds: float) -> np.ndarray:
-    """Periods of the live loop at 10 Hz, s, with the simulated ship in another process."""
+    """Periods of the live loop at 10 Hz, s, with the ship in another process."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp:127.0.0.1:{server.getsockname()[1]}"
     ship = multiprocessing.Process(target=sail, args=(address, seconds + 60.0))
@@ -197,12 +198,14 @@ def measure_loop(seconds: float) -> None:
         busy = [multiprocessing.Process(target=burn) for _ in range(load)]
         for process in busy:
             process.start()
-        off = np.abs(periods(seconds) - 0.1) * 1e3
+        off_ms = 1e3 * np.abs(periods(seconds) - 0.1)
+        median, most_of_them, largest = np.quantile(off_ms, [0.5, 0.99, 1.0])
+        load_average, *_ = os.getloadavg()
         print(
             f"live loop, {load} busy processes on {os.cpu_count()} cores, load average"
-            f" {os.getloadavg()[0]:.0f}: {len(off)} periods, off 100 ms by"
-            f" {np.median(off):.1f} ms at the median, {np.quantile(off, 0.99):.1f} ms at"
-            f" the 99th percentile, {off.max():.1f} ms at most",
+            f" {load_average:.0f}: {len(off_ms)} periods, off 100 ms by {median:.1f} ms"
+            f" at the median, {most_of_them:.1f} ms at the 99th percentile,"
+            f" {largest:.1f} ms at most",
             flush=True,
         )
         for process in busy:

@@ -1,4 +1,4 @@
-"""Settings of the classical controllers, found for each task by direct search on its cost.
+"""Direct search for the classical controllers' settings, by each task's cost.
 
 Every controller has the same budget: `EVALUATIONS` settings, each tried on the same
 `EPISODES` episodes, whose seeds are never scored. The search is Nelder and Mead's, over
@@ -193,7 +193,7 @@ def is_sane(controller: Controller) -> bool:
 
 
 def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
-    """What is searched of a controller: alternatives, each a list of settings, the design's own first."""
+    """Settings searched of a controller: lists of alternatives, the design's first."""
     if kind in LAWS:
         if not task.task.follows_path:
             raise no_path(kind, task)

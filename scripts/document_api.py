@@ -1,4 +1,4 @@
-"""Write `docs/api`: a page for each public package, with the names of its `__init__.pyi`.
+"""Write `docs/api`: a page for each public package, with its names.
 
 `python scripts/document_api.py`; a test compares the pages with what this writes.
 mkdocstrings puts the docstrings in. One page more has what the other pages, the README
@@ -36,7 +36,7 @@ IMPORT = re.compile(
 
 
 def names(package: str) -> list[str]:
-    """The public names of a package, submodules and constants left out, in the order of its file."""
+    """Public names of a package without submodules and constants, in file order."""
     if (ROOT / package.replace(".", "/")).with_suffix(".py").is_file():
         return list(import_module(package).__all__)
     stub = ROOT / package.replace(".", "/") / "__init__.pyi"
@@ -51,7 +51,10 @@ def names(package: str) -> list[str]:
 
 
 def pages() -> dict[str, str]:
-    """Each page by its file name. A name that several packages have is described once, on the first page."""
+    """Pages by file name.
+
+    A name that several packages have is described once, on the first page.
+    """
     said: dict[str, str] = {}
     written = {}
     for package, purpose in PACKAGES.items():
@@ -79,7 +82,7 @@ def pages() -> dict[str, str]:
 
 
 def imported() -> list[tuple[str, str]]:
-    """Functions and classes that are imported in pages, README and examples, with their modules."""
+    """Names imported in pages, README and examples, with their modules."""
     pages = [path for path in (ROOT / "docs").rglob("*.md") if path.parent != PAGES]
     found = set[tuple[str, str]]()
     for path in (ROOT / "README.md", *pages, *(ROOT / "examples").rglob("*.py")):

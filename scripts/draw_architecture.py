@@ -1,4 +1,6 @@
-"""Draw the pictures of `docs/architecture.md` from the code: rooms with their imports, and a step.
+"""Draw the pictures of `docs/architecture.md` from the code.
+
+They are the rooms with their imports, and a step.
 
 `python scripts/draw_architecture.py`; a test compares the pictures with what this
 draws.
@@ -85,7 +87,7 @@ def modules() -> dict[str, Path]:
 
 
 def imports() -> Edges:
-    """Which file imports which, imports within functions and for type checking counted."""
+    """Imports between files, those in functions and for type checking included."""
     files = modules()
     return {
         (name, other)
@@ -222,54 +224,70 @@ def _box(name: str, place: tuple[float, float]) -> Iterator[str]:
 def _arrows_down(
     short: Edges, both: Edges, places: Mapping[str, tuple[float, float]]
 ) -> Iterator[str]:
-    """Arrows from the lower side of a box to the upper side of another, spread over the sides."""
+    """Arrows from a box's lower side to another's upper side, spread over the sides."""
+
+    def by_place(name: str) -> tuple[float, str]:
+        x, _ = places[name]
+        return x, name
+
     for a, b in sorted(short):
-        (xa, ya), (xb, yb) = places[a], places[b]
+        xa, ya = places[a]
+        xb, yb = places[b]
         if ya == yb:
-            right = xb > xa
-            x1, x2 = (xa + WIDE, xb) if right else (xa, xb + WIDE)
-            path = f"M{x1:g} {ya + HIGH / 2:g} L{x2:g} {yb + HIGH / 2:g}"
+            begin, end = (xa + WIDE, xb) if xb > xa else (xa, xb + WIDE)
+            level = ya + HIGH / 2
+            path = f"M{begin:g} {level:g} L{end:g} {level:g}"
         else:
-            out = sorted(
-                (places[d][0], d) for c, d in short if c == a and places[d][1] > ya
-            )
-            into = sorted(
-                (places[c][0], c) for c, d in short if d == b and places[c][1] < yb
-            )
-            x1 = xa + WIDE * (1 + [d for _, d in out].index(b)) / (1 + len(out))
-            x2 = xb + WIDE * (1 + [c for _, c in into].index(a)) / (1 + len(into))
-            middle = (ya + HIGH + yb) / 2
-            path = (
-                f"M{x1:g} {ya + HIGH:g} C{x1:g} {middle:g} {x2:g} {middle:g} {x2:g}"
-                f" {yb:g}"
-            )
+            below = [d for c, d in short if c == a and places[d][1] > ya]
+            above = [c for c, d in short if d == b and places[c][1] < yb]
+            begin = xa + WIDE * _share(sorted(below, key=by_place), b)
+            end = xb + WIDE * _share(sorted(above, key=by_place), a)
+            bottom = ya + HIGH
+            path = _curve(begin, bottom, end, yb, bend=(bottom + yb) / 2)
         yield line_to(path, both=(a, b) in both)
+
+
+def _share(names: list[str], name: str) -> float:
+    """Part of a side at which the arrow of one of several names stands."""
+    return (1 + names.index(name)) / (1 + len(names))
 
 
 def _arrow_up(a: str, b: str, places: Mapping[str, tuple[float, float]]) -> str:
     """An import against the order, dashed."""
-    (xa, ya), (xb, yb) = places[a], places[b]
+    xa, ya = places[a]
+    xb, yb = places[b]
     if ya == yb:
-        x1, x2, y = xa + WIDE * 0.5, xb + WIDE * 0.2, ya - 22
-        return line_to(
-            f"M{x1:g} {ya:g} C{x1:g} {y:g} {x2:g} {y:g} {x2:g} {yb:g}", dashed=True
-        )
-    side = 0.85 if xb >= xa else 0.15
-    x1, x2 = xa + WIDE * side, xb + WIDE * (0.9 if xb <= xa else 0.1)
-    middle = (ya + yb + HIGH) / 2
-    path = f"M{x1:g} {ya:g} C{x1:g} {middle:g} {x2:g} {middle:g} {x2:g} {yb + HIGH:g}"
-    return line_to(path, dashed=True)
+        begin = xa + WIDE * 0.5
+        end = xb + WIDE * 0.2
+        bend = ya - 22
+        bottom = yb
+    else:
+        begin_side = 0.85 if xb >= xa else 0.15
+        end_side = 0.9 if xb <= xa else 0.1
+        begin = xa + WIDE * begin_side
+        end = xb + WIDE * end_side
+        bend = (ya + yb + HIGH) / 2
+        bottom = yb + HIGH
+    return line_to(_curve(begin, ya, end, bottom, bend), dashed=True)
+
+
+def _curve(x1: float, y1: float, x2: float, y2: float, bend: float) -> str:
+    """Path of a curve that leaves and arrives upright, by way of the height `bend`."""
+    return f"M{x1:g} {y1:g} C{x1:g} {bend:g} {x2:g} {bend:g} {x2:g} {y2:g}"
 
 
 def _legend(y: float) -> Iterator[str]:
-    yield line_to(f"M{LEFT} {y + 8} L{LEFT + 40} {y + 8}")
-    yield text(
-        LEFT + 48, y + 12, "imports; left out where it follows from others", size=11
-    )
-    yield line_to(f"M{LEFT + 340} {y + 8} L{LEFT + 380} {y + 8}", both=True)
-    yield text(LEFT + 388, y + 12, "both ways, without a circle of files", size=11)
-    yield line_to(f"M{LEFT + 640} {y + 8} L{LEFT + 680} {y + 8}", dashed=True)
-    yield text(LEFT + 688, y + 12, "against the order, without a circle", size=11)
+    level = y + 8
+    meanings: list[tuple[int, str, dict[str, bool]]] = [
+        (0, "imports; left out where it follows from others", {}),
+        (340, "both ways, without a circle of files", {"both": True}),
+        (640, "against the order, without a circle", {"dashed": True}),
+    ]
+    for offset, meaning, style in meanings:
+        begin = LEFT + offset
+        end = begin + 40
+        yield line_to(f"M{begin} {level} L{end} {level}", **style)
+        yield text(end + 8, level + 4, meaning, size=11)
 
 
 GIVERS = {
@@ -303,7 +321,7 @@ RAISED = {
 
 
 def stages() -> dict[str, tuple[str, list[tuple[str, str]]]]:
-    """What a step does, in order: docstring of each function, and what it calls, with the givers."""
+    """A step in order: docstring and calls of each function, with the givers."""
     functions = {}
     for name in STEP_FILES:
         functions |= _functions(ENGINE / name)
@@ -334,10 +352,13 @@ def givers() -> dict[str, str]:
 
 def _called(function: ast.FunctionDef) -> list[str]:
     """Names of the functions that a function calls, in the order of its lines."""
-    calls = [node.func for node in ast.walk(function) if isinstance(node, ast.Call)]
-    names = [call for call in calls if isinstance(call, ast.Name)]
+    names = []
+    for node in ast.walk(function):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            names.append(node.func)
     names.sort(key=lambda name: (name.lineno, name.col_offset))
-    return list(dict.fromkeys(name.id for name in names))
+    distinct = dict.fromkeys(name.id for name in names)
+    return list(distinct)
 
 
 def _given(

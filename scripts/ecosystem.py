@@ -143,7 +143,7 @@ def tianshou_native() -> None:
 
 
 class TianshouShips:
-    """A native vector environment made with `autoreset_mode="Disabled"`, as Tianshou's collector uses it.
+    """A native vector environment without autoreset, as Tianshou's collector uses it.
 
     For `collect(n_step=...)`, in which every ship takes every step.
     """
@@ -194,7 +194,7 @@ def cleanrl_single() -> None:
 
 
 def cleanrl_native() -> None:
-    """The same wrappers around a native vector environment, in their forms for vectors."""
+    """The same wrappers in their forms for vectors, around a native environment."""
     from gymnasium.wrappers import vector as w
 
     env = w.NormalizeObservation(w.ClipAction(w.RecordEpisodeStatistics(many())))
@@ -213,7 +213,7 @@ def _cleanrl(envs: Any) -> None:
 
 
 def sb3_wrapped() -> None:
-    """ShipVecEnv around Gymnasium's wrapper of a native vector environment, in stable-baselines3."""
+    """ShipVecEnv around Gymnasium's wrapper of a native one, in stable-baselines3."""
     from gymnasium.wrappers.vector import RecordEpisodeStatistics
     from stable_baselines3 import PPO
 

@@ -1,4 +1,4 @@
-"""Read mutated files of every kind and look for what is neither read nor refused in one message.
+"""Read mutated files of every kind; each has to be read or refused in one message.
 
     python scripts/fuzz.py                              150,000 of each fast kind
     python scripts/fuzz.py --inputs 1000000             a million of each fast kind

@@ -1,4 +1,4 @@
-"""Kernel ships beside the models they correct, on simulated zigzags of KVLCC2's 7 m model with noise.
+"""Kernel ships beside the models that they correct, on simulated noisy zigzags.
 
 python scripts/kernel_ships.py    the table of docs/grey_box.md
 """

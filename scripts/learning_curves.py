@@ -1,9 +1,10 @@
-"""Learning curves of PPO from scratch by the shipped settings, with seeds, against classical autopilots.
+"""Learning curves of PPO from scratch, with seeds, against classical autopilots.
 
-    python scripts/learning_curves.py          six runs of about a minute, and the picture
-    python scripts/learning_curves.py --draw   the picture, from build/learning_curves.json
+    python scripts/learning_curves.py          six runs of a minute, and the picture
+    python scripts/learning_curves.py --draw   the picture alone
 
-The picture is docs/images/learning_curves.png. Costs are means of a hundred episodes
+The picture is docs/images/learning_curves.png, its data
+build/learning_curves.json. Costs are means of a hundred episodes
 held out.
 """
 
@@ -71,7 +72,7 @@ def curves() -> dict[str, Any]:
 
 
 def draw(found: dict[str, Any]) -> None:
-    """Cost against decisions, a line for each seed, and classical autopilots as level lines."""
+    """Cost against decisions, a line a seed; classical autopilots are level lines."""
     import matplotlib
 
     matplotlib.use("agg")

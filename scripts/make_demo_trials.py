@@ -1,4 +1,4 @@
-"""Write the demo's recorded manoeuvres: the Mariner class ship with the sensors of a sea trial.
+"""Write the demo's trials: the Mariner class ship with the sensors of a sea trial.
 
 The reference ship is steered through zigzags and a turning circle by a helmsman who
 reads the noisy compass, and what the ship's sensors would have logged is written as CSV
@@ -42,12 +42,16 @@ YAW_RATE_NOISE = 0.02  # rate gyro, deg/s
 SURGE_NOISE, SWAY_NOISE = 0.03, 0.02  # Doppler log, m/s
 RUDDER_RESOLUTION = 0.1  # feedback, deg
 
-HEADER = "time_s,gnss_north_m,gnss_east_m,compass_deg,log_ahead_kn,log_starboard_kn,gyro_deg_s,rudder_deg"
+HEADER = (
+    "time_s,gnss_north_m,gnss_east_m,compass_deg,log_ahead_kn,log_starboard_kn,"
+    "gyro_deg_s,rudder_deg"
+)
 FORMATS = ("%.1f", "%.2f", "%.2f", "%.2f", "%.3f", "%.3f", "%.3f", "%.1f")
 
 SHIP_FILE = """\
-# The demo: sea trials of a Mariner class cargo ship, simulated with realistic sensor noise by
-# scripts/make_demo_trials.py. Added masses are not given, as in most ships: they are estimated.
+# The demo: sea trials of a Mariner class cargo ship, simulated with realistic sensor
+# noise by scripts/make_demo_trials.py. Added masses are not given, as in most ships:
+# they are estimated.
 
 [ship]
 name = "Mariner class cargo ship"
@@ -122,20 +126,25 @@ def sail(model: ShipModel, order: Order, rng: np.random.Generator) -> Floats:
     array of shape (n_samples, 8)
         Time and the state at each tick of the logger, SI units.
     """
+    heading = model.state_names.index("psi")
     state = model.service_state.copy()
-    state[model.state_names.index("psi")] = np.radians(order.course_deg)
-    side, rows = 1.0, []
+    state[heading] = np.radians(order.course_deg)
+    steps = round(SAMPLING / STEP)
     ticks = round((APPROACH + order.duration) / SAMPLING)
+    side = 1.0
+    rows = []
     for tick in range(ticks + 1):
         time = tick * SAMPLING
         rows.append([time, *state])
-        compass_deg = np.degrees(state[2]) + rng.normal(0.0, HEADING_NOISE)
-        first_turn = np.sign(order.rudder_deg) * (compass_deg - order.course_deg)
+        compass_deg = np.degrees(state[heading]) + rng.normal(0.0, HEADING_NOISE)
+        turned_deg = compass_deg - order.course_deg
+        first_turn = np.sign(order.rudder_deg) * turned_deg
         if order.heading_deg is not None and side * first_turn >= order.heading_deg:
             side = -side
+
         rudder_deg = side * order.rudder_deg if time >= APPROACH else 0.0
-        steps = round(SAMPLING / STEP)
-        ahead = model.simulate(np.full((steps, 1), np.radians(rudder_deg)), STEP, state)
+        rudder = np.full((steps, 1), np.radians(rudder_deg))
+        ahead = model.simulate(rudder, STEP, state)
         state = np.array([ahead[name][-1] for name in model.state_names])
     return np.array(rows)
 

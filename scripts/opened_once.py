@@ -84,7 +84,7 @@ time_constant = {time_constant}
 def verdicts(
     criteria: Mapping[str, Mapping[str, Any]], ship: ShipModel
 ) -> Counter[str]:
-    """How many criteria are decided, and how many of these wrongly; the name of each that is wrong."""
+    """Counts of criteria decided, of wrong decisions, and names of the wrong ones."""
     found: Counter[str] = Counter()
     truth = imo_assessment(ship, 0)
     for name, one in criteria.items():

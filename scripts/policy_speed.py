@@ -1,4 +1,7 @@
-"""Commands per second of a learned policy in NumPy, one core: python scripts/policy_speed.py."""
+"""Commands per second of a learned policy in NumPy, on one core.
+
+python scripts/policy_speed.py
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Predict measured ships and write `docs/real_ships.md`: `python scripts/predict_real_ships.py [a] ... [f]`.
+"""Predict measured ships and write `docs/real_ships.md`.
+
+python scripts/predict_real_ships.py [a] ... [f]
 
 Takes about ten minutes in all, most of it for case a. The measurements lie beside the
 checkout.

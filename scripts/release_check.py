@@ -1,4 +1,4 @@
-"""Build the wheel, install it in clean environments and try what it is for: README's lines, and each extra.
+"""Build the wheel, install it in clean environments and try README and extras.
 
     python scripts/release_check.py                 the core and every extra
     python scripts/release_check.py core report     only these
@@ -40,7 +40,8 @@ from typer.testing import CliRunner
 from agents.cli import app
 for name in typer.main.get_command(app).commands:
     assert CliRunner().invoke(app, [name, "--help"]).exit_code == 0, name
-assert CliRunner().invoke(app, ["identify", "absent.toml", "--out", "out"]).exit_code == 2
+refused = CliRunner().invoke(app, ["identify", "absent.toml", "--out", "out"])
+assert refused.exit_code == 2
 """
 PICTURE = """
 import gymnasium, shipgym
@@ -64,13 +65,15 @@ MINARI = """
 import os
 os.environ["MINARI_DATASETS_PATH"] = os.getcwd()
 import gymnasium, shipgym
-env = shipgym.RecordEpisode(gymnasium.make("shipgym/CourseKeeping-v0", max_episode_steps=3), "episodes")
+env = gymnasium.make("shipgym/CourseKeeping-v0", max_episode_steps=3)
+env = shipgym.RecordEpisode(env, "episodes")
 env.reset(seed=0)
 while not env.step(env.action_space.sample())[3]:
     pass
 episode = shipgym.Episode.load("episodes/episode-00000.json")
 dataset = shipgym.interchange.to_minari([episode], "shipgym/tried-v0")
-assert shipgym.interchange.from_minari(dataset)[0].rewards.tolist() == episode.rewards.tolist()
+(again,) = shipgym.interchange.from_minari(dataset)
+assert again.rewards.tolist() == episode.rewards.tolist()
 """
 (README,) = re.findall(
     r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL
@@ -135,7 +138,7 @@ UV = [sys.executable, "-m", "uv"]
 
 
 def check(wheel: Path, extra: str, resolution: str) -> str:
-    """What went wrong with the wheel and an extra in a clean environment; empty if nothing did."""
+    """Fault of the wheel and an extra in a clean environment; empty if none."""
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
         python = str(home / "env" / "bin" / "python")

@@ -1,4 +1,4 @@
-"""Run the papers' tables again: `python scripts/reproduce.py all`, or one paper, or `requirements`.
+"""Run the papers' tables: `python scripts/reproduce.py all`, a paper, `requirements`.
 
 Two to four minutes in all. `shipgym reproduce` runs this program. Exits with 1 if an
 aim is missed.
@@ -39,7 +39,7 @@ def main(
         ),
     ] = None,
 ) -> None:
-    """Run the papers' tables again: printed, ours their way, ours at its best, and whether the aim is met."""
+    """Run the papers' tables: printed, their way, at best, and aims met."""
     names = papers_of(paper)
     with err.status("starting") as status:
         results = reproduce(names, tell=status.update)

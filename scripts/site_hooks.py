@@ -1,4 +1,4 @@
-"""What the site is built with beside its plugins: equations as MathML, notebooks as pages.
+"""Hooks of the site: equations as MathML, notebooks as pages.
 
 mkdocs calls these functions (`hooks` in `mkdocs.yml`). Equations are drawn by the
 browser itself, so that no script is loaded from elsewhere.
@@ -45,7 +45,7 @@ def _block(latex: str) -> str:
 
 
 def notebook_page(path: Path) -> str:
-    """A notebook as Markdown: text, code, and what the code printed and drew when it was last executed."""
+    """A notebook as Markdown: text, code, and its outputs when last executed."""
     cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
     parts = []
     for cell in cells:

@@ -1,4 +1,4 @@
-"""Sail for a long time with random, extreme and adversarial actions and look for anything that breaks.
+"""Sail for a long time with random, extreme and adversarial actions.
 
     python scripts/soak.py                      10^8 steps
     python scripts/soak.py --steps 10000000     fewer
@@ -61,7 +61,7 @@ class Run:
         return f"{self.id}, {self.model}, {self.kind}"
 
     def make(self) -> Any:
-        """Its vector environment; wild ones are in seas and sail on where others stop."""
+        """Its vector environment; wild ones are in seas and never stop."""
         wild = self.kind != "extreme"
         steps = {"episode_steps": 150} if self.kind == "random" else {}
         options: dict[str, Any] = (
@@ -96,7 +96,7 @@ def runs() -> Iterator[Run]:
 def adversary(
     observations: NDArray[np.float32], space: gymnasium.Space[Any], step: int
 ) -> Any:
-    """Steer away from the course as hard as the ship can, the shaft full ahead and astern by turns."""
+    """Steer away from the course hard, the shaft full ahead and astern by turns."""
     starboard = observations[:, 0] < 0.0
     if isinstance(space, gymnasium.spaces.MultiDiscrete):
         return np.where(starboard, int(space.nvec[0]) - 1, 0)
@@ -142,7 +142,7 @@ def check_inside(run: Run, env: Any, infos: dict[str, Any]) -> None:
 
 
 def sail(run: Run, steps: int, advance: Callable[[int], None]) -> tuple[int, float]:
-    """Take steps in all rows; number of episodes that ended, and growth of memory, MiB."""
+    """Take steps in all rows; count of ended episodes, and growth of memory, MiB."""
     env = run.make()
     random = np.random.default_rng(0)
     env.action_space.seed(0)

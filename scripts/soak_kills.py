@@ -1,4 +1,4 @@
-"""Kill identify, train, tune and benchmark at random moments, go on, and compare with an uninterrupted run.
+"""Kill identify, train, tune and benchmark at random, go on, compare the results.
 
     python scripts/soak_kills.py                50 kills of each
     python scripts/soak_kills.py --kills 10     fewer
@@ -109,7 +109,7 @@ class Victim:
 
 
 def command(words: list[str], home: Path) -> None:
-    """The command line in a folder, with a checkpoint at each boundary of a training."""
+    """The command line in a folder, with a checkpoint at each training boundary."""
     os.chdir(home)
     sys.argv = words
     with (home.parent / f"{home.name}.log").open("w") as log:

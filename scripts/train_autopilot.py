@@ -1,4 +1,4 @@
-"""Train an autopilot by PPO on paths, keep it in a file, and compare it with classical ones.
+"""Train an autopilot by PPO on paths and compare it with classical ones.
 
 python scripts/train_autopilot.py FOLDER
 """
@@ -29,7 +29,7 @@ def on_progress(now: TrainingProgress) -> None:
 def main(
     folder: Annotated[Path, typer.Argument(help="Folder of the training.")],
 ) -> None:
-    """Train, or go on with a training that was stopped, then compare on new episodes."""
+    """Train, or resume a training that was stopped, then compare on new episodes."""
     plan = make_plan(
         TrainingRequest("ppo", environment="path-following", model="mariner", threads=2)
     )

@@ -1,4 +1,4 @@
-"""Train the agents of `agents/pretrained` again, for every task of the benchmark's suite.
+"""Train the agents of `agents/pretrained`, for every task of the suite.
 
     python scripts/train_pretrained.py                              # missing runs
     python scripts/train_pretrained.py --tasks roll-limit --seeds 0,1
@@ -158,7 +158,7 @@ class Run:
 
 
 def print_table(result: BenchmarkResult, tasks: list[str], algorithm: str) -> None:
-    """Print the best baseline, every training seed and the gain, a row for each task."""
+    """Print the best baseline, every training seed and the gain, a row a task."""
     print(f"| {' | '.join(HEADS)} |")
     print(f"|{' --- |' * len(HEADS)}")
     draws = Draws(len(tasks), result.summary["seeds"]["count"])

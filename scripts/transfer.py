@@ -2,8 +2,8 @@
 
     python scripts/transfer.py [TASK ...] --out transfer/    # resumes where it stopped
 
-Each autopilot of a task of the benchmark is made twice in the same way, and both run the
-same 100 episodes on the ship:
+Each autopilot of a task of the benchmark is made twice in the same way, and both run
+the same 100 episodes on the ship:
 
     wheel-over     designed on the model, or on the ship
     tuned          the classical controller that cost least on the model, its settings

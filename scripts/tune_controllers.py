@@ -3,8 +3,8 @@
     python scripts/tune_controllers.py                      # what is missing
     python scripts/tune_controllers.py --tasks sharp-turns --again
 
-The suite's file of tuned settings is written after every controller and task: stopped at
-any moment, it goes on where it was.
+The suite's file of tuned settings is written after every controller and task: stopped
+at any moment, it goes on where it was.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Run the commands of `docs/tutorial.md` and put what they print, shortened, and pictures into the page.
+"""Run the commands of `docs/tutorial.md` and put output and pictures into it.
 
 `python scripts/tutorial.py [FOLDER]`; the folder keeps the log, the ship file and all
 that is written.
@@ -104,7 +104,7 @@ def logged(run: Trial, number: int) -> pd.DataFrame:
 
 
 def run_command(command: str, folder: Path) -> str:
-    """What a command prints, without lines that a page does not need; nothing of one that ends in `&`."""
+    """Output of a command without needless lines; empty if it ends in `&`."""
     if command.endswith("&"):
         subprocess.Popen(
             command[:-1],
@@ -143,7 +143,7 @@ def shortened(lines: list[str], wanted: dict[str, int]) -> list[str]:
 
 
 def environment() -> dict[str, str]:
-    """That of this process, with 100 columns, without colours, and its own programs first."""
+    """Environment of this process: 100 columns, no colours, its own programs first."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     return os.environ | {
         "COLUMNS": "100",
@@ -154,7 +154,7 @@ def environment() -> dict[str, str]:
 
 
 def edited(ship: str, wanted: str) -> str:
-    """A ship file with the lines that a user writes into it: a key where it stands, commented out or not."""
+    """A ship file with a user's lines in it, each key in its place."""
     head, *trials = ship.split("[[trials]]")
     wishes, *of_trials = wanted.split("[[trials]]")
     head = _with_lines(head, wishes)

@@ -1,4 +1,4 @@
-"""Wrong command lines, made from the commands' own parameters: each is refused with one message.
+"""Wrong command lines, made from the commands' parameters: each gets one message.
 
     python scripts/wrong_commands.py               all of them
     python scripts/wrong_commands.py --sample 60   some, drawn
@@ -103,7 +103,7 @@ WRITTEN = (
 
 
 def commands() -> dict[str, Any]:
-    """The commands with all their parameters; `reproduce` leaves them to a script in another process."""
+    """Commands with all their parameters; `reproduce` leaves them to a script."""
     group = typer.main.get_command(app)
     context = typer.Context(group, info_name="shipgym")
     return {
@@ -118,7 +118,7 @@ def commands() -> dict[str, Any]:
 
 
 def lines() -> Iterator[list[str]]:
-    """Every wrong command line; what comes last counts where an option is given twice."""
+    """Every wrong command line; of an option given twice the last counts."""
     yield from (
         ["no-such-command"],
         ["--no-such-option"],

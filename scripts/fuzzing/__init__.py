@@ -1,1 +1,1 @@
-"""The parts of `scripts/fuzz.py`: mutations, kinds of files, and processes that read what comes out."""
+"""The parts of `scripts/fuzz.py`: mutations, kinds of files, reading processes."""

@@ -1,4 +1,4 @@
-"""Write the corpus of the fuzz again: one small sound file, or folder of files, of everything that is read.
+"""Write the corpus of the fuzz: one small sound file of everything that is read.
 
 PYTHONPATH=scripts python -m fuzzing.make_corpus    into tests/corpus
 
@@ -70,7 +70,7 @@ def trials(folder: Path) -> None:
 
 
 def logs(folder: Path) -> None:
-    """A log of each kind: ISO time, positions and rudder; NMEA 0183 with its checksums."""
+    """Logs of each kind: ISO time, positions and rudder; NMEA 0183 with checksums."""
     import pandas as pd
     from scipy.io import savemat
 
@@ -117,7 +117,7 @@ def logs(folder: Path) -> None:
 
 
 def models(folder: Path) -> None:
-    """Tables of terms with a covariance and without, own equations, a grey box, captive tests."""
+    """Tables of terms with and without covariance, grey box, captive tests."""
     folder.joinpath("model").mkdir()
     for name in ("mariner-nomoto", "kvlcc2-rm-svm", "mariner"):
         shipgym.load_model(name).save(folder / "model" / f"{name}.json")

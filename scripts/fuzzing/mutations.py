@@ -1,4 +1,4 @@
-"""One change to the content of a file, by its format: JSON, TOML, CSV, safetensors, Parquet, or bytes."""
+"""One change to a file, by its format: JSON, TOML, CSV, safetensors, Parquet, bytes."""
 
 from __future__ import annotations
 
@@ -334,7 +334,7 @@ DTYPES = (
 
 
 def safetensors_changed(random: Random, content: bytes) -> Change:
-    """The header's length, a type, shape or offset in it, anything in it, or a number of the data."""
+    """Change the header's length, an entry of it, or a number of the data."""
     (length,) = struct.unpack("<Q", content[:8])
     header, data = _json(content[8 : 8 + length]), content[8 + length :]
     said: str | Callable[[], str]
@@ -414,7 +414,7 @@ def _metadata(random: Random, header: Any) -> tuple[Any, Callable[[], str]]:
 
 
 def parquet_changed(random: Random, content: bytes) -> Change:
-    """A column dropped, renamed, of another type, of other length or with other values; or bytes."""
+    """Drop, rename, retype, resize or change a column; or change bytes."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -470,7 +470,7 @@ def parquet_changed(random: Random, content: bytes) -> Change:
 
 
 def zip_changed(random: Random, content: bytes) -> Change:
-    """A change to one member, which is JSON, another zip or bytes, or to which members there are."""
+    """Change one member, which is JSON, a zip or bytes, or the set of members."""
     with zipfile.ZipFile(io.BytesIO(content)) as file:
         members: list[list[Any]] = [
             [one.filename, file.read(one)] for one in file.infolist()

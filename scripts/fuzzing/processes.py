@@ -1,4 +1,4 @@
-"""Chunks of inputs in several processes; one that dies is replaced, and the input at fault reported."""
+"""Chunks of inputs in several processes; a dead one is replaced and reported."""
 
 from __future__ import annotations
 
@@ -86,16 +86,13 @@ def run(
     try:
         while True:
             while work and time.monotonic() < until and len(running) < workers:
-                running.append(_start(kinds, scratch, seed))
-            for worker in running:
-                if worker.chunk is None and work and time.monotonic() < until:
-                    worker.chunk = work.popleft()
-                    worker.seen = (-1, time.monotonic(), worker.spent())
-                    with suppress(OSError):  # one that has ended is noticed below
-                        worker.pipe.send(worker.chunk)
+                worker = _start(kinds, scratch, seed)
+                running.append(worker)
+            _hand_out(work, running, until)
             busy = [worker for worker in running if worker.chunk is not None]
             if not busy:
                 return reports
+
             ready = wait([worker.pipe for worker in busy], timeout=1.0)
             for worker in busy:
                 report = _answer(worker, worker.pipe in ready)
@@ -103,16 +100,28 @@ def run(
                     continue
                 reports[report.kind].add(report)
                 tell(report)
-                if not worker.process.is_alive() or worker.chunk is not None:
-                    again = worker.chunk
+                has_failed = worker.chunk is not None
+                if has_failed or not worker.process.is_alive():
                     _stop(worker)
                     running.remove(worker)
-                    if again is not None:
-                        work.appendleft(again)
+                if worker.chunk is not None:
+                    work.appendleft(worker.chunk)
     finally:
         for worker in running:
             _stop(worker)
         shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _hand_out(work: deque[Chunk], running: Iterable[Worker], until: float) -> None:
+    """Give each idle process a chunk while there are any, and time."""
+    for worker in running:
+        if not work or time.monotonic() >= until:
+            return
+        if worker.chunk is None:
+            worker.chunk = work.popleft()
+            worker.seen = (-1, time.monotonic(), worker.spent())
+            with suppress(OSError):  # one that has ended is noticed by its answer
+                worker.pipe.send(worker.chunk)
 
 
 def _start(kinds: dict[str, Kind], scratch: Path, seed: int) -> Worker:
@@ -134,7 +143,7 @@ def _stop(worker: Worker) -> None:
 
 
 def _answer(worker: Worker, ready: bool) -> Report | None:
-    """What a worker reports; the chunk stays with one that died or is stuck, without the input at fault."""
+    """Report of a worker; a dead or stuck one's chunk stays without that input."""
     chunk = worker.chunk
     assert chunk is not None
     if ready:

@@ -1,4 +1,4 @@
-"""Reading mutated files in this process: what is refused, what is read, and what goes wrong."""
+"""Read mutated files in this process: refusals, readings and faults."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Kind:
 
 
 class HangError(BaseException):
-    """Reading takes too long; not an Exception, so that no reader takes it for one of a file's."""
+    """Reading takes too long; no Exception, so that no reader catches it."""
 
 
 @dataclass
@@ -130,7 +130,7 @@ class Seed:
     odd: set[str] = field(default_factory=set)  # where something else than a file is
 
     def put(self, files: Mapping[str, bytes | str]) -> None:
-        """Write what differs from the seed; a text instead of bytes names what is there instead."""
+        """Write the difference from the seed; a text in place of bytes names them."""
         for name in self.spoilt - files.keys():
             self._write(name, self.files[name])
         self.spoilt = set(files)
@@ -196,7 +196,7 @@ class Reader:
     def run(
         self, first: int, last: int, skip: frozenset[int], tell: Callable[[int], None]
     ) -> Report:
-        """Read inputs by their numbers; `tell` is called with each before it is read."""
+        """Read inputs by number; `tell` is called with each before it is read."""
         report = Report(self.kind.name)
         _forget_peak()
         before, begun = _status("VmRSS"), time.monotonic()
@@ -328,7 +328,7 @@ def _mend(
 
 
 def _site(error: BaseException) -> str:
-    """Type of an exception and the place in the project, or in what it calls, that it came from."""
+    """Type of an exception and the place in the project that it came from."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [
         frame
@@ -349,7 +349,7 @@ def _site(error: BaseException) -> str:
 
 
 def _unfit(error: BaseException) -> str | None:
-    """What is wrong with a refusal: nobody reads a message of pages, and none may fail to be printed."""
+    """Fault of a refusal: too long to be read, or not printable."""
     message = str(error)
     if not isinstance(error, InputError):
         return None

@@ -201,7 +201,7 @@ def at(root: Node, path: Path) -> Node:
 
 
 def changed(root: Node, path: Path, change: Callable[[Node], Node]) -> Node:
-    """Nested values with one of them changed; what is around it is copied, the rest shared."""
+    """Nested values with one changed: its surroundings copied, the rest shared."""
     if not path:
         return change(root)
     copy: Node = dict(root) if isinstance(root, dict) else list(root)

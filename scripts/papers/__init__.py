@@ -1,4 +1,4 @@
-"""The papers' cases, run again: what they print, what comes out their way, and what is best.
+"""The papers' cases: as printed, as computed their way, and at best.
 
 One file or folder per paper. Each has a `PAPER`: a citation and a function that yields
 the rows of its tables. Beside them stand two comparators, and Zhu's requirements R1 to

@@ -1,4 +1,4 @@
-"""Cao et al. 2015: the Mariner's 40 derivatives from one 15/15 zigzag, by sample structure.
+"""Cao et al. 2015: the Mariner's 40 derivatives from one 15/15 zigzag.
 
 500 s simulated with classical Runge-Kutta at 0.1 s and sampled at 0.5 s, no noise;
 LS-SVM with C = 4e6, 6e8 and 6e8. The paper's columns hold r; with r L in its place, and
@@ -202,7 +202,7 @@ def table_rows() -> Iterator[Row]:
 
 
 def prediction_rows() -> Iterator[Row]:
-    """Figures 3 to 10: 25/25 zigzag and 30 deg turning circle by the identified models."""
+    """Figures 3 to 10: 25/25 zigzag and 30 deg turning circle of identified models."""
     figures = {"integral": ("3, 4", "5, 6"), "euler": ("7, 8", "9, 10")}
     for samples, numbers in figures.items():
         ours = as_printed(samples)
@@ -234,7 +234,7 @@ def off(trial: Trial, truth: Trial, channel: str) -> float:
 
 
 def column_rows() -> Iterator[Row]:
-    """What the columns hold, and the constant b: neither is printed as it must have been."""
+    """Meaning of the columns, and the constant b: both are misprinted."""
     for samples, table in (("integral", 2), ("euler", 5)):
         found = errors(as_printed(samples, by_length=False))["X_rr"]
         yield Row(

@@ -1,4 +1,4 @@
-"""Two methods of others beside ours on the papers' cases: an extended Kalman filter and a neural network.
+"""Two other methods on the papers' cases: an extended Kalman filter, a network.
 
 The filter carries the coefficients as states that do not change and starts them from
 zero. The network learns the change of the velocities over a sample from velocities and
@@ -62,7 +62,9 @@ def kalman_history(
     noise: Floats,
     deviation: Floats,
 ) -> Floats:
-    """Coefficients after each sample, by an extended Kalman filter that estimates them with the states.
+    """Coefficients after each sample by an extended Kalman filter.
+
+    The filter estimates them together with the states.
 
     Parameters
     ----------
@@ -83,18 +85,26 @@ def kalman_history(
     -------
     array of shape (n_samples, n_coefficients)
     """
-    m, n = len(noise), len(noise) + len(deviation)
+    m = len(noise)
+    deviations = np.concatenate([noise, deviation])
     state = np.concatenate([measured[0], np.zeros(len(deviation))])
-    covariance = np.diag(np.concatenate([noise, deviation]) ** 2)
-    step = STEP * np.concatenate([noise, deviation])
+    covariance = np.diag(deviations**2)
+    noise_covariance = np.diag(noise**2)
+    # the state itself, and with a small change of each of its components
+    step = STEP * deviations
+    changes = np.column_stack([np.zeros(len(step)), np.diag(step)])
     history = np.zeros((len(measured), len(deviation)))
     for k in range(1, len(measured)):
-        points = state[:, None] + np.column_stack([np.zeros(n), np.diag(step)])
+        points = state[:, None] + changes
         moved = _advanced(rate, points, m, delta[k - 1 : k + 1], interval)
-        jacobian = (moved[:, 1:] - moved[:, :1]) / step
+        predicted = moved[:, 0]
+        jacobian = (moved[:, 1:] - predicted[:, None]) / step
         covariance = jacobian @ covariance @ jacobian.T
-        gain = np.linalg.solve(covariance[:m, :m] + np.diag(noise**2), covariance[:m]).T
-        state = moved[:, 0] + gain @ (measured[k] - moved[:m, 0])
+
+        innovation = measured[k] - predicted[:m]
+        innovation_covariance = covariance[:m, :m] + noise_covariance
+        gain = np.linalg.solve(innovation_covariance, covariance[:m]).T
+        state = predicted + gain @ innovation
         covariance = covariance - gain @ covariance[:m]
         covariance = 0.5 * (covariance + covariance.T)
         history[k] = state[m:]
@@ -102,18 +112,23 @@ def kalman_history(
 
 
 def _advanced(rate: Rate, points: Floats, m: int, delta: Floats, h: float) -> Floats:
-    """Runge-Kutta over one interval, the rudder linear in between; coefficients stay."""
-    x, theta, middle = points[:m], points[m:], 0.5 * float(delta.sum())
-    a = rate(x, theta, float(delta[0]))
+    """Runge-Kutta over an interval, the rudder linear in it, coefficients constant."""
+    x = points[:m]
+    theta = points[m:]
+    first, last = delta.tolist()
+    middle = 0.5 * (first + last)
+    a = rate(x, theta, first)
     b = rate(x + 0.5 * h * a, theta, middle)
     c = rate(x + 0.5 * h * b, theta, middle)
-    d = rate(x + h * c, theta, float(delta[1]))
-    return np.concatenate([x + h / 6.0 * (a + 2.0 * b + 2.0 * c + d), theta])
+    d = rate(x + h * c, theta, last)
+    mean_rate = a + 2.0 * b + 2.0 * c + d
+    moved = x + h / 6.0 * mean_rate
+    return np.concatenate([moved, theta])
 
 
 @cache
 def nomoto_history(structure: str, start: float = START) -> Floats:
-    """Hual Trooper's coefficients from yaw rate and heading as instruments show them (`song2020.trial`)."""
+    """Hual Trooper's coefficients from measured yaw rate and heading."""
     trial = song2020.trial(structure, noisy=True)
     r, delta = trial["r"], trial["delta"]
     columns = [r, delta] if structure == "nomoto" else [r, r**3, delta]
@@ -134,7 +149,7 @@ def nomoto_history(structure: str, start: float = START) -> Floats:
 
 @cache
 def mariner_history(start: float = START) -> Floats:
-    """The six parameters of Table 7.3.2 from the noisy record (`recursive_start.zigzag_trial`)."""
+    """The six parameters of Table 7.3.2 from the noisy zigzag record."""
     trial, length = recursive_start.zigzag_trial(noisy=True), recursive_start.LENGTH
     units = np.array(
         [1 / length, 1.0, 1 / length, 1 / length**2, 1 / length, 1 / length**2]
@@ -160,7 +175,7 @@ def mariner_history(start: float = START) -> Floats:
 
 
 class Network(NamedTuple):
-    """A network that steps velocities on, and the means and sizes that standardise it."""
+    """A network that predicts changes of velocities, and its standardisation."""
 
     weights: Sequence[tuple[Floats, Floats]]
     inputs: tuple[Floats, Floats]
@@ -168,20 +183,23 @@ class Network(NamedTuple):
 
     def run(self, trial: Trial, states: Sequence[str]) -> dict[str, Floats]:
         """The velocities of a trial from its first sample and its rudder."""
-        x, delta = np.array([trial[name][0] for name in states]), trial["delta"]
+        mean, size = self.inputs
+        middle, change = self.changes
+        *hidden, (last_matrix, last_offset) = self.weights
+        x = np.array([trial[name][0] for name in states])
         path = np.empty((len(trial), len(states)))
-        for k in range(len(trial)):
+        for k, rudder in enumerate(trial["delta"]):
             path[k] = x
-            layer = (np.append(x, delta[k]) - self.inputs[0]) / self.inputs[1]
-            for i, (matrix, offset) in enumerate(self.weights):
-                layer = layer @ matrix + offset
-                layer = np.tanh(layer) if i < len(self.weights) - 1 else layer
-            x = x + self.changes[0] + self.changes[1] * layer
+            layer = (np.append(x, rudder) - mean) / size
+            for matrix, offset in hidden:
+                layer = np.tanh(layer @ matrix + offset)
+            output = layer @ last_matrix + last_offset
+            x = x + middle + change * output
         return dict(zip(states, path.T, strict=True))
 
 
 def trained(trials: Sequence[Trial], states: Sequence[str], seed: int) -> Network:
-    """A network of two hidden layers on the changes of some velocities over a sample."""
+    """A network of two hidden layers on the changes of velocities over a sample."""
     X = np.concatenate(
         [
             np.column_stack([trial[c] for c in (*states, "delta")])[:-1]
@@ -274,7 +292,7 @@ def sampled_turn(rudder_deg: float) -> Trial:
 
 
 def filter_rows() -> Iterator[Row]:
-    """Table 7.3.2 of Zhu and section 3.1 of Song by the filter, from three certainties of the start."""
+    """Zhu's Table 7.3.2 and Song's section 3.1 by the filter, from three starts."""
     best = recursive_start.errors(recursive_start.at_best())
     ends = [recursive_start.errors(mariner_history(start)[-1]) for start in STARTS]
     for k, name in enumerate(recursive_start.NAMES):

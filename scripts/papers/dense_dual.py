@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 def dense_dual_solution(
     X: ArrayLike, y: ArrayLike, C: float, fit_intercept: bool = True
 ) -> tuple[Floats, float]:
-    """Coefficients from the dual system as printed, [[0, 1'], [1, X X' + I/C]] [b; alpha] = [0; y].
+    """Coefficients by the dual system [[0, 1'], [1, X X' + I/C]] [b; alpha] = [0; y].
 
     O(n^3) in the number of samples and less accurate than `LSSVM`: an oracle for tests
     and benchmarks.
@@ -32,18 +32,21 @@ def dense_dual_solution(
     coef : array of shape (n_features,)
     intercept : float
     """
-    X, y = np.asarray(X, dtype=float), np.asarray(y, dtype=float)
-    n = len(y)
-    if not fit_intercept:
-        return X.T @ np.linalg.solve(X @ X.T + np.eye(n) / C, y), 0.0
-    multipliers, intercept = dense_dual_multipliers(X, y, C)
+    X = np.asarray(X, dtype=float)
+    y = np.asarray(y, dtype=float)
+    if fit_intercept:
+        multipliers, intercept = dense_dual_multipliers(X, y, C)
+    else:
+        regularisation = np.eye(len(y)) / C
+        multipliers = np.linalg.solve(X @ X.T + regularisation, y)
+        intercept = 0.0
     return X.T @ multipliers, intercept
 
 
 def dense_dual_multipliers(
     X: ArrayLike, y: ArrayLike, C: float
 ) -> tuple[Floats, float]:
-    """Lagrange multipliers of the dual system as printed; by it the errors are multipliers / C.
+    """Lagrange multipliers of the dual system; the errors are multipliers / C.
 
     Parameters
     ----------
@@ -55,8 +58,11 @@ def dense_dual_multipliers(
     multipliers : array of shape (n_samples,)
     intercept : float
     """
-    X, y = np.asarray(X, dtype=float), np.asarray(y, dtype=float)
-    solution = np.linalg.solve(_dual_matrix(X, C), np.concatenate([[0.0], y]))
+    X = np.asarray(X, dtype=float)
+    y = np.asarray(y, dtype=float)
+    matrix = _dual_matrix(X, C)
+    right_side = np.concatenate([[0.0], y])
+    solution = np.linalg.solve(matrix, right_side)
     return solution[1:], float(solution[0])
 
 
@@ -85,17 +91,25 @@ def dense_truncated_solution(
     coef : array of shape (n_features,)
     intercept : float
     """
-    X, y = np.asarray(X, dtype=float), np.asarray(y, dtype=float)
+    X = np.asarray(X, dtype=float)
+    y = np.asarray(y, dtype=float)
+    right_side = np.concatenate([[0.0], y])
     left, values, right = np.linalg.svd(_dual_matrix(X, C))
-    projected = left[:, :rank].T @ np.concatenate([[0.0], y])
-    solution = right[:rank].T @ (projected / values[:rank])
-    return X.T @ solution[1:], float(solution[0])
+    kept_left = left[:, :rank]
+    kept_right = right[:rank]
+    projected = kept_left.T @ right_side
+    solution = kept_right.T @ (projected / values[:rank])
+    intercept = float(solution[0])
+    multipliers = solution[1:]
+    return X.T @ multipliers, intercept
 
 
 def _dual_matrix(X: Floats, C: float) -> Floats:
     n = len(X)
     matrix = np.ones((n + 1, n + 1))
     matrix[0, 0] = 0.0
-    np.matmul(X, X.T, out=matrix[1:, 1:])
-    matrix[np.arange(1, n + 1), np.arange(1, n + 1)] += 1.0 / C
+    products = matrix[1:, 1:]  # a view
+    np.matmul(X, X.T, out=products)
+    diagonal = np.arange(n)
+    products[diagonal, diagonal] += 1.0 / C
     return matrix

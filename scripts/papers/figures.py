@@ -1,4 +1,4 @@
-"""The figures of `docs/reproduction.md`, drawn with matplotlib from what the rows are made of."""
+"""The figures of `docs/reproduction.md`, drawn from the data of the rows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mei et al. 2019: a tanker and a linear support vector regression as a model of KVLCC2 (RM-SVM).
+"""Mei et al. 2019: a tanker and a linear SVR as a model of KVLCC2 (RM-SVM).
 
 Two target ships. MARIN's zigzags of 2007, which the paper learns from, are no part of
 this project: their rows are run where the files lie beside the checkout. The MMG model
@@ -124,7 +124,7 @@ def selection_rows() -> Iterator[Row]:
 
 
 def virtual_rows() -> Iterator[Row]:
-    """The MMG model as the target: errors of the turns, and of what figures 8 and 9 draw."""
+    """The MMG model as target: errors of the turns and of figures 8 and 9."""
     target, hull = virtual(), same_hull()
     fits = (papers_way(target).model, our_way(target, hull).model)
     bare = (target.bare(TANKER), target.bare(hull))
@@ -184,7 +184,7 @@ def _virtual_row(
 
 
 def tanker_rows() -> Iterator[Row]:
-    """How far the tanker leads at best, and why not further: the same terms, taught the turns themselves."""
+    """The tanker's least error: the same terms, fitted to the turns themselves."""
     target = virtual()
     ours, hindsight = our_way(target, TANKER).model, taught_the_turns(HARD)
     for rudder in (HARD, -HARD):
@@ -217,7 +217,7 @@ def tanker_rows() -> Iterator[Row]:
 
 
 def figure_rows(target: Target | None) -> Iterator[Row]:
-    """Figure 5: reference ship against target; 6: what the pattern search finds; 7: the 20/20 zigzag."""
+    """Figures 5 (reference and target), 6 (pattern search) and 7 (20/20 zigzag)."""
     pairs = _figure_pairs(target)
     for q, word, printed in (
         ("u", "surge", 0.99),
@@ -264,7 +264,7 @@ def figure_rows(target: Target | None) -> Iterator[Row]:
 
 
 def _figure_pairs(target: Target | None) -> dict[str, Pair]:
-    """Their way and at best, by what is compared; nothing where the data is not at hand."""
+    """Errors their way and at best, by quantity; empty where the data is missing."""
     if target is None:
         return {}
     fits = (papers_way(target), our_way(target, TANKER))
@@ -338,7 +338,7 @@ def turn_rows(target: Target | None) -> Iterator[Row]:
 
 
 def _measured_models(target: Target | None) -> dict[str, list[ShipModel]]:
-    """Their way and at best, and the bare reference beside; none where the data is not at hand."""
+    """Errors their way, at best and of the bare reference; none without the data."""
     if target is None:
         return {"": [], BARE: []}
     return {

@@ -1,4 +1,4 @@
-"""The target ships of Mei 2019, and the models of them that the rows of its tables compare."""
+"""The target ships of Mei 2019, and the models of them in its tables."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ class Target:
 
 @cache
 def virtual() -> Target:
-    """The MMG model of KVLCC2 at model scale, sampled without noise at what is 1 Hz at full scale."""
+    """The MMG model of KVLCC2 at model scale without noise, at 1 Hz at full scale."""
     ship = load_model("kvlcc2-l7")
     second = float(
         np.sqrt(ship.particulars.length / load_model("kvlcc2").particulars.length)
@@ -177,7 +177,7 @@ def virtual() -> Target:
 
 
 def _recorded(run: Trial, ship: ShipModel, name: str) -> Trial:
-    """What the paper's towing tank records: every so many steps, no orders, the shaft speed."""
+    """Record of the paper's tank: every so many steps, shaft speed, no orders."""
     channels = {
         c: run[c][::STEPS_PER_SAMPLE] for c in ("x", "y", "psi", "u", "v", "r", "delta")
     }
@@ -193,7 +193,7 @@ def _recorded(run: Trial, ship: ShipModel, name: str) -> Trial:
 
 @cache
 def measured(folder: Path = DATA) -> Target | None:
-    """MARIN's zigzags, scaled to the ship, at about 1 Hz; None where the files are not at hand."""
+    """MARIN's zigzags scaled to the ship, at 1 Hz; None where the files are missing."""
     if not all((folder / f"{file}.csv").is_file() for file in FILES.values()):
         return None
     ship = load_model("kvlcc2")
@@ -224,24 +224,24 @@ def _second_by_second(trial: Trial) -> Trial:
 
 @cache
 def papers_way(target: Target) -> IdentificationResult:
-    """The tanker as reference, constants free, pattern search on the correlation of headings."""
+    """The tanker as reference by pattern search on the correlation of headings."""
     return target.fit(TANKER, **PAPERS_WAY)
 
 
 @cache
 def our_way(target: Target, reference: str) -> IdentificationResult:
-    """The weight of the errors by what fits of the 10/10s predict of the 20/20s; search on rms errors."""
+    """As reference by search on rms errors, weighted by 10/10 fits of the 20/20s."""
     return target.fit(reference, folds=LARGEST_RUDDER)
 
 
 @cache
 def usual_way(target: Target, reference: str) -> IdentificationResult:
-    """As `our_way`, with the weight by what fits of three trials predict of the fourth."""
+    """As `our_way`, weighted by fits of three trials that predict the fourth."""
     return target.fit(reference, folds=TRIALS)
 
 
 def same_hull() -> str:
-    """The reference ship most like the virtual ship, other than herself: her hull at full scale."""
+    """The other reference ship most like the virtual ship, at full scale."""
     target = virtual()
     return select_reference(
         target.ship.particulars, tuple(target.trials[0].channels), CANDIDATES
@@ -250,7 +250,7 @@ def same_hull() -> str:
 
 @cache
 def taught_the_turns(rudder_deg: float) -> ShipModel:
-    """The tanker and linear terms, by least squares of the zigzags and of the turns to be predicted."""
+    """The tanker and linear terms by least squares of zigzags and target turns."""
     target = virtual()
     ship, gear = target.ship.particulars, target.ship.steering
     turns = [
@@ -278,7 +278,9 @@ def taught_the_turns(rudder_deg: float) -> ShipModel:
 
 
 def acceleration_correlations(target: Target, model: ShipModel) -> dict[str, float]:
-    """Pearson correlation of a grey box's accelerations with the measured ones, means over windows.
+    """Correlation of a grey box's accelerations with measured ones.
+
+    Pearson's, of means over windows.
 
     Parameters
     ----------
@@ -314,7 +316,7 @@ def acceleration_correlations(target: Target, model: ShipModel) -> dict[str, flo
 
 
 def heading_correlation(target: Target, fit: IdentificationResult) -> float:
-    """Pearson correlation of simulated and measured heading in the 20/20 zigzag to starboard."""
+    """Pearson correlation of simulated and measured heading, 20/20 to starboard."""
     prediction = fit.predictions[SHOWN]
     assert prediction is not None
     return float(np.corrcoef(prediction["psi"], target.trial(SHOWN)["psi"])[0, 1])

@@ -1,4 +1,4 @@
-"""The papers' tables beside ours: for the terminal, for programs, and as a page of the documentation."""
+"""The papers' tables beside ours, for terminal, programs and documentation."""
 
 from __future__ import annotations
 
@@ -17,20 +17,22 @@ HEADINGS = ("case", "quantity", "printed", "{ours}", "agrees", "at best", "aim",
 NUMBERS = ("printed", "{ours}", "at best")
 INTRODUCTION = """# The papers' tables, run again
 
-Written by `python scripts/reproduce.py all --markdown docs/reproduction.md`. *Printed* is the paper's number;
-*as the paper* is our number by the paper's method on the same case; *at best* is ours by the best method in
-shipgym, on the same data. A cell is empty where the paper shows only a picture or does not publish its data;
-the note, whose number is in the last column, then says what is used instead.
+Written by `python scripts/reproduce.py all --markdown docs/reproduction.md`. *Printed*
+is the paper's number; *as the paper* is our number by the paper's method on the same
+case; *at best* is ours by the best method in shipgym, on the same data. A cell is empty
+where the paper shows only a picture or does not publish its data; the note, whose
+number is in the last column, then says what is used instead.
 
-*Agrees* says whether *as the paper* equals the printed number within 10 % or within the rounding of the
-printed digits. *Met* is a different question: whether *at best* reaches the aim. An aim is counted once, even
-if several rows show the same number. The conclusions of each paper come before its tables, each with the rows
-that confirm or contradict it and with what "accurate" or "better" was taken to mean.
+*Agrees* says whether *as the paper* equals the printed number within 10 % or within the
+rounding of the printed digits. *Met* is a different question: whether *at best* reaches
+the aim. An aim is counted once, even if several rows show the same number. The
+conclusions of each paper come before its tables, each with the rows that confirm or
+contradict it and with what "accurate" or "better" was taken to mean.
 """
 
 
 def papers_of(name: str) -> tuple[str, ...]:
-    """Short names of the papers asked for: one, or all, with the requirements after them.
+    """Short names of the papers asked for: one or all, the requirements last.
 
     Raises
     ------
@@ -101,13 +103,21 @@ def page(results: Mapping[str, Sequence[Row]]) -> str:
 def _overview(results: Mapping[str, Sequence[Row]]) -> list[str]:
     """Verdicts, agreement and aims of each paper, a line each."""
     words = (CONFIRMED, CONTRADICTED, NOT_TESTABLE)
-    lines = ["| | " + " | ".join((*words, "agree with print", "aims met")) + " |"]
-    lines.append("| --- " + "| ---: " * (len(words) + 2) + "|")
+    headings = (*words, "agree with print", "aims met")
+    lines = [
+        "| | " + " | ".join(headings) + " |",
+        "| --- " + "| ---: " * len(headings) + "|",
+    ]
     for name, rows in results.items():
-        verdicts = [one.verdict(rows) for one in get_paper(name).conclusions]
-        counts = [str(verdicts.count(word)) if verdicts else "" for word in words]
-        cells = (*counts, _share(*_agreement(rows)), _share(*aims(rows)))
-        lines.append(f"| [{name}](#{name}) | " + " | ".join(cells) + " |")
+        paper = get_paper(name)
+        verdicts = [one.verdict(rows) for one in paper.conclusions]
+        cells = [f"[{name}](#{name})"]
+        for word in words:
+            count = verdicts.count(word)
+            cells.append(str(count) if verdicts else "")
+        cells.append(_share(*_agreement(rows)))
+        cells.append(_share(*aims(rows)))
+        lines.append("| " + " | ".join(cells) + " |")
     return [*lines, ""]
 
 
@@ -195,7 +205,7 @@ def _found(row: Row) -> str:
 
 
 def _requirements(requirements: Sequence[Requirement]) -> list[str]:
-    """What has to be, why it is, and the tests and tables that show it; none for a paper's tables."""
+    """Requirement, reason, and the tests and tables that show it; none for a paper."""
     if not requirements:
         return []
     lines = [

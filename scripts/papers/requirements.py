@@ -1,4 +1,4 @@
-"""Zhu's requirements R1 to R8 (Zhu 2018, chapter 2): why each holds, and what it measures.
+"""Zhu's requirements R1 to R8 (Zhu 2018, chapter 2): reasons and measurements.
 
 On the thesis' own case: the container ship's 10/10 zigzag, 1800 samples of 0.5 s, for
 steering of four terms (row 6 of Tables 7.4.9 and 7.4.10), and a straight line with
@@ -201,10 +201,14 @@ def steering(structure: str = "steering5") -> IdentificationResult:
 def straight_line(seed: int, use: str) -> Trial:
     """Rudder amidships, a new shaft speed every 150 s."""
     ship = load_model("container")
-    steps = round(150.0 / 0.1)
-    orders = np.random.default_rng(seed).uniform(0.6, 1.4, 6) * ship.service_shaft_speed
-    commands = np.column_stack([np.zeros(6 * steps), np.repeat(orders, steps)])
-    return recorded(ship.simulate(commands, 0.1), f"straight line {seed}", use)
+    dt = 0.1
+    steps = round(150.0 / dt)
+    rng = np.random.default_rng(seed)
+    orders = rng.uniform(0.6, 1.4, 6) * ship.service_shaft_speed
+    shaft = np.repeat(orders, steps)
+    rudder = np.zeros(shaft.size)
+    run = ship.simulate(np.column_stack([rudder, shaft]), dt)
+    return recorded(run, f"straight line {seed}", use)
 
 
 @cache
@@ -408,7 +412,7 @@ def start_rows() -> Iterator[Row]:
 
 
 def duality_gap(X: Floats, y: Floats, weight: float) -> float:
-    """Primal less dual value at the solution, by the primal one: 0 only at the global minimum."""
+    """Duality gap by the primal value: 0 only at the global minimum."""
     estimator = LSSVM(C=weight, scale=False).fit(X, y)
     error = y - estimator.predict(X)
     primal = 0.5 * float(estimator.coef_ @ estimator.coef_) + 0.5 * weight * float(

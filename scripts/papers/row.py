@@ -1,4 +1,4 @@
-"""A line of a reproduction (printed, ours as the paper did it, ours at best) and what a paper concludes."""
+"""A row of a reproduction (printed, their way, at best) and a paper's conclusions."""
 
 from __future__ import annotations
 
@@ -46,21 +46,23 @@ class Row:
 
     @property
     def agrees(self) -> bool | None:
-        """Whether ours by the paper's method is what is printed; None where one of the two is lacking.
+        """Whether ours by the paper's method agrees with print; None if one is absent.
 
         Within 10 %, or by what rounding to the printed digits hides.
         """
         if self.printed is None or self.as_paper is None:
             return None
         mantissa, _, power = f"{self.printed:.4g}".partition("e")
-        hidden = 0.5 * 10.0 ** (int(power or 0) - len(mantissa.partition(".")[2]))
-        return abs(self.as_paper - self.printed) <= max(
-            AGREEMENT * abs(self.printed), hidden
-        )
+        _, _, decimals = mantissa.partition(".")
+        last_digit = int(power or 0) - len(decimals)
+        hidden = 0.5 * 10.0**last_digit
+        tolerance = AGREEMENT * abs(self.printed)
+        difference = abs(self.as_paper - self.printed)
+        return difference <= max(tolerance, hidden)
 
     @property
     def figure(self) -> object:
-        """What its aim is about: rows of the same measured number at best share one aim."""
+        """Subject of its aim: rows of the same number at best share one aim."""
         found = self.as_paper if self.best is None else self.best
         return (
             (self.quantity, found)
@@ -115,7 +117,7 @@ class Conclusion:
         return [by_name[name] for name in self.shown_by if name in by_name]
 
     def verdict(self, rows: Sequence[Row]) -> str:
-        """`confirmed`, `contradicted`, or `not testable`, also where the rows' data is not at hand."""
+        """`confirmed`, `contradicted`, or `not testable`, as without the rows' data."""
         shown = self.rows(rows)
         found = [
             row for row in shown if row.as_paper is not None or row.best is not None

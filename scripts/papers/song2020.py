@@ -1,4 +1,4 @@
-"""Song 2020: Nomoto's coefficients of Hual Trooper sample by sample, and Yukun's four motions.
+"""Song 2020: Nomoto's coefficients of Hual Trooper, and Yukun's four motions.
 
 Rudder, duration, sampling time, start and omega of the paper's runs are not printed;
 Yukun's trials, propeller and rudder are not published. In their place stand zigzags of
@@ -79,7 +79,7 @@ FAR = (
 
 
 def ship(structure: str, coefficients: Mapping[str, float] | None = None) -> ShipModel:
-    """Hual Trooper by Nomoto's equation (`nomoto`) or with the cube of r (`norrbin`)."""
+    """Hual Trooper by Nomoto's equation (`nomoto`), or with r^3 (`norrbin`)."""
     values = dict(coefficients or TRUTH[structure])
     return ShipModel(PARTICULARS.name, structure, PARTICULARS, SteeringGear(), values)
 
@@ -123,7 +123,7 @@ def regression(structure: str) -> tuple[Floats, Floats]:
 def gradient(
     X: Floats, y: Floats, omega: float = 0.0, gain: float = 1.0, scale: bool = True
 ) -> tuple[Floats, float]:
-    """The coefficients after the last sample, shape (n_terms,), and the largest |omega e|."""
+    """Coefficients after the last sample, shape (n_terms,), and largest |omega e|."""
     history, largest = gradient_history(X, y, omega, gain, scale)
     return np.asarray(history[-1]), largest
 
@@ -131,7 +131,7 @@ def gradient(
 def gradient_history(
     X: Floats, y: Floats, omega: float = 0.0, gain: float = 1.0, scale: bool = True
 ) -> tuple[Floats, float]:
-    """Equations 3-3 to 3-8 as printed: the innovation e, or tanh(omega e), by the sum of squares.
+    """Equations 3-3 to 3-8 as printed, with the innovation e or tanh(omega e).
 
     Parameters
     ----------
@@ -151,16 +151,18 @@ def gradient_history(
     largest : float
         The largest |omega e|, which tells whether the tanh bends.
     """
-    size = np.sqrt(np.mean(X**2, axis=0)) if scale else np.ones(X.shape[1])
-    theta, total, largest, history = np.zeros(X.shape[1]), 0.0, 0.0, np.empty(X.shape)
+    n_terms = X.shape[1]
+    size = np.sqrt(np.mean(X**2, axis=0)) if scale else np.ones(n_terms)
+    theta = np.zeros(n_terms)
+    total = 0.0  # sum of squares of the regressors so far
+    largest = 0.0
+    history = np.empty(X.shape)
     for k, (phi, target) in enumerate(zip(X / size, y.tolist(), strict=True)):
         error = target - float(phi @ theta)
         total += float(phi @ phi)
         if total > 0.0:
-            theta = (
-                theta
-                + gain * (np.tanh(omega * error) if omega else error) / total * phi
-            )
+            innovation = np.tanh(omega * error) if omega else error
+            theta = theta + gain * innovation / total * phi
             largest = max(largest, abs(omega * error))
         history[k] = theta / size
     return history, largest
@@ -177,7 +179,7 @@ def by_gradient(structure: str, method: str) -> dict[str, float]:
 
 @cache
 def at_best(structure: str, noisy: bool = False) -> dict[str, float]:
-    """Inverse-free multi-innovation least squares on splines; with noise refined by simulation."""
+    """Inverse-free multi-innovation least squares on splines; noise is refined."""
     run = trial(structure, noisy)
     if noisy:
         return dict(
@@ -192,9 +194,11 @@ def at_best(structure: str, noisy: bool = False) -> dict[str, float]:
 
 def indices(coefficients: Mapping[str, float]) -> dict[str, float]:
     """K and T of the linear equation; alpha and beta of the other."""
-    c_r, c_d = coefficients["c_r"], coefficients["c_d"]
+    c_r = coefficients["c_r"]
+    c_d = coefficients["c_d"]
     if "c_r3" in coefficients:
-        return {"alpha": -c_r / c_d, "beta": -coefficients["c_r3"] / c_d}
+        c_r3 = coefficients["c_r3"]
+        return {"alpha": -c_r / c_d, "beta": -c_r3 / c_d}
     return {"K": -c_d / c_r, "T": -1.0 / c_r}
 
 
@@ -278,7 +282,7 @@ def ratio_rows() -> Iterator[Row]:
 
 
 def innovation_rows() -> Iterator[Row]:
-    """What the tanh does: nothing, but for the factor omega of the step, which slows it down."""
+    """Effect of the tanh: only the factor omega of the step, which slows it down."""
     X, y = regression("nomoto")
     truth = indices(TRUTH["nomoto"])
 
@@ -395,7 +399,7 @@ def prediction_rows() -> Iterator[Row]:
 
 
 def time_rows() -> Iterator[Row]:
-    """Chapter 4: the same least squares with a matrix inverse (MILS) and without (TMILS)."""
+    """Chapter 4: least squares with a matrix inverse (MILS) and without (TMILS)."""
     X, y = regression("norrbin")
 
     def seconds(length: int, inverse_free: bool) -> tuple[float, Floats]:

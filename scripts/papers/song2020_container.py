@@ -87,36 +87,38 @@ def recorded(angle: float, heading: float) -> Trial:
 
 
 def thrust_and_rudder(u: Any, v: Any, r: Any, delta: Any, n: Any) -> tuple[Any, Any]:
-    """Thrust and normal force of the rudder, prime system, from velocities in SI units."""
-    L, U = own.LENGTH, np.hypot(u, v)
-    u_, v_, r_ = u / U, v / U, r * L / U
-    u_P = u_ * (
-        1.0 - own.PUBLISHED.wp + own.PUBLISHED.tau * (v_ + own.PUBLISHED.xp * r_) ** 2
-    )
-    J = u_P * U / (n * own.DIAMETER)
+    """Rudder thrust and normal force, prime system, from velocities in SI units."""
+    ship = own.PUBLISHED
+    L = own.LENGTH
+    D = own.DIAMETER
+    U = np.hypot(u, v)
+    u_ = u / U
+    v_ = v / U
+    r_ = r * L / U
+    u_P = u_ * (1.0 - ship.wp + ship.tau * (v_ + ship.xp * r_) ** 2)
+    J = u_P * U / (n * D)
     K_T = 0.527 - 0.455 * J
-    thrust = 2.0 * own.DIAMETER**4 / (L * L) * K_T * n * np.abs(n) / U**2
+    thrust = 2.0 * D**4 / (L * L) * K_T * n * np.abs(n) / U**2
+
     v_R = (
-        own.PUBLISHED.gamma * v_
-        + own.PUBLISHED.c_Rr * r_
-        + own.PUBLISHED.c_Rrrr * r_**3
-        + own.PUBLISHED.c_Rrrv * r_**2 * v_
+        ship.gamma * v_
+        + ship.c_Rr * r_
+        + ship.c_Rrrr * r_**3
+        + ship.c_Rrrv * r_**2 * v_
     )
-    u_R = (
-        u_P
-        * own.PUBLISHED.epsilon
-        * np.sqrt(1.0 + 8.0 * own.PUBLISHED.kappa / np.pi * K_T / J**2)
-    )
-    lift = (
-        6.13 * own.ASPECT_RATIO / (own.ASPECT_RATIO + 2.25) * own.RUDDER_AREA / (L * L)
-    )
-    return thrust, -lift * (u_R**2 + v_R**2) * np.sin(delta + np.arctan2(v_R, u_R))
+    race = np.sqrt(1.0 + 8.0 * ship.kappa / np.pi * K_T / J**2)
+    u_R = u_P * ship.epsilon * race
+    aspect = own.ASPECT_RATIO
+    lift = 6.13 * aspect / (aspect + 2.25) * own.RUDDER_AREA / (L * L)
+    inflow = np.arctan2(v_R, u_R)
+    normal = -lift * (u_R**2 + v_R**2) * np.sin(delta + inflow)
+    return thrust, normal
 
 
 def regressors(
     motion: Mapping[str, Any], hull: Mapping[str, str] = HULL
 ) -> dict[str, list[Any]]:
-    """Equation 4-2 by equation of motion, prime system; the rudder stands last, before it in surge thrust.
+    """Terms of equation 4-2, prime system: rudder last, in surge after the thrust.
 
     The paper's F_N is positive for a positive rudder angle, the container ship's is its
     opposite.
@@ -153,32 +155,42 @@ def _product(values: Mapping[str, Any], powers: tuple[tuple[str, int], ...]) -> 
 
 
 def known_forces(motion: Mapping[str, Any]) -> dict[str, Any]:
-    """What equation 4-5 takes for known: centripetal forces and the righting moment, prime system."""
-    U, L = np.hypot(motion["u"], motion["v"]), own.LENGTH
-    u, v, r = motion["u"] / U, motion["v"] / U, motion["r"] * L / U
+    """Known part of equation 4-5: centripetal forces and righting moment, prime."""
+    L = own.LENGTH
+    U = np.hypot(motion["u"], motion["v"])
+    u = motion["u"] / U
+    v = motion["v"] / U
+    r = motion["r"] * L / U
+    hull = own.PUBLISHED
     righting = own.WEIGHT / (0.5 * L * L) * own.GM / L / U**2
     return {
-        "u": (own.PUBLISHED.m + own.PUBLISHED.my) * v * r,
-        "v": -(own.PUBLISHED.m + own.PUBLISHED.mx) * u * r,
+        "u": (hull.m + hull.my) * v * r,
+        "v": -(hull.m + hull.mx) * u * r,
         "r": 0.0 * r,
-        "p": own.PUBLISHED.mx * own.PUBLISHED.lx * u * r - righting * motion["phi"],
+        "p": hull.mx * hull.lx * u * r - righting * motion["phi"],
     }
 
 
 def inertia_matrix() -> Floats:
-    """From accelerations in surge, sway, yaw and roll, times length of the angular ones, to prime forces."""
-    ship, L = load_model("container"), own.LENGTH
+    """From accelerations in surge, sway, yaw and roll to prime forces.
+
+    Angular accelerations are times length.
+    """
+    L = own.LENGTH
+    prime_mass = 0.5 * 1025.0 * L**3
+    lengths = np.array([1.0, 1.0, L, L])
     matrix = np.zeros((4, 4))
-    matrix[:3] = inertia(ship) / (0.5 * 1025.0 * L**3) / np.array([1.0, 1.0, L, L])
+    matrix[:3] = inertia(load_model("container")) / prime_mass / lengths
     matrix[2] /= L
-    matrix[3, :3], matrix[3, 3] = matrix[:3, 3], own.PUBLISHED.Ix + own.PUBLISHED.Jx
+    matrix[3, :3] = matrix[:3, 3]
+    matrix[3, 3] = own.PUBLISHED.Ix + own.PUBLISHED.Jx
     return matrix
 
 
 def regression(
     trial: Trial, hull: Mapping[str, str] = HULL
 ) -> dict[str, tuple[Floats, Floats]]:
-    """Equation 4-8: regressors and what is left of the forces, accelerations by central differences."""
+    """Equation 4-8: regressors and remaining forces, by central differences."""
     motion = {name: trial[name] for name in CHANNELS}
     speed = np.hypot(trial["u"], trial["v"])
     lengths = np.array([1.0, 1.0, own.LENGTH, own.LENGTH])
@@ -210,7 +222,7 @@ def fitted(fit: Fit) -> dict[str, Floats]:
 
 
 def predicted(theta: Mapping[str, Floats], trial: Trial) -> Trial:
-    """The trial's rudder and shaft speed through the identified equations, from its first state."""
+    """Response of the identified equations to a trial's inputs from its first state."""
     from scipy.integrate import solve_ivp
 
     matrix = np.linalg.inv(inertia_matrix())
@@ -218,18 +230,22 @@ def predicted(theta: Mapping[str, Floats], trial: Trial) -> Trial:
 
     def rates(t: float, state: Floats) -> list[float]:
         motion = dict(zip(STATE, state.tolist(), strict=True))
-        motion |= {
-            name: float(np.interp(t, trial.t, trial[name])) for name in ("delta", "n")
-        }
-        columns, known = regressors(motion), known_forces(motion)
-        forces = [float(theta[q] @ np.array(columns[q])) + known[q] for q in EQUATIONS]
-        u, v, psi = motion["u"], motion["v"], motion["psi"]
+        for name in ("delta", "n"):
+            motion[name] = float(np.interp(t, trial.t, trial[name]))
+        columns = regressors(motion)
+        known = known_forces(motion)
+        forces = []
+        for q in EQUATIONS:
+            identified = float(theta[q] @ np.array(columns[q]))
+            forces.append(identified + known[q])
+
+        u = motion["u"]
+        v = motion["v"]
+        psi = motion["psi"]
+        north = u * np.cos(psi) - v * np.sin(psi)
+        east = u * np.sin(psi) + v * np.cos(psi)
         accelerations = (matrix @ forces) * (u * u + v * v) / lengths
-        over_ground = (
-            u * np.cos(psi) - v * np.sin(psi),
-            u * np.sin(psi) + v * np.cos(psi),
-        )
-        return [*over_ground, motion["r"], *accelerations.tolist(), motion["p"]]
+        return [north, east, motion["r"], *accelerations.tolist(), motion["p"]]
 
     start = [trial[name][0] for name in STATE]
     found = solve_ivp(
@@ -258,7 +274,7 @@ def off(found: Trial, truth: Trial, channel: str) -> float:
 
 
 def coefficient_rows() -> Iterator[Row]:
-    """Table 4-2: the numbers of propeller and rudder, which alone have a counterpart."""
+    """Table 4-2: propeller and rudder, the only numbers with a counterpart."""
     yield Row(
         "Table 4-2",
         "41 hull coefficients of Yukun",
@@ -337,7 +353,7 @@ def prediction_rows() -> Iterator[Row]:
 
 
 def polynomial_rows() -> Iterator[Row]:
-    """The same without data of propeller and rudder, by `identify` with the structure `mmg4dof`."""
+    """The same by `identify` with `mmg4dof`, without data of propeller and rudder."""
     ship, truth = load_model("container"), recorded(20, 20)
     trials = [recorded(10, 20), truth.with_(use="validate")]
     found = identify(trials, "mmg4dof", particulars=ship.particulars).predictions[

@@ -1,4 +1,4 @@
-"""Xu et al. 2020: truncated LS-SVM on captive tests, and the reduction of 38 terms to 18.
+"""Xu et al. 2020: truncated LS-SVM on captive tests, from 38 terms to 18.
 
 The towing tank's records are not published. In their place stands a virtual tank
 (`xu2020_tank`) in which Table 11 is the truth, with white noise. What the paper's R^2
@@ -134,7 +134,7 @@ def reduced_regression(forces: Floats) -> ForceRegression:
 
 
 def fit(sizes: Floats, seed: int = SEED) -> Fit:
-    """Reduce step by step and fit what Table 11 has, with noise of the given standard deviations."""
+    """Reduce step by step and fit Table 11, with noise of given deviations."""
     forces = measured(sizes, seed)
     reductions: dict[int, Reduction] = {}
     known: dict[str, float] = {}
@@ -159,7 +159,7 @@ def usual_fit() -> Fit:
 
 @dataclass(frozen=True)
 class Moments:
-    """Coefficients of the yaw moment by the classical LS-SVM as printed, and by the truncated one.
+    """Yaw-moment coefficients by classical LS-SVM as printed and truncated.
 
     Attributes
     ----------
@@ -179,17 +179,23 @@ class Moments:
 
 @cache
 def yaw_problem(n_samples: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Raw columns and yaw moments of some tests, as many samples as asked for, and of the others."""
-    fitted, whole = usual_fit(), full_regression()
+    """Raw columns and yaw moments of so many samples of some tests, and of others."""
+    fitted = usual_fit()
+    whole = full_regression()
     rows = np.flatnonzero(whole.equation == FORCES.index("N"))
+    columns = whole.features[rows]
+    number = {name: i for i, name in enumerate(whole.names)}
+
+    # without what the coefficients of X and Y contribute to the moment
     shared = {name: value for name, value in fitted.stepwise.items() if name[0] != "N"}
-    column = {name: i for i, name in enumerate(whole.names)}
-    moment = fitted.forces[rows] - whole.features[rows][
-        :, [column[name] for name in shared]
-    ] @ np.array(list(shared.values()))
-    features = whole.features[rows][:, [column[name] for name in LSSVM_TABLE_2]]
+    known = columns[:, [number[name] for name in shared]]
+    moment = fitted.forces[rows] - known @ np.array(list(shared.values()))
+    features = columns[:, [number[name] for name in LSSVM_TABLE_2]]
+
     seen = np.isin(whole.trial[rows], TRAINING)
-    picked = np.flatnonzero(seen)[np.linspace(0, seen.sum() - 1, n_samples).astype(int)]
+    in_training = np.flatnonzero(seen)
+    evenly = np.linspace(0, in_training.size - 1, n_samples)
+    picked = in_training[evenly.astype(int)]
     return features[picked], moment[picked], features[~seen], moment[~seen]
 
 
@@ -294,7 +300,7 @@ def table_2_rows() -> Iterator[Row]:
 
 
 def weight_rows() -> Iterator[Row]:
-    """Look for a C with which the classical estimator fits the training set and fails in validation."""
+    """Look for a C at which the classical estimator fails in validation only."""
     for k, use in enumerate(("training", "validation")):
         for C in SCANNED:
             yield Row(
@@ -408,7 +414,7 @@ def _loss_row(table: int) -> Row:
 
 
 def coefficient_rows() -> Iterator[Row]:
-    """Table 11 recovered: by the last step of each force, and from X, Y and N together."""
+    """Table 11 recovered by the last step of each force, and from all forces."""
     found = usual_fit()
     for name, value in TABLE_11.items():
         off = 100.0 * abs(found.joint[name] / value - 1.0)
@@ -424,7 +430,7 @@ def coefficient_rows() -> Iterator[Row]:
 
 
 def kept_rows() -> Iterator[Row]:
-    """38 terms to 18, by the paper's steps and from all tests at once, with one noise and with others."""
+    """From 38 terms to 18 by the paper's steps and at once, with several noises."""
     found, same = usual_fit(), set(TABLE_11)
     stepwise, whole = (
         final_terms(found.reductions),
@@ -463,7 +469,7 @@ def kept_rows() -> Iterator[Row]:
 
 
 def repeated(sizes: Floats, draws: int) -> tuple[int, int]:
-    """In how many draws of the noise exactly the 18 terms are left: step by step, and all at once."""
+    """Number of noise draws that leave exactly the 18 terms, stepwise and at once."""
     counts = [0, 0]
     for seed in range(draws):
         found = fit(sizes, seed)
@@ -494,7 +500,10 @@ def validation_rows() -> Iterator[Row]:
 
 
 def coverage(draws: int = DRAWS) -> float:
-    """How many 95 % intervals of the 18 coefficients hold the truth, %, one decomposition for all noise."""
+    """Per cent of 95 % intervals of the 18 coefficients that hold the truth.
+
+    One decomposition serves all draws of noise.
+    """
     regression = full_regression()
     reduced = reduced_regression(regression.targets)
     scales = reduced.scales()
@@ -520,7 +529,7 @@ def coverage(draws: int = DRAWS) -> float:
 
 
 def uncertainty_rows() -> Iterator[Row]:
-    """Coverage of the intervals, and what noise as large as Table 12's misfit would do."""
+    """Coverage of the intervals, also with noise as large as Table 12's misfit."""
     covered = coverage()
     yield Row(
         "Table 11",
@@ -548,7 +557,7 @@ def uncertainty_rows() -> Iterator[Row]:
 
 
 def _noisy_errors() -> tuple[Floats, Floats]:
-    """Standard errors of the joint fit, and the truth, with the noise that would leave Table 12's R^2."""
+    """Standard errors of the joint fit and the truth, with noise of Table 12's R^2."""
     regression = full_regression()
     sizes = np.array(
         [

@@ -1,4 +1,4 @@
-"""What truncation does on the 38 collinear terms: errors against rank and noise, in the virtual tank.
+"""Truncation on the 38 collinear terms: errors against rank and noise.
 
 Ten of the seventeen tests are fitted, X, Y and N together with the force of each in
 parts of its root mean square; the others are predicted. The columns are scaled to one
@@ -42,7 +42,7 @@ DRAWS = 5
 
 
 class Problem(NamedTuple):
-    """Scaled regressors and forces without noise of the tests that are fitted and of the others."""
+    """Scaled regressors and noise-free forces of fitted and of other tests."""
 
     X: Floats
     y: Floats
@@ -112,7 +112,7 @@ def errors(noise: float) -> Errors:
 
 
 def _off(coefficients: Floats) -> tuple[Floats, Floats]:
-    """Relative errors of coefficients, and of the forces that they predict, for each column."""
+    """Relative errors of coefficients and of predicted forces, for each column."""
     case = problem()
     wrong = np.linalg.norm(coefficients - case.coefficients[:, None], axis=0)
     missed = np.sqrt(

@@ -1,4 +1,4 @@
-"""The captive tests of Xu et al. 2020 in a virtual tank, and their reduction of 38 terms step by step.
+"""The captive tests of Xu et al. 2020 in a virtual tank, and their reduction.
 
 The ship is Table 11's; her mass, the amplitudes and periods of the tests and the noise
 are not printed. The steps are those of section 5: by type of test the terms to start
@@ -131,12 +131,14 @@ class Step:
 
 
 def _step(table: int, force: str, kinds: str, printed: str) -> Step:
-    """A step from its table: term, old and revised error, separated by spaces, `-` where dropped."""
+    """A step from its table: term, old and revised error, `-` where dropped."""
     words = printed.split()
-    errors = {
-        f"{force}_{term}": (float(old), None if revised == "-" else float(revised))
-        for term, old, revised in zip(words[::3], words[1::3], words[2::3], strict=True)
-    }
+    triples = zip(words[::3], words[1::3], words[2::3], strict=True)
+    errors: dict[str, tuple[float, float | None]] = {}
+    for term, old, revised in triples:
+        is_dropped = revised == "-"
+        new_error = None if is_dropped else float(revised)
+        errors[f"{force}_{term}"] = (float(old), new_error)
     return Step(table, force, tuple(kinds.split()), errors)
 
 
@@ -189,7 +191,7 @@ STEPS = (
 
 
 def xu_ship(particulars: Particulars) -> ShipModel:
-    """The ship of Table 11, which has neither rudder nor propeller; the paper prints no particulars."""
+    """The ship of Table 11, without rudder, propeller and printed particulars."""
     source = {"source": PMM18.source.replace("equations 39 to 41", "Table 11")}
     return ShipModel(
         "xu-2020", "pmm18", particulars, SteeringGear(), TABLE_11, provenance=source
@@ -231,7 +233,7 @@ def truth(names: tuple[str, ...]) -> Floats:
 
 
 def noise_sizes() -> Floats:
-    """Standard deviation of the noise of X, Y and N, prime system, for `NOISE` 1, shape (3,)."""
+    """Standard deviations of noise of X, Y and N at `NOISE` 1, prime, shape (3,)."""
     regression = full_regression()
     squares = [
         np.mean(regression.targets[regression.equation == i] ** 2)
@@ -242,7 +244,7 @@ def noise_sizes() -> Floats:
 
 
 def measured(sizes: Floats, seed: int = SEED) -> Floats:
-    """The forces with white noise of the given standard deviations of X, Y and N, shape (n_rows,)."""
+    """Forces with white noise of given deviations of X, Y and N, shape (n_rows,)."""
     regression = full_regression()
     noise = np.random.default_rng(seed).standard_normal(len(regression))
     forces: Floats = regression.targets + sizes[regression.equation] * noise
@@ -250,16 +252,16 @@ def measured(sizes: Floats, seed: int = SEED) -> Floats:
 
 
 def rows_of(force: str, kinds: tuple[str, ...]) -> NDArray[np.int64]:
-    """Rows of one force in tests of the given types, in the order of time within the tests.
+    """Rows of one force in tests of given types, in order of time within tests.
 
     So that each of the stretches that an elimination holds out has its part of every
     test.
     """
     regression = full_regression()
     wanted = np.array([kind in kinds for kind, _ in captive_tests()])
-    rows = np.flatnonzero(
-        (regression.equation == FORCES.index(force)) & wanted[regression.trial]
-    )
+    is_force = regression.equation == FORCES.index(force)
+    is_wanted = wanted[regression.trial]
+    rows = np.flatnonzero(is_force & is_wanted)
     counts = np.bincount(regression.trial[rows])
     clock = np.concatenate([np.arange(n) / n for n in counts if n])
     return rows[np.argsort(clock, kind="stable")]

@@ -1,4 +1,4 @@
-"""Measured ships: what identification predicts of runs it has not seen, one file a case.
+"""Measured ships: predictions of runs that identification has not seen.
 
 Each case is a function of a `Data` that gives a `Section` of `docs/real_ships.md`;
 `scripts/predict_real_ships.py` runs them. The measurements lie beside the checkout, not

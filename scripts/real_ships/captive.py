@@ -1,4 +1,4 @@
-"""(e) KVLCC2, static captive tests: truncated LS-SVM with reduction, after Xu et al. 2020.
+"""(e) KVLCC2, static captive tests: truncated LS-SVM, reduced as by Xu et al. 2020.
 
 81 steady conditions of drift, rudder and propeller loading, without yaw or
 acceleration: what they tell is the hull's response to drift and the rudder's force, not
@@ -76,13 +76,13 @@ class Captive:
     kind: NDArray[np.str_]
 
     def features(self, force: str) -> Floats:
-        """Shape (n_conditions, n_terms), by the square of the loading as the targets."""
+        """Regressors by the square of the loading, shape (n_conditions, n_terms)."""
         return np.column_stack(
             [self.v**i * self.d**j * self.n ** (k - 2.0) for i, j, k in TERMS[force]]
         )
 
     def targets(self, force: str) -> Floats:
-        """The force by rho L^2 U0^2/2: as large as the balance felt it, else slow tests outweigh all."""
+        """Force by rho L^2 U0^2/2, lest slow tests outweigh all."""
         return np.asarray(self.forces[force] / self.n**2)
 
 
@@ -92,7 +92,7 @@ def names(force: str) -> list[str]:
 
 
 def read(folder: Path) -> Captive:
-    """The tests, with the rudder turned to the project's sign (in the file positive steers to port).
+    """The tests, with the rudder positive to starboard (in the file to port).
 
     A test that stands there twice counts once. Their order is dealt out so that each of
     the stretches that the reduction holds out has tests of every kind.
@@ -191,10 +191,14 @@ def study(tests: Captive, force: str) -> Found:
 def combined(tests: Captive, force: str, terms: Sequence[str]) -> float:
     """R2 of the tests with drift and rudder, which are then not fitted."""
     kept = [names(force).index(name) for name in terms]
-    X, y = tests.features(force)[:, kept], tests.targets(force)
+    X = tests.features(force)[:, kept]
+    y = tests.targets(force)
     apart = (tests.v != 0.0) & (tests.d != 0.0)
-    X = X[:, X[~apart].any(axis=0)]  # terms of both are 0 in all other tests
-    return r_squared(y[apart], X[apart] @ truncated(X[~apart], y[~apart]))
+    fitted = ~apart
+    X = X[:, X[fitted].any(axis=0)]  # terms of both are 0 in all other tests
+    coefficients = truncated(X[fitted], y[fitted])
+    predicted = X[apart] @ coefficients
+    return r_squared(y[apart], predicted)
 
 
 def run(data: Data) -> Section:
@@ -272,10 +276,11 @@ def _painter(tests: Captive, found: dict[str, Found]) -> Callable[[Any], None]:
 
 
 TEXT = """
-{count} different steady conditions (some of the 81 listed are repeated) at a constant shaft speed: rudder
-at six speeds, drift, drift with rudder. Terms: powers of v' = -sin(drift), rudder d and loading n = U0/U;
-forces by rho L^2 U0^2/2 with one U0 for all, as the balance measures them. Uncertain or collinear terms are
-dropped one by one as long as the held-out tests (five folds with tests of every kind) are explained as
+{count} different steady conditions (some of the 81 listed are repeated) at a constant
+shaft speed: rudder at six speeds, drift, drift with rudder. Terms: powers of v' =
+-sin(drift), rudder d and loading n = U0/U; forces by rho L^2 U0^2/2 with one U0 for
+all, as the balance measures them. Uncertain or collinear terms are dropped one by one
+as long as the held-out tests (five folds with tests of every kind) are explained as
 well.
 
 {fits}
@@ -284,13 +289,13 @@ The reduced models:
 
 {coefficients}
 
-A harder test: the same terms are fitted to rudder tests and drift tests alone, and the tests with both are
-predicted:
+A harder test: the same terms are fitted to rudder tests and drift tests alone, and the
+tests with both are predicted:
 
 {combined}
 
-**Limits.** Without yaw or acceleration the tests identify neither inertia nor the damping of yaw; the cross
-terms of rudder and drift appear only in the tests with both.
+**Limits.** Without yaw or acceleration the tests identify neither inertia nor the
+damping of yaw; the cross terms of rudder and drift appear only in the tests with both.
 
 ![Measured and modelled forces](images/real_ships_e.svg)
 """

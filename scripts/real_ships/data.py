@@ -59,7 +59,7 @@ class MeasuredShip:
     runs: dict[str, Trial]
 
     def bare_reference(self, reference: str) -> ShipModel:
-        """A reference ship at this ship's scale, its shaft speed that at the start of the first run."""
+        """A reference ship at this scale and at the first run's initial shaft speed."""
         first = next(iter(self.runs.values()))
         shaft = float(first["n"][0]) if "n" in first else 0.0
         gear = self.steering or SteeringGear()

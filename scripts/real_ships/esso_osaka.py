@@ -1,4 +1,4 @@
-"""(d) Esso Osaka on a pond: runs that start from rest, wind a third of the ship's speed, satellite spikes."""
+"""(d) Esso Osaka on a pond: starts from rest, strong wind, satellite spikes."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def under_way(trial: Trial) -> Trial:
 
 
 def errors(model: ShipModel, trial: Trial) -> Floats:
-    """RMSE of u, v, r and heading; NaN where the model ran away or lacks the channel."""
+    """RMSE of u, v, r and heading; NaN after running away or without the channel."""
     prediction = predict(model, trial)
     found = []
     for channel in ("u", "v", "r", "psi"):
@@ -78,7 +78,7 @@ def study(ship: MeasuredShip, settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def bare_study(ship: MeasuredShip) -> dict[str, Any]:
-    """The same of the reference ship as it is, its shaft speed the fastest of the runs."""
+    """The same of the reference ship, at the fastest shaft speed of the runs."""
     names = [name for name in ship.runs if name.startswith("zigzag")]
     shaft = max(float(ship.runs[name]["n"].max()) for name in names)
     model = fastest(ship, shaft)
@@ -94,7 +94,7 @@ def bare_study(ship: MeasuredShip) -> dict[str, Any]:
 
 
 def fastest(ship: MeasuredShip, shaft: float) -> ShipModel:
-    """The reference ship at this scale; `speed` of the ship file is that of the fastest approach."""
+    """The reference ship at this scale and at the speed of the fastest approach."""
     from shipgym.ships import converted_model
     from shipgym.ships.steering import SteeringGear
 
@@ -226,9 +226,10 @@ def _painter(ship: MeasuredShip, found: dict[str, Any]) -> Callable[[Any], None]
 
 
 TEXT = """
-Each of the six zigzags is predicted from the five others, open loop from measured rudder and shaft speed; 5
-Hz. The ship is at rest at first; the structure `cubic` and the grey box include the shaft speed and so can
-start from rest. From when she has way on (0.1 m/s):
+Each of the six zigzags is predicted from the five others, open loop from measured
+rudder and shaft speed; 5 Hz. The ship is at rest at first; the structure `cubic` and
+the grey box include the shaft speed and so can start from rest. From when she has way
+on (0.1 m/s):
 
 {way}
 
@@ -242,11 +243,12 @@ For comparison, the size of the motion (under way):
 
 Values that the repair replaces as outliers: {repaired}.
 
-**Limits.** The wind is a third of the ship's speed and no model here includes it: its effect on the heading
-counts as error. About half of the yaw rate is predicted; the error of heading, its integral, is larger than
-the motion itself. Repair changes little here: a few short spikes hardly affect least squares over whole
-runs. Each run has its own shaft speed (10 to 17 1/s), so that most predictions are at a speed that few of
-the other runs cover. A structure without the shaft speed keeps its speed.
+**Limits.** The wind is a third of the ship's speed and no model here includes it: its
+effect on the heading counts as error. About half of the yaw rate is predicted; the
+error of heading, its integral, is larger than the motion itself. Repair changes little
+here: a few short spikes hardly affect least squares over whole runs. Each run has its
+own shaft speed (10 to 17 1/s), so that most predictions are at a speed that few of the
+other runs cover. A structure without the shaft speed keeps its speed.
 
 ![Zigzags from rest](images/real_ships_d.svg)
 """

@@ -144,7 +144,7 @@ def run(data: Data) -> Section:
 
 
 def summary_row(name: str, result: dict[str, Any]) -> list[str]:
-    """Means over all predictions, how many ran away, and how many models the guard refuses."""
+    """Means over all predictions, and counts of models that fail or are refused."""
     errors = [error for of_run in result["errors"].values() for error in of_run]
     away = int(sum(np.isnan(error[0]) for error in errors))
     return [
@@ -215,27 +215,31 @@ def _painter(ship: MeasuredShip, found: dict[str, Any]) -> Callable[[Any], None]
 
 
 TEXT = """
-Means over the runs that are not used, for all {count} ways to take three of the six zigzags that switch at
-5 or 10 degrees, predicted open loop from the measured rudder; every fourth sample (5 Hz).
+Means over the runs that are not used, for all {count} ways to take three of the six
+zigzags that switch at 5 or 10 degrees, predicted open loop from the measured rudder;
+every fourth sample (5 Hz).
 
 {table}
 
-Fits that the guard refuses run away in a simulated hard turn or reversal; the table still shows their
-predictions, without the runs in which they run away.
+Fits that the guard refuses run away in a simulated hard turn or reversal; the table
+still shows their predictions, without the runs in which they run away.
 
-`abkowitz12` is the Abkowitz table of the Mariner without the cube of the rudder, its products with drift,
-and three terms of surge. Its coefficients are pulled toward the KVLCC2 of the literature by virtual trials
-of that ship, which determines the turn. Chosen within the triple, the pull is the strongest of 0 to 0.2
-whose error of r, each run predicted from the two others, is within a quarter of the smallest. The last row
-has the pull of 0.1 that this rule gives for all six runs, see (b): one recipe for zigzags and turns. **The
-table itself was found while looking at all six runs** (some fifty were tried), so its figures are
-optimistic. 'Table and pull chosen within the triple' chooses between `abkowitz`, `abkowitz12` and
-`abkowitz12` with the cube of the rudder, and the pull with the smallest error, within each triple: only the
-list of three tables depends on the runs that it predicts. If a model runs away in the guard, the next
-stronger pull is taken.
+`abkowitz12` is the Abkowitz table of the Mariner without the cube of the rudder, its
+products with drift, and three terms of surge. Its coefficients are pulled toward the
+KVLCC2 of the literature by virtual trials of that ship, which determines the turn.
+Chosen within the triple, the pull is the strongest of 0 to 0.2 whose error of r, each
+run predicted from the two others, is within a quarter of the smallest. The last row has
+the pull of 0.1 that this rule gives for all six runs, see (b): one recipe for zigzags
+and turns. **The table itself was found while looking at all six runs** (some fifty were
+tried), so its figures are optimistic. 'Table and pull chosen within the triple' chooses
+between `abkowitz`, `abkowitz12` and `abkowitz12` with the cube of the rudder, and the
+pull with the smallest error, within each triple: only the list of three tables depends
+on the runs that it predicts. If a model runs away in the guard, the next stronger pull
+is taken.
 
-Turns of the same fits with the rudder at 35 degrees, from straight ahead, means and standard deviations
-over the fits (measured at MARIN, see (b): 3.25 and 3.34 to starboard):
+Turns of the same fits with the rudder at 35 degrees, from straight ahead, means and
+standard deviations over the fits (measured at MARIN, see (b): 3.25 and 3.34 to
+starboard):
 
 {turns}
 
@@ -243,12 +247,13 @@ By run, `abkowitz12` with the pull:
 
 {runs}
 
-**Limits.** Repeats of the 10/10 agree within 0.2 to 0.5 degrees of first overshoot: the aim of 0.4 is
-within the repeatability of the experiment itself. Z_10_05 is the worst in second overshoot: even least
-squares with the full Abkowitz table on all six runs misses it by 2.9 degrees. Z_30_05 is an
-extrapolation from runs of at most 20 degrees of rudder. Zigzags that switch at 1 degree are not
-counted: KVLCC2 is neutral to unstable on course ([measurements](measurements.md)), and in open loop the
-smallest error of the neutral helm grows into a heading drift; the model of the first triple gives
+**Limits.** Repeats of the 10/10 agree within 0.2 to 0.5 degrees of first overshoot: the
+aim of 0.4 is within the repeatability of the experiment itself. Z_10_05 is the worst in
+second overshoot: even least squares with the full Abkowitz table on all six runs misses
+it by 2.9 degrees. Z_30_05 is an extrapolation from runs of at most 20 degrees of
+rudder. Zigzags that switch at 1 degree are not counted: KVLCC2 is neutral to unstable
+on course ([measurements](measurements.md)), and in open loop the smallest error of the
+neutral helm grows into a heading drift; the model of the first triple gives
 
 {slight}
 

@@ -1,4 +1,4 @@
-"""(b) KVLCC2: from HSVA's zigzags alone, MARIN's zigzags and turning circles; another tank, another scale."""
+"""(b) KVLCC2: from HSVA's zigzags alone, MARIN's zigzags and turning circles."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ TURNS = ("advance +35", "diameter +35", "advance -35", "diameter -35")
 def models(
     hsva: MeasuredShip, marin: MeasuredShip
 ) -> tuple[dict[str, ShipModel], float, dict[float, float]]:
-    """Models of the HSVA zigzags at MARIN's scale, the pull chosen, and the errors that chose it."""
+    """Models of the HSVA zigzags at MARIN's scale, the pull, and its errors."""
     runs = [hsva.runs[name] for name in HSVA_RUNS]
     found = {}
     for structure in ("abkowitz", "cubic", STRUCTURE):
@@ -70,7 +70,7 @@ def models(
 
 
 def full_scale(model: ShipModel, marin: MeasuredShip) -> ShipModel:
-    """The model at MARIN's length and speed, its shaft speed that at the start of MARIN's runs.
+    """The model at MARIN's length, speed and shaft speed at the start of its runs.
 
     The tanks ran different propellers: shaft speeds are told by each one's at service
     speed.
@@ -202,10 +202,11 @@ def _circles(axis: Any, models_: dict[str, ShipModel]) -> None:
 
 
 TEXT = """
-Fitted to all six HSVA zigzags of (a), scaled to MARIN's length and speed by Froude's law. The settings come
-from HSVA data alone, with one exception: by how much a stronger pull may increase the error on the zigzags
-(a quarter) was set after it was known how the turns depend on the pull. MARIN's zigzags are predicted open
-loop from the measured rudder, full scale (times 6.76 for the yaw rate of a 7 m model).
+Fitted to all six HSVA zigzags of (a), scaled to MARIN's length and speed by Froude's
+law. The settings come from HSVA data alone, with one exception: by how much a stronger
+pull may increase the error on the zigzags (a quarter) was set after it was known how
+the turns depend on the pull. MARIN's zigzags are predicted open loop from the measured
+rudder, full scale (times 6.76 for the yaw rate of a 7 m model).
 
 {zigzags}
 
@@ -213,26 +214,29 @@ By run, `abkowitz12` with the pull:
 
 {runs}
 
-Turning circles with 35 degrees of rudder from straight ahead at service speed, ship lengths:
+Turning circles with 35 degrees of rudder from straight ahead at service speed, ship
+lengths:
 
 {turns}
 
-The refinement fits the simulated motion in segments of 8 ship lengths; the reference ship's turns are
-included in its cost (`anchor="kvlcc2-l7"`) with a weight of 0.01.
+The refinement fits the simulated motion in segments of 8 ship lengths; the reference
+ship's turns are included in its cost (`anchor="kvlcc2-l7"`) with a weight of 0.01.
 
-{verdict} The measured values printed for -35 repeat those of +35 and are not used; the data here do not
-include measured circles.
+{verdict} The measured values printed for -35 repeat those of +35 and are not used; the
+data here do not include measured circles.
 
-The pull, {strength}, is found as in (a), each of the six runs predicted from the five others. The next
-table shows how the turn depends on it, which the zigzags hardly determine:
+The pull, {strength}, is found as in (a), each of the six runs predicted from the five
+others. The next table shows how the turn depends on it, which the zigzags hardly
+determine:
 
 {path}
 
-**Limits.** MARIN's neutral helm is about -0.8 to -1.2 degrees, HSVA's is not: this makes the heading of an
-unstable ship drift, whatever the model. The steady turn (drift of 20 degrees, speed down to 0.37) lies
-outside all zigzags. It is determined by the reference ship: the weaker the pull, the better the zigzags and
-the wider the circle. The rule that chooses the pull gives up a quarter of the zigzags' accuracy for it;
-that quarter is a judgement, not a measurement.
+**Limits.** MARIN's neutral helm is about -0.8 to -1.2 degrees, HSVA's is not: this
+makes the heading of an unstable ship drift, whatever the model. The steady turn (drift
+of 20 degrees, speed down to 0.37) lies outside all zigzags. It is determined by the
+reference ship: the weaker the pull, the better the zigzags and the wider the circle.
+The rule that chooses the pull gives up a quarter of the zigzags' accuracy for it; that
+quarter is a judgement, not a measurement.
 
 ![MARIN's zigzags and circles](images/real_ships_b.svg)
 """

@@ -22,7 +22,7 @@ DURATION_LENGTHS = 25.0  # of a turn, ship lengths at service speed
 
 
 def zigzag_errors(model: ShipModel, trial: Trial) -> Floats:
-    """RMSE of r and heading and sizes of the errors of two overshoots, NaN where there is none."""
+    """RMSE of r and heading, and errors of two overshoots; NaN where there is none."""
     metrics = trial_metrics(model, trial, predict(model, trial))
     rms = [metrics["rmse"][channel] for channel in ("r", "psi")]
     found = [

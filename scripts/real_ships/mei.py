@@ -150,9 +150,9 @@ def shown(ship: MeasuredShip, fitted: dict[str, ShipModel]) -> Callable[[Any], N
 
 
 TEXT = """
-Samples are at about 1 Hz and the reference ship is converted by similarity. The reference ships are Mei's
-(the tanker, which his selection by particulars gives) and the KVLCC2 of the literature. Each zigzag is
-predicted from the three others:
+Samples are at about 1 Hz and the reference ship is converted by similarity. The
+reference ships are Mei's (the tanker, which his selection by particulars gives) and the
+KVLCC2 of the literature. Each zigzag is predicted from the three others:
 
 {zigzags}
 
@@ -164,10 +164,10 @@ Turning circles with 35 degrees of rudder, ship lengths:
 
 {turns}
 
-**Limits.** The overshoots that the paper prints as measured are not those of this record. First overshoots
-to starboard and to port, measured, degrees: {differences}. The linear correction of RM-SVM is fitted in the
-range of the zigzags; in the steady turn it is extrapolated, and may make the turn worse than that of the
-bare reference ship.
+**Limits.** The overshoots that the paper prints as measured are not those of this
+record. First overshoots to starboard and to port, measured, degrees: {differences}. The
+linear correction of RM-SVM is fitted in the range of the zigzags; in the steady turn it
+is extrapolated, and may make the turn worse than that of the bare reference ship.
 
 ![MARIN's zigzags and circles by RM-SVM](images/real_ships_c.svg)
 """

@@ -1,4 +1,4 @@
-"""(f) KVLCC2 by the MMG form: from three zigzags of HSVA the other zigzags, and MARIN's circles."""
+"""(f) KVLCC2 by the MMG form: from three HSVA zigzags the others, and circles."""
 
 from __future__ import annotations
 
@@ -57,26 +57,33 @@ MARGIN = 0.1  # by which the error held out may exceed the least for a stronger 
 
 
 def overshoot_errors(model: ShipModel, trial: Trial) -> Floats:
-    """Sizes of the errors of two overshoots, the rudder reversed at the measured headings, degrees."""
-    heading, length = switch_heading_deg(trial), model.particulars.length
-    measured, sailed = zigzag_indices(trial, length, heading), closed_loop(model, trial)
+    """Errors of two overshoots, rudder reversed at the measured headings, degrees."""
+    heading = switch_heading_deg(trial)
+    length = model.particulars.length
+    measured = zigzag_indices(trial, length, heading)
+    sailed = closed_loop(model, trial)
+    errors = np.full(2, np.nan)
     if sailed is None:
-        return np.full(2, np.nan)
+        return errors
     found = zigzag_indices(sailed, length, heading)
-    names = ("overshoot_1_deg", "overshoot_2_deg")
-    pairs = [(getattr(measured, name), getattr(found, name)) for name in names]
-    return np.array(
-        [np.nan if None in pair else abs(pair[0] - pair[1]) for pair in pairs]
-    )
+    for k, name in enumerate(("overshoot_1_deg", "overshoot_2_deg")):
+        true = getattr(measured, name)
+        ours = getattr(found, name)
+        if true is not None and ours is not None:
+            errors[k] = abs(true - ours)
+    return errors
 
 
 def all_errors(model: ShipModel, trial: Trial) -> Floats:
-    """Open loop r, heading and overshoots; then the overshoots with the rudder reversed as measured."""
+    """Open loop r, heading and overshoots; overshoots at measured reversals."""
     return np.concatenate([zigzag_errors(model, trial), overshoot_errors(model, trial)])
 
 
 def circle(model: ShipModel, side: float) -> tuple[float | None, ...]:
-    """Advance, tactical diameter, steady drift and speed of a turn to a side; nothing where it runs away."""
+    """Advance, tactical diameter, steady drift and speed of a turn to one side.
+
+    Empty where the model runs away.
+    """
     ship = model.particulars
     travel = ship["length"] / ship["speed"]
     try:
@@ -86,8 +93,10 @@ def circle(model: ShipModel, side: float) -> tuple[float | None, ...]:
     except UnstableModelError:
         return (None,) * len(TURN)
     found = turning_indices(run, ship.length)
-    drift = float(np.degrees(np.arctan2(-run["v"][-1], run["u"][-1]))) * side
-    speed = float(np.hypot(run["u"][-1], run["v"][-1])) / ship["speed"]
+    u = run["u"][-1]
+    v = run["v"][-1]
+    drift = float(np.degrees(np.arctan2(-v, u))) * side
+    speed = float(np.hypot(u, v)) / ship["speed"]
     return found.advance_lengths, found.tactical_diameter_lengths, drift, speed
 
 
@@ -97,7 +106,7 @@ def cells(errors: Floats) -> list[str]:
 
 
 def circle_cells(model: ShipModel) -> list[str]:
-    """Starboard then port: advance and diameter, off by how many per cent, drift, off by how much, speed."""
+    """Advance, diameter, drift and speed, starboard then port, with differences."""
     found = []
     for side, measured in zip((1.0, -1.0), CIRCLES, strict=True):
         ours = circle(model, side)
@@ -126,7 +135,7 @@ def fitted(
 
 
 def held_out(ship: MeasuredShip, **settings: Any) -> float:
-    """Errors of each of the fitted runs, predicted from the two others, by the aims; their mean."""
+    """Errors by the aims of each fitted run, predicted from two others; their mean."""
     errors = []
     for name in FITTED:
         model = fitted(ship, [other for other in FITTED if other != name], **settings)
@@ -273,63 +282,72 @@ def painter(
     return paint
 
 
-LIMITS = """Both priors meet the aims for yaw rate and heading; that of the reference ship also those
-for the first overshoot, the advance to port and drift to starboard, that of formulas those for advance
-and drift to starboard. They miss those for the second overshoot (0.51 and 0.63 instead of 0.45), that
-of formulas the one for the first (0.34 instead of 0.30), and for the rest of the circles, most of all
-for the tactical diameter: by 4.1 % to starboard and 10.7 % to port, that of formulas by 12.5 and 20.1
-%. In MARIN's tank the ship turns tighter to port, by 3 % in advance and 8 % in diameter; HSVA's zigzags
-show no such difference, and the models turn nearly alike to both sides: an advance that is the same to
-both sides is at best 1.5 % off each of them, a diameter 4.2 %, so that a model which turns alike to
-both sides cannot meet the aims of 1 and 4 % on both. HSVA's measured thrust differs between the two
-sides; models that include this predict the fitted runs no better. With a weaker prior the zigzags are
-predicted better and the turns become wider: with formula priors as wide as published ships scatter, at
-strength 2, the zigzags are predicted better than with narrower ones (0.082 instead of 0.091 deg/s) and
-the circle worse (5.4 and 12.6 instead of 1.0 and 8.8 %). The choice between them is made by the rule
-for the strength; the trials hardly decide it: while reversals of the rudder were read from the
-measurements up to 0.2 s late, it chose strength 2 with all three priors, whose circles are nearer and
-whose first overshoots with the reference ship are farther off."""
+LIMITS = """Both priors meet the aims for yaw rate and heading; that of the reference
+ship also those for the first overshoot, the advance to port and drift to starboard,
+that of formulas those for advance and drift to starboard. They miss those for the
+second overshoot (0.51 and 0.63 instead of 0.45), that of formulas the one for the first
+(0.34 instead of 0.30), and for the rest of the circles, most of all for the tactical
+diameter: by 4.1 % to starboard and 10.7 % to port, that of formulas by 12.5 and 20.1 %.
+In MARIN's tank the ship turns tighter to port, by 3 % in advance and 8 % in diameter;
+HSVA's zigzags show no such difference, and the models turn nearly alike to both sides:
+an advance that is the same to both sides is at best 1.5 % off each of them, a diameter
+4.2 %, so that a model which turns alike to both sides cannot meet the aims of 1 and 4 %
+on both. HSVA's measured thrust differs between the two sides; models that include this
+predict the fitted runs no better. With a weaker prior the zigzags are predicted better
+and the turns become wider: with formula priors as wide as published ships scatter, at
+strength 2, the zigzags are predicted better than with narrower ones (0.082 instead of
+0.091 deg/s) and the circle worse (5.4 and 12.6 instead of 1.0 and 8.8 %). The choice
+between them is made by the rule for the strength; the trials hardly decide it: while
+reversals of the rudder were read from the measurements up to 0.2 s late, it chose
+strength 2 with all three priors, whose circles are nearer and whose first overshoots
+with the reference ship are farther off."""
 
 TEXT = """
-Structure `mmg` ([structures](structures.md#the-mmg-form)), fitted to {fitted} alone. Means over the three
-other zigzags that switch at 5 or 10 degrees, open loop from the measured rudder, every fourth sample (5
-Hz); the last two columns are the overshoots with the rudder reversed at the measured headings, which the
-neutral helm hardly affects.
+Structure `mmg` ([structures](structures.md#the-mmg-form)), fitted to {fitted} alone.
+Means over the three other zigzags that switch at 5 or 10 degrees, open loop from the
+measured rudder, every fourth sample (5 Hz); the last two columns are the overshoots
+with the rudder reversed at the measured headings, which the neutral helm hardly
+affects.
 
 {zigzags}
 
-The terms beyond the standard form and the prior's standard deviations with a reference ship come from an
-earlier study that had seen all of these runs; with formulas the standard deviations are at least the
-scatter of four published ships about them, this one among them (`tests/identification/test_mmg.py`). The
-strength of the prior is the strongest of 1, 2, 3 that is within a tenth of the best when each of the three
-fitted runs is predicted from the two others: the score is the average of the errors of yaw rate, heading
-and both reversed overshoots, each divided by its aim:
+The terms beyond the standard form and the prior's standard deviations with a reference
+ship come from an earlier study that had seen all of these runs; with formulas the
+standard deviations are at least the scatter of four published ships about them, this
+one among them (`tests/identification/test_mmg.py`). The strength of the prior is the
+strongest of 1, 2, 3 that is within a tenth of the best when each of the three fitted
+runs is predicted from the two others: the score is the average of the errors of yaw
+rate, heading and both reversed overshoots, each divided by its aim:
 
 {chosen}
 
-Forty-five recipes were compared in this way for each of the first two priors, before the other runs
-were looked at, and only the strength made a significant difference: segments of 0.35 to 5 ship lengths
-in place of 1.7 (at strength 2 one length is 0.01 and 0.11 better, 1.3 lengths are worse, 3 and 5 far
-worse), a propeller whose advance ratio, or whose thrust, wake and difference of the sides, are the
-measured ones (within 0.09 of the rows above), a helm offset for each run (0.03 better to 0.23 worse), a
-kernel on the residuals (overshoots better, heading worse: 1.3 to 1.9). The reversals of the rudder were
-then read from the measurements up to 0.2 s later than now; these comparisons were not repeated.
-However, the results on the other runs with strengths 1, 2 and 3 were already known for earlier priors.
+Forty-five recipes were compared in this way for each of the first two priors, before
+the other runs were looked at, and only the strength made a significant difference:
+segments of 0.35 to 5 ship lengths in place of 1.7 (at strength 2 one length is 0.01 and
+0.11 better, 1.3 lengths are worse, 3 and 5 far worse), a propeller whose advance ratio,
+or whose thrust, wake and difference of the sides, are the measured ones (within 0.09 of
+the rows above), a helm offset for each run (0.03 better to 0.23 worse), a kernel on the
+residuals (overshoots better, heading worse: 1.3 to 1.9). The reversals of the rudder
+were then read from the measurements up to 0.2 s later than now; these comparisons were
+not repeated. However, the results on the other runs with strengths 1, 2 and 3 were
+already known for earlier priors.
 
-The rows with other strengths are there for comparison. By run, with the prior of the reference ship:
+The rows with other strengths are there for comparison. By run, with the prior of the
+reference ship:
 
 {runs}
 
-The coefficients that moved farthest from that prior (in its standard deviations): {found}.
+The coefficients that moved farthest from that prior (in its standard deviations):
+{found}.
 
-The same models at MARIN's scale (Froude), rudder 35 degrees from straight ahead at service speed, with time
-counted from the execute order; in brackets the difference from the measured circles (aims: advance 1 %,
-tactical diameter 4 %, drift 1.5 deg):
+The same models at MARIN's scale (Froude), rudder 35 degrees from straight ahead at
+service speed, with time counted from the execute order; in brackets the difference from
+the measured circles (aims: advance 1 %, tactical diameter 4 %, drift 1.5 deg):
 
 {circles}
 
-A fit, including the choice of strength and the prediction of every trial, takes about {seconds:.1f} s of
-processor time with a warm cache (aim: 3 s).
+A fit, including the choice of strength and the prediction of every trial, takes about
+{seconds:.1f} s of processor time with a warm cache (aim: 3 s).
 
 **Limits.** {limits}
 

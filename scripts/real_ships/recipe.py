@@ -1,4 +1,4 @@
-"""What is fitted to the KVLCC2: a reduced Abkowitz table pulled toward a reference ship's zigzags and turns.
+"""The recipe for KVLCC2: a reduced Abkowitz table pulled toward a reference ship.
 
 The table was found on the HSVA zigzags: without the cubes of the rudder, it predicts
 larger rudders than it has seen. How strong the pull is, each fit finds among its own
@@ -112,7 +112,7 @@ def held_out_error(
     strength: float,
     structure: str = STRUCTURE,
 ) -> float:
-    """Root mean square error of r, deg/s, over runs predicted one by one from the others.
+    """RMS error of r, deg/s, over runs predicted one by one from the others.
 
     Infinite where a model runs away.
     """
@@ -138,8 +138,10 @@ def chosen_strength(
         Held out, deg/s, by strength.
     """
     errors = {strength: held_out_error(ship, names, strength) for strength in STRENGTHS}
-    most = (1.0 + TOLERANCE) * min(errors.values())
-    return max(strength for strength, error in errors.items() if error <= most), errors
+    least = min(errors.values())
+    most = (1.0 + TOLERANCE) * least
+    tolerable = [strength for strength, error in errors.items() if error <= most]
+    return max(tolerable), errors
 
 
 def fitted(ship: MeasuredShip, names: Sequence[str]) -> ShipModel:
@@ -167,7 +169,7 @@ def fitted_with_table(ship: MeasuredShip, names: Sequence[str]) -> ShipModel:
 def steady(
     ship: MeasuredShip, names: Sequence[str], least: float, structure: str
 ) -> ShipModel:
-    """The least pull, from a given one on, with which the model does not run away; that one if none."""
+    """The least pull from a given one on that keeps the model stable; else that one."""
     runs = [ship.runs[name] for name in names]
     for strength in STRENGTHS[STRENGTHS.index(least) :]:
         model = pulled(ship, tuple(names), strength, structure)
@@ -177,7 +179,7 @@ def steady(
 
 
 def refined(ship: MeasuredShip, names: Sequence[str]) -> IdentificationResult:
-    """Refinement by simulation from the same start, the reference ship's turns inside its cost."""
+    """Refinement by simulation from the same start, reference turns in its cost."""
     strength, _ = chosen_strength(ship, names)
     return identify(
         [ship.runs[name] for name in names],

@@ -1,4 +1,4 @@
-"""A section of the document: text, tables, figures, put in place of its earlier self."""
+"""A section of the document: text, tables and figures, put in their old place."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def number(value: float | None, digits: int = 3) -> str:
 def headings(
     axis: Any, trial: Trial, predictions: Mapping[str, Trial | None], title: str
 ) -> None:
-    """A trial's heading and what models predict of it, by label, on an axis of matplotlib."""
+    """A trial's heading and predictions of it by label, on a matplotlib axis."""
     axis.plot(trial.t, np.degrees(trial["psi"]), "k", lw=1.2, label="measured")
     for label, predicted in predictions.items():
         if predicted is not None:
@@ -56,7 +56,7 @@ def headings(
 
 
 def wrapped(text: str) -> str:
-    """Markdown whose paragraphs, unlike its tables and images, have lines of one width."""
+    """Markdown with paragraphs wrapped to one width; tables and images stay."""
     blocks = text.strip().split("\n\n")
     prose = [
         (

@@ -1,4 +1,4 @@
-"""Environments: one at a time, in vectors, in weather, of kernel models, and with a learner on top."""
+"""Environments: single, in vectors, in weather, of kernel models, with a learner."""
 
 from __future__ import annotations
 
@@ -37,7 +37,9 @@ SYNC_STEPS_IN_PYTHON = """
 import sys, time
 import gymnasium, numpy as np, shipgym
 n = int(sys.argv[3])
-env = gymnasium.make_vec(sys.argv[1], num_envs=n, vectorization_mode="sync", model=sys.argv[2])
+env = gymnasium.make_vec(
+    sys.argv[1], num_envs=n, vectorization_mode="sync", model=sys.argv[2]
+)
 env.reset(seed=0)
 actions = np.zeros((n, 1), dtype=np.float32)
 least = float("inf")
@@ -51,7 +53,7 @@ print(5 * n / least)
 
 
 def single_environment(n_steps: int = 1000) -> Row:
-    """Steps per second through `gymnasium.make`, against the same files run as plain Python."""
+    """Steps per second by `gymnasium.make`, against the same files as plain Python."""
     env = gymnasium.make("shipgym/CourseKeeping-v0", model=MODEL)
     env.reset(seed=0)
     action = np.zeros(1, dtype=np.float32)
@@ -79,7 +81,7 @@ def native_speed(
     clock: Callable[[], float] = time.process_time,
     **options: Any,
 ) -> float:
-    """Steps per second of a native vector environment of Gymnasium, by all that its `step` returns."""
+    """Steps per second of a native vector environment, with all returned values."""
     env = gymnasium.make_vec(
         env_id, num_envs=n_envs, vectorization_mode="vector_entry_point", **options
     )
@@ -98,7 +100,7 @@ def native_speed(
 
 
 def native_against_python(task: str, n_envs: int = 64) -> Row:
-    """The native vector environment against SyncVectorEnv of the same files run as plain Python."""
+    """The native vector environment against SyncVectorEnv as plain Python."""
     native = native_speed(env_id(task), n_envs, model=MODEL)
     (plain,) = run_python(
         SYNC_STEPS_IN_PYTHON, env_id(task), MODEL, str(n_envs), NUMBA_DISABLE_JIT="1"
@@ -173,7 +175,7 @@ def weather(n_envs: int) -> Row:
 
 
 def kernel_ship(n_envs: int = 1024, centres: int = 64) -> Row:
-    """A black-box model with radial basis functions, against their sums alone on NumPy arrays."""
+    """A radial-basis model against its sums alone on NumPy arrays."""
     ship = shipgym.load_model("kvlcc2-l7")
     trials = [
         zigzag(ship, angle, angle, duration=100.0, dt=0.2, port_first=port).with_(
@@ -206,7 +208,7 @@ def kernel_ship(n_envs: int = 1024, centres: int = 64) -> Row:
 
 
 def learning(task: str) -> Row:
-    """Frames per second of PPO with the shipped settings, on two cores, and what part of it is ours."""
+    """Frames per second of PPO as shipped, on two cores, and our share of the time."""
     from speed.learning import ppo_speed  # here, because torch takes seconds to import
 
     frames, share = ppo_speed(env_id(task))

@@ -1,4 +1,4 @@
-"""Identification: regression, searches, recursive updates, refinement by simulation error."""
+"""Identification: regression, searches, recursion, refinement by simulation."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def made_up_regression(n_samples: int, n_terms: int) -> tuple[Floats, Floats]:
 
 
 def truncated_fit(n_samples: int, aim: str, n_terms: int = 15) -> Row:
-    """TLS-SVM in primal form, its L-curve included, against the dense dual system of LS-SVM."""
+    """TLS-SVM in primal form with its L-curve, against the dense dual LS-SVM."""
     X, y = made_up_regression(n_samples, n_terms)
     primal = best_time(lambda: TruncatedLSSVM(C=1e6).fit(X, y), 200)
     dense = best_time(
@@ -49,7 +49,7 @@ def truncated_fit(n_samples: int, aim: str, n_terms: int = 15) -> Row:
 
 
 def bee_colony_search(objective: str, n_samples: int = 1800, n_terms: int = 7) -> Row:
-    """Search for C by the bee colony of Zhu 2018 (20 sources, 30 rounds), against ten times the samples."""
+    """Zhu's bee colony for C (20 sources, 30 rounds), on 1 and 10 times the samples."""
 
     def least(n: int) -> float:
         X, y = made_up_regression(n, n_terms)
@@ -69,7 +69,7 @@ def bee_colony_search(objective: str, n_samples: int = 1800, n_terms: int = 7) -
 
 
 def recursive_updates(n_samples: int = 50_000, n_terms: int = 15) -> Row:
-    """Recursive least squares with forgetting, sample by sample, against the same update in NumPy."""
+    """Recursive least squares with forgetting, against the same update in NumPy."""
     random = np.random.default_rng(0)
     X = random.standard_normal((n_samples, n_terms))
     y = X @ random.standard_normal(n_terms) + 0.1 * random.standard_normal(n_samples)
@@ -95,7 +95,7 @@ def recursive_updates(n_samples: int = 50_000, n_terms: int = 15) -> Row:
 
 
 def refinement() -> Row:
-    """Refinement of a 40-coefficient model on four noisy trials, against the regression it starts from."""
+    """Refinement of 40 coefficients on four noisy trials, against the regression."""
     ship = shipgym.load_model("mariner")
     plan = ((10, 10), (15, 15), (20, 20), (30, 20))
     trials = [

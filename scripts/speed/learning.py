@@ -1,4 +1,4 @@
-"""How fast stable-baselines3's PPO learns on ShipVecEnv, and which part of the time is the environment's."""
+"""Learning speed of PPO on ShipVecEnv, and the environment's share of the time."""
 
 from __future__ import annotations
 

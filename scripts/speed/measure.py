@@ -1,4 +1,4 @@
-"""What every measurement needs: a row of the table, the least time of some repeats, a fresh process."""
+"""Parts of every measurement: a table row, the least time, a fresh process."""
 
 from __future__ import annotations
 

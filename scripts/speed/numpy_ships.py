@@ -1,4 +1,4 @@
-"""The engine's own functions run on NumPy arrays: what a batch of ships costs without compiling.
+"""The engine's functions on NumPy arrays: a batch of ships without compiling.
 
 The functions are rewritten mechanically: choices become `numpy.where`, least and
 largest become their NumPy functions, and sine, cosine, exponential and arc tangent are

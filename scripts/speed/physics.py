@@ -21,7 +21,7 @@ FLEET = {
 
 
 def batched_physics(name: str, n_ships: int, aim: str) -> Row:
-    """Runge-Kutta steps of the bare ship, one core, against the same equations on NumPy arrays."""
+    """Runge-Kutta steps of the bare ship, one core, against NumPy arrays."""
     model = shipgym.load_model(name)
     random = np.random.default_rng(0)
     rudders = np.radians(30.0) * random.uniform(-1.0, 1.0, n_ships)

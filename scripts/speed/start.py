@@ -35,7 +35,8 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 
 name, n = sys.argv[1], int(sys.argv[2])
 start = time.perf_counter()
-env = SubprocVecEnv([lambda: __import__("gymnasium").make(name)] * n, start_method="spawn")
+makers = [lambda: __import__("gymnasium").make(name)] * n
+env = SubprocVecEnv(makers, start_method="spawn")
 env.reset()
 env.step([env.action_space.sample() for _ in range(n)])
 wall = time.perf_counter() - start
@@ -46,7 +47,7 @@ print(wall, used.ru_utime + used.ru_stime)
 
 
 def start_up() -> list[Row]:
-    """Import, and `gymnasium.make` up to the first step with a warm cache, in fresh processes."""
+    """Import, and `gymnasium.make` up to a step with a warm cache, in new processes."""
     code = FIRST_STEP.format(model=MODEL)
     runs = np.array([run_python(code) for _ in range(5)])
     imported, first_step = runs.min(axis=0)
@@ -69,7 +70,7 @@ def start_up() -> list[Row]:
 
 
 def cold_start(sea: str, aim: str) -> Row:
-    """Processor time to the first step of a fresh process, on an empty cache and on a filled one."""
+    """Processor time to the first step of a new process, on empty and filled caches."""
     with tempfile.TemporaryDirectory() as cache:
         (cold,), (warm,) = (
             run_python(COLD_START, MODEL, sea, SHIPGYM_CACHE=cache) for _ in range(2)
@@ -85,7 +86,7 @@ def cold_start(sea: str, aim: str) -> Row:
 
 
 def cold_workers() -> list[Row]:
-    """Workers of stable-baselines3 that start at once on an empty cache, by the clock; and CartPole's."""
+    """Time of stable-baselines3's workers started at once without cache; CartPole's."""
 
     def taken(env_id: str, n: int) -> tuple[float, float]:
         with tempfile.TemporaryDirectory() as cache:

@@ -1,4 +1,4 @@
-"""Latitudes and longitudes as instruments write them: degrees, degrees and minutes, or also seconds."""
+"""Latitudes and longitudes as texts: degrees, with or without minutes and seconds."""
 
 import re
 from collections.abc import Sequence
@@ -28,15 +28,18 @@ def read_angles(texts: Sequence[str], minutes: bool = False) -> Floats:
     where one is none of these.
     """
     matches = []
+    with_minutes = minutes
     for text in texts:
         match = _ANGLE.fullmatch(text)
         if text and match is None:
             raise ValueError(text)
         matches.append(match)
+        with_minutes |= _is_ddmm(match)
 
-    with_minutes = minutes or any(map(_is_ddmm, matches))
-    angles = [_degrees(match, with_minutes) for match in matches]
-    return np.array(angles, dtype=float)
+    angles = np.empty(len(matches))
+    for k, match in enumerate(matches):
+        angles[k] = _degrees(match, with_minutes)
+    return angles
 
 
 def _is_ddmm(match: re.Match[str] | None) -> bool:

@@ -1,4 +1,4 @@
-"""Offsets between the clocks of sensors: yaw rate against heading, rudder against yaw acceleration.
+"""Offsets between clocks: yaw rate against heading, rudder against yaw acceleration.
 
 Each is the delay at which one channel explains the other best, by least squares over
 windows of some seconds, which is a band-pass: slower than that both are bound by the
@@ -41,7 +41,8 @@ class _Windows:
         middle = self.centres + delay
         begin = np.interp(middle - self.half, self.t, values)
         end = np.interp(middle + self.half, self.t, values)
-        slope: Floats = (end - begin) / (2.0 * self.half)
+        length = 2.0 * self.half
+        slope: Floats = (end - begin) / length
         return slope
 
 
@@ -53,10 +54,17 @@ class _DelayFit(NamedTuple):
     squares: float  # of the residual, never zero
 
 
+class _Minimum(NamedTuple):
+    """Minimum of a parabola through three values."""
+
+    at: float
+    curvature: float
+
+
 def clock_offset(
     t: Floats, target: Floats, late: Floats, others: Mapping[str, Floats]
 ) -> ClockOffset | None:
-    """How late a channel is against the change of a target; None where nothing can be said.
+    """Delay of a channel against the change of a target; None where it cannot be found.
 
     Parameters
     ----------
@@ -73,67 +81,85 @@ def clock_offset(
     if windows is None:
         return None
     known = _known_directions(windows, others)
-    change = _unexplained(windows.slope(target), known)
+    slope = windows.slope(target)
+    change = _unexplained(slope, known)
     channel = integral(t, late)
 
     def fit(delay: float) -> _DelayFit:
         regressor = _unexplained(windows.slope(channel, delay), known)
         return _fit(change, regressor)
 
-    step = 0.25
-    delays = np.arange(-LONGEST_DELAY_S, LONGEST_DELAY_S + 0.1, step)
+    delays = np.arange(-LONGEST_DELAY_S, LONGEST_DELAY_S + 0.1, 0.25)
     squares = np.array([fit(delay).squares for delay in delays])
-    k = int(np.argmin(squares))
-    if k in (0, delays.size - 1):
-        return None
-
-    # the parabola through the least squares and those before and after
-    around = slice(k - 1, k + 2)
-    half_curvature, slope, _ = np.polyfit(
-        delays[around] - delays[k], squares[around], 2
-    )
-    curvature = 2.0 * float(half_curvature)
     power = float(change @ change)
-    if curvature * step**2 <= 1e-12 * power:  # no more than rounding
+    least = _minimum(delays, squares, rounding=1e-12 * power)
+    if least is None:
         return None
 
-    delay = float(delays[k] - slope / curvature)
-    best = fit(delay)
+    best = fit(least.at)
     free = _independent_samples(best)
+    variance = 2.0 * best.squares / free / least.curvature
     explained = max(power / best.squares - 1.0, 0.0)
     return ClockOffset(
-        late=delay,
-        error=math.sqrt(2.0 * best.squares / free / curvature),
+        late=least.at,
+        error=math.sqrt(variance),
         gain=best.gain,
         certainty=math.sqrt(free * explained),
     )
 
 
+def _minimum(x: Floats, y: Floats, rounding: float) -> _Minimum | None:
+    """Minimum of values at evenly spaced x; None at either end, or of a flat curve."""
+    k = int(np.argmin(y))
+    is_at_end = k in (0, x.size - 1)
+    if is_at_end:
+        return None
+    around = slice(k - 1, k + 2)
+    from_least = x[around] - x[k]
+    half_curvature, slope, _ = np.polyfit(from_least, y[around], deg=2)
+    curvature = 2.0 * float(half_curvature)
+    step = float(x[1] - x[0])
+    if curvature * step**2 <= rounding:
+        return None
+    return _Minimum(
+        at=float(x[k] - slope / curvature),
+        curvature=curvature,
+    )
+
+
 def _windows(t: Floats) -> _Windows | None:
-    """Windows a sample apart, within the record however late a channel is; None of too few or many."""
+    """Windows one sample apart, inside the record for every delay.
+
+    None where there are too few or too many.
+    """
     length = 5.0
     margin = LONGEST_DELAY_S + length
-    first, last = t[0] + margin, t[-1] - margin
+    first = t[0] + margin
+    last = t[-1] - margin
     step = max(usual_step(t), 0.5)
     count = (last - first) / step
     if not 60.0 < count < 200_000.0:
         return None
-    centres = np.arange(first, last, step)
-    return _Windows(t, centres, half=max(0.5 * length, step))
+    return _Windows(
+        t=t,
+        centres=np.arange(first, last, step),
+        half=max(0.5 * length, step),
+    )
 
 
 def _known_directions(windows: _Windows, others: Mapping[str, Floats]) -> Floats:
-    """Orthonormal basis of what a constant and other channels explain, shape (n_windows, n)."""
+    """Orthonormal basis of a constant and other channels, shape (n_windows, n)."""
+    smallest = 0.02  # singular value; what is less follows from the others
     columns = [np.ones(windows.centres.size)]
     for values in others.values():
         total = integral(windows.t, values)
-        columns.append(windows.slope(total))
+        slope = windows.slope(total)
+        columns.append(slope)
     directions = np.column_stack(columns)
     directions /= np.linalg.norm(directions, axis=0)
     basis, sizes, _ = np.linalg.svd(directions, full_matrices=False)
-    smallest = 0.02  # what is less follows from the others
-    kept: Floats = basis[:, sizes > smallest]
-    return kept
+    is_independent = sizes > smallest
+    return np.asarray(basis[:, is_independent])
 
 
 def _unexplained(values: Floats, directions: Floats) -> Floats:
@@ -149,27 +175,38 @@ def _fit(change: Floats, regressor: Floats) -> _DelayFit:
     gain = float(regressor @ change) / max(power, tiny)
     residual = change - gain * regressor
     squares = float(residual @ residual)
-    return _DelayFit(gain, residual, max(squares, tiny))
+    return _DelayFit(
+        gain=gain,
+        residual=residual,
+        squares=max(squares, tiny),
+    )
 
 
 def _independent_samples(fit: _DelayFit) -> float:
     """Number of independent residuals, by the correlation of each with the next."""
     residual = fit.residual
-    covariance = float(residual[1:] @ residual[:-1])
+    before = residual[:-1]
+    after = residual[1:]
+    covariance = float(after @ before)
     correlation = max(covariance / fit.squares, 0.0)
     share = (1.0 - correlation) / (1.0 + correlation)
     return max(residual.size * share, 2.0)
 
 
 def rudder_clock_offset(t: Floats, r: Floats, delta: Floats) -> ClockOffset | None:
-    """How late the rudder is against the yaw acceleration, given yaw rate and the history of both."""
-    history = {
+    """Delay of the rudder against the yaw acceleration.
+
+    Yaw rate and the history of both explain the rest of the acceleration.
+    """
+    explained = {
+        "r": r,
+        "r^3": r**3,
         "r, 20 s": _remembered(t, r, memory=20.0),
         "delta, 20 s": _remembered(t, delta, memory=20.0),
         "r, 80 s": _remembered(t, r, memory=80.0),
         "delta, 80 s": _remembered(t, delta, memory=80.0),
     }
-    return clock_offset(t, r, delta, {"r": r, "r3": r**3, **history})
+    return clock_offset(t, target=r, late=delta, others=explained)
 
 
 def _remembered(t: Floats, values: Floats, memory: float) -> Floats:
@@ -180,16 +217,26 @@ def _remembered(t: Floats, values: Floats, memory: float) -> Floats:
     step = even[1] - even[0]
     decay = math.exp(-step / memory)
     resampled = np.interp(even, t, values)
-    lagged = lfilter([1.0 - decay], [1.0, -decay], resampled)
+    lagged = lfilter(
+        b=[1.0 - decay],
+        a=[1.0, -decay],
+        x=resampled,
+    )
     return np.interp(t, even, lagged)
 
 
 def reverses(values: Floats, least: float = 0.0) -> bool:
-    """Tell whether a channel goes there and back as in zigzags, three times or more: one step shows no delay."""
+    """Tell whether a channel goes there and back three times or more, as in zigzags.
+
+    A single step shows no delay.
+    """
     low, high = np.quantile(values, [0.02, 0.98])
     span = high - low
-    from_middle = values - 0.5 * (low + high)
+    if span <= least:
+        return False
+    middle = 0.5 * (low + high)
+    from_middle = values - middle
     is_far = np.abs(from_middle) > 0.25 * span
     sides = np.sign(from_middle[is_far])
-    reversals = np.diff(sides) != 0.0
-    return bool(span > least and reversals.sum() >= 3)
+    changes = np.diff(sides)
+    return bool(np.count_nonzero(changes) >= 3)

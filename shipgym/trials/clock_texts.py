@@ -1,4 +1,4 @@
-"""Times as instruments write them: with or without a date, and how far a clock is ahead of UTC."""
+"""Times as instruments write them, with or without a date, and time zones."""
 
 import re
 from collections.abc import Sequence
@@ -22,7 +22,10 @@ class Clock(NamedTuple):
 
 
 def zone_seconds(zone: str, where: str) -> float:
-    """How far a clock is ahead of UTC, s, from a text such as "+02:00" or "UTC"; InputError for others."""
+    """Seconds that a clock is ahead of UTC, from a text such as "+02:00" or "UTC".
+
+    Raises InputError for another text.
+    """
     suffix = "Z" if zone == "UTC" else zone
     try:
         ahead = datetime.fromisoformat(f"2000-01-01T00:00{suffix}").utcoffset()
@@ -35,10 +38,11 @@ def zone_seconds(zone: str, where: str) -> float:
 
 
 def read_clock(texts: Sequence[str]) -> Clock:
-    """Read dates and times in any usual form, or times of the day, which go on at midnight.
+    """Read dates and times in any usual form, or times of the day.
 
-    Where day and month may be exchanged, that order is taken with which the texts span
-    the shorter time. Raises ValueError, with the text, where one is no time.
+    Times of the day go on at midnight. Where day and month may be exchanged, that order
+    is taken with which the texts span the shorter time. Raises ValueError, with the
+    text, where one is no time.
     """
     first = next((text for text in texts if text), "")
     of_day = _TIME_OF_DAY.fullmatch(first) is not None
@@ -75,7 +79,10 @@ def _times_of_day(series: Any) -> Floats:
 
 
 def _dated_times(series: Any, first: str) -> Floats:
-    """Seconds since 1970, nan for what is no date; of two orders of day and month the likelier."""
+    """Seconds since 1970, nan for an invalid date.
+
+    Of the two orders of day and month the likelier is taken.
+    """
     import pandas as pd
 
     begins_with_year = first[:4].isdigit()

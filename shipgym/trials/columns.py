@@ -1,4 +1,4 @@
-"""Which column of a file holds which channel, in which unit, and where its values stand in the file."""
+"""Columns of a file by channel, their units, and the place of each value."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -65,8 +65,8 @@ def parse_columns(
     messages. Raises InputError for an unknown channel, key or unit, and for a unit of
     another quantity.
     """
-    parsed = {}
     check_table(columns, where)
+    parsed = {}
     for channel, entry in columns.items():
         check_channel(channel, where)
         place = f"{where} {channel}"
@@ -76,21 +76,26 @@ def parse_columns(
 
 def _parse_column(channel: str, entry: Any, where: str) -> Column:
     fields = dict(entry) if isinstance(entry, Mapping) else {"column": entry}
-    keys = ("column", "unit", "date", "zone") if channel == "t" else ("column", "unit")
+    keys = ["column", "unit"]
+    if channel == "t":
+        keys += ["date", "zone"]
     check_keys(fields, keys, where)
     name = fields.pop("column", None)
     if not isinstance(name, str):
-        example = f'{{ column = "name", unit = "{si_unit(channel)}" }}'
+        unit = si_unit(channel)
         raise InputError(
-            f"{where}: expected the name of a column or {example}, got {entry!r}"
+            f"{where}: expected the name of a column or"
+            f' {{ column = "name", unit = "{unit}" }}, got {entry!r}'
         )
+
+    check_text(name, where)
     if "unit" in fields:
         si_factor(channel, fields["unit"], where)
-    for key in fields:
-        check_text(fields[key], where)
+    for field in fields.values():
+        check_text(field, where)
     if "zone" in fields:
         zone_seconds(fields["zone"], f"{where} zone")
-    return Column(check_text(name, where).strip(), **fields)
+    return Column(name.strip(), **fields)
 
 
 def choose_columns(
@@ -104,18 +109,18 @@ def choose_columns(
     """
     if columns is None:
         columns = _named_like_channels(table)
+    named = {"t": Column("t"), **columns}
     chosen = {}
-    for channel, column in {"t": Column("t"), **columns}.items():
+    for channel, column in named.items():
         is_elsewhere = part and column.name not in table.cells
         if is_elsewhere and channel != "t":
             continue
         known_unit = table.units.get(column.name, si_unit(channel))
-        unit = column.unit or known_unit
-        chosen[channel] = replace(column, unit=unit)
+        chosen[channel] = replace(column, unit=column.unit or known_unit)
     if len(chosen) == 1:
+        channels = quoted(QUANTITIES)
         raise InputError(
-            f"{table.path}: columns: expected some of {quoted(QUANTITIES)}, got time"
-            " alone"
+            f"{table.path}: columns: expected some of {channels}, got time alone"
         )
     return chosen
 
@@ -126,9 +131,11 @@ def _named_like_channels(table: LogTable) -> dict[str, Column]:
         if name in table.cells:
             columns[name] = Column(name)
     if not columns.keys() - {"t"}:
+        channels = quoted(QUANTITIES)
+        present = quoted(table.header)
         raise InputError(
-            f"{table.path}: no column is named like a channel ({quoted(QUANTITIES)})."
-            f" Columns present: {quoted(table.header)}. Name the column of each channel"
+            f"{table.path}: no column is named like a channel ({channels})."
+            f" Columns present: {present}. Name the column of each channel"
             " in [columns] (or columns=...)"
         )
     return columns

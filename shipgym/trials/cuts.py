@@ -17,7 +17,7 @@ _EXPECTED = (
 
 
 class Stretch(NamedTuple):
-    """A part of a log, from one moment to another, in seconds of its time or by the clock."""
+    """A part of a log between two moments, in seconds of its time or by the clock."""
 
     first: float | str
     last: float | str
@@ -28,8 +28,10 @@ def check_cut(cut: Any, where: str) -> None:
     if cut == "rudder":
         return
     pairs = cut if isinstance(cut, list) and cut else [None]
-    if not all(_is_stretch(pair) for pair in pairs):
-        raise InputError(f"{where} cut: {_EXPECTED}, got {shown(cut)}")
+    for pair in pairs:
+        if not _is_stretch(pair):
+            found = shown(cut)
+            raise InputError(f"{where} cut: {_EXPECTED}, got {found}")
 
 
 def _is_stretch(pair: Any) -> bool:
@@ -47,26 +49,32 @@ def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
     if cut == "rudder":
         stretches = _active_stretches(log, where)
     else:
-        stretches = [Stretch(*pair) for pair in cut]
-    return [_samples(stretch, log, where) for stretch in stretches]
+        stretches = [Stretch(first, last) for first, last in cut]
+    parts = []
+    for stretch in stretches:
+        samples = _samples(stretch, log, where)
+        parts.append(samples)
+    return parts
 
 
 def _samples(stretch: Stretch, log: Log, where: str) -> slice:
     first = _seconds(stretch.first, log, where)
     last = _seconds(stretch.last, log, where)
-    begin = np.searchsorted(log.t, first)
-    end = np.searchsorted(log.t, last, side="right")
+    begin = int(np.searchsorted(log.t, first))
+    end = int(np.searchsorted(log.t, last, side="right"))
     if end - begin < FEWEST_SAMPLES:
+        span = _span(log)
         raise InputError(
-            f"{where} cut: expected stretches of the log, which goes from {_span(log)},"
+            f"{where} cut: expected stretches of the log, which goes from {span},"
             f" got {stretch.first} to {stretch.last}, which holds no trial"
         )
-    return slice(int(begin), int(end))
+    return slice(begin, end)
 
 
 def _span(log: Log) -> str:
     """From when to when a log goes, in seconds and by its clock."""
-    first, last = log.t[0], log.t[-1]
+    first = log.t[0]
+    last = log.t[-1]
     seconds = f"{first:g} to {last:g} s"
     if log.start is None:
         return seconds
@@ -76,7 +84,7 @@ def _span(log: Log) -> str:
 
 
 def _seconds(moment: float | str, log: Log, where: str) -> float:
-    """A moment on the time of the log, s; a time of the day is that next to its beginning."""
+    """A moment on the log's time, s; a time of the day is the one next to its start."""
     if not isinstance(moment, str):
         return float(moment)
     try:
@@ -99,16 +107,21 @@ def _seconds(moment: float | str, log: Log, where: str) -> float:
 def _active_stretches(log: Log, where: str) -> list[Stretch]:
     """From before the rudder leaves its usual place until it is quiet again."""
     largest_swing = 3.0 * DEGREE  # of a rudder that is at its usual place
-    longest_pause, shortest, margin = 60.0, 30.0, 30.0  # s, of a manoeuvre
+    longest_pause = 60.0  # s, within a manoeuvre
+    shortest = 30.0  # s
+    margin = 30.0  # s, before and after
     delta = log.channels.get("delta", np.zeros(log.t.size))
     swing = np.abs(delta - np.median(delta))
     active = log.t[swing > largest_swing]
     is_pause = np.diff(active) > longest_pause
+    ends = np.flatnonzero(is_pause) + 1
+
     stretches = []
-    for moments in np.split(active, np.flatnonzero(is_pause) + 1):
+    for moments in np.split(active, ends):
         if moments.size and np.ptp(moments) > shortest:
-            first, last = float(moments[0]), float(moments[-1])
-            stretches.append(Stretch(first - margin, last + margin))
+            first = float(moments[0]) - margin
+            last = float(moments[-1]) + margin
+            stretches.append(Stretch(first, last))
     if not stretches:
         raise InputError(
             f'{where} cut: expected with "rudder" manoeuvres, in which the rudder is'

@@ -9,7 +9,7 @@ from shipgym.arrays import Floats
 
 
 def time_derivative(t: Floats, values: Floats) -> Floats:
-    """Differentiate a sampled signal, in units per second; smoothed as far as its noise asks for.
+    """Differentiate a sampled signal by a spline that smooths its noise.
 
     Quintic splines are fitted by least squares with a knot at every second, third,
     fifth, ... sample. While the knots resolve the motion, the residual is the noise and
@@ -25,37 +25,45 @@ def time_derivative(t: Floats, values: Floats) -> Floats:
     # of noise, as a power of the distance of knots: that of a random walk has a half
     steepest_growth = 0.8
     n = t.size
-    step = (t[-1] - t[0]) / (n - 1)
-    samples = (t - t[0]) / step
+    since_start = t - t[0]
+    step = since_start[-1] / (n - 1)
+    samples = since_start / step
     best = make_interp_spline(samples, values, k=min(3, n - 1))
 
-    noise_before, spacing_before = 0.0, 0
+    noise_before = 0.0
+    spacing_before = 0
     spacing = 2
     while n // spacing >= fewest_spans:
         spline, noise = _smoothed(samples, values, spacing)
         if spacing_before:
             growth = math.log(noise / noise_before)
-            if growth > steepest_growth * math.log(spacing / spacing_before):
+            widening = math.log(spacing / spacing_before)
+            if growth > steepest_growth * widening:
                 break
             best = spline
-        noise_before, spacing_before = noise, spacing
+        noise_before = noise
+        spacing_before = spacing
         spacing = math.ceil(1.4 * spacing)
-    return np.asarray(best.derivative()(samples) / step, dtype=np.float64)
+
+    derivative = best.derivative()
+    return np.asarray(derivative(samples) / step, dtype=np.float64)
 
 
 def _smoothed(samples: Floats, values: Floats, spacing: int) -> tuple[Any, float]:
-    """Quintic spline with a knot at every so many samples, and the noise that it leaves."""
+    """Quintic spline with a knot every `spacing` samples, and the noise it leaves."""
     from scipy.interpolate import make_lsq_spline
 
     degree = 5
     n = samples.size
-    inner = samples[np.arange(spacing, n - spacing, spacing)]
-    ends = np.repeat([samples[0], samples[-1]], degree + 1)
-    knots = np.sort(np.concatenate([ends, inner]))
+    first = np.repeat(samples[0], degree + 1)
+    inner = samples[spacing : n - spacing : spacing]
+    last = np.repeat(samples[-1], degree + 1)
+    knots = np.concatenate([first, inner, last])
     spline = make_lsq_spline(samples, values, knots, k=degree)
 
     residual = np.linalg.norm(values - spline(samples))
     free = max(n - inner.size - degree - 1, 1)
-    largest = max(np.abs(values).max(), 1e-290)
     noise = residual * math.sqrt(n) / free
-    return spline, float(noise + 1e-15 * largest)
+    largest = max(np.abs(values).max(), 1e-290)
+    rounding = 1e-15 * largest
+    return spline, float(noise + rounding)

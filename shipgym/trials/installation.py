@@ -18,7 +18,7 @@ _KEYS = ("gnss_antenna", "heading_offset_deg", "rudder_offset_deg", "clock_offse
 
 @dataclass(frozen=True)
 class Installation:
-    """Where the antenna stands, what heading and rudder show too much, what is done with late clocks.
+    """Antenna position, offsets of heading and rudder, and treatment of late clocks.
 
     Attributes
     ----------
@@ -41,7 +41,10 @@ class Installation:
     def from_mapping(
         cls, table: Any, where: str, ship: Particulars | None = None
     ) -> Installation:
-        """Check the table ``[sensors]``; InputError also for an antenna outside the ship."""
+        """Check the table ``[sensors]``.
+
+        Raises InputError also for an antenna outside the ship.
+        """
         check_table(table, where, _KEYS)
         clocks = table.get("clock_offsets")
         if clocks is not None:

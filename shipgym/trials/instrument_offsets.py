@@ -1,4 +1,4 @@
-"""What heading and rudder show where the truth is zero, by the straight parts of a log."""
+"""Offsets of heading and rudder, estimated from the straight parts of a log."""
 
 import math
 from collections.abc import Mapping
@@ -34,15 +34,17 @@ class HeadingOffset(NamedTuple):
 
 
 def straight_parts(t: Floats, channels: Mapping[str, Floats]) -> Flags:
-    """Which samples lie amid a straight steady part, where heading and rudder hardly change."""
+    """Flags of samples amid a straight steady part, shape (n_samples,)."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     width = math.ceil(STRAIGHT_S / usual_step(t)) + 1
-    straight = np.full(t.size, "psi" in channels and t.size > width)
+    can_be_straight = "psi" in channels and t.size > width
+    straight = np.full(t.size, can_be_straight)
     for name in ("psi", "delta"):
         if name in channels:
-            highest = maximum_filter1d(channels[name], width)
-            lowest = minimum_filter1d(channels[name], width)
+            values = channels[name]
+            highest = maximum_filter1d(values, width)
+            lowest = minimum_filter1d(values, width)
             straight &= highest - lowest < STRAIGHT_RANGE
     return straight
 
@@ -62,37 +64,47 @@ def heading_offset(
         return None
     north = channels["ground_north"][straight]
     east = channels["ground_east"][straight]
-
-    # unknown are U cos(o), U sin(o) and the current to north and east
-    c, s = np.cos(psi), np.sin(psi)
-    zero, one = np.zeros(psi.size), np.ones(psi.size)
-    to_north = np.column_stack([c, s, one, zero])
-    to_east = np.column_stack([s, -c, zero, one])
-    rows = np.vstack([to_north, to_east])
     ground = np.concatenate([north, east])
+    rows = _ground_velocity_regressors(psi)
     fitted, *_ = np.linalg.lstsq(rows, ground, rcond=None)
 
     # samples of one straight part say the same
     left = ground - rows @ fitted
     variance = 0.5 * STRAIGHT_S * np.var(left)
     covariance = variance * np.linalg.pinv(rows.T @ rows)
+    across_error = math.sqrt(covariance[1, 1])
     along, across, *_ = fitted
     speed = math.hypot(along, across)
     return HeadingOffset(
         offset=math.atan2(across, along),
-        error=math.sqrt(covariance[1, 1]) / speed,
+        error=across_error / speed,
     )
+
+
+def _ground_velocity_regressors(psi: Floats) -> Floats:
+    """Regressors of north and then east velocity over ground, shape (2 n_samples, 4).
+
+    Unknown are U cos(o), U sin(o), and the current to north and east.
+    """
+    c = np.cos(psi)
+    s = np.sin(psi)
+    zero = np.zeros(psi.size)
+    one = np.ones(psi.size)
+    to_north = np.column_stack([c, s, one, zero])
+    to_east = np.column_stack([s, -c, zero, one])
+    return np.vstack([to_north, to_east])
 
 
 def rudder_offset(
     t: Floats, channels: Mapping[str, Floats], straight: Flags
 ) -> float | None:
-    """Mean rudder, rad, of the straight parts; None without any in which the heading is straight.
+    """Mean rudder, rad, of the straight parts; None if no heading in them is straight.
 
     At an overshoot the heading hardly changes either, and the rudder is held, but the
     heading is bent. Of several angles held the one counts at which it is bent least, by
     far.
     """
+    psi = channels["psi"]
     delta = channels["delta"]
     half = math.ceil(0.5 * STRAIGHT_S / usual_step(t))
     inside = straight[half : t.size - half]
@@ -100,45 +112,52 @@ def rudder_offset(
     if not rows.size:
         return None
 
-    by_rudder = rows[np.argsort(delta[rows])]
+    # rows at which the same angle is held
+    order = np.argsort(delta[rows])
+    by_rudder = rows[order]
     is_step = np.diff(delta[by_rudder]) > STRAIGHT_RANGE
-    held = np.split(by_rudder, np.flatnonzero(is_step) + 1)
-    bends = [_bend(channels["psi"], part, half) for part in held]
-    straightest = bends.index(min(bends))
-    is_distinct = bends[straightest] <= 0.3 * max(bends)
+    begins = np.flatnonzero(is_step) + 1
+    held = np.split(by_rudder, begins)
+
+    bends = [_bend(psi, part, half) for part in held]
+    least = min(bends)
+    is_distinct = least <= 0.3 * max(bends)
     if len(held) > 1 and not is_distinct:
         return None
-    return float(delta[held[straightest]].mean())
+    straightest = held[bends.index(least)]
+    return float(delta[straightest].mean())
 
 
 def _bend(psi: Floats, rows: npt.NDArray[np.intp], half: int) -> float:
     """Mean second difference of the heading over so many samples to both sides."""
-    before, after = psi[rows - half], psi[rows + half]
-    bends = before - 2.0 * psi[rows] + after
-    return abs(float(bends.mean()))
+    before = psi[rows - half]
+    here = psi[rows]
+    after = psi[rows + half]
+    second_difference = before - 2.0 * here + after
+    return abs(float(second_difference.mean()))
 
 
 def correct_offsets(log: Log, installation: Installation) -> None:
-    """Take the offsets of heading and rudder, given or estimated, out of the channels of a log.
+    """Remove given or estimated offsets from heading and rudder of a log.
 
     Raises InputError where one cannot be estimated.
     """
-    channels = log.channels
-    offset = installation.heading_offset
-    if offset and log.has("psi"):
-        if isinstance(offset, str):
-            offset = _estimated_heading_offset(log)
-        channels["psi"] = channels["psi"] - offset
+    heading = installation.heading_offset
+    if heading and log.has("psi"):
+        if isinstance(heading, str):
+            heading = _estimated_heading_offset(log)
+        log.channels["psi"] = log.channels["psi"] - heading
 
-    offset = installation.rudder_offset
-    if offset and log.has("delta"):
-        if isinstance(offset, str):
-            offset = _estimated_rudder_offset(log)
-        channels["delta"] = channels["delta"] - offset
+    rudder = installation.rudder_offset
+    if rudder and log.has("delta"):
+        if isinstance(rudder, str):
+            rudder = _estimated_rudder_offset(log)
+        log.channels["delta"] = log.channels["delta"] - rudder
 
 
 def _estimated_heading_offset(log: Log) -> float:
-    found = heading_offset(log.channels, straight_parts(log.t, log.channels))
+    straight = straight_parts(log.t, log.channels)
+    found = heading_offset(log.channels, straight)
     if found is None:
         needed = "with sog and cog on courses over 60 deg apart"
         raise _not_estimated("heading_offset_deg", needed, log)
@@ -147,7 +166,8 @@ def _estimated_heading_offset(log: Log) -> float:
 
 
 def _estimated_rudder_offset(log: Log) -> float:
-    offset = rudder_offset(log.t, log.channels, straight_parts(log.t, log.channels))
+    straight = straight_parts(log.t, log.channels)
+    offset = rudder_offset(log.t, log.channels, straight)
     if offset is None:
         needed = "and a heading that does not turn back in them, as at an overshoot"
         raise _not_estimated("rudder_offset_deg", needed, log)

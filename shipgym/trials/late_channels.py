@@ -1,10 +1,11 @@
-"""Late yaw rate and rudder in a log, and a rudder of the wrong sign: found, refused or to be corrected."""
+"""Late yaw rate and rudder in a log, and a rudder of the wrong sign."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.trials.clock_offsets import (
     ClockOffset,
@@ -46,16 +47,18 @@ class LateChannel(NamedTuple):
     def evidence(self) -> str:
         """What was found, in words."""
         comparison = _COMPARISONS[self.channel]
+        size = abs(self.delay)
         side = "late" if self.delay > 0.0 else "early"
         return (
-            f"{comparison.name} is {abs(self.delay):.2f} s {side} against"
+            f"{comparison.name} is {size:.2f} s {side} against"
             f" {comparison.target} (standard error {self.error:.2f} s)"
         )
 
     @property
     def is_small(self) -> bool:
         """Whether it is left on one clock where nobody decided."""
-        return abs(self.delay) <= _COMPARISONS[self.channel].refused_s
+        comparison = _COMPARISONS[self.channel]
+        return abs(self.delay) <= comparison.refused_s
 
 
 def find_late_channels(log: Log) -> list[LateChannel]:
@@ -66,13 +69,14 @@ def find_late_channels(log: Log) -> list[LateChannel]:
     """
     significant = 2.5  # standard errors
     rate = _rate_offset(log)
+    rudder = _rudder_offset(log, rate)
     late = []
-    for channel, offset in (("r", rate), ("delta", _rudder_offset(log, rate))):
-        if offset is None:
+    for channel, offset in {"r": rate, "delta": rudder}.items():
+        if offset is None or offset.certainty < CERTAIN:
             continue
-        error = math.hypot(offset.error, _COMPARISONS[channel].dynamics_s)
-        is_significant = abs(offset.late) >= significant * error
-        if is_significant and offset.certainty >= CERTAIN:
+        comparison = _COMPARISONS[channel]
+        error = math.hypot(offset.error, comparison.dynamics_s)
+        if abs(offset.late) >= significant * error:
             late.append(LateChannel(channel, offset.late, error))
     return late
 
@@ -99,36 +103,49 @@ def is_corrected(
 
 def _rate_offset(log: Log) -> ClockOffset | None:
     """How late the yaw rate is against the heading, where a log tells it."""
-    psi, r = log.channels.get("psi"), log.channels.get("r")
-    if psi is None or r is None or not reverses(r):
+    if not log.has("psi", "r"):
         return None
-    return clock_offset(log.t, psi, r, {})
+    psi = log.channels["psi"]
+    r = log.channels["r"]
+    if not reverses(r):
+        return None
+    return clock_offset(log.t, target=psi, late=r, others={})
 
 
 def _rudder_offset(log: Log, rate: ClockOffset | None) -> ClockOffset | None:
-    """How late the rudder is against the yaw rate on the clock of the heading, where a log tells it.
+    """Delay of the rudder against the yaw rate, on the clock of the heading.
+
+    None where the log does not show it.
 
     InputError for a rudder of the wrong sign.
     """
-    t, channels = log.t, log.channels
-    delta = channels.get("delta")
-    if delta is None or not {"psi", "r"} & channels.keys():
+    has_motion = log.has("psi") or log.has("r")
+    if not log.has("delta") or not has_motion:
         return None
+    delta = log.channels["delta"]
     if not reverses(delta, least=2.0 * DEGREE):
         check_circle(log)
         return None
 
-    if "r" in channels:
-        delay = 0.0 if rate is None else rate.late
-        r = np.interp(t + delay, t, channels["r"])
-    else:
-        r = time_derivative(t, channels["psi"])
-    rudder = rudder_clock_offset(t, r, delta)
+    r = _rate_on_heading_clock(log, rate)
+    rudder = rudder_clock_offset(log.t, r, delta)
     if _is_against(rudder) and not _is_against(rate):
-        without_history = clock_offset(t, r, delta, {"r": r})
+        without_history = clock_offset(log.t, r, delta, {"r": r})
         if _is_against(without_history):
             raise _wrong_sign(log, "a yaw acceleration that follows the rudder")
     return rudder
+
+
+def _rate_on_heading_clock(log: Log, rate: ClockOffset | None) -> Floats:
+    """Yaw rate with its own delay taken out, rad/s."""
+    t = log.t
+    if not log.has("r"):
+        psi = log.channels["psi"]
+        return time_derivative(t, psi)
+    r = log.channels["r"]
+    if rate is None:
+        return r
+    return np.interp(t + rate.late, t, r)
 
 
 def _is_against(offset: ClockOffset | None) -> bool:
@@ -137,20 +154,23 @@ def _is_against(offset: ClockOffset | None) -> bool:
 
 
 def check_circle(log: Log) -> None:
-    """Refuse a rudder that stays on one side and turns the ship to the other, as in a circle."""
-    if "psi" not in log.channels:
+    """Refuse a rudder held to one side while the ship turns to the other."""
+    if not log.has("psi"):
         return
-    psi, delta = log.channels["psi"], log.channels["delta"]
+    psi = log.channels["psi"]
+    delta = log.channels["delta"]
     rudder = np.median(delta)
     side = np.sign(rudder)
     is_laid = abs(rudder) > 8.0 * DEGREE
     stays_there = np.quantile(side * delta, 0.1) > 0.0
-    turned = side * (psi[-1] - psi[0])
-    if is_laid and stays_there and turned < -60.0 * DEGREE:
+    turned = psi[-1] - psi[0]
+    turns_away = side * turned < -60.0 * DEGREE
+    if is_laid and stays_there and turns_away:
         raise _wrong_sign(log, "a ship that turns away from the rudder,")
 
 
 def _wrong_sign(log: Log, found: str) -> InputError:
+    """Error of a rudder that is positive to port."""
     return implausible(
         log.where,
         f"expected a positive rudder to turn the bow to starboard, got {found} with the"

@@ -1,4 +1,4 @@
-"""From what a log holds to the project's frame and origin: velocities in the body frame, at midship."""
+"""From a log's frame and origin to velocities in the body frame, at midship."""
 
 import math
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from shipgym.trials.units import KNOT
 
 
 def to_project_conventions(log: Log, conventions: Conventions) -> None:
-    """Convert frame and origin of a log, and derive the channels that follow from others.
+    """Convert frame and origin of a log, and derive channels that follow from others.
 
     The channels are in the file's frame, the heading without jumps, the rudder positive
     to starboard. The yaw rate is derived from the heading, surge and sway from velocity
@@ -49,13 +49,18 @@ def _needs_moving(log: Log, installation: Installation) -> bool:
 
 
 def _derive_turning(log: Log) -> None:
-    """Derive the yaw rate from the heading, or, without positions, the heading from the yaw rate."""
-    if log.has("psi"):
-        if not log.has("r"):
-            log.derive("r", time_derivative(log.t, log.channels["psi"]))
+    """Derive yaw rate from heading or, without positions, heading from yaw rate."""
+    if log.has("psi", "r"):
         return
-    if log.has("r") and not log.has("x") and not log.has("y"):
-        log.derive("psi", _heading_from_start(log))
+    if log.has("psi"):
+        psi = log.channels["psi"]
+        rate = time_derivative(log.t, psi)
+        log.derive("r", rate)
+        return
+    has_position = log.has("x") or log.has("y")
+    if log.has("r") and not has_position:
+        heading = _heading_from_start(log)
+        log.derive("psi", heading)
 
 
 def _heading_from_start(log: Log) -> Floats:
@@ -90,7 +95,10 @@ def _earth_to_body(log: Log) -> None:
 
 
 def _cg_to_midship(log: Log, xg: float) -> None:
-    """Move position, sway and yaw moment from the centre of gravity, `xg` forward of midship, to midship."""
+    """Move position, sway and yaw moment from the centre of gravity to midship.
+
+    The centre of gravity is `xg` m forward of midship.
+    """
     needed = {"v": "r", "x": "psi", "y": "psi", "N": "Y"}
     for name, other in needed.items():
         if log.has(name) and not log.has(other):
@@ -98,26 +106,32 @@ def _cg_to_midship(log: Log, xg: float) -> None:
                 f'{log.where}: origin = "cg": expected {other} to move {name} to'
                 " midship, got none; name its column"
             )
+
     channels = log.channels
+    moved = {}
     if log.has("v"):
-        channels["v"] = channels["v"] - xg * channels["r"]
+        moved["v"] = channels["v"] - xg * channels["r"]
     if log.has("x"):
-        channels["x"] = channels["x"] - xg * np.cos(channels["psi"])
+        north = xg * np.cos(channels["psi"])
+        moved["x"] = channels["x"] - north
     if log.has("y"):
-        channels["y"] = channels["y"] - xg * np.sin(channels["psi"])
+        east = xg * np.sin(channels["psi"])
+        moved["y"] = channels["y"] - east
     if log.has("N"):
-        channels["N"] = channels["N"] + xg * channels["Y"]
+        moved["N"] = channels["N"] + xg * channels["Y"]
+    channels |= moved
 
 
 def to_midship(log: Log, installation: Installation) -> None:
-    """Move positions and velocities of GNSS to midship and make surge and sway of what was logged.
+    """Move GNSS positions and velocities to midship and derive surge and sway.
 
     Velocity over ground gives u and v, else positions; a speed through the water takes
     the place of u, and the current that it shows is taken out of v. Raises InputError
     for GNSS without a heading.
     """
     is_elsewhere = not installation.is_at_midship
-    if not log.has("psi") and (is_elsewhere or log.has("ground_north")):
+    needs_heading = is_elsewhere or log.has("ground_north")
+    if needs_heading and not log.has("psi"):
         raise InputError(
             f"{log.where}: expected a column psi, the heading, with positions or"
             " velocities of GNSS, got none"
@@ -162,10 +176,15 @@ def _velocity(log: Log, installation: Installation) -> tuple[Floats, Floats] | N
     if log.has("ground_north"):
         north = channels.pop("ground_north")
         east = channels.pop("ground_east")
-        r = channels["r"]
         u, v = rotate_to_body(north, east, channels["psi"])
-        return u + installation.starboard * r, v - installation.forward * r
-    if log.has("u", "v") or not log.has("x", "y", "psi"):
+        # of the antenna, which the yaw rate moves too
+        r = channels["r"]
+        surge = u + installation.starboard * r
+        sway = v - installation.forward * r
+        return surge, sway
+
+    are_logged = log.has("u", "v")
+    if are_logged or not log.has("x", "y", "psi"):
         return None
     north = time_derivative(log.t, channels["x"])
     east = time_derivative(log.t, channels["y"])
@@ -209,13 +228,14 @@ class SetAndDrift(NamedTuple):
 def set_and_drift(
     psi: Floats, water: Floats, surge: Floats, sway: Floats
 ) -> SetAndDrift:
-    """Current that a speed through the water shows against surge and sway over ground, m/s.
+    """Current, m/s, from speed through the water and velocity over ground.
 
     It explains best the difference of both along the ship; on nearly one course the
     part across is taken from the mean sway, as if there were no leeway.
     """
     # along the ship, and on one course across her too
-    c, s = np.cos(psi), np.sin(psi)
+    c = np.cos(psi)
+    s = np.sin(psi)
     rows = np.column_stack([c, s])
     values = surge - water
     if np.ptp(psi) < DISTINCT_COURSES:
@@ -224,9 +244,11 @@ def set_and_drift(
         values = np.concatenate([values, sway])
 
     current, *_ = np.linalg.lstsq(rows, values, rcond=None)
-    left = values - rows @ current
+    north, east = current.tolist()
+    explained = rows @ current
+    left = values - explained
     return SetAndDrift(
-        north=float(current[0]),
-        east=float(current[1]),
+        north=north,
+        east=east,
         unexplained=float(np.std(left)),
     )

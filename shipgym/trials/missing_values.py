@@ -1,4 +1,4 @@
-"""Missing values of a log: refused, or filled where no hole is too long; and time that goes on."""
+"""Missing values of a log, refused or filled, and the check that time increases."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -17,7 +17,7 @@ REPAIR = ("repair", "interpolate")
 
 
 class FilledChannels(NamedTuple):
-    """Channels without missing values, SI units, of the rows from the first whole one to the last."""
+    """Channels without missing values, SI units, between first and last whole row."""
 
     t: Floats
     channels: dict[str, Floats]
@@ -40,11 +40,12 @@ def check_time(t: Floats, locator: Locator) -> None:
 
 
 def _refuse_time(t: Floats, row: int, locator: Locator) -> None:
-    before, after = t[row - 1], t[row]
+    before = t[row - 1]
+    after = t[row]
+    earlier = locator.in_file("t", before, digits=10)
     later = locator.in_file("t", after, digits=10)
     change = f"stands still at {later}"
     if after < before:
-        earlier = locator.in_file("t", before, digits=10)
         change = f"goes back from {earlier} to {later}"
     place = locator.place(row, "t")
     raise InputError(
@@ -65,53 +66,65 @@ def fill_missing(
     _check_present(t, channels, locator, repair)
     check_time(t, locator)
     whole = _whole_rows(channels, locator)
-    first, last = int(whole[0]), int(whole[-1])
-    kept = slice(first, last + 1)
-    locator = replace(locator, rows=locator.rows[kept])
+    kept = slice(whole[0], whole[-1] + 1)
     t = t[kept]
-    filled, counts = {}, {}
+    locator = replace(locator, rows=locator.rows[kept])
+
+    filled = {}
+    counts = {}
     for name, every in channels.items():
         values = every[kept]
         is_missing = ~np.isfinite(values)
-        counts[name] = int(is_missing.sum())
-        if counts[name]:
+        if is_missing.any():
             _check_holes(t, is_missing, name, locator)
-            values = _interpolated(t, values, is_missing, is_heading=name == "psi")
+            is_heading = name == "psi"
+            values = _interpolated(t, values, is_missing, is_heading=is_heading)
         filled[name] = values
-    return FilledChannels(t, filled, locator, counts)
+        counts[name] = int(is_missing.sum())
+    return FilledChannels(
+        t=t,
+        channels=filled,
+        locator=locator,
+        counts=counts,
+    )
 
 
 def _check_present(
     t: Floats, channels: Mapping[str, Floats], locator: Locator, repair: str | None
 ) -> None:
-    """Refuse missing times, and without `repair` every missing value, naming the first."""
-    table = {"t": t, **channels}
-    values = np.column_stack(list(table.values()))
+    """Refuse missing times and, without `repair`, every missing value."""
+    values = np.column_stack([t, *channels.values()])
     is_missing = ~np.isfinite(values)
     refused = is_missing if repair is None else is_missing[:, :1]
     if not refused.any():
         return
+
     row, column = np.argwhere(refused)[0]
-    name = list(table)[column]
+    name = ["t", *channels][column]
+    place = locator.place(row, name)
+    found = values[row, column]
+    lacking = np.count_nonzero(is_missing.any(axis=1))
     remedy = 'repair = "interpolate" fills it from its neighbours, or remove the row'
+    proposals = [REPAIR]
     if name == "t":
         remedy = "time cannot be interpolated, remove the row"
-    lacking = np.count_nonzero(is_missing.any(axis=1))
+        proposals = []
     raise InputError(
-        f"{locator.place(row, name)}: expected a number, got no value"
-        f" ({values[row, column]:g}); {remedy} ({lacking} of {t.size} rows lack a value)",
-        () if name == "t" else (REPAIR,),
+        f"{place}: expected a number, got no value ({found:g}); {remedy}"
+        f" ({lacking} of {t.size} rows lack a value)",
+        proposals,
     )
 
 
 def _whole_rows(
     channels: Mapping[str, Floats], locator: Locator
 ) -> npt.NDArray[np.intp]:
-    """Rows that lack no value; InputError where they are less than half, or less than three."""
-    present = [np.isfinite(values) for values in channels.values()]
-    is_whole = np.all(present, axis=0)
+    """Rows without missing values; InputError if less than half, or less than three."""
+    is_present = np.isfinite(list(channels.values()))
+    is_whole = is_present.all(axis=0)
     rows = np.flatnonzero(is_whole)
-    n_rows, n_whole = is_whole.size, rows.size
+    n_rows = is_whole.size
+    n_whole = rows.size
     fewest = max(FEWEST_SAMPLES, n_rows // 2)
     if n_whole < fewest:
         raise InputError(
@@ -124,20 +137,25 @@ def _whole_rows(
 
 def _check_holes(t: Floats, is_missing: Flags, channel: str, locator: Locator) -> None:
     """Refuse to fill a hole of many rows; the first and the last row are whole."""
-    most_rows, most_steps = 10, 20.0  # both are exceeded by a hole too long to fill
+    # both are exceeded by a hole too long to fill
+    most_rows = 10
+    most_steps = 20.0
     edges = np.flatnonzero(np.diff(is_missing)) + 1
-    first, after = edges[::2], edges[1::2]
+    first = edges[::2]
+    after = edges[1::2]
     rows = after - first
     spans = t[after] - t[first - 1]
     is_long = spans > most_steps * usual_step(t)
     too_long = is_long & (rows > most_rows)
     if not too_long.any():
         return
+
     k = np.argmax(too_long)
+    place = locator.place(first[k], channel)
+    span = locator.in_file("t", spans[k])
     raise InputError(
-        f"{locator.place(first[k], channel)}: expected a hole of at most"
-        f" {most_steps:g} time steps to interpolate over, got {rows[k]} rows"
-        f" without a value, over {locator.in_file('t', spans[k])}; split the file there,"
+        f"{place}: expected a hole of at most {most_steps:g} time steps to interpolate"
+        f" over, got {rows[k]} rows without a value, over {span}; split the file there,"
         " or leave out the rows or the column"
     )
 
@@ -148,11 +166,12 @@ def _interpolated(
     """Values with their gaps filled; headings without jumps."""
     from scipy.interpolate import PchipInterpolator
 
-    known = values[~is_missing]
+    is_known = ~is_missing
+    known = values[is_known]
     if is_heading:
         known = np.unwrap(known)
-    curve = PchipInterpolator(t[~is_missing], known)
+    curve = PchipInterpolator(t[is_known], known)
     filled = values.copy()
-    filled[~is_missing] = known
+    filled[is_known] = known
     filled[is_missing] = curve(t[is_missing])
     return filled

@@ -1,4 +1,4 @@
-"""From latitudes and longitudes to metres, and between the frames of the earth and of the ship."""
+"""From latitude and longitude to metres, and between earth and body frame."""
 
 import math
 from typing import Any
@@ -15,11 +15,11 @@ _ECCENTRICITY_2 = 6.69437999014e-3  # its first eccentricity, squared
 def local_metres(
     lat: Floats, lon: Floats, origin: tuple[float, float]
 ) -> tuple[Floats, Floats]:
-    """North and east of an origin, m, of latitudes and longitudes in degrees, over the date line too.
+    """North and east of an origin, m, of latitudes and longitudes in degrees.
 
-    By the radii of curvature of WGS 84 along the meridian and across it (Fossen 2011,
-    Handbook of Marine Craft Hydrodynamics and Motion Control, 2.3): within 1 part in
-    10,000 up to 30 km away.
+    Valid across the date line too. By the radii of curvature of WGS 84 along the
+    meridian and across it (Fossen 2011, Handbook of Marine Craft Hydrodynamics and
+    Motion Control, 2.3): within 1 part in 10,000 up to 30 km away.
     """
     origin_lat, origin_lon = origin
     phi = origin_lat * DEGREE
@@ -28,16 +28,19 @@ def local_metres(
     across_meridian = _EQUATOR / math.sqrt(curvature)
 
     turned_north = (lat - origin_lat) * DEGREE
-    turned_east = (lon - origin_lon + 180.0) % 360.0 - 180.0
+    from_antimeridian = lon - origin_lon + 180.0
+    turned_east = from_antimeridian % 360.0 - 180.0
     middle = phi + 0.5 * turned_north
     parallel = across_meridian * np.cos(middle)
-    return along_meridian * turned_north, parallel * turned_east * DEGREE
+    north = along_meridian * turned_north
+    east = parallel * turned_east * DEGREE
+    return north, east
 
 
 def rotate_to_body(north: Any, east: Any, psi: Any) -> tuple[Any, Any]:
-    """Surge and sway of a north and east velocity, m/s, or distance, m, by the heading, rad; back by -psi.
+    """Rotate a north and east vector by the heading, rad, to surge and sway.
 
-    Numbers, or arrays of shape (n_samples,).
+    With -psi it rotates back. Numbers, or arrays of shape (n_samples,).
     """
     c, s = np.cos(psi), np.sin(psi)
     return north * c + east * s, east * c - north * s

@@ -1,7 +1,8 @@
-"""Sentences of NMEA 0183, for logs and for the helm: the table `nmea.toml`, and the numbers in a line.
+"""Sentences of NMEA 0183, for logs and for the helm.
 
-A sentence is ``$`` or nothing, two letters of the talker, three of the kind, fields
-after commas, and ``*`` with the checksum: the exclusive or of all characters between.
+The table `nmea.toml` says which numbers stand where. A sentence is ``$`` or nothing,
+two letters of the talker, three of the kind, fields after commas, and ``*`` with the
+checksum: the exclusive or of all characters between.
 """
 
 import re
@@ -17,7 +18,9 @@ from shipgym.files import shipped_toml
 from shipgym.trials.units import UNITS
 
 _SENTENCE = re.compile(
-    r"\s*\$?(?P<text>(?P<address>\w+),(?P<fields>[^*]*))\*(?P<checksum>[0-9A-Fa-f]{2})\s*"
+    r"\s*\$?"
+    r"(?P<text>(?P<talker>P|\w{1,2})(?P<kind>\w*),(?P<fields>[^*]*))"
+    r"\*(?P<checksum>[0-9A-Fa-f]{2})\s*"
 )
 _QUANTITIES_IN_SI = ("length", "angle", "angular rate", "speed", "shaft speed")
 _SPEED_UNITS = {"N": "knots", "K": "km/h", "M": "m/s"}
@@ -72,22 +75,22 @@ class NmeaQuantity:
 def _with_letters(entry: Mapping[str, Any]) -> dict[str, Any]:
     """An entry of the table whose tables of letters are by place."""
     fields = dict(entry)
-    of_letters = {"valid", "degraded", "letters", "only_if"}
-    for key in of_letters & entry.keys():
+    for name in ("valid", "degraded", "letters", "only_if"):
+        if name not in entry:
+            continue
         by_place = {}
-        for at, letters in entry[key].items():
-            place = int(at)
-            by_place[place] = frozenset(letters)
-        fields[key] = by_place
+        for at, letters in entry[name].items():
+            by_place[int(at)] = frozenset(letters)
+        fields[name] = by_place
     return fields
 
 
 def _sentence_kind(entry: Mapping[str, Any]) -> SentenceKind:
-    kind = _with_letters(entry)
     numbers = {}
     for quantity, place in entry["fields"].items():
         place = _with_letters(place)
         numbers[quantity] = NumberField(**place)
+    kind = _with_letters(entry)
     kind["fields"] = numbers
     return SentenceKind(**kind)
 
@@ -135,17 +138,16 @@ def parse_sentence(line: str) -> Sentence:
     if expected != found.upper():
         raise ValueError(f"expected the checksum {expected}, got {found}")
 
-    address = match["address"]
-    letters = 1 if address.startswith("P") else 2
+    fields = match["fields"]
     return Sentence(
-        talker=address[:letters],
-        kind=address[letters:],
-        fields=match["fields"].split(","),
+        talker=match["talker"],
+        kind=match["kind"],
+        fields=fields.split(","),
     )
 
 
 def steering_numbers(sentence: Sentence) -> dict[str, float]:
-    """Numbers of a sentence that an autopilot may steer by, in SI units and radians, by quantity.
+    """Numbers that an autopilot may steer by, in SI units and radians, by quantity.
 
     Nothing for a kind that is not known, a status that is not valid, an empty field, or
     a number beyond any sensor's range. Raises ValueError, KeyError or IndexError where
@@ -155,12 +157,14 @@ def steering_numbers(sentence: Sentence) -> dict[str, float]:
     if kind is None or kind.log_only:
         return {}
     numbers = {}
-    for quantity, place in kind.fields.items():
+    for name, place in kind.fields.items():
         needed = {**kind.valid, **place.letters, **place.only_if}
         value = _number(place, sentence.fields, needed)
-        largest = NMEA_QUANTITIES[quantity].largest
-        if value is not None and abs(value) <= largest:
-            numbers[quantity] = value
+        if value is None:
+            continue
+        quantity = NMEA_QUANTITIES[name]
+        if abs(value) <= quantity.largest:
+            numbers[name] = value
     return numbers
 
 
@@ -172,7 +176,8 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
     large. Raises ValueError where one is broken.
     """
     kind = NMEA_SENTENCES[sentence.kind]
-    fields = sentence.fields + [""] * 20  # those at the end may be missing
+    absent = [""] * 20  # those at the end may be missing
+    fields = [*sentence.fields, *absent]
     valid = dict(kind.valid)
     for at, letters in kind.degraded.items():
         valid[at] |= letters
@@ -195,7 +200,10 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
 
 
 def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float | None:
-    """One number in SI units; None where its field is empty or the letters needed are not there."""
+    """One number in SI units.
+
+    None where its field is empty or the letters needed are not there.
+    """
     for at, letters in needed.items():
         if fields[at] not in letters:
             return None
@@ -212,7 +220,8 @@ def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float
         unit = _SPEED_UNITS[letter]
     if unit == "ddmm.mm":  # 5430.5 is 54 degrees and 30.5 minutes
         degrees, minutes = divmod(value, 100.0)
-        value, unit = degrees + minutes / 60.0, "deg"
+        value = degrees + minutes / 60.0
+        unit = "deg"
     value *= _TO_SI[unit]
 
     if place.side is None:

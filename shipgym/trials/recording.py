@@ -1,4 +1,4 @@
-"""From a table's columns to channels in SI units, each with its time: one file of a log."""
+"""From a table's columns to channels in SI units, each on its clock."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -78,7 +78,7 @@ def read_recording(
     *,
     part: bool = False,
 ) -> Recording:
-    """Read the chosen columns of a table, check them, and fill what is missing where that is asked for.
+    """Read the chosen columns of a table, checked and, if asked for, repaired.
 
     `columns` and `part` are as :func:`.columns.choose_columns` takes them. Anything
     wrong with a file is an InputError that names line, column, value and remedy.
@@ -88,27 +88,40 @@ def read_recording(
         _check_pairs(table, chosen)
     times = _read_times(table, chosen["t"])
     chosen["t"] = replace(chosen["t"], unit=times.unit)
-    locator = Locator(table, chosen, np.arange(times.t.size))
+    locator = Locator(
+        table=table,
+        columns=chosen,
+        rows=np.arange(times.t.size),
+    )
 
     channels = _read_numbers(locator)
     outliers = 0
     if "lat" in chosen:
         track = _local_track(locator, times.t, repair)
-        channels |= {"x": track.north, "y": track.east}
+        outliers = track.outliers
+        channels["x"] = track.north
+        channels["y"] = track.east
         chosen["x"] = replace(chosen["lat"], unit="m")
         chosen["y"] = replace(chosen["lon"], unit="m")
-        outliers = track.outliers
+
     signals, locator, filled = _signals(times.t, channels, locator, repair)
     if outliers:
         filled |= {"x": outliers, "y": outliers}
     if "sog" in signals:
         _make_velocity(signals, locator)
-    return Recording(signals, locator, filled, times.start)
+    return Recording(
+        signals=signals,
+        locator=locator,
+        filled=filled,
+        start=times.start,
+    )
 
 
 def _check_pairs(table: LogTable, chosen: Mapping[str, Column]) -> None:
+    """Refuse one channel of a pair without the other."""
     for name, other in _PAIRS.items():
-        if name in chosen and other not in chosen:
+        is_alone = name in chosen and other not in chosen
+        if is_alone:
             raise InputError(
                 f"{table.path}: columns: expected {name} and {other}, got {name} alone;"
                 " name the column of the other"
@@ -117,48 +130,60 @@ def _check_pairs(table: LogTable, chosen: Mapping[str, Column]) -> None:
 
 def _read_numbers(locator: Locator) -> dict[str, Floats]:
     """Channels that are numbers in the file, in SI units."""
+    table = locator.table
     channels = {}
     for channel, column in locator.columns.items():
-        if channel not in ("t", "lat", "lon"):
-            numbers = locator.table.numbers(column.name)
-            factor = si_factor(channel, column.unit)
-            channels[channel] = factor * numbers
+        if channel in ("t", "lat", "lon"):
+            continue
+        numbers = table.numbers(column.name)
+        factor = si_factor(channel, column.unit)
+        channels[channel] = factor * numbers
     return channels
 
 
 def _signals(
     t: Floats, channels: dict[str, Floats], locator: Locator, repair: str | None
 ) -> tuple[Signals, Locator, dict[str, int]]:
-    """Channels on the clock of the rows, what is missing filled and counted, or each on a clock of its own."""
+    """Signals of channels, their locator, and counts of values filled in.
+
+    The channels are on the clock of the rows, or each on a clock of its own.
+    """
     filled: dict[str, int] = {}
+    signals: Signals = {}
     table = {"t": t, **channels}
-    is_whole = all(np.isfinite(values).all() for values in table.values())
+    columns = np.array(list(table.values()))
+    is_whole = bool(np.isfinite(columns).all())
     if not is_whole and have_own_clocks(t, channels):
         check_ranges(table, locator)
-        own = {}
         for channel, values in channels.items():
-            own[channel] = _own_signal(channel, t, values, locator)
-        return own, locator, filled
+            signals[channel] = _own_signal(channel, t, values, locator)
+        return signals, locator, filled
 
     if is_whole:
         check_time(t, locator)
     else:
         t, channels, locator, filled = fill_missing(t, channels, locator, repair)
     check_ranges({"t": t, **channels}, locator)
-    signals = {}
     for channel, values in channels.items():
-        signals[channel] = Signal(t, _continuous(channel, t, values, locator))
+        continuous = _continuous(channel, t, values, locator)
+        signals[channel] = Signal(t, continuous)
     return signals, locator, filled
 
 
-def _continuous(channel: str, t: Floats, values: Floats, locator: Locator) -> Floats:
+def _continuous(
+    channel: str,
+    t: Floats,
+    values: Floats,
+    locator: Locator,
+) -> Floats:
     """Values of a channel, headings and directions of the wind without jumps."""
-    if channel not in ("psi", "wind_from"):
-        return values
-    unwrapped = np.unwrap(values)
+    if channel == "wind_from":
+        return np.unwrap(values)
     if channel == "psi":
+        unwrapped = np.unwrap(values)
         check_heading(t, unwrapped, values, locator)
-    return unwrapped
+        return unwrapped
+    return values
 
 
 def _read_times(table: LogTable, column: Column) -> _Times:
@@ -166,41 +191,47 @@ def _read_times(table: LogTable, column: Column) -> _Times:
     cells = table.texts(column.name)
     if column.date is not None:
         dates = table.texts(column.date)
-        pairs = zip(dates, cells, strict=True)
-        cells = [f"{date} {time}".strip() for date, time in pairs]
+        for row, date in enumerate(dates):
+            moment = f"{date} {cells[row]}"
+            cells[row] = moment.strip()
 
     first = next(filter(None, cells), "0")
-    if is_number(first.replace(",", ".")):
+    is_numeric = is_number(first.replace(",", "."))
+    if is_numeric:
         numbers = table.numbers(column.name)
-        clock = si_factor("t", column.unit) * numbers
-        if not column.unit.startswith("unix"):
-            return _Times(clock, column.unit, None)
+        factor = si_factor("t", column.unit)
+        clock = factor * numbers
     else:
         clock = _read_clock_cells(table, column, cells)
+    if is_numeric and not column.unit.startswith("unix"):
+        return _Times(clock, column.unit, start=None)
 
     known = clock[np.isfinite(clock)]
     zero = float(known[0]) if known.size else 0.0
     ahead = zone_seconds(column.zone, str(table.path))
-    return _Times(clock - zero, "s", zero - ahead)
+    return _Times(clock - zero, unit="s", start=zero - ahead)
 
 
 def _read_clock_cells(table: LogTable, column: Column, cells: list[str]) -> Floats:
-    """Seconds since 1970 or of the day; InputError names the first cell that is no time."""
+    """Seconds since 1970 or of the day; InputError for the first invalid cell."""
     try:
         return read_clock(cells).seconds
     except ValueError as error:
         wrong = str(error)
     row = cells.index(wrong) if wrong in cells else 0
+    place = table.cell(row, column.name)
+    beginning = cells[row][:40]
     raise InputError(
-        f"{table.cell(row, column.name)}: expected a number, ISO 8601"
+        f"{place}: expected a number, ISO 8601"
         " (2024-05-31T09:30:00), or a time of day with its date in another column:"
-        f' t = {{ column = "{column.name}", date = "..." }}, got {cells[row][:40]!r}'
+        f' t = {{ column = "{column.name}", date = "..." }}, got {beginning!r}'
     )
 
 
 def _read_position(locator: Locator, channel: str) -> Floats:
     """Degrees of latitude or longitude in any of their forms."""
-    table, column = locator.table, locator.columns[channel]
+    table = locator.table
+    column = locator.columns[channel]
     cells = table.texts(column.name)
     try:
         return read_angles(cells, minutes=column.unit != "deg")
@@ -208,67 +239,89 @@ def _read_position(locator: Locator, channel: str) -> Floats:
         wrong = str(error)
     if is_number(wrong):  # such as 1e-05
         return table.numbers(column.name)
+
     row = cells.index(wrong) if wrong in cells else 0
+    place = locator.place(row, channel)
     raise InputError(
-        f"{locator.place(row, channel)}: expected degrees (57.6872), degrees and minutes"
+        f"{place}: expected degrees (57.6872), degrees and minutes"
         f" (57°41.234'N) or ddmm.mmm (5741.234N), got {wrong!r}"
     )
 
 
 def _local_track(locator: Locator, t: Floats, repair: str | None) -> _Track:
-    """Positions by north and east of the first one; outliers are refused unless they are to be filled."""
+    """Positions by north and east of the first one.
+
+    Outliers are refused unless they are to be filled.
+    """
     lat = _read_position(locator, "lat")
     lon = _read_position(locator, "lon")
     check_ranges({"lat": lat, "lon": lon}, locator)
-    north, east = np.full_like(t, np.nan), np.full_like(t, np.nan)
-    is_known = np.isfinite(lat) & np.isfinite(lon) & np.isfinite(t)
+    north = np.full_like(t, np.nan)
+    east = np.full_like(t, np.nan)
+    is_known = np.isfinite(lat + lon + t)
     rows = np.flatnonzero(is_known)
     if not rows.size:
         return _Track(north, east, outliers=0)
 
+    lat = lat[rows]
+    lon = lon[rows]
+    clock = t[rows]
     here = replace(locator, rows=rows)
-    lat, lon, clock = lat[rows], lon[rows], t[rows]
     x, y = local_metres(lat, lon, origin=(lat[0], lon[0]))
     check_track(clock, x, y, here)
     is_far = find_outliers(clock, x, y)
     if repair is None:
         check_outliers(lat, lon, is_far, here)
-    north[rows[~is_far]] = x[~is_far]
-    east[rows[~is_far]] = y[~is_far]
+
+    is_near = ~is_far
+    kept = rows[is_near]
+    north[kept] = x[is_near]
+    east[kept] = y[is_near]
     return _Track(north, east, outliers=int(is_far.sum()))
 
 
-def _own_signal(channel: str, t: Floats, values: Floats, locator: Locator) -> Signal:
+def _own_signal(
+    channel: str,
+    t: Floats,
+    values: Floats,
+    locator: Locator,
+) -> Signal:
     """A channel where it has values; InputError for too few or time that goes back."""
-    rows = np.flatnonzero(np.isfinite(values))
+    is_present = np.isfinite(values)
+    rows = np.flatnonzero(is_present)
     column = locator.columns[channel].name
     if rows.size < FEWEST_SAMPLES:
         raise InputError(
             f"{locator.path}: column '{column}': expected {FEWEST_SAMPLES} values or"
             f" more, got {rows.size}; leave it out"
         )
+
     clock = t[rows]
     here = replace(locator, rows=locator.rows[rows])
     stands_still = np.diff(clock) <= 0.0
     if stands_still.any():
         k = np.argmax(stands_still)
         before, after = clock[k : k + 2]
+        place = here.place(k + 1, "t")
         raise InputError(
-            f"{here.place(k + 1, 't')}: expected time to increase between values of"
-            f" '{column}', got {before:.10g} and then {after:.10g} s; sort the rows, or,"
-            " where two ships or receivers are in the file, keep those of one"
+            f"{place}: expected time to increase between values of"
+            f" '{column}', got {before:.10g} and then {after:.10g} s; sort the rows,"
+            " or, where two ships or receivers are in the file, keep those of one"
         )
-    return Signal(clock, _continuous(channel, clock, values[rows], here))
+    present = _continuous(channel, clock, values[rows], here)
+    return Signal(clock, present)
 
 
 def _make_velocity(signals: Signals, locator: Locator) -> None:
     """Replace speed and course over ground by velocities to the north and east."""
     t, speed = signals.pop("sog")
-    course = signals.pop("cog").values
+    _, course = signals.pop("cog")
     if speed.size != course.size:
         raise InputError(
             f"{locator.path}: expected sog and cog in the same rows, got {speed.size}"
             f" values of sog and {course.size} of cog"
         )
-    signals["ground_north"] = Signal(t, speed * np.cos(course))
-    signals["ground_east"] = Signal(t, speed * np.sin(course))
+    north = speed * np.cos(course)
+    east = speed * np.sin(course)
+    signals["ground_north"] = Signal(t, north)
+    signals["ground_east"] = Signal(t, east)

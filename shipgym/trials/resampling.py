@@ -1,4 +1,4 @@
-"""Channels that were logged at different rates, each on a clock of its own, and one clock for all of them."""
+"""Channels that were logged on clocks of their own, and one clock for all."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -26,7 +26,7 @@ Signals = dict[str, Signal]  # by channel
 
 @dataclass
 class Log:
-    """The channels of one log on one clock, in SI units; corrections change it in place.
+    """Channels of one log on one clock, in SI units; corrections change it in place.
 
     Attributes
     ----------
@@ -78,13 +78,14 @@ def have_own_clocks(t: Floats, channels: Mapping[str, Floats]) -> bool:
     Then every row has a time and some value, and the values of some channel stand two
     rows or more apart as a rule.
     """
-    present = [np.isfinite(values) for values in channels.values()]
-    has_value = np.any(present, axis=0)
+    # flags of shape (n_channels, n_rows)
+    is_present = np.isfinite(list(channels.values()))
+    has_value = is_present.any(axis=0)
     has_time = np.isfinite(t)
     if not np.all(has_time & has_value):
         return False
-    for is_present in present:
-        rows = np.flatnonzero(is_present)
+    for of_channel in is_present:
+        rows = np.flatnonzero(of_channel)
         if rows.size >= FEWEST_SAMPLES and usual_step(rows) >= 2.0:
             return True
     return False
@@ -92,8 +93,8 @@ def have_own_clocks(t: Floats, channels: Mapping[str, Floats]) -> bool:
 
 def share_clock(signals: Mapping[str, Signal]) -> bool:
     """Tell whether all channels were logged by one and the same clock."""
-    first = next(iter(signals.values()))
-    return all(signal.t is first.t for signal in signals.values())
+    clocks = {id(signal.t) for signal in signals.values()}
+    return len(clocks) == 1
 
 
 def on_one_clock(signals: Mapping[str, Signal], where: str) -> Log:
@@ -108,15 +109,21 @@ def on_one_clock(signals: Mapping[str, Signal], where: str) -> Log:
         return _resampled(signals, where)
     channels = {}
     for name, signal in signals.items():
-        channels[name] = signal.values
         t = signal.t
-    return Log(t, channels, where, notes=[])
+        channels[name] = signal.values
+    return Log(
+        t=t,
+        channels=channels,
+        where=where,
+        notes=[],
+    )
 
 
 def _resampled(signals: Mapping[str, Signal], where: str) -> Log:
     clocks = _motion_clocks(signals)
     t = max(clocks.values(), key=usual_step)
-    longest_step = 6.0 * usual_step(t)  # a longer one is a hole
+    # a longer one is a hole
+    longest_step = 6.0 * usual_step(t)
 
     is_known = np.ones(t.size, dtype=bool)
     notes = []
@@ -124,9 +131,11 @@ def _resampled(signals: Mapping[str, Signal], where: str) -> Log:
         steps = np.diff(clock)
         is_hole = steps > longest_step
         is_known &= _inside(t, clock, is_hole)
-        if is_hole.any():
+        count = np.count_nonzero(is_hole)
+        if count:
+            longest = steps.max()
             notes.append(
-                f"{name} has {is_hole.sum()} holes, of up to {steps.max():.4g} s;"
+                f"{name} has {count} holes, of up to {longest:.4g} s;"
                 " nothing is put there"
             )
 
@@ -140,15 +149,27 @@ def _resampled(signals: Mapping[str, Signal], where: str) -> Log:
     channels = {}
     for name, signal in signals.items():
         channels[name] = np.interp(t, signal.t, signal.values)
-    return Log(t, channels, where, notes)
+    return Log(
+        t=t,
+        channels=channels,
+        where=where,
+        notes=notes,
+    )
 
 
 def _motion_clocks(signals: Mapping[str, Signal]) -> dict[str, Floats]:
-    """Clocks of the channels of the motion, so that nothing of it is invented between samples; else all."""
+    """Clocks of the motion's channels, between whose samples nothing is invented.
+
+    Those of all channels where there is none of the motion.
+    """
     motion = {"x", "ground_north", "u", "psi", "r", "delta"}
-    clocks = {name: signal.t for name, signal in signals.items()}
-    of_motion = {name: clock for name, clock in clocks.items() if name in motion}
-    return of_motion or clocks
+    all_clocks = {}
+    of_motion = {}
+    for name, signal in signals.items():
+        all_clocks[name] = signal.t
+        if name in motion:
+            of_motion[name] = signal.t
+    return of_motion or all_clocks
 
 
 def _inside(t: Floats, clock: Floats, is_hole: Flags) -> Flags:
@@ -156,10 +177,11 @@ def _inside(t: Floats, clock: Floats, is_hole: Flags) -> Flags:
     after = np.searchsorted(clock, t)
     after = np.clip(after, 1, clock.size - 1)
     before = after - 1
-    begin, end = clock[before], clock[after]
-    is_between = (t > begin) & (t < end)
-    in_hole = is_between & is_hole[before]
-    first, last = clock[0], clock[-1]
-    in_span = (t >= first) & (t <= last)
-    inside: Flags = in_span & ~in_hole
+    is_after = t > clock[before]
+    is_before = t < clock[after]
+    in_hole = is_hole[before] & is_after & is_before
+
+    has_begun = t >= clock[0]
+    has_ended = t > clock[-1]
+    inside: Flags = has_begun & ~has_ended & ~in_hole
     return inside

@@ -1,4 +1,4 @@
-"""Measurement errors of a ship's sensors: noise, resolution, outliers, gaps, delay and drift."""
+"""Errors of a ship's sensors: noise, resolution, outliers, gaps, delay and drift."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -61,35 +61,38 @@ class Sensor:
     def read(
         self, times: Floats, t: Floats, signal: Floats, rng: np.random.Generator
     ) -> Floats:
-        """Readings at some times of a signal known at times t, straight between them; all times in s."""
+        """Readings at `times` of a signal given at `t`, linear in between; all in s."""
         n = times.size
         reading: Floats = np.interp(times - self.latency_s, t, signal)
         if self.drift:
-            reading += self.drift * gauss_markov(times, self.drift_time_s, rng)
+            wander = gauss_markov(times, self.drift_time_s, rng)
+            reading += self.drift * wander
         reading += self.noise * rng.standard_normal(n)
+
         is_outlier = rng.random(n) < self.outlier_probability
-        error = self.outlier_size * rng.standard_normal(n)
-        reading += np.where(is_outlier, error, 0.0)
+        outlier = self.outlier_size * rng.standard_normal(n)
+        reading += np.where(is_outlier, outlier, 0.0)
         if self.resolution:
-            reading = np.round(reading / self.resolution) * self.resolution
+            steps = np.round(reading / self.resolution)
+            reading = steps * self.resolution
         return reading
 
 
 def gauss_markov(
     t: Floats, correlation_time_s: float, rng: np.random.Generator
 ) -> Floats:
-    """First-order Gauss-Markov process of unit variance at times in s, stationary from the first sample on.
+    """First-order Gauss-Markov process of unit variance, stationary; times in s.
 
     Its autocorrelation is exp(-|lag| / correlation time), whatever the steps (Gelb
     1974, Applied Optimal Estimation, 3.8).
     """
     decay = np.exp(-np.diff(t) / correlation_time_s)
     spread = np.sqrt(1.0 - decay**2)
-    shocks = rng.standard_normal(t.size)
-    process = shocks.copy()
-    for k in range(t.size - 1):
-        kept = decay[k] * process[k]
-        process[k + 1] = kept + spread[k] * shocks[k + 1]
+    # the first value has the stationary distribution
+    process = rng.standard_normal(t.size)
+    process[1:] *= spread
+    for k in range(1, t.size):
+        process[k] += decay[k - 1] * process[k - 1]
     return process
 
 
@@ -116,7 +119,9 @@ SEA_TRIAL: Mapping[str, Sensor] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Sensors:
-    """The sensors of a ship and her logger; InputError for an unknown channel, or a number out of range.
+    """The sensors of a ship and her logger.
+
+    Raises InputError for an unknown channel or a number out of range.
 
     Attributes
     ----------
@@ -213,12 +218,13 @@ class Sensors:
     def _outside_gaps(self, count: int, seed: int) -> Flags:
         """Which samples are not in a gap."""
         rng = _random(seed, SEA_CHANNELS[0])
-        logged = np.ones(count, dtype=bool)
         is_start = rng.random(count) < self.dropout_probability
         starts = np.flatnonzero(is_start)
         lengths = rng.geometric(1.0 / self.dropout_samples, starts.size)
-        for start, length in zip(starts, lengths, strict=True):
-            logged[start : start + length] = False
+        ends = starts + lengths
+        logged = np.ones(count, dtype=bool)
+        for start, end in zip(starts, ends, strict=True):
+            logged[start:end] = False
         return logged
 
 
@@ -228,7 +234,7 @@ def _random(seed: int, channel: str) -> np.random.Generator:
 
 
 def _measurable(trial: Trial) -> dict[str, Floats]:
-    """Channels that there are to measure: first-order motion in waves added, the weather left out."""
+    """Channels that can be measured: with motion in waves, without the weather."""
     measurable = {}
     for name, values in trial.channels.items():
         if name in SEA_CHANNELS:  # known of a simulation, to no instrument
@@ -241,6 +247,6 @@ def _measurable(trial: Trial) -> dict[str, Floats]:
 
 
 def orders_at(times: Floats, t: Floats, orders: Floats) -> Floats:
-    """Orders, each given at a time t and held until the next, at other times; all in s."""
+    """Orders at some times, each held from its time t to the next; all in s."""
     last = np.searchsorted(t, times + 1e-9, side="right") - 1
     return np.asarray(orders[last])

@@ -1,4 +1,4 @@
-"""The ship file: one TOML file with a ship's particulars, its data's conventions and its trials."""
+"""The ship file: a TOML file of a ship's particulars, conventions and trials."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -61,7 +61,7 @@ class ShipFile:
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read and check a ship file; the trials' logs must exist and are read by :meth:`trials`.
+        """Read and check a ship file; its logs must exist, :meth:`trials` reads them.
 
         Paths in the file are relative to its folder, or absolute. Raises InputError for
         a missing file, broken TOML, an unknown key or word, a wrong type or value, no
@@ -88,30 +88,33 @@ class ShipFile:
         )
 
     def completed_particulars(self) -> Particulars:
-        """The particulars with what is absent estimated and marked (:meth:`Particulars.completed`)."""
+        """Particulars with absent ones estimated (:meth:`Particulars.completed`)."""
         with placed(str(self.path)):
             return self.particulars.completed()
 
     def trials(self, use: str | None = None) -> list[Trial]:
-        """Read the trials of a use, by default all but those to skip, each named by its ``file``.
+        """Read the trials of a use, by default all but those to skip.
 
         In the order of the file. Raises InputError for anything wrong with a log.
         """
         if use is not None:
             check_choice(use, USES, f"{self.path}: trials(use)")
+        wanted = [use]
+        if use is None:
+            wanted = [name for name in USES if name != "skip"]
         trials = []
         for entry in self.entries:
-            is_wanted = entry.use != "skip" if use is None else entry.use == use
-            if is_wanted:
+            if entry.use in wanted:
                 trials += self._read(entry)
         return trials
 
     def trial(self, file: str) -> Trial:
-        """Read one trial by its ``file`` (of a log that is cut, the first), whatever its use."""
+        """Read one trial by its ``file``, whatever its use; of a cut log the first."""
         files = [entry.file for entry in self.entries]
         check_choice(file, files, f"{self.path}: trial")
-        entry = self.entries[files.index(file)]
-        return self._read(entry)[0]
+        number = files.index(file)
+        first, *_ = self._read(self.entries[number])
+        return first
 
     def _read(self, entry: TrialEntry) -> list[Trial]:
         """Trials of a log: one, or those that it is cut into."""

@@ -1,4 +1,4 @@
-"""One recorded manoeuvre: its channels in SI units and the project's signs, from CSV and back."""
+"""One recorded manoeuvre, in SI units and the project's signs; CSV in and out."""
 
 from __future__ import annotations
 
@@ -74,8 +74,9 @@ class Trial:
         Values of each channel.
     name : str, optional
         Name of the trial; for a file its file name.
-    kind : {"zigzag", "turning-circle", "spiral", "pull-out", "straight", "captive", "random"}, optional
-        The manoeuvre, where known.
+    kind : str, optional
+        The manoeuvre, where known, as in `KINDS`: "zigzag", "turning-circle", "spiral",
+        "pull-out", "straight", "captive" or "random".
     use : {"fit", "validate", "skip"}, optional
         What the trial is for.
     derived : collection of str, optional
@@ -139,7 +140,7 @@ class Trial:
         if length is not None:
             length = check_number(length, f"{where}: length", above=0.0)
         if over_ground is None:
-            over_ground = bool({"u", "v"} & set(derived))
+            over_ground = "u" in derived or "v" in derived
         vars(self).update(
             t=times,
             channels=MappingProxyType(arrays),
@@ -173,11 +174,12 @@ class Trial:
 
     @property
     def sha256(self) -> str:
-        """Hash of time and channels, independent of the file's formatting and of name, kind and use."""
+        """Hash of time and channels, independent of formatting, name, kind and use."""
         digest = hashlib.sha256()
-        for channel in ("t", *sorted(self.channels)):
-            values = self[channel].astype("<f8")
-            digest.update(channel.encode())
+        names = sorted(self.channels)
+        for name in ("t", *names):
+            values = self[name].astype("<f8")
+            digest.update(name.encode())
             digest.update(b"\0")
             digest.update(values.tobytes())
         return digest.hexdigest()
@@ -208,10 +210,13 @@ class Trial:
 
     def __repr__(self) -> str:
         channels = list(self.channels)
-        count = len(self)
         return (
-            f"Trial(name={self.name!r}, kind={self.kind!r}, use={self.use!r},"
-            f" samples={count}, duration={self.duration:g} s, channels={channels})"
+            f"Trial(name={self.name!r},"
+            f" kind={self.kind!r},"
+            f" use={self.use!r},"
+            f" samples={len(self)},"
+            f" duration={self.duration:g} s,"
+            f" channels={channels})"
         )
 
     def _settings(self) -> dict[str, Any]:
@@ -229,13 +234,14 @@ class Trial:
         }
 
     def with_(self, **changes: Any) -> Trial:
-        """Return a copy with another ``name``, ``kind``, ``use``, ``length`` or ``over_ground``."""
-        known = ("name", "kind", "use", "length", "over_ground")
-        unknown = sorted(changes.keys() - set(known))
+        """Return a copy with a changed name, kind, use, length or ``over_ground``."""
+        known = ["name", "kind", "use", "length", "over_ground"]
+        unknown = changes.keys() - known
         if unknown:
+            wrong = quoted(sorted(unknown))
             names = ", ".join(known)
             raise InputError(
-                f"trial '{self.name}': cannot change {quoted(unknown)}, only {names}"
+                f"trial '{self.name}': cannot change {wrong}, only {names}"
             )
         settings = self._settings()
         settings |= changes
@@ -254,20 +260,24 @@ class Trial:
         by channel, on top of those filled before. Raises InputError as for a new trial.
         """
         settings = self._settings()
-        settings["repaired"] = Counter(self.repaired) + Counter(repaired or {})
         settings["raw"] = self
+        if repaired:
+            before = Counter(self.repaired)
+            settings["repaired"] = before + Counter(repaired)
         times = self.t if t is None else t
         changed = {**self.channels, **channels}
         return Trial(times, changed, **settings)
 
     def part(self, rows: slice, name: str | None = None) -> Trial:
-        """Trial of some of the samples, which are no manoeuvre any more, by the same name or another."""
+        """Trial of some samples, without kind and use, by the same or another name."""
         channels = {}
         for channel, values in self.channels.items():
             channels[channel] = values[rows]
-        if name is None:
-            name = self.name
-        return Trial(self.t[rows], channels, name=name)
+        return Trial(
+            self.t[rows],
+            channels,
+            name=self.name if name is None else name,
+        )
 
     @classmethod
     def from_csv(
@@ -325,6 +335,7 @@ class Trial:
         chosen = None
         if columns is not None:
             chosen = parse_columns(columns, f"{where} columns")
+        installation = Installation.from_mapping(sensors or {}, f"{where} sensors")
         conventions = Conventions(
             rudder_positive=rudder_positive,
             velocity_frame=velocity_frame,
@@ -332,7 +343,7 @@ class Trial:
             xg=xg,
             repair=repair,
             where=where,
-            installation=Installation.from_mapping(sensors or {}, f"{where} sensors"),
+            installation=installation,
         )
         log = import_tables([table], chosen, conventions)
         own_name = table.path.name if name is None else name
@@ -345,32 +356,32 @@ class Trial:
         columns: Mapping[str, str | Mapping[str, str]] | None = None,
         **settings: Any,
     ) -> Trial:
-        """Read a trial from a pandas frame; an index that is no plain count of rows is a column.
+        """Read a trial from a pandas frame.
 
-        `columns` and the other keywords are those of :meth:`from_csv`. Raises
-        InputError as that does.
+        An index that is no plain count of rows is a column. `columns` and the other
+        keywords are those of :meth:`from_csv`. Raises InputError as that does.
         """
         return cls.from_csv(read_frame(frame), columns, **settings)
 
     def to_csv(self, path: str | Path) -> None:
-        """Write time and all channels in SI units; :meth:`from_csv` reads back the very same numbers.
+        """Write time and channels in SI units; :meth:`from_csv` reads the same numbers.
 
         The file, replaced where it exists, is never there in part. InputError if it
         cannot be written.
         """
         names = ["t", *self.channels]
-        columns = [self[name].tolist() for name in names]
+        columns = [self[name] for name in names]
         lines = [",".join(names)]
-        for row in zip(*columns, strict=True):
-            cells = map(repr, row)
-            line = ",".join(cells)
+        for row in np.column_stack(columns).tolist():
+            line = ",".join(map(repr, row))
             lines.append(line)
         lines.append("")
-        write_text("\n".join(lines), Path(path))
+        text = "\n".join(lines)
+        write_text(text, Path(path))
 
 
 def trial_of(log: Log, name: str, samples: slice = slice(None), **facts: Any) -> Trial:
-    """Make the trial in some of the samples of a log; `facts` are its kind, use and length."""
+    """Trial of some samples of a log; `facts` are its kind, use and length."""
     channels = {}
     for channel, values in log.channels.items():
         channels[channel] = values[samples]
@@ -387,12 +398,13 @@ def trial_of(log: Log, name: str, samples: slice = slice(None), **facts: Any) ->
 
 
 def cut_trials(cut: Any, log: Log, name: str, where: str, **facts: Any) -> list[Trial]:
-    """Make the trials into which a log is cut (:func:`.cut_log`), each named by its seconds."""
+    """Trials of the stretches of a cut log (:func:`.cut_log`), named by seconds."""
     trials = []
     for samples in cut_log(cut, log, where):
-        trial = trial_of(log, name, samples, **facts)
-        first, last = trial.t[0], trial.t[-1]
-        trials.append(trial.with_(name=f"{name} {first:.0f}-{last:.0f} s"))
+        t = log.t[samples]
+        own_name = f"{name} {t[0]:.0f}-{t[-1]:.0f} s"
+        trial = trial_of(log, own_name, samples, **facts)
+        trials.append(trial)
     return trials
 
 
@@ -435,8 +447,9 @@ def _check_time(t: Floats, where: str) -> None:
         )
     stands_still = np.diff(t) <= 0.0
     if stands_still.any():
-        sample = int(np.argmax(stands_still)) + 1
-        before, time = t[sample - 1], t[sample]
+        sample = np.argmax(stands_still) + 1
+        before = t[sample - 1]
+        time = t[sample]
         raise InputError(
             f"{where}: sample {sample}: expected strictly increasing time, got {time:g}"
             f" after {before:g} s"

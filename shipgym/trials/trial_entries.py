@@ -1,4 +1,4 @@
-"""The tables ``[[trials]]`` of a ship file, each with what the file has for all of them."""
+"""The tables ``[[trials]]`` of a ship file, with what the file gives for all."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ _KEYS = ("file", "kind", "use", "columns", "cut", "sensors", *_CONVENTIONS)
 
 @dataclass(frozen=True)
 class TrialEntry:
-    """One ``[[trials]]`` table, checked, with what it takes over from the file's own tables.
+    """One ``[[trials]]`` table, checked and completed by the file's own tables.
 
     Attributes
     ----------
@@ -125,7 +125,8 @@ def _read_entry(table: Any, folder: Path, where: str, shared: _Shared) -> TrialE
     if "columns" in table:
         columns = {**columns, **parse_columns(table["columns"], f"{where} columns")}
     conventions = shared.conventions
-    if not table.keys().isdisjoint((*_CONVENTIONS, "sensors")):
+    own = {*_CONVENTIONS, "sensors"} & table.keys()
+    if own:
         conventions = _own_conventions(table, where, shared)
     return TrialEntry(
         file=" + ".join(files),
@@ -169,7 +170,7 @@ def _own_conventions(
 
 
 def _check_entries(path: Path, entries: Sequence[TrialEntry]) -> None:
-    """Refuse a file that is listed again with the same cut, and a file without trials to fit."""
+    """Refuse a file listed again with the same cut, and a file with nothing to fit."""
     listed = set()
     for entry in entries:
         part = (*map(os.path.normpath, entry.paths), str(entry.cut))

@@ -1,4 +1,4 @@
-"""From the tables of one log to channels in SI units with the project's signs, frame and origin."""
+"""From the tables of a log to channels in SI units, at midship."""
 
 from collections.abc import Mapping, Sequence
 
@@ -46,86 +46,101 @@ def import_tables(
     the project's signs and are in the body frame, at midship. Anything wrong with a
     file is an InputError that names line, column, value and remedy.
     """
+    is_part = len(tables) > 1
     recordings = []
+    remarks: list[str] = []
     for table in tables:
-        is_part = len(tables) > 1
         recording = read_recording(table, columns, conventions.repair, part=is_part)
         recordings.append(recording)
-    signals = _joined(recordings)
+        remarks += table.notes
+
+    first, *others = recordings
+    signals = dict(first.signals)
+    for other in others:
+        signals |= _on_first_clock(other, first, signals)
     if conventions.rudder_positive == "port":
         _turn_rudder(signals)
 
-    log = on_one_clock(signals, str(tables[0].path))
-    locator = recordings[0].locator
-    remarks = _check_motion(log, recordings, conventions)
+    log = on_one_clock(signals, first.locator.path)
+    motion_remarks = _check_motion(log, recordings, conventions)
     late = find_late_channels(log)
     if late:
-        log, notes = _corrected(log, signals, late, conventions)
-        remarks += notes
-    _check_agreement(log, locator, conventions)
-    log.notes = [note for table in tables for note in table.notes] + log.notes + remarks
+        log, clock_remarks = _corrected(log, signals, late, conventions)
+        motion_remarks += clock_remarks
+    _check_agreement(log, first.locator, conventions)
 
+    log.notes = remarks + log.notes + motion_remarks
     to_project_conventions(log, conventions)
     _complete(log, recordings)
     return log
 
 
-def _joined(recordings: Sequence[Recording]) -> Signals:
-    """Channels of all files of a log on the clock of the first."""
-    base, *others = recordings
-    signals = dict(base.signals)
-    for other in others:
-        path = other.locator.table.path
-        if (base.start is None) != (other.start is None):
-            raise InputError(
-                f"{path}: expected times that count from one moment in all files of"
-                " this log, got clock times in one of two only"
-            )
-        repeated = signals.keys() & other.signals.keys()
-        if repeated:
-            raise InputError(
-                f"{path}: expected each channel in one file of this log, got"
-                f" {quoted(sorted(repeated))} again; rename the column that is not to"
-                " be read"
-            )
-        shift = (other.start or 0.0) - (base.start or 0.0)
-        moved = {}
-        for name, (t, values) in other.signals.items():
-            moved[name] = Signal(t + shift, values)
-        check_overlap(signals, moved, path, other.locator.columns["t"].name)
-        signals |= moved
-    return signals
+def _on_first_clock(
+    other: Recording,
+    first: Recording,
+    known: Signals,
+) -> Signals:
+    """Channels of another file of a log on the clock of the first one.
+
+    Raises InputError for channels that are known already, and for other times.
+    """
+    path = other.locator.table.path
+    if (first.start is None) != (other.start is None):
+        raise InputError(
+            f"{path}: expected times that count from one moment in all files of"
+            " this log, got clock times in one of two only"
+        )
+    repeated = known.keys() & other.signals.keys()
+    if repeated:
+        names = quoted(sorted(repeated))
+        raise InputError(
+            f"{path}: expected each channel in one file of this log, got"
+            f" {names} again; rename the column that is not to be read"
+        )
+
+    first_start = first.start or 0.0
+    other_start = other.start or 0.0
+    shift = other_start - first_start
+    moved = {}
+    for name, (t, values) in other.signals.items():
+        moved[name] = Signal(t + shift, values)
+    time_column = other.locator.columns["t"]
+    check_overlap(known, moved, path, time_column.name)
+    return moved
 
 
 def _turn_rudder(signals: Signals) -> None:
     """Make a rudder that is positive to port positive to starboard."""
     for name in signals.keys() & {"delta", "delta_command"}:
-        t, values = signals[name]
-        signals[name] = Signal(t, 0.0 - values)
+        signal = signals[name]
+        signals[name] = signal._replace(values=0.0 - signal.values)
 
 
 def _check_motion(
     log: Log, recordings: Sequence[Recording], conventions: Conventions
 ) -> list[str]:
-    """Remarks on rudder, time and motion over ground; InputError for what cannot be right."""
+    """Remarks on rudder, time and motion over ground, refused where impossible."""
     locator = recordings[0].locator
-    has_positions = any("lat" in one.locator.columns for one in recordings)
+    has_positions = False
+    for recording in recordings:
+        has_positions |= "lat" in recording.locator.columns
+
     remarks = []
-    if has_positions and "delta" not in log.channels:
+    if has_positions and not log.has("delta"):
         remarks.append(_NO_RUDDER)
-    if not is_usual(usual_step(log.t)):
+    step = usual_step(log.t)
+    if not is_usual(step):
         remarks += check_steps(log.t, locator)
-    if has_positions or "ground_north" in log.channels:
+    if has_positions or log.has("ground_north"):
         remarks += check_over_ground(log, conventions.installation, locator)
     return remarks
 
 
 def _check_agreement(log: Log, locator: Locator, conventions: Conventions) -> None:
     """Refuse channels that contradict each other."""
-    channels = log.channels.keys()
-    if {"psi", "r"} <= channels:
+    if log.has("psi", "r"):
         check_yaw_rate(log, locator)
-    if {"x", "y", "psi", "u", "v"} <= channels:
+    if log.has("x", "y", "psi", "u", "v"):
         check_velocity(log, conventions.velocity_frame, locator)
 
 
@@ -139,29 +154,32 @@ def _corrected(
     choice = conventions.installation.clock_offsets
     is_one_clock = share_clock(signals)
     corrected = dict(signals)
-    notes = []
+    remarks = []
     for one in late:
+        treatment = "left as logged"
         if is_corrected(one, choice, log.where, is_one_clock=is_one_clock):
-            t, values = signals[one.channel]
-            corrected[one.channel] = Signal(t - one.delay, values)
-            notes.append(f"{one.evidence}; corrected")
-        else:
-            notes.append(f"{one.evidence}; left as logged")
-    return on_one_clock(corrected, log.where), notes
+            treatment = "corrected"
+            signal = signals[one.channel]
+            corrected[one.channel] = signal._replace(t=signal.t - one.delay)
+        remarks.append(f"{one.evidence}; {treatment}")
+    return on_one_clock(corrected, log.where), remarks
 
 
 def _complete(log: Log, recordings: Sequence[Recording]) -> None:
-    """Put the channels into their order, and add clock and count of what was filled in."""
-    channels = {}
+    """Order the channels, and add the clock and the counts of values filled in."""
+    ordered = {}
     for name in QUANTITIES:
         if name in log.channels:
-            channels[name] = log.channels[name]
-    log.channels = channels
+            ordered[name] = log.channels[name]
+    log.channels = ordered
+
     for recording in recordings:
         for name, count in recording.filled.items():
-            if count and name in channels:
+            if count and name in ordered:
                 log.repaired[name] = count
+
     first = recordings[0]
     if first.start is not None:
-        zone = first.locator.columns["t"].zone
-        log.start = first.start + zone_seconds(zone, log.where)
+        time_column = first.locator.columns["t"]
+        ahead = zone_seconds(time_column.zone, log.where)
+        log.start = first.start + ahead

@@ -1,6 +1,7 @@
 """Channels of a trial and the units in which a file may hold them."""
 
 import math
+from typing import Any
 
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
@@ -42,14 +43,19 @@ def si_factor(channel: str, unit: str, where: str = "unit") -> float:
     fitting = UNITS[quantity]
     if isinstance(unit, str) and unit in fitting:
         return fitting[unit]
+    raise _no_such_unit(unit, quantity, where)
+
+
+def _no_such_unit(unit: Any, quantity: str, where: str) -> InputError:
+    fitting = UNITS[quantity]
+    expected = quoted(fitting)
     hint = did_you_mean(str(unit), fitting)
     for other, units in UNITS.items():
         if str(unit) in units:
             hint = f" '{unit}' is a unit of {other}"
             break
-    raise InputError(
-        f"{where}: expected a unit of {quantity} ({quoted(fitting)}), got"
-        f" {unit!r}.{hint}"
+    return InputError(
+        f"{where}: expected a unit of {quantity} ({expected}), got {unit!r}.{hint}"
     )
 
 
@@ -61,12 +67,13 @@ LARGEST_MAGNITUDES: dict[str, float] = {
 
 
 def check_channel(name: str, where: str, *, time: bool = True) -> str:
-    """Return `name`, which must be a channel of a file, ``t`` included, or of a trial where not `time`."""
+    """Return `name`, a channel of a file or, without `time`, of a trial."""
     # time is a column of a file, and no channel of a trial
     known = tuple(QUANTITIES) if time else CHANNELS
     if name not in known:
+        names = quoted(known)
         hint = did_you_mean(str(name), known)
         raise InputError(
-            f"{where}: unknown channel {name!r}.{hint} Known channels: {quoted(known)}"
+            f"{where}: unknown channel {name!r}.{hint} Known channels: {names}"
         )
     return name

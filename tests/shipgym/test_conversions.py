@@ -1,4 +1,4 @@
-"""Steering from one linear form into another, and straight-line stability of the published ships."""
+"""Conversions between linear steering forms, and straight-line stability."""
 
 from dataclasses import replace
 
@@ -130,7 +130,7 @@ def test_a_scaled_ship_has_the_same_prime_form():
 
 
 def test_a_nomoto_ship_follows_her_transfer_function_in_any_manoeuvre():
-    """Large angles too: the equation is linear, and second order in yaw without any sway."""
+    """Large angles too: the equation is linear, second order in yaw, without sway."""
     ship = nomoto2_ship(FORM, SHIP, SteeringGear(35.0, 3.0, 0.0))
     orders = np.repeat([0.3, -0.2, 0.5, 0.0], 400)[:, None]
     trial = ship.simulate(orders, 0.1)
@@ -144,7 +144,7 @@ def test_a_nomoto_ship_follows_her_transfer_function_in_any_manoeuvre():
 
 
 def test_a_record_of_a_steady_turn_goes_on_as_one():
-    """Its first sample does not tell the memory of yaw: it is taken for that of a steady yaw rate."""
+    """Its first sample has no memory of yaw, and is taken for a steady yaw rate."""
     constant = {
         "u": SHIP["speed"],
         "v": 0.0,
@@ -197,7 +197,9 @@ def test_nomoto2_survives_its_file_and_is_sound(tmp_path):
     ],
 )
 def test_straight_line_stability_is_as_the_literature_has_it(name, unstable):
-    """Mariner and S175 hold their course; the Esso tanker does not (van Berlekom & Goddard 1972).
+    """Mariner and S175 hold their course, the Esso tanker does not.
+
+    Van Berlekom & Goddard 1972.
 
     KVLCC2 is called unstable (SIMMAN 2008). Her MMG model of 2015 has another flow at
     the rudder to either side, and at service speed is unstable in the smallest turns to
@@ -214,7 +216,7 @@ def test_straight_line_stability_is_as_the_literature_has_it(name, unstable):
 
 
 def test_the_criterion_of_mariner_is_that_of_her_derivatives():
-    """C = Y_v (N_r - m xG) - N_v (Y_r - m); Mariner's Y_r and N_r are printed with the mass in them."""
+    """C = Y_v (N_r - m xG) - N_v (Y_r - m), where Mariner's table includes the mass."""
     expected = (-1160.0 * -166.0 - -264.0 * -499.0) * 1e-10
     symmetric = replace(
         MARINER,

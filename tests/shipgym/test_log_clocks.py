@@ -1,4 +1,4 @@
-"""Channels of a log on one clock, what is late among them, files of one log, and its parts that are trials."""
+"""Channels on one clock, late channels, logs of several files, and cuts."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""From what a log holds to the project's signs, frame and origin, and what is filled in."""
+"""From a log's signs, frame and origin to the project's, and filled values."""
 
 import math
 
@@ -54,7 +54,7 @@ def test_a_speed_through_the_water_is_surge_and_shows_no_drift_without_a_heading
 
 @pytest.mark.parametrize("turned_deg", [30.0, 300.0])
 def test_a_current_is_what_speed_over_ground_has_more_than_the_log(turned_deg):
-    """Of a ship without leeway, in a current of 0.5 m/s to the north and 0.2 m/s to the west."""
+    """A ship without leeway, in a current of 0.5 m/s north and 0.2 m/s west."""
     t = np.arange(200.0)
     psi = np.linspace(0.3, 0.3 + turned_deg * DEGREE, 200)
     channels = {
@@ -143,7 +143,7 @@ def test_ten_samples_of_straight_parts_tell_an_offset():
 
 
 def test_samples_of_one_straight_part_say_the_same():
-    """One in ten of them tells something new; courses 90 deg apart have the chord 2 sin 45 deg."""
+    """One in ten tells something new; courses 90 deg apart: chord 2 sin 45 deg."""
     t, _, channels = two_courses()
     straight = straight_parts(t, channels)
     channels["ground_north"] = channels["ground_north"] + np.where(t % 2, 0.1, -0.1)
@@ -227,7 +227,7 @@ def test_a_hole_is_too_long_with_more_than_ten_rows_over_more_than_twenty_steps(
     [(20, 10, True), (20, 9, False), (4, 3, True), (4, 2, False)],
 )
 def test_half_of_the_rows_and_three_have_to_be_whole(size, whole, enough, tmp_path):
-    """Where not every row has some value: those are holes, no channels at other rates."""
+    """Rows without any value are holes, no channels at other rates."""
     t = np.arange(float(size))
     u = 1.0 + 0.1 * t
     u[np.linspace(1, size - 2, size - whole).round().astype(int)] = np.nan

@@ -1,4 +1,4 @@
-"""Logs as bridges make them become trials in SI units at midship; what is wrong in them is named."""
+"""Logs as bridges make them become trials in SI units; faults are named."""
 
 import math
 from pathlib import Path
@@ -21,7 +21,7 @@ LAT, LON = 57.687, 11.74
 
 
 def sail(n=1201, step=0.5, current=(0.3, -0.4)):
-    """A ship of 150 m in zigzags on two courses with straight parts, in a current, at midship."""
+    """A ship of 150 m in zigzags on two courses with straight parts, in a current."""
     t = step * np.arange(n)
     order = (
         15
@@ -85,7 +85,10 @@ COLUMNS = {
 
 
 def bridge_log(path, keep=lambda row: row, gyro=1.0):
-    """ISO time, decimal comma, Latin-1; GNSS at 1 Hz, gyro and rudder (to port, half degrees) at 2 Hz."""
+    """ISO time, decimal comma, Latin-1.
+
+    GNSS at 1 Hz, gyro and rudder (to port, half degrees) at 2 Hz.
+    """
     lines = ["Zeit;Breite;Länge;SOG [kn];COG [°];Gyro [°];Ruder [°]"]
     for k, t in enumerate(SAILED["t"]):
         here = ["", "", "", ""]
@@ -214,9 +217,9 @@ def nmea_log(path, rudder=True, end=600):
         clock = f"09{30 + k // 120:02d}{k // 2 % 60:02d}"
         lat, lon = ((abs(GNSS[name][k]) % 1) * 60 for name in ("lat", "lon"))
         place = f"57{lat:07.4f},N,011{lon:07.4f},E"
-        lines.append(
-            f"GPRMC,{clock}.00,A,{place},{GNSS['sog'][k] / KNOT:.2f},{GNSS['cog'][k] / DEGREE:.1f},310524,,,A"
-        )
+        knots = GNSS["sog"][k] / KNOT
+        course = GNSS["cog"][k] / DEGREE
+        lines.append(f"GPRMC,{clock}.00,A,{place},{knots:.2f},{course:.1f},310524,,,A")
         lines.append(f"IIGGA,{clock}.00,{place},1,08,1.0,20.0,M,,M,,")
         for j in (k, k + 1):
             heading = SAILED["psi"][j] / DEGREE % 360
@@ -239,7 +242,7 @@ def nmea_log(path, rudder=True, end=600):
 
 
 def test_an_nmea_log_becomes_a_trial(tmp_path):
-    """The gyro's heading, not the compass's; speed through the water as u, the current out of sway."""
+    """The gyro's heading, not the compass's; log speed as u; sway without current."""
     trial = Trial.from_csv(nmea_log(tmp_path / "log.nmea"), sensors=ANTENNA)
     assert error(trial, "psi") < 0.5 * DEGREE
     assert error(trial, "delta") < 1.0 * DEGREE
@@ -324,7 +327,7 @@ def test_a_yaw_rate_or_heading_of_the_wrong_sign_is_not_taken_for_the_rudders(tm
         path = written(tmp_path / "run.csv", **changed)
         with pytest.raises(
             InputError,
-            match=r"'psi' \(heading\) and 'r' \(yaw rate\) to be positive .* opposite signs",
+            match=r"\(heading\) and 'r' \(yaw rate\) to be positive .* opposite signs",
         ):
             Trial.from_csv(path)
 
@@ -360,7 +363,7 @@ def test_rows_that_are_unusually_far_apart_are_a_remark(tmp_path):
 
 
 def test_a_circle_away_from_the_rudder_is_named(tmp_path):
-    """In a turning circle nothing goes there and back; its side alone tells the sign of the rudder."""
+    """In a turning circle only its side tells the sign of the rudder."""
     t = np.arange(0.0, 400.0, 1.0)
     circle = {
         "psi": 0.01 * t,
@@ -467,7 +470,7 @@ def test_the_zero_of_the_rudder_is_estimated_from_straight_parts(tmp_path):
 @pytest.mark.parametrize("name", ["kvlcc2", "mariner", "container"])
 @pytest.mark.parametrize("angle", [5.0, 10.0])
 def test_overshoots_are_not_taken_for_straight_parts(name, angle):
-    """Heading and rudder hardly change at an overshoot: only a log with a straight approach has a zero."""
+    """At an overshoot heading and rudder hardly change: only straight runs count."""
     trial = zigzag(load_model(name), angle, angle, dt=1.0)
     noise = np.random.default_rng(0).normal(0.0, 0.1 * DEGREE, (2, len(trial) + 60))
     psi = np.append(np.full(60, trial["psi"][0]), trial["psi"]) + noise[0]
@@ -539,9 +542,7 @@ def test_a_log_is_cut_into_trials_by_rudder_by_seconds_and_by_the_clock(tmp_path
     assert trial.t[[0, -1]] == pytest.approx([60.0, 240.0])
     with pytest.raises(
         InputError,
-        match=(
-            r"2024-05-31 09:30:00 to 2024-05-31 09:40:00, got 11:00 to 11:10, which holds"
-        ),
+        match="2024-05-31 09:30:00 to 2024-05-31 09:40:00, got 11:00 to 11:10",
     ):
         ship_file(
             tmp_path,

@@ -1,4 +1,4 @@
-"""What no ship does, and what channels of one ship cannot say at once, is found with what to do about it."""
+"""Impossible values and contradicting channels are refused with a remedy."""
 
 import math
 from pathlib import Path
@@ -41,7 +41,7 @@ UNITS = {
 
 
 def locator(n=1000, **changed):
-    """Samples in the rows of log.csv from line 2 on, each channel in a column of its name."""
+    """Samples in log.csv from line 2 on, each channel in a column of its name."""
     columns = {name: Column(name, unit) for name, unit in (UNITS | changed).items()}
     cells = dict.fromkeys(columns, ())
     words = "line {line} (data row {row})"
@@ -89,7 +89,7 @@ def test_the_unit_that_makes_values_plausible_is_proposed():
 
 
 def turning(step_deg, dt=1.0, n=1, every=4, size=101):
-    """A heading that takes n steps of some degrees one way, each followed by one back."""
+    """A heading of n steps of some degrees one way, each followed by one back."""
     step = np.zeros(size - 1)
     step[10 : 10 + every * n : every] = step_deg * DEGREE
     step[10 + every // 2 : 10 + every * n : every] = -step_deg * DEGREE
@@ -127,7 +127,7 @@ def test_a_heading_of_several_turns_in_a_step_is_in_another_unit():
 
 
 def misled(increments, share, gain):
-    """Increments times a gain, with some that have nothing to do with them, a share of the whole."""
+    """Increments times a gain, with a share of unrelated ones."""
     other = np.random.default_rng(1).standard_normal(increments.size)
     known = np.column_stack([increments, np.ones(increments.size)])
     other = other - known @ np.linalg.lstsq(known, other, rcond=None)[0]
@@ -137,7 +137,7 @@ def misled(increments, share, gain):
 
 
 def yaw_rate_found(gain, share=0.0, turned_deg=90.0, start=0.0):
-    """Of a heading that changes so many times as fast as the yaw rate, which has a bias, says."""
+    """A heading `gain` times as fast as the yaw rate, which has a bias."""
     t = np.arange(31.0)
     yaw = 0.5 * turned_deg * DEGREE / max(abs(gain), 1.0) * np.sin(0.7 * t)
     r = np.gradient(yaw)

@@ -1,4 +1,4 @@
-"""Logs of every kind of file become the same table, and what is wrong in a file is named with its place."""
+"""Logs of every kind of file become the same table; faults have their place."""
 
 import math
 import os
@@ -407,7 +407,7 @@ def rmc(k, sog="10.0", cog="20.0"):
     ],
 )
 def test_a_wind_from_the_bow_is_turned_by_the_heading(texts, speed, from_deg, tmp_path):
-    """The true one (T) is preferred to the apparent one (R), which needs the ship's velocity."""
+    """The true wind (T) is preferred to the apparent one (R), which needs velocity."""
     heading = "HEHDT,20.0,T"
     every = [text for k in range(3) for text in (rmc(k), heading, *texts)]
     table = read_log(nmea_log(tmp_path / "log.nmea", *every))
@@ -430,7 +430,7 @@ def test_a_wind_from_the_bow_is_turned_by_the_heading(texts, speed, from_deg, tm
     ],
 )
 def test_of_several_sources_the_better_one_is_read(channel, sources, best, tmp_path):
-    """True headings and logs of two axes first, then sources of their own, then those that say the most."""
+    """True headings and two-axis logs first, then own sources, then the busiest."""
     texts = [
         text
         for k in range(9)

@@ -14,7 +14,6 @@ from shipgym import (
     Wind,
     load_model,
 )
-from shipgym.envs import recording
 from shipgym.envs.recording import plain
 
 COURSE_KEEPING = "shipgym/CourseKeeping-v0"
@@ -44,7 +43,7 @@ def files(folder):
 
 
 def test_what_an_agent_did_is_identified_again(tmp_path):
-    """Random rudders that hold for 40 s each: the identified ship answers as the one that was sailed."""
+    """Random rudders held for 40 s: the identified ship answers as the one sailed."""
     from identification import identify
 
     ship = load_model("mariner")
@@ -267,30 +266,36 @@ def test_a_recorded_environment_is_still_gymnasiums(tmp_path):
     )
 
 
-def test_of_what_is_reported_single_finite_numbers_are_kept():
-    info = {
-        "cross_track": np.float32(1.5),
-        "in_corridor": np.True_,
-        "steps": 3,
-        "far": np.inf,
-        "text": "a",
-        "waypoints": np.zeros(2),
-        "reward_end": -1.0,
-        "success": True,
-        "is_success": False,
-    }
-    assert recording._numbers(info) == {
-        "cross_track": 1.5,
-        "in_corridor": 1.0,
-        "steps": 3.0,
-    }
+class Reporting(gymnasium.Wrapper):
+    """Adds to what the environment reports, at each step something else."""
+
+    def reset(self, **settings):
+        observation, info = self.env.reset(**settings)
+        return observation, info | {"a": 0.5, "first": 1.0}
+
+    def step(self, action):
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        info |= {
+            "a": np.float32(1.5),
+            "in_corridor": np.True_,
+            "later": 3,
+            "far": np.inf,
+            "text": "a",
+            "vector": np.zeros(2),
+            "success": True,
+        }
+        return observation, reward, terminated, truncated, info
 
 
-def test_a_name_that_some_step_lacks_is_left_out():
-    found = recording._columns([{"a": 1.0, "b": 2.0}, {"b": 3.0, "c": 4.0}])
-    assert {name: values.tolist() for name, values in found.items()} == {
-        "b": [2.0, 3.0]
-    }
+def test_of_what_every_step_reports_single_finite_numbers_are_kept(tmp_path):
+    sail(RecordEpisode(course_keeping(episode_steps=2), tmp_path / "plain"))
+    sail(RecordEpisode(Reporting(course_keeping(episode_steps=2)), tmp_path / "more"))
+    plain_info = Episode.load(tmp_path / "plain" / "episode-00000.json").info
+    episode = Episode.load(tmp_path / "more" / "episode-00000.json")
+    added = {name: episode.info[name].tolist() for name in episode.info}
+    assert added.keys() - plain_info.keys() == {"a"}
+    assert added["a"] == [0.5, 1.5, 1.5]
+    assert episode.success is True
 
 
 def test_episodes_are_counted_from_the_last_seed(tmp_path):

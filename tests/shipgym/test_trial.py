@@ -1,4 +1,4 @@
-"""A recorded manoeuvre comes in by CSV with its units, signs and frame, and goes out again without loss."""
+"""A recorded manoeuvre comes in by CSV and goes out again without loss."""
 
 import math
 import pickle
@@ -21,7 +21,7 @@ T = np.linspace(0.0, 60.0, 301)
 
 
 def manoeuvre(t=T):
-    """A smooth zigzag-like motion of a 7 m model whose channels agree with each other."""
+    """A smooth zigzag-like motion of a 7 m model with consistent channels."""
     psi = 0.4 * np.sin(0.2 * t)
     r = 0.08 * np.cos(0.2 * t)
     u = 1.1 + 0.05 * np.cos(0.4 * t)
@@ -389,7 +389,7 @@ def test_a_noisy_heading_gives_a_yaw_rate_that_is_better_than_differences(tmp_pa
 
 
 def quintic(values, spacing):
-    """Least squares with a knot at every so many samples: the slope at them, and the noise that is left."""
+    """Least squares with knots some samples apart: the slope, and the noise left."""
     s = np.arange(float(values.size))
     knots = s[np.arange(spacing, s.size - spacing, spacing)]
     above = np.clip((s[:, None] - knots) / s.size, 0.0, None)
@@ -407,7 +407,7 @@ def quintic(values, spacing):
 
 
 def test_noise_grows_by_less_than_the_power_of_eight_tenths_of_the_distance_of_knots():
-    """Between knots at every second and every third of 24 samples; with fewer samples nothing is smoothed."""
+    """Knots at every second and third of 24 samples; fewer samples are not smoothed."""
     t, noise = np.arange(24.0), np.random.default_rng(0).standard_normal(24)
 
     def growth(motion):
@@ -777,7 +777,7 @@ def test_what_no_ship_does_begins_at_its_limit(tmp_path, channel, unit, largest)
 
 
 def test_velocities_derived_from_positions_are_over_ground(tmp_path):
-    """GNSS positions hold the current, a log's velocities do not; copies and pickles remember which it is."""
+    """GNSS positions hold the current, log velocities do not; copies remember which."""
     whole = Trial(T, manoeuvre()[0])
     whole.to_csv(tmp_path / "log.csv")
     assert not Trial.from_csv(tmp_path / "log.csv").over_ground

@@ -1,4 +1,4 @@
-"""Zhu 2018: least-squares support vector regression of simplified ship models, with C by bee colony.
+"""Zhu 2018: LS-SVR of simplified ship models, with C by bee colony.
 
 One file per case study: 7.2 Nomoto's forms (`response_models`), 7.3 recursive least
 squares from LS-SVR's start (`recursive_start`), 7.4 the container ship

@@ -131,14 +131,17 @@ def zigzag_trial(angle_deg: float, rudder_limit_deg: float = 35.0) -> Trial:
 @cache
 def straight_line(use: str) -> Trial:
     """A straight line with varying shaft orders as sampled; `learned` or `verified`."""
-    held = round(DURATION / len(ORDERS[use]) / STEP)
-    shaft = np.repeat(np.array(ORDERS[use]) * RPM, held)
-    trial = ship().simulate(np.column_stack([np.zeros_like(shaft), shaft]), STEP)
+    orders = np.array(ORDERS[use]) * RPM
+    held = round(DURATION / len(orders) / STEP)
+    shaft = np.repeat(orders, held)
+    rudder = np.zeros_like(shaft)
+    commands = np.column_stack([rudder, shaft])
+    trial = ship().simulate(commands, STEP)
     return every(trial, round(INTERVAL / STEP), f"straight line {use}")
 
 
 def surge_terms(trial: Trial) -> Floats:
-    """Terms of equation 5.8: surge speed above 8 m/s, its cube, shaft order above 80 rpm.
+    """Terms of equation 5.8: surge speed above 8 m/s and its cube, order over 80 rpm.
 
     The thesis does not say whether it took order or shaft speed; with the order come
     its coefficients.
@@ -154,7 +157,7 @@ def surge_fit(trial: Trial, estimator: LSSVM | TunedLSSVM) -> Difference:
 
 
 def surge(fit: Difference, trial: Trial) -> dict[str, Floats]:
-    """Predict surge from the first sample and the shaft orders; infinite from where the ship runs away."""
+    """Predict surge from the first sample and orders; infinite after running away."""
     faster = np.full(len(trial), np.inf)
     x = float(trial["u"][0]) - SPEED
     for k, quicker in enumerate(surge_terms(trial)[:, 2].tolist()):
@@ -180,10 +183,15 @@ def as_printed(method: str) -> dict[str, Difference]:
 
 def predicted_errors(fits: dict[str, Difference]) -> dict[str, float]:
     """Mean squared errors of the second straight line and the 20/20 zigzag."""
-    line, turns = straight_line("verified"), zigzag_trial(20)
+    line = straight_line("verified")
+    turns = zigzag_trial(20)
+    driven = surge(fits["u"], line)
     steered = steer(fits["v"], fits["r"], turns)
-    errors = {q: mean_square(steered, turns, q) for q in ("v", "r")}
-    return {"u": mean_square(surge(fits["u"], line), line, "u")} | errors
+    return {
+        "u": mean_square(driven, line, "u"),
+        "v": mean_square(steered, turns, "v"),
+        "r": mean_square(steered, turns, "r"),
+    }
 
 
 @cache
@@ -194,7 +202,7 @@ def best_surge() -> ShipModel:
 
 @cache
 def best_steering(rudder_limit_deg: float = 35.0) -> ShipModel:
-    """Four terms with the instantaneous speed in sway and yaw, from spline samples of the 10/10 zigzag."""
+    """Four terms with instantaneous speed in sway and yaw, from 10/10 splines."""
     columns = {"u": SURGE_IN_TURNS, "v": FOUR_WITH_SPEED, "r": FOUR_WITH_SPEED}
     return spline_fit(
         zigzag_trial(10, rudder_limit_deg), ship(rudder_limit_deg), columns
@@ -204,10 +212,15 @@ def best_steering(rudder_limit_deg: float = 35.0) -> ShipModel:
 @cache
 def best_errors() -> dict[str, float]:
     """What the best models here reach in the thesis' predictions."""
-    line, turns = straight_line("verified"), zigzag_trial(20)
-    sailed = predict(best_steering(), turns)
-    errors = {q: mean_square(sailed, turns, q) for q in ("v", "r")}
-    return {"u": mean_square(predict(best_surge(), line), line, "u")} | errors
+    line = straight_line("verified")
+    turns = zigzag_trial(20)
+    driven = predict(best_surge(), line)
+    steered = predict(best_steering(), turns)
+    return {
+        "u": mean_square(driven, line, "u"),
+        "v": mean_square(steered, turns, "v"),
+        "r": mean_square(steered, turns, "r"),
+    }
 
 
 @cache
@@ -277,7 +290,7 @@ def weight_rows() -> Iterator[Row]:
 
 
 def condition() -> float:
-    """Condition number of the seven terms of the 10/10 zigzag, each by its standard deviation."""
+    """Condition number of the seven standardised terms of the 10/10 zigzag."""
     terms = steering_terms(zigzag_trial(10))
     return float(np.linalg.cond((terms - terms.mean(axis=0)) / terms.std(axis=0)))
 

@@ -6,6 +6,7 @@ and predicts by stepping that difference equation.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -74,7 +75,7 @@ def first_samples(trial: Trial, count: int) -> Trial:
 
 
 def search(method: str, equation: str, most: float | None = None) -> TunedLSSVM:
-    """LS-SVR of which C is searched for by one of the thesis' methods, on columns as they are."""
+    """LS-SVR on columns as they are, with C found by a method of the thesis."""
     optimiser, objective = SEARCHES[method]
     bounds = (LEAST_C, MOST_C[equation] if most is None else most)
     return TunedLSSVM(
@@ -84,10 +85,18 @@ def search(method: str, equation: str, most: float | None = None) -> TunedLSSVM:
 
 def steering_terms(trial: Trial) -> Floats:
     """The seven terms of equation 7.1, SI units, shape (n_samples, 7)."""
-    v, r, delta = trial["v"], trial["r"], trial["delta"]
-    return np.column_stack(
-        [v, np.abs(v) * v, np.abs(r) * v, r, np.abs(v) * r, np.abs(r) * r, delta]
-    )
+    v = trial["v"]
+    r = trial["r"]
+    terms = [
+        v,
+        np.abs(v) * v,
+        np.abs(r) * v,
+        r,
+        np.abs(v) * r,
+        np.abs(r) * r,
+        trial["delta"],
+    ]
+    return np.column_stack(terms)
 
 
 def term_columns(structure: str, equation: str) -> list[int]:
@@ -162,31 +171,36 @@ def steering_fit(
 
 
 def steer(sway: Difference, yaw: Difference, trial: Trial) -> dict[str, Floats]:
-    """Predict a trial from its first sample and its rudder; infinite from where the ship runs away."""
-    path = np.full((2, len(trial)), np.inf)
-    v, r = float(trial["v"][0]), float(trial["r"][0])
+    """Predict a trial from its first sample and rudder; infinite after running away."""
+    sways = np.full(len(trial), np.inf)
+    rates = np.full(len(trial), np.inf)
+    v = float(trial["v"][0])
+    r = float(trial["r"][0])
     for k, delta in enumerate(trial["delta"].tolist()):
-        path[:, k] = v, r
+        sways[k] = v
+        rates[k] = r
         terms = (v, abs(v) * v, abs(r) * v, r, abs(v) * r, abs(r) * r, delta)
-        v, r = sway.step(v, terms), yaw.step(r, terms)
+        v = sway.step(v, terms)
+        r = yaw.step(r, terms)
         if not (abs(v) < RAN_AWAY and abs(r) < RAN_AWAY):
             break
-    return {"v": path[0], "r": path[1]}
+    return {"v": sways, "r": rates}
 
 
 def mean_square(
     predicted: Mapping[str, Floats] | Trial | None, trial: Trial, channel: str
 ) -> float:
-    """Mean squared error of a channel, of yaw rate in deg^2/s^2 as printed; infinite after running away."""
+    """Mean squared error of a channel; infinite after running away.
+
+    Of yaw rate in deg^2/s^2, as printed.
+    """
     if predicted is None:
-        return float("inf")
+        return math.inf
     error = predicted[channel] - trial[channel]
+    if not np.isfinite(error).all():
+        return math.inf
     unit = np.degrees(1.0) if channel == "r" else 1.0
-    return (
-        float(unit**2 * np.mean(error**2))
-        if np.all(np.isfinite(error))
-        else float("inf")
-    )
+    return float(unit**2 * np.mean(error**2))
 
 
 @lru_cache(maxsize=2)
@@ -198,7 +212,7 @@ def spline_samples(trial: Trial, ship: ShipModel) -> Samples:
 def spline_fit(
     trial: Trial, ship: ShipModel, columns: Mapping[str, Sequence[int]]
 ) -> ShipModel:
-    """A model with the instantaneous speed in its terms, by least squares on spline samples.
+    """A model with instantaneous speed in its terms, by least squares on splines.
 
     Parameters
     ----------

@@ -1,4 +1,6 @@
-"""Section 7.3: the Mariner's linear steering by recursive least squares, started from zero or from LS-SVR.
+"""Section 7.3: the Mariner's linear steering by recursive least squares.
+
+Started from zero or from LS-SVR.
 
 A 20/20 zigzag at 7.7 m/s, sampled at 0.5 s; from 200 to 220 s the record of the rudder
 has noise of 1.5 per cent of its order. The thesis regresses v(k+1) on v, v U, r U and
@@ -118,16 +120,19 @@ def parameters(sway: Floats, yaw: Floats) -> Floats:
 
 @cache
 def euler_trial(noisy: bool) -> Trial:
-    """The ship integrated by Euler's rule at the interval of the samples, under the same rudder."""
-    trial, record = zigzag_trial(False), zigzag_trial(noisy)
-    v, r = np.zeros(len(trial)), np.zeros(len(trial))
-    sway, yaw = (
-        TRUTH * INTERVAL / np.array([LENGTH, 1.0, LENGTH, LENGTH**2, LENGTH, LENGTH**2])
-    ).reshape(2, 3)
+    """The ship by Euler's rule at the samples' interval, under the same rudder."""
+    trial = zigzag_trial(False)
+    record = zigzag_trial(noisy)
+    units = np.array([LENGTH, 1.0, LENGTH, LENGTH**2, LENGTH, LENGTH**2])
+    per_step = TRUTH * INTERVAL / units
+    sway, yaw = per_step.reshape(2, 3)
+    v = np.zeros(len(trial))
+    r = np.zeros(len(trial))
     for k, delta in enumerate(-trial["delta"][:-1]):
         U = np.hypot(SPEED, v[k])
         terms = np.array([v[k] * U, r[k] * U, delta * U**2])
-        v[k + 1], r[k + 1] = v[k] + sway @ terms, r[k] + yaw @ terms
+        v[k + 1] = v[k] + sway @ terms
+        r[k + 1] = r[k] + yaw @ terms
     channels = {
         "u": np.full(len(trial), SPEED),
         "v": v,
@@ -139,7 +144,7 @@ def euler_trial(noisy: bool) -> Trial:
 
 @cache
 def history(method: str, euler: bool = False, noisy: bool = True) -> Floats:
-    """The six parameters after each sample by `RLS` or `LSSVR-RLS`, on columns as they are."""
+    """The six parameters after each sample by `RLS` or `LSSVR-RLS`, unscaled."""
     estimator = RecursiveLeastSquares(
         C=C_ZERO,
         scale=False,
@@ -165,7 +170,7 @@ def fluctuation(method: str, euler: bool) -> float:
 
 @cache
 def at_best() -> Floats:
-    """The six parameters by the same recursion on spline samples, the coefficient of the state held at 1."""
+    """The six parameters by the same recursion on splines, the state's factor 1."""
     model = identify(
         [zigzag_trial(noisy=True)],
         STRUCTURE,
@@ -185,7 +190,7 @@ def errors(found: Floats) -> Floats:
 
 
 def from_pairs(count: int, interval: int, noisy: bool) -> Floats:
-    """The six parameters by LS-SVR from a number of pairs of samples, every n-th of the record."""
+    """The six parameters by LS-SVR from some pairs of samples, every n-th."""
     found = []
     for X, y in regressions(zigzag_trial(noisy)).values():
         rows = slice(0, count * interval, interval)
@@ -213,7 +218,7 @@ def spline_rows(noisy: bool) -> dict[str, tuple[Floats, Floats]]:
 
 
 def from_spline_pairs(count: int, interval: int, noisy: bool) -> Floats:
-    """The six parameters by least squares from the same pairs, with what happens between their samples."""
+    """The six parameters by least squares from the same pairs and what lies between."""
     rows = slice(0, count * interval, interval)
     found = np.concatenate(
         [
@@ -244,7 +249,7 @@ def table_rows() -> Iterator[Row]:
 
 
 def euler_rows() -> Iterator[Row]:
-    """Table 7.3.2 on a ship that Euler's rule integrates; how much a22 moves on either ship."""
+    """Table 7.3.2 on a ship of Euler's rule, and the spread of a22 on both ships."""
     for method, printed in PRINTED.items():
         found = errors(history(method, euler=True)[-1])
         for k, name in enumerate(NAMES):

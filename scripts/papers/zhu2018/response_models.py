@@ -73,7 +73,7 @@ STAND_IN = "the log is not published: a stand-in, means over 20 logs"
 
 @dataclass(frozen=True)
 class Form:
-    """Nomoto's form T rdot + r + a r^3 = K delta, with r in rad/s, and what goes with it as a constant."""
+    """Nomoto's T rdot + r + a r^3 = K delta, r in rad/s, and the thesis' constant."""
 
     K: float
     T: float
@@ -128,10 +128,15 @@ def as_printed(trial: Trial, method: str, form: str) -> Form:
     method : {"LS", "LS-SVR"}
     form : {"linear", "nonlinear"}
     """
-    r, step = trial["r"], float(trial.t[1] - trial.t[0])
-    terms = [r, trial["delta"]] if form == "linear" else [r, trial["delta"], r**3]
+    r = trial["r"]
+    step = float(trial.t[1] - trial.t[0])
+    terms = [r, trial["delta"]]
+    if form == "nonlinear":
+        terms.append(r**3)
+    X = np.column_stack(terms)[:-1]
+    y = np.diff(r) / step
     estimator = LSSVM(C=np.inf, fit_intercept=False) if method == "LS" else TunedLSSVM()
-    estimator.fit(np.column_stack(terms)[:-1], np.diff(r) / step)
+    estimator.fit(X, y)
     damping, gain, *bend = estimator.coef_.tolist()
     return Form(
         -gain / damping,
@@ -142,7 +147,7 @@ def as_printed(trial: Trial, method: str, form: str) -> Form:
 
 
 def at_best(trial: Trial, form: str) -> Form:
-    """A form by the weighted LS-SVM after repair, with what the rudder does between the samples."""
+    """A form by weighted LS-SVM after repair, with the rudder between samples."""
     model = identify(
         [trial],
         "nomoto" if form == "linear" else "norrbin",
@@ -181,17 +186,22 @@ def mean_error(forms: tuple[Form, ...], name: str) -> float:
 
 
 def residuals(form: Form, trial: Trial) -> Floats:
-    """Yaw rate of a log less that predicted from its rudder, straight between the samples, rad/s."""
-    steps = round(float(trial.t[1] - trial.t[0]) / SMALL_STEP)
-    times = np.linspace(trial.t[0], trial.t[-1], steps * (len(trial) - 1) + 1)
-    path, now = np.empty(len(times)), float(trial["r"][0])
-    for k, delta in enumerate(np.interp(times, trial.t, trial["delta"]).tolist()):
-        path[k] = now
-        now = min(
-            max(now + SMALL_STEP * form.rate(now, delta), -LARGEST_YAW_RATE),
-            LARGEST_YAW_RATE,
-        )
-    return np.asarray(trial["r"] - path[::steps])
+    """Yaw rate of a log less that predicted from its rudder, rad/s.
+
+    The rudder is straight between the samples.
+    """
+    t = trial.t
+    steps = round(float(t[1] - t[0]) / SMALL_STEP)
+    count = steps * (len(trial) - 1) + 1
+    times = np.linspace(t[0], t[-1], count)
+    rudder = np.interp(times, t, trial["delta"])
+    predicted = np.empty(count)
+    r = float(trial["r"][0])
+    for k, delta in enumerate(rudder.tolist()):
+        predicted[k] = r
+        r = r + SMALL_STEP * form.rate(r, delta)
+        r = min(max(r, -LARGEST_YAW_RATE), LARGEST_YAW_RATE)
+    return np.asarray(trial["r"] - predicted[::steps])
 
 
 def correlation(a: Floats, b: Floats) -> Floats:
@@ -259,14 +269,18 @@ def robust_rows() -> Iterator[Row]:
 
 
 def residual_measures(method: str, form: str) -> dict[str, float]:
-    """Means over the logs of what Figures 7.2.3 and 7.2.5 show of the residuals of the 30/30 zigzag."""
+    """Means over logs of the residuals in Figures 7.2.3 and 7.2.5, 30/30 zigzag."""
     found = []
     for seed, fit in zip(SEEDS, fitted(method, form), strict=True):
         trial = log(ASSESSED, len(SEEDS) + seed)
         error = residuals(fit, trial)
-        own, rudder = correlation(error, error), correlation(error, trial["delta"])
-        found.append((float(np.std(error)) / DEGREE, beyond(own), beyond(rudder)))
-    return dict(zip(MEASURES, np.mean(found, axis=0).tolist(), strict=True))
+        deviation_deg = float(np.std(error)) / DEGREE
+        with_itself = correlation(error, error)
+        with_rudder = correlation(error, trial["delta"])
+        measures = (deviation_deg, beyond(with_itself), beyond(with_rudder))
+        found.append(measures)
+    means = np.mean(found, axis=0)
+    return dict(zip(MEASURES, means.tolist(), strict=True))
 
 
 def figure_rows() -> Iterator[Row]:

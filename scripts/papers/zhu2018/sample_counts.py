@@ -1,4 +1,4 @@
-"""Section 7.4.7: time, error of prediction and coefficients against the number of samples.
+"""Section 7.4.7: time, prediction error and coefficients by number of samples.
 
 Surge as in section 7.4.2, sway and yaw with the four terms that section 7.4.6 chooses,
 from the first so many samples of the same trials.
@@ -80,7 +80,7 @@ def fits_of(count: int, method: str) -> dict[str, Difference]:
 def learned(
     count: int, method: str = "ABC"
 ) -> tuple[dict[str, float], dict[str, list[float]]]:
-    """Mean squared errors of prediction, and coefficients, by equation: points of Figures 7.4.9 to 7.4.13."""
+    """Prediction errors and coefficients by equation: Figures 7.4.9 to 7.4.13."""
     line, turns = straight_line("verified"), zigzag_trial(20)
     fits = fits_of(count, method)
     steered = steer(fits["v"], fits["r"], turns)
@@ -96,7 +96,7 @@ def learned(
 
 @cache
 def learned_best(count: int) -> dict[str, float]:
-    """The same errors by least squares on spline samples, with the instantaneous speed in sway and yaw."""
+    """The same errors by least squares on splines, with the instantaneous speed."""
     line, turns = straight_line("verified"), zigzag_trial(20)
     columns = {"u": SURGE_IN_TURNS, "v": FOUR_WITH_SPEED, "r": FOUR_WITH_SPEED}
     alone = spline_fit(
@@ -117,7 +117,7 @@ def enough(errors: Floats, most: float) -> int | None:
 
 
 def settled_from(values: Floats) -> int:
-    """Samples from which on all columns keep within 10 per cent of their last values."""
+    """Number of samples from which all columns stay within 10 % of the last values."""
     off = np.any(np.abs(values - values[-1]) > SETTLED * np.abs(values[-1]), axis=1)
     last = int(np.flatnonzero(off)[-1]) + 1 if off.any() else 0
     return COUNTS[last]
@@ -153,7 +153,7 @@ def seconds(
 
 
 def time_rows() -> Iterator[Row]:
-    """Figures 7.4.7 and 7.4.8: time with all samples, and its growth with their number."""
+    """Figures 7.4.7 and 7.4.8: time with all samples, and its growth."""
     for objective in ("training", "k-fold"):
         found = seconds(COUNTS[-1], "ABC", objective, FINE_REPEATS)
         yield Row(

@@ -135,22 +135,20 @@ def at_best(trial: Trial) -> ShipModel:
 
 @cache
 def errors() -> tuple[dict[tuple[str, float], float], dict[tuple[str, float], float]]:
-    """Mean squared errors by equation and zigzag, to the ship's own motion: as the thesis, and at best."""
+    """Mean squared errors by equation and zigzag: as the thesis, and at best."""
     ours: dict[tuple[str, float], list[float]] = {key: [] for key in PRINTED}
     best: dict[tuple[str, float], list[float]] = {key: [] for key in PRINTED}
     for seed in SEEDS:
-        fits, model = as_printed(record(seed)), at_best(record(seed))
+        fits = as_printed(record(seed))
+        model = at_best(record(seed))
         for angle in ASSESSED:
-            truth = every(
-                sailed(angle), round(INTERVAL / STEP), f"zigzag {angle:g}/{angle:g}"
-            )
-            stepped, simulated = (
-                steer(fits["v"], fits["r"], truth),
-                predict(model, sailed(angle)),
-            )
+            run = sailed(angle)
+            sampled = every(run, round(INTERVAL / STEP), f"zigzag {angle:g}/{angle:g}")
+            stepped = steer(fits["v"], fits["r"], sampled)
+            simulated = predict(model, run)
             for q in EQUATIONS:
-                ours[q, angle].append(mean_square(stepped, truth, q))
-                best[q, angle].append(mean_square(simulated, sailed(angle), q))
+                ours[q, angle].append(mean_square(stepped, sampled, q))
+                best[q, angle].append(mean_square(simulated, run, q))
     return (
         {key: float(np.mean(values)) for key, values in ours.items()},
         {key: float(np.mean(values)) for key, values in best.items()},

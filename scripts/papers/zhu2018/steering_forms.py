@@ -1,4 +1,4 @@
-"""Sections 7.4.5 and 7.4.6: Nomoto's forms and ten reduced steering models of the container ship.
+"""Sections 7.4.5, 7.4.6: Nomoto's forms and ten reduced steering models.
 
 All learn from the 10/10 zigzag and predict the 20/20. The reduced forms are fits of the
 change of v and r over a step, since some of them have no linear term that could carry
@@ -115,7 +115,7 @@ INCONSISTENT = "not a number in the thesis; without a linear damping term"
 
 @dataclass(frozen=True)
 class NomotoFit:
-    """Nomoto's form T rdot + r + n3 r^3 = K delta, and the error of its predicted 20/20, deg2/s2."""
+    """Nomoto's T rdot + r + n3 r^3 = K delta, and its error of the 20/20, deg2/s2."""
 
     K: float
     T: float
@@ -149,7 +149,7 @@ def as_printed(row: int, rudder_limit_deg: float = 35.0) -> dict[str, Difference
 
 @cache
 def at_best(row: int, angle_deg: float = 10.0) -> ShipModel:
-    """The terms of a row with the instantaneous speed, by least squares on spline samples of a zigzag."""
+    """Terms of a row with instantaneous speed, by least squares on splines."""
     columns: dict[str, Sequence[int]] = {
         q: term_columns(structure_of(row), q) for q in PREFIX
     }
@@ -291,7 +291,7 @@ def error_rows() -> Iterator[Row]:
 
 
 def chosen_rows() -> Iterator[Row]:
-    """Section 7.4.6: the pair that the thesis chooses, its |v| r replaced, and either rudder limit."""
+    """Section 7.4.6: the chosen pair, its |v| r replaced, and both rudder limits."""
     cases = (
         (
             35.0,

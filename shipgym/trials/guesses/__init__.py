@@ -1,4 +1,4 @@
-"""What a log holds where nobody says it: columns, units, signs and frames, each guess with its reason."""
+"""Columns, units, signs and frames of a log, guessed, each with its reason."""
 
 from shipgym.trials.guesses.columns import ColumnGuess, guess_columns
 from shipgym.trials.guesses.trials import ConventionGuess, TrialGuess, guess_trial

@@ -36,7 +36,7 @@ class ColumnGuess(NamedTuple):
 
 
 class _Names(NamedTuple):
-    """Names of columns by channel, as patterns of `fnmatch`, in the order in which they are tried."""
+    """Names of columns by channel, as `fnmatch` patterns in the order of trial."""
 
     known: dict[str, list[str]]
     with_unit: dict[str, list[str]]  # only with a unit of the channel
@@ -54,7 +54,7 @@ def _column_names() -> _Names:
 
 
 def guess_columns(table: LogTable) -> list[ColumnGuess]:
-    """Channels of a table, each of one column; none where no column has a name that is known.
+    """Guess the column of each channel by its name; empty where no name is known.
 
     A column whose name ends with a unit of another quantity is not taken: a gyro in
     deg/s shows no heading.

@@ -1,4 +1,4 @@
-"""A log read with what is guessed: where a check names another unit, sign or frame, that is tried."""
+"""Logs read with guessed columns and conventions, corrected by what checks propose."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class TrialGuess:
 
 
 def guess_trial(path: str | Path) -> TrialGuess:
-    """Read a log with what is guessed, and where a check names something else, with that.
+    """Read a log with guesses; where a check proposes another setting, try that.
 
     A unit that a column's name tells is kept. Raises InputError, as the readers do, for
     a log that cannot be read so.
@@ -95,7 +95,7 @@ def _read(
 def _next_proposal(
     error: InputError, columns: Mapping[str, ColumnGuess], tried: set[Proposal]
 ) -> Proposal | None:
-    """The first proposal of a refusal that was not tried yet, and is no unit that a name tells."""
+    """First proposal of a refusal that was not tried and is no unit given by a name."""
     for name, value in error.instead:
         proposal = Proposal(name, value)
         may_be_tried = name not in QUANTITIES  # a convention

@@ -42,7 +42,10 @@ class NameEnd(NamedTuple):
 
 
 def split_unit(name: str) -> NameEnd:
-    """Part a column's name, in lower case with blanks for underscores, from the unit with which it ends."""
+    """Part a column's name from the unit with which it ends.
+
+    The name is in lower case, with blanks for underscores.
+    """
     text = name.replace(" per ", "/")
     text = text.rstrip("]) ")
     bare = text
@@ -67,7 +70,7 @@ def _spelled_units(text: str) -> list[str]:
 
 
 def named_unit(units: list[str], channel: str) -> UnitGuess | None:
-    """The unit of a channel among those with which a name ends; None where there is none."""
+    """Unit of a channel among those with which a name ends; None if there is none."""
     for unit in units:
         if unit in UNITS[QUANTITIES[channel]]:
             return UnitGuess(unit, "from its name")
@@ -75,22 +78,28 @@ def named_unit(units: list[str], channel: str) -> UnitGuess | None:
 
 
 def names_another_quantity(units: list[str], channel: str) -> bool:
-    """Tell whether a name ends with a unit of another quantity; one letter may be none: "Heading M"."""
+    """Tell whether a name ends with a unit of another quantity.
+
+    A single letter may be no unit, as in "Heading M".
+    """
     if named_unit(units, channel) is not None:
         return False
     return any(len(unit) > 1 for unit in units)
 
 
 def unit_by_size(values: Floats | None, channel: str) -> UnitGuess:
-    """The SI unit of a channel unless its largest value is too large for that; None: values that are texts."""
+    """SI unit of a channel unless its largest value is too large for that.
+
+    Values that are texts are None.
+    """
     unit = si_unit(channel)
     if values is None:
         return UnitGuess(unit, "from its content")
     known = values[np.isfinite(values)]
     largest = np.abs(known).max(initial=0.0)
-    limit, other = _BY_SIZE.get(channel) or _BY_SIZE.get(
-        QUANTITIES[channel], (np.inf, "")
-    )
+    limit, other = _BY_SIZE.get(QUANTITIES[channel], (np.inf, ""))
+    if channel in _BY_SIZE:
+        limit, other = _BY_SIZE[channel]
     if largest > limit:
         unit = other
     if unit == "unix" and largest > _MILLISECONDS:

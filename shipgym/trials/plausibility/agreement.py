@@ -15,7 +15,7 @@ from shipgym.trials.columns import Locator
 from shipgym.trials.plausibility.refusal import Proposal, implausible
 from shipgym.trials.plausibility.sampling import likelier_time_units
 from shipgym.trials.resampling import Log
-from shipgym.trials.units import DEGREE, QUANTITIES, UNITS, si_factor
+from shipgym.trials.units import DEGREE, QUANTITIES, UNITS
 
 
 class GainFit(NamedTuple):
@@ -30,8 +30,8 @@ def check_yaw_rate(log: Log, locator: Locator) -> None:
 
     The channels are in SI units, the heading without jumps.
     """
-    turned = _without_trend(log.t, log.channels["psi"])
     integrated = integral(log.t, log.channels["r"])
+    turned = _without_trend(log.t, log.channels["psi"])
     expected = _without_trend(log.t, integrated)
     largest_turn = max(np.ptp(turned), np.ptp(expected))
     if largest_turn < 2.0 * DEGREE:
@@ -42,7 +42,9 @@ def check_yaw_rate(log: Log, locator: Locator) -> None:
     is_other_motion = fit.misfit > 0.5
     if is_other_motion or 0.2 < gain < 5.0:
         return
-    heading, rate = locator.columns["psi"].name, locator.columns["r"].name
+
+    heading = locator.columns["psi"].name
+    rate = locator.columns["r"].name
     columns = f"columns '{heading}' (heading) and '{rate}' (yaw rate)"
     if gain > 0.0:
         raise _other_rate(gain, columns, log.t, locator)
@@ -56,14 +58,19 @@ def check_yaw_rate(log: Log, locator: Locator) -> None:
 
 def _other_rate(gain: float, columns: str, t: Floats, locator: Locator) -> InputError:
     proposals = _nearest_units(gain, t, locator)
-    only_time = all(one.name == "t" for one in proposals)
-    wrong = "of time" if only_time else "of one of them"
-    declarations = " or ".join(locator.declaration(*one) for one in proposals)
+    wrong = "of time"
+    declarations = []
+    for proposal in proposals:
+        declaration = locator.declaration(*proposal)
+        declarations.append(declaration)
+        if proposal.name != "t":
+            wrong = "of one of them"
+    alternatives = " or ".join(declarations)
     return implausible(
         locator.path,
         f"expected {columns} to agree, got a heading that changes {gain:.3g} times as"
         " fast as the yaw rate says",
-        f"likely a wrong unit {wrong}, declare {declarations}",
+        f"likely a wrong unit {wrong}, declare {alternatives}",
         *proposals,
     )
 
@@ -74,67 +81,89 @@ def _nearest_units(gain: float, t: Floats, locator: Locator) -> list[Proposal]:
     Where none does and the unit of time is in doubt, that comes first: two units are
     wrong.
     """
-    gains = {}
+    gains = {}  # that are left with a unit
     for unit, ratio in _other_units("psi", locator).items():
-        gains[Proposal("psi", unit)] = gain * ratio
+        proposal = Proposal("psi", unit)
+        gains[proposal] = gain * ratio
     for unit, ratio in _other_units("r", locator).items():
-        gains[Proposal("r", unit)] = gain / ratio
-    times = []
-    for unit, scale in likelier_time_units(t, locator).items():
-        times.append(Proposal("t", unit))
-        gains[times[-1]] = gain / scale
+        proposal = Proposal("r", unit)
+        gains[proposal] = gain / ratio
+    time_units = []
+    for unit, ratio in likelier_time_units(t, locator).items():
+        proposal = Proposal("t", unit)
+        gains[proposal] = gain / ratio
+        time_units.append(proposal)
 
-    distances = {one: abs(math.log(changed)) for one, changed in gains.items()}
+    distances = {}
+    for proposal, left in gains.items():
+        distances[proposal] = abs(math.log(left))
     nearest = min(distances.values())
     far = 0.5  # logarithm of the ratio of two rates that are not the same
-    if times and nearest > far:
-        return times[:1]
-    return [one for one, distance in distances.items() if distance < nearest + 0.01]
+    if time_units and nearest > far:
+        return time_units[:1]
+
+    proposals = []
+    for proposal, distance in distances.items():
+        if distance < nearest + 0.01:
+            proposals.append(proposal)
+    return proposals
 
 
 def _other_units(channel: str, locator: Locator) -> dict[str, float]:
     """Units of a channel that were not declared, by how much larger they are."""
     declared = locator.columns[channel].unit
-    own = si_factor(channel, declared)
+    quantity = QUANTITIES[channel]
+    factors = dict(UNITS[quantity])
+    own = factors.pop(declared)
     ratios = {}
-    for unit, factor in UNITS[QUANTITIES[channel]].items():
-        if unit != declared:
-            ratios[unit] = factor / own
+    for unit, factor in factors.items():
+        ratios[unit] = factor / own
     return ratios
 
 
 def check_velocity(log: Log, frame: str, locator: Locator) -> None:
-    """Refuse velocities u and v that cannot be those of the positions, by their frame or their size.
+    """Refuse velocities that do not follow the positions, by frame or size.
 
     The channels are in SI units, the heading without jumps; `frame`, "body" or "earth",
     is the declared one of u and v.
     """
     channels = log.channels
     velocity = channels["u"] + 1j * channels["v"]
-    turned = velocity * np.exp(1j * channels["psi"])
-    fits = {"body": _fit_track(log, turned), "earth": _fit_track(log, velocity)}
+    heading = np.exp(1j * channels["psi"])
+    fits = {
+        "body": _fit_track(log, velocity * heading),
+        "earth": _fit_track(log, velocity),
+    }
     declared = fits.pop(frame)
     other_frame, other = fits.popitem()
 
+    is_off = declared.misfit > 0.03
     is_better = other.misfit < 0.2 * declared.misfit
     has_right_size = 0.8 < other.gain.real < 1.25
-    gain = abs(declared.gain)
-    if declared.misfit > 0.03 and is_better and has_right_size:
+    if is_off and is_better and has_right_size:
         raise _other_frame(frame, other_frame, locator)
-    if declared.misfit < 0.2 and not 0.55 < gain < 1.8:
+
+    gain = abs(declared.gain)
+    has_wrong_size = not 0.55 < gain < 1.8
+    if declared.misfit < 0.2 and has_wrong_size:
         raise _other_speed(gain, log.t, locator)
 
 
 def _fit_track(log: Log, velocity: npt.NDArray[np.complex128]) -> GainFit:
     """Fit the change of position, north + i east, by that which a velocity gives."""
-    north, east = log.channels["x"], log.channels["y"]
-    position = _at_windows(north + 1j * east)
-    expected = _at_windows(integral(log.t, velocity))
-    return _fit_changes(expected, position)
+    north = log.channels["x"]
+    east = log.channels["y"]
+    position = north + 1j * east
+    sailed = integral(log.t, velocity)
+    return _fit_changes(
+        regressor=_at_windows(sailed),
+        target=_at_windows(position),
+    )
 
 
 def _other_frame(frame: str, other: str, locator: Locator) -> InputError:
-    u, v = locator.columns["u"].name, locator.columns["v"].name
+    u = locator.columns["u"].name
+    v = locator.columns["v"].name
     return implausible(
         locator.path,
         f"expected columns '{u}' and '{v}' to follow the positions as velocities in the"
@@ -151,10 +180,11 @@ def _other_speed(gain: float, t: Floats, locator: Locator) -> InputError:
         if 0.55 < gain / scale < 1.8:
             times.append(Proposal("t", unit))
     if times:
-        wrong = f"time, declare {locator.declaration(*times[0])}"
+        declaration = locator.declaration(*times[0])
+        wrong = f"time, declare {declaration}"
     else:
-        x, y, u, v = (f"'{locator.columns[channel].name}'" for channel in "xyuv")
-        wrong = f"{x}, {y} or of {u}, {v} (a knot is 0.514 m/s): declare it"
+        x, y, u, v = (locator.columns[channel].name for channel in "xyuv")
+        wrong = f"'{x}', '{y}' or of '{u}', '{v}' (a knot is 0.514 m/s): declare it"
     return implausible(
         locator.path,
         "expected positions and velocities to agree, got a position that changes"
@@ -166,27 +196,34 @@ def _other_speed(gain: float, t: Floats, locator: Locator) -> InputError:
 
 def _at_windows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """The values at the edges of at most 30 windows."""
-    edges = np.linspace(0, values.size - 1, 30 + 1)
-    samples = np.unique(edges.round().astype(int))
-    return values.take(samples)
+    most_windows = 30
+    last = values.size - 1
+    edges = np.linspace(0, last, most_windows + 1)
+    samples = np.rint(edges).astype(int)
+    return values.take(np.unique(samples))
 
 
 def _without_trend(t: Floats, values: Floats) -> Floats:
-    """The values at the windows' edges without their straight line: a rate sensor has a bias."""
+    """Values at the windows' edges without their line: a rate sensor has a bias."""
     time = _at_windows(t - t[0])
-    ends = _at_windows(values)
-    line = np.polyfit(time, ends, 1)
-    left: Floats = ends - np.polyval(line, time)
+    at_edges = _at_windows(values)
+    line = np.polyfit(time, at_edges, deg=1)
+    trend = np.polyval(line, time)
+    left: Floats = at_edges - trend
     return left
 
 
 def _fit_changes(regressor: npt.NDArray[Any], target: npt.NDArray[Any]) -> GainFit:
-    """Fit the changes of a target from window to window, as gain times those of the regressor."""
-    known, sought = np.diff(regressor), np.diff(target)
+    """Fit changes between windows of a target by gain times those of the regressor."""
+    known = np.diff(regressor)
+    sought = np.diff(target)
     power = np.vdot(known, known).real
     size = np.linalg.norm(sought)
     if power == 0.0 or size == 0.0:
         return GainFit(gain=1.0 + 0.0j, misfit=1.0)
-    gain = complex(np.vdot(known, sought) / power)
-    residual = np.linalg.norm(sought - gain * known)
-    return GainFit(gain, misfit=float(residual / size))
+
+    projection = np.vdot(known, sought)
+    gain = complex(projection / power)
+    residual = sought - gain * known
+    unexplained = np.linalg.norm(residual)
+    return GainFit(gain, misfit=float(unexplained / size))

@@ -22,17 +22,21 @@ def check_heading(t: Floats, psi: Floats, logged: Floats, locator: Locator) -> N
     logged in rad, each of shape (n_samples,).
     """
     fastest_turn = 60.0 * DEGREE
-    steps = np.abs(np.diff(psi))
-    is_fast = steps > fastest_turn * np.diff(t)
-    several_turns = np.abs(np.diff(logged)) > _TURN_AND_JUMP
-    jumps = is_fast & (steps > _LARGEST_JUMP)
+    logged_steps = np.abs(np.diff(logged))
+    several_turns = logged_steps > _TURN_AND_JUMP
     if several_turns.any():
         _refuse_unit(t, logged, several_turns, locator)
+
+    steps = np.abs(np.diff(psi))
+    is_fast = steps > fastest_turn * np.diff(t)
     if is_fast.mean() > 0.05:
         _refuse_unit(t, logged, is_fast, locator)
+
+    jumps = is_fast & (steps > _LARGEST_JUMP)
     if jumps.any():
+        first = np.argmax(jumps)
         raise implausible(
-            locator.place(np.argmax(jumps) + 1, "psi"),
+            locator.place(first + 1, "psi"),
             _evidence(t, logged, jumps, locator),
             'empty the wrong cells and import with repair = "interpolate", or correct'
             " them",
@@ -41,10 +45,11 @@ def check_heading(t: Floats, psi: Floats, logged: Floats, locator: Locator) -> N
 
 def _refuse_unit(t: Floats, logged: Floats, wrong: Flags, locator: Locator) -> None:
     """Refuse a heading that is in another unit, or on a clock in another unit."""
+    first = np.argmax(wrong)
     proposal = _likelier_unit(t, logged, locator)
     declaration = locator.declaration(*proposal)
     raise implausible(
-        locator.place(np.argmax(wrong) + 1, "psi"),
+        locator.place(first + 1, "psi"),
         _evidence(t, logged, wrong, locator),
         f"likely a wrong unit: declare {declaration}",
         proposal,
@@ -64,9 +69,11 @@ def _evidence(t: Floats, logged: Floats, wrong: Flags, locator: Locator) -> str:
 
 
 def _likelier_unit(t: Floats, logged: Floats, locator: Locator) -> Proposal:
-    """Another unit of time where the heading stays within a turn, else of the heading."""
-    units = list(likelier_time_units(t, locator))
-    if units and np.ptp(logged) < _TURN_AND_JUMP:
-        return Proposal("t", units[0])
+    """Another unit of time if the heading stays within a turn, else of the heading."""
+    time_units = list(likelier_time_units(t, locator))
+    is_within_a_turn = np.ptp(logged) < _TURN_AND_JUMP
+    if time_units and is_within_a_turn:
+        return Proposal("t", time_units[0])
     declared = locator.columns["psi"].unit
-    return Proposal("psi", "deg" if declared == "rad" else "rad")
+    other = "deg" if declared == "rad" else "rad"
+    return Proposal("psi", other)

@@ -1,4 +1,4 @@
-"""Heading against the course over ground: a ship at berth, a heading that is none, a compass with an offset."""
+"""Heading against course over ground: ships at berth, wrong columns, compasses."""
 
 import math
 
@@ -16,12 +16,14 @@ from shipgym.trials.units import DEGREE
 
 
 def velocity_over_ground(log: Log) -> npt.NDArray[np.complex128]:
-    """North + i east velocity, m/s, as GNSS tells it by speed and course, or by positions."""
+    """North + i east velocity, m/s, by speed and course over ground or positions."""
     channels = log.channels
     if "ground_north" in channels:
-        return channels["ground_north"] + 1j * channels["ground_east"]
-    north = time_derivative(log.t, channels["x"])
-    east = time_derivative(log.t, channels["y"])
+        north = channels["ground_north"]
+        east = channels["ground_east"]
+    else:
+        north = time_derivative(log.t, channels["x"])
+        east = time_derivative(log.t, channels["y"])
     return north + 1j * east
 
 
@@ -40,8 +42,8 @@ def check_over_ground(
     if fastest < slowest:
         raise implausible(
             locator.path,
-            f"expected a manoeuvre, got a ship that makes at most {fastest:.2g} m/s over"
-            " ground: she is at berth or at anchor",
+            "expected a manoeuvre, got a ship that makes at most"
+            f" {fastest:.2g} m/s over ground: she is at berth or at anchor",
             "read another log",
         )
     moving = speed > 0.3 * fastest  # a slow ship has no course
@@ -57,7 +59,7 @@ def check_over_ground(
 def check_course(
     psi: Floats, course: Floats, locator: Locator, *, offset_is_known: bool = False
 ) -> None:
-    """Refuse a heading that is the course over ground, turns the other way, or is far from it.
+    """Refuse a heading that copies, mirrors or is far from the course over ground.
 
     Both are in rad, of shape (n_samples,).
     """
@@ -97,18 +99,19 @@ def check_course(
 
 
 def check_compass(log: Log, locator: Locator) -> list[str]:
-    """Remark on a heading that shows too much on every course, or is magnetic by its name."""
+    """Remark on a heading with a constant offset, or a magnetic one by its name."""
     straight = straight_parts(log.t, log.channels)
     found = heading_offset(log.channels, straight)
     if found is not None and found.is_certain:
-        offset_deg = f"{found.offset / DEGREE:.1f}"
+        offset_deg = round(found.offset / DEGREE, 1)
         remark = (
-            f"the heading shows {offset_deg} deg too much on every course, as a magnetic"
-            " compass or a gyro that is not aligned does; to remove it write"
-            f" heading_offset_deg = {offset_deg} in [sensors]"
+            f"the heading shows {offset_deg} deg too much on every course, as a"
+            " magnetic compass or a gyro that is not aligned does; to remove it"
+            f" write heading_offset_deg = {offset_deg} in [sensors]"
         )
         return [remark]
-    if "mag" in locator.columns["psi"].name.lower():
+    column = locator.columns["psi"].name
+    if "mag" in column.lower():
         remark = (
             "the heading is magnetic by its name; write what it shows too much as"
             " heading_offset_deg"

@@ -15,7 +15,7 @@ class _Span(NamedTuple):
     end: float
 
     def overlaps(self, other: "_Span", shift: float = 0.0) -> bool:
-        """Tell whether this span, so much earlier, and another one have a time in common."""
+        """Tell whether this span, moved back by `shift`, overlaps another."""
         return self.begin - shift < other.end and self.end - shift > other.begin
 
 
@@ -29,17 +29,21 @@ def check_overlap(
 
     `path` and `column` are that file and its column of the time.
     """
-    own, other = _span(signals), _span(others)
+    own = _span(signals)
+    other = _span(others)
     if other.overlaps(own):
         return
-    half_hour, largest_zone = 1800.0, 14.0 * 3600.0
+
+    half_hour = 1800.0
+    largest_zone = 14.0 * 3600.0
     middle_apart = (other.begin + other.end - own.begin - own.end) / 2.0
     shift = half_hour * round(middle_apart / half_hour)
     remedy = "name files that were written at the same time"
     if abs(shift) <= largest_zone and other.overlaps(own, shift):
+        zone = _zone(shift)
         remedy = (
-            f'likely its clock is in another time zone: write t = {{ column = "{column}",'
-            f' zone = "{_zone(shift)}" }}'
+            "likely its clock is in another time zone: write"
+            f' t = {{ column = "{column}", zone = "{zone}" }}'
         )
     apart = other.begin - own.begin
     raise implausible(
@@ -51,10 +55,12 @@ def check_overlap(
 
 
 def _span(signals: Mapping[str, Signal]) -> _Span:
-    clocks = [signal.t for signal in signals.values()]
-    begin = min(clock[0] for clock in clocks)
-    end = max(clock[-1] for clock in clocks)
-    return _Span(float(begin), float(end))
+    begins = []
+    ends = []
+    for signal in signals.values():
+        begins.append(float(signal.t[0]))
+        ends.append(float(signal.t[-1]))
+    return _Span(min(begins), max(ends))
 
 
 def _zone(shift: float) -> str:

@@ -1,4 +1,4 @@
-"""Positions that no ship reaches from those before and after, and tracks of two ships in one log."""
+"""Positions that no ship reaches, and tracks of two ships in one log."""
 
 import numpy as np
 
@@ -13,28 +13,36 @@ def find_outliers(t: Floats, x: Floats, y: Floats) -> Flags:
 
     Time in s and positions in m, shape (n_positions,).
     """
-    is_outlier = np.zeros(t.size, dtype=bool)
     too_fast = _too_fast(t, x, y)
-    if too_fast.size >= 2:
-        is_outlier[0] = too_fast[0]
-        is_outlier[1:-1] = too_fast[:-1] & too_fast[1:]
-        is_outlier[-1] = too_fast[-1]
+    if too_fast.size < 2:
+        return np.zeros(t.size, dtype=bool)
+    # the first and the last one have a neighbour on one side only
+    to_it = np.insert(too_fast, 0, True)
+    from_it = np.append(too_fast, True)
+    is_outlier: Flags = to_it & from_it
     return is_outlier
 
 
 def check_track(t: Floats, x: Floats, y: Floats, locator: Locator) -> None:
-    """Refuse a track that jumps so often that two ships must be in the log; units as in `find_outliers`."""
+    """Refuse a track that jumps so often that two ships must be in the log.
+
+    Units are those of `find_outliers`.
+    """
     too_fast = _too_fast(t, x, y)
+    steps = too_fast.size
     count = np.count_nonzero(too_fast)
-    if too_fast.size < 2 or count <= 0.1 * too_fast.size:
+    if steps < 2 or count <= 0.1 * steps:
         return
+
     k = np.argmax(too_fast)
-    distance = np.hypot(x[k + 1] - x[k], y[k + 1] - y[k]) / 1000.0
+    north = x[k + 1] - x[k]
+    east = y[k + 1] - y[k]
+    kilometres = np.hypot(north, east) / 1000.0
     duration = t[k + 1] - t[k]
     raise implausible(
         locator.place(k + 1, "lat"),
-        f"expected the track of one ship, got a position that jumps {distance:.4g} km"
-        f" within {duration:g} s, as in {count} of {too_fast.size} steps",
+        f"expected the track of one ship, got a position that jumps {kilometres:.4g} km"
+        f" within {duration:g} s, as in {count} of {steps} steps",
         "likely two ships are in one log: keep the rows of one, or declare the unit of"
         " lat and lon",
     )
@@ -58,10 +66,12 @@ def check_outliers(
 
 
 def _too_fast(t: Floats, x: Floats, y: Floats) -> Flags:
-    """Steps between positions that are faster than any ship, shape (n_positions - 1,)."""
+    """Flags of steps that are faster than any ship, shape (n_positions - 1,)."""
     fastest = 50.0  # m/s
     shortest_step = 0.1  # s, in which receivers write their times
-    distance = np.hypot(np.diff(x), np.diff(y))
+    north = np.diff(x)
+    east = np.diff(y)
+    distance = np.hypot(north, east)
     duration = np.maximum(np.diff(t), shortest_step)
     too_fast: Flags = distance > fastest * duration
     return too_fast

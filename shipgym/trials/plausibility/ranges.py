@@ -13,28 +13,30 @@ from shipgym.trials.units import LARGEST_MAGNITUDES, QUANTITIES, UNITS, si_facto
 
 
 def check_ranges(channels: Mapping[str, Floats], locator: Locator) -> None:
-    """Refuse values beyond `LARGEST_MAGNITUDES`, with the units that would make them plausible.
+    """Refuse values beyond `LARGEST_MAGNITUDES`; propose units that fit.
 
     The channels are in SI units, of shape (n_samples,), nan where there is none.
     """
     rounding = 1.0 + 1e-9
     for channel, largest in LARGEST_MAGNITUDES.items():
-        if channel in channels:
-            values = channels[channel]
-            too_large = np.abs(values) > rounding * largest
-            if too_large.any():
-                raise _out_of_range(channel, values, too_large, locator)
+        if channel not in channels:
+            continue
+        values = channels[channel]
+        too_large = np.abs(values) > rounding * largest
+        if too_large.any():
+            raise _out_of_range(channel, values, too_large, locator)
 
 
 def _out_of_range(
     channel: str, values: Floats, too_large: Flags, locator: Locator
 ) -> InputError:
     first = np.argmax(too_large)
+    largest = np.nanmax(np.abs(values))
     declared = locator.columns[channel].unit
     most = _spelled(LARGEST_MAGNITUDES[channel], channel, declared)
     found = _spelled(values[first], channel, declared)
 
-    proposals = _smaller_units(channel, declared, np.nanmax(np.abs(values)))
+    proposals = _smaller_units(channel, declared, largest)
     remedy = "check the column and its unit, or correct the value"
     if proposals:
         declaration = locator.declaration(*proposals[0])
@@ -48,22 +50,27 @@ def _out_of_range(
 
 
 def _smaller_units(channel: str, declared: str, size: float) -> list[Proposal]:
-    """Units in which the largest value of a channel is no larger than that of a ship."""
+    """Units in which the largest value of a channel can be a ship's."""
     own = si_factor(channel, declared)
-    largest_ratio = LARGEST_MAGNITUDES[channel] / size
+    quantity = QUANTITIES[channel]
+    most = LARGEST_MAGNITUDES[channel]
+    largest_ratio = most / size
     proposals = []
-    for unit, factor in UNITS[QUANTITIES[channel]].items():
+    for unit, factor in UNITS[quantity].items():
         ratio = factor / own
-        if ratio < 1.0 and ratio <= largest_ratio:
-            proposals.append(Proposal(channel, unit))
+        if ratio <= largest_ratio:
+            proposal = Proposal(channel, unit)
+            proposals.append(proposal)
     return proposals
 
 
 def _spelled(value: float, channel: str, unit: str) -> str:
-    """A value in SI units as the file has it, with degrees in brackets where that is in radians."""
-    number = value / si_factor(channel, unit)
+    """A value in SI units as the file has it; radians in degrees too, in brackets."""
+    factor = si_factor(channel, unit)
+    number = value / factor
     text = f"{number:g} {unit}"
     if unit not in ("rad", "rad/s"):
         return text
+    in_degrees = math.degrees(number)
     degrees = unit.replace("rad", "deg")
-    return f"{text} ({math.degrees(number):g} {degrees})"
+    return f"{text} ({in_degrees:g} {degrees})"

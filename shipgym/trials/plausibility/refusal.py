@@ -6,7 +6,7 @@ from shipgym.errors import InputError
 
 
 class Proposal(NamedTuple):
-    """A setting with which a log may be read instead: a channel's unit, or a convention."""
+    """A setting to read a log with instead: a channel's unit, or a convention."""
 
     name: str
     value: str

@@ -3,11 +3,11 @@
 from shipgym.arrays import Floats
 from shipgym.trials.columns import Locator
 from shipgym.trials.resampling import usual_step
-from shipgym.trials.units import UNITS, si_factor
+from shipgym.trials.units import UNITS
 
 
 def likelier_time_units(t: Floats, locator: Locator) -> dict[str, float]:
-    """Units of time, by how much longer they are, with which unusual steps become usual ones.
+    """Units of time that make unusual steps usual, and how much longer they are.
 
     None where the steps of the times, s, are usual already.
     """
@@ -15,10 +15,11 @@ def likelier_time_units(t: Floats, locator: Locator) -> dict[str, float]:
     step = usual_step(t)
     if is_usual(step):
         return likelier
+
+    factors = UNITS["time"]
     declared = locator.columns["t"].unit
-    own = si_factor("t", declared)
     for unit in ("s", "ms", "min", "h"):
-        scale = UNITS["time"][unit] / own
+        scale = factors[unit] / factors[declared]
         if is_usual(scale * step):
             likelier[unit] = scale
     return likelier
@@ -31,11 +32,13 @@ def is_usual(step: float) -> bool:
 
 def check_steps(t: Floats, locator: Locator) -> list[str]:
     """Remark on rows that are so far apart that the unit of time, s, may be wrong."""
-    remarks = []
-    for unit in likelier_time_units(t, locator):
-        declaration = locator.declaration("t", unit)
-        remarks.append(
-            f"the rows are {usual_step(t):.4g} s apart, which is unusual in a"
-            f" manoeuvre; if the unit of time is wrong, declare {declaration}"
-        )
-    return remarks[:1]
+    units = list(likelier_time_units(t, locator))
+    if not units:
+        return []
+    step = usual_step(t)
+    declaration = locator.declaration("t", units[0])
+    remark = (
+        f"the rows are {step:.4g} s apart, which is unusual in a"
+        f" manoeuvre; if the unit of time is wrong, declare {declaration}"
+    )
+    return [remark]

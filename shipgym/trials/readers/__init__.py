@@ -1,1 +1,1 @@
-"""Logs of every kind as one table of columns: a file for each kind, with a function that reads it."""
+"""Readers of logs: a file for each kind, with a function that makes a table of it."""

@@ -3,26 +3,34 @@
 import csv
 import re
 from collections import Counter
-from collections.abc import Mapping
 from pathlib import Path
 
 from shipgym.errors import InputError
 from shipgym.files import LARGEST_CSV, read_text
 from shipgym.trials.readers.log_table import LogTable, is_number
 
+_LONGEST_LINE = 100_000  # characters
+
 
 def read_csv(path: str | Path) -> LogTable:
-    """Read a CSV file in UTF-8 or Latin-1 with one header line; delimiter comma, semicolon or tab.
+    """Read a CSV file with one header line, its delimiter comma, semicolon or tab.
 
-    Raises InputError for a missing file, a folder, an empty or binary file, repeated or
-    no names in the header, and a row with more or fewer cells than the header.
+    The encoding is UTF-8 or Latin-1. Raises InputError for a missing file, a folder, an
+    empty or binary file, repeated or no names in the header, and a row with more or
+    fewer cells than the header.
     """
     path = Path(path)
     lines = read_lines(path, "CSV file")
-    _check_lines(path, lines)
+    for number, line in enumerate(lines, start=1):
+        if "\0" in line or len(line) > _LONGEST_LINE:
+            raise _no_text(path, number, line)
+
     numbered = enumerate(lines, start=1)
-    header_at, header_line = next(filter(_has_text, numbered), (0, ""))
-    if not header_line:
+    for number, line in numbered:
+        if line.strip():
+            header_at, header_line = number, line
+            break
+    else:
         raise InputError(
             f"{path}: expected a header line with column names and rows below, got an"
             " empty file"
@@ -36,9 +44,16 @@ def read_csv(path: str | Path) -> LogTable:
     rows = {}  # by the number of their line
     blank = delimiter + " \t"
     for number, line in numbered:
-        if line.strip(blank):
-            rows[number] = _split(line, delimiter)
-    _check_rows(path, rows, len(header))
+        if not line.strip(blank):
+            continue
+        cells = _split(line, delimiter)
+        rows[number] = cells
+        if len(cells) != len(header):
+            raise InputError(
+                f"{path}: line {number} (data row {len(rows)}): expected"
+                f" {len(header)} cells as in the header, got {len(cells)}; complete or"
+                " remove the row"
+            )
     columns = zip(*rows.values(), strict=True) if rows else [()] * len(header)
     return LogTable(
         path=path,
@@ -49,13 +64,8 @@ def read_csv(path: str | Path) -> LogTable:
     )
 
 
-def _has_text(numbered: tuple[int, str]) -> bool:
-    _, line = numbered
-    return bool(line.strip())
-
-
 def read_lines(path: Path, what: str) -> list[str]:
-    """Lines of a text file, at most a million; `what` is expected there, as "CSV file"."""
+    """Lines of a text file, at most a million; `what` names the file's kind."""
     text = read_text(path, what, LARGEST_CSV, latin=True)
     text = text.replace("\r\n", "\n")
     text = text.replace("\r", "\n")
@@ -76,19 +86,15 @@ def _split(line: str, delimiter: str) -> list[str]:
     return line.split(delimiter)
 
 
-def _check_lines(path: Path, lines: list[str]) -> None:
-    """Refuse zero bytes, and lines that are too long for a table."""
-    longest = 100_000
-    for number, line in enumerate(lines, start=1):
-        if "\0" not in line and len(line) <= longest:
-            continue
+def _no_text(path: Path, number: int, line: str) -> InputError:
+    """Error of a line with zero bytes, or too long for a table."""
+    fault = f"{len(line)} characters"
+    if "\0" in line:
         fault = "binary content (a zero byte)"
-        if "\0" not in line:
-            fault = f"{len(line)} characters"
-        raise InputError(
-            f"{path}: line {number}: expected text of at most {longest}"
-            f" characters, got {fault}; save the table as comma-separated text in UTF-8"
-        )
+    return InputError(
+        f"{path}: line {number}: expected text of at most {_LONGEST_LINE}"
+        f" characters, got {fault}; save the table as comma-separated text in UTF-8"
+    )
 
 
 def _check_header(path: Path, header: list[str], line: int) -> None:
@@ -115,13 +121,3 @@ def _check_header(path: Path, header: list[str], line: int) -> None:
             f"{where}: expected a header with column names such as t,psi,u,v,r,delta,"
             " got only numbers"
         )
-
-
-def _check_rows(path: Path, rows: Mapping[int, list[str]], expected: int) -> None:
-    for k, (line, row) in enumerate(rows.items(), start=1):
-        count = len(row)
-        if count != expected:
-            raise InputError(
-                f"{path}: line {line} (data row {k}): expected {expected} cells as in"
-                f" the header, got {count}; complete or remove the row"
-            )

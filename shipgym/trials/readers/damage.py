@@ -1,4 +1,4 @@
-"""Whatever a library says of a damaged file, as one message; limits to what a file is unpacked to."""
+"""Errors of libraries on damaged files as one message, and limits of size."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +13,7 @@ LARGEST_PACKED, LARGEST_UNPACKED = 32 * MIB, 256 * MIB
 
 @contextmanager
 def damage_reported(path: Path, kind: str, remedy: str) -> Iterator[None]:
-    """Turn every exception within the block into an InputError of one line that ends with `remedy`."""
+    """Turn exceptions within the block into an InputError that ends with `remedy`."""
     try:
         yield
     except InputError:

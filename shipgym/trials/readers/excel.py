@@ -20,39 +20,54 @@ from shipgym.trials.readers.log_table import LogTable
 
 
 def read_excel(path: Path) -> LogTable:
-    """Read the first sheet of a workbook (.xlsx); its first row has the names of the columns.
+    """Read the first sheet of a workbook (.xlsx), whose first row names the columns.
 
     Blank rows and columns are left out. Raises InputError for a damaged or large file,
     for merged cells, and where a name is missing or repeated.
     """
     content = read_bytes(path, "workbook of Excel", LARGEST_PACKED)
-    with damage_reported(
-        path, "Excel (.xlsx)", "save the sheet again as .xlsx or as CSV"
-    ):
+    remedy = "save the sheet again as .xlsx or as CSV"
+    with damage_reported(path, "Excel (.xlsx)", remedy):
         parts = zipfile.ZipFile(io.BytesIO(content))
-        check_unpacked(path, sum(part.file_size for part in parts.infolist()))
+        sizes = [part.file_size for part in parts.infolist()]
+        check_unpacked(path, sum(sizes))
+
         frame = _sheet(path, content, parts)
-        frame = frame.dropna(how="all").dropna(axis=1, how="all")
-        names, below = frame.iloc[0], frame.iloc[1:]
-        below.columns = _column_names(path, names)
-        table = read_frame(below.reset_index(drop=True), path)
-        return replace(table, rows=(below.index + 1).tolist())
+        frame = frame.dropna(how="all")
+        frame = frame.dropna(axis=1, how="all")
+        header = frame.iloc[0]
+        values = frame.iloc[1:]
+        values.columns = _column_names(path, header)
+        rows = values.index + 1
+        table = read_frame(values.reset_index(drop=True), path)
+        return replace(table, rows=rows.tolist())
 
 
 def _sheet(path: Path, content: bytes, parts: zipfile.ZipFile) -> Any:
-    """Cells of the first sheet as a pandas frame; InputError for too many or merged ones."""
+    """Cells of the first sheet as a pandas frame.
+
+    Raises InputError for too many or merged ones.
+    """
     openpyxl = import_module("openpyxl")
     pandas = import_module("pandas")
-    book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
+    book = openpyxl.load_workbook(
+        io.BytesIO(content),
+        read_only=True,
+        data_only=True,
+    )
     sheet = book.worksheets[0]
-    if (sheet.max_row or 0) * (sheet.max_column or 0) > MOST_CELLS:
+    n_rows = sheet.max_row or 0
+    n_columns = sheet.max_column or 0
+    if n_rows * n_columns > MOST_CELLS:
         raise InputError(
             f"{path}: expected at most {MOST_CELLS} cells, got more; save it as CSV"
         )
+
     source = parts.read(sheet._worksheet_path)
     _, merged, after = source.partition(b'<mergeCell ref="')
     if merged:
-        cells = after.partition(b'"')[0].decode("ascii", "replace")
+        first, _, _ = after.partition(b'"')
+        cells = first.decode("ascii", "replace")
         raise InputError(
             f"{path}: sheet {sheet.title!r}: expected a cell for each value, got merged"
             f" cells {cells}; unmerge them (Home, Merge & Center, Unmerge Cells), or"
@@ -65,9 +80,12 @@ def _column_names(path: Path, cells: Any) -> list[str]:
     """Names in the first row of a sheet, a pandas series; InputError for none."""
     names = [str(cell).strip() for cell in cells]
     only_numbers = all(isinstance(cell, int | float) for cell in cells)
-    if only_numbers or len(set(names)) < len(names):
+    are_distinct = len(set(names)) == len(names)
+    if only_numbers or not are_distinct:
+        row = cells.name + 1
+        found = quoted(names)
         raise InputError(
-            f"{path}: row {cells.name + 1}: expected names of columns, each once, got"
-            f" {quoted(names)[:200]}"
+            f"{path}: row {row}: expected names of columns, each once, got"
+            f" {found[:200]}"
         )
     return names

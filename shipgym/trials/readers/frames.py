@@ -17,10 +17,10 @@ def read_frame(frame: Any, name: str | Path = "frame", first: int = 0) -> LogTab
     for what is no frame, and for one without values or with too many.
     """
     if not hasattr(frame, "columns") or not hasattr(frame, "index"):
-        raise InputError(
-            f"{name}: expected a pandas DataFrame, got a {type(frame).__name__}"
-        )
-    if type(frame.index).__name__ != "RangeIndex":
+        kind = type(frame).__name__
+        raise InputError(f"{name}: expected a pandas DataFrame, got a {kind}")
+    index_kind = type(frame.index).__name__
+    if index_kind != "RangeIndex":
         frame = frame.reset_index()
     n_rows, n_columns = frame.shape
     if not 0 < frame.size <= MOST_CELLS:
@@ -28,11 +28,13 @@ def read_frame(frame: Any, name: str | Path = "frame", first: int = 0) -> LogTab
             f"{name}: expected a table of at most {MOST_CELLS} values, got {n_columns}"
             f" columns of {n_rows} rows; split the file, or leave out columns"
         )
+
     cells = {}
     for label, column in frame.items():
+        column_name = str(label).strip()
         is_numeric = column.dtype.kind in "fiub"
-        kind = column.dtype if is_numeric else object
-        cells[str(label).strip()] = column.to_numpy(kind)
+        dtype = column.dtype if is_numeric else object
+        cells[column_name] = column.to_numpy(dtype)
     return LogTable(
         path=Path(name),
         cells=cells,

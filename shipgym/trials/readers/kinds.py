@@ -1,4 +1,4 @@
-"""Which kind of log a file is, by the ending of its name and by how it begins, and what reads it."""
+"""Kinds of logs, recognised by name and beginning of a file, and their readers."""
 
 import re
 from collections.abc import Callable
@@ -30,7 +30,7 @@ _NMEA_LINE = re.compile(r"^[^\n]{0,60}[$!][A-Z]{4,5},", re.MULTILINE)
 
 
 def recognise_kind(path: Path) -> str:
-    """Kind of a log, a key of `READERS`; texts are CSV unless they begin as another kind does.
+    """Kind of a log, a key of `READERS`; a text is CSV unless it begins otherwise.
 
     Raises InputError for a text file that is missing or too large.
     """

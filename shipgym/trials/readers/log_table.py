@@ -1,4 +1,4 @@
-"""A log as a table of named columns: what every reader returns, whatever the kind of its file."""
+"""A log as a table of named columns, which every reader returns."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -58,40 +58,49 @@ class LogTable:
         return self.place_words.format(line=self.rows[row], row=row + 1)
 
     def cell(self, row: int, column: str) -> str:
-        """Place of a cell for a message: ``run.csv: line 12 (data row 11), column 'yaw'``."""
+        """Place of a cell: ``run.csv: line 12 (data row 11), column 'yaw'``."""
         return f"{self.path}: {self.place(row)}, column '{column}'"
 
     def column(self, name: str) -> Any:
         """Cells of a column; InputError if there is none of this name."""
         if name not in self.cells:
+            hint = did_you_mean(name, self.header)
+            present = quoted(self.header)
             raise InputError(
-                f"{self.path}: column '{name}' not"
-                f" found.{did_you_mean(name, self.header)} Columns present:"
-                f" {quoted(self.header)}. Name the column in [columns] (or columns=...)"
+                f"{self.path}: column '{name}' not found.{hint} Columns present:"
+                f" {present}. Name the column in [columns] (or columns=...)"
             )
         return self.cells[name]
 
     def texts(self, name: str) -> list[str]:
-        """Cells of a column as texts without blanks around them, empty where there is no value."""
+        """Cells of a column as stripped texts, empty where there is no value."""
         texts = []
         for cell in self.column(name):
             text = str(cell).strip()
-            is_missing = text.lower() in _MISSING_WORDS
-            texts.append("" if is_missing else text)
+            if text.lower() in _MISSING_WORDS:
+                text = ""
+            texts.append(text)
         return texts
 
     def numbers(self, name: str) -> Floats:
-        """A column as numbers, nan where there is no value; InputError for other text."""
+        """A column as numbers, nan where there is no value.
+
+        Raises InputError for other text.
+        """
         cells = self.column(name)
-        if isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub":
-            return cells.astype(np.float64)
+        kind = cells.dtype.kind if isinstance(cells, np.ndarray) else None
+        if kind in ("f", "i", "u", "b"):
+            return np.asarray(cells, dtype=np.float64)
         try:
             return plain_numbers(cells)
         except (ValueError, TypeError):
             return self._numbers_of_texts(name)
 
     def _numbers_of_texts(self, name: str) -> Floats:
-        """Numbers with decimal commas and words for "no value"; InputError names the first other text."""
+        """Numbers of texts with decimal commas and words for "no value".
+
+        Raises InputError for the first other text.
+        """
         texts = self.texts(name)
         numbers = np.full(len(texts), np.nan)
         for row, text in enumerate(texts):
@@ -100,8 +109,9 @@ class LogTable:
             if self.decimal_comma and "." not in text:
                 text = text.replace(",", ".")
             if not is_number(text):
+                place = self.cell(row, name)
                 raise InputError(
-                    f"{self.cell(row, name)}: expected a number, got '{texts[row]}';"
+                    f"{place}: expected a number, got '{texts[row]}';"
                     " correct the cell, or leave it empty where the value is missing"
                     ' and import with repair = "interpolate"'
                 )
@@ -110,7 +120,7 @@ class LogTable:
 
 
 def plain_numbers(cells: Sequence[Any]) -> Floats:
-    """Numbers of cells that are all written plainly or empty, as in most files; ValueError for others."""
+    """Numbers of cells that are plainly written or empty; ValueError for others."""
     numbers = []
     for cell in cells:
         if "_" in str(cell):

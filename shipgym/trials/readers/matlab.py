@@ -5,7 +5,7 @@ MathWorks, MAT-File Format, "Level 5 MAT-File Format".
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -58,18 +58,24 @@ def read_matlab(path: Path) -> LogTable:
     vectors, and complex numbers.
     """
     content = read_bytes(path, "MATLAB file", LARGEST_PACKED)
-    if content[:8] == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in content[:_HEADER_BYTES]:
+    header = content[:_HEADER_BYTES]
+    is_hdf5 = content.startswith(b"\x89HDF\r\n\x1a\n")
+    if is_hdf5 or b"MATLAB 7.3" in header:
         raise InputError(
             f"{path}: expected a MATLAB file of version 5 to 7, got MATLAB 7.3 (HDF5);"
             " save(..., '-v7')"
         )
     remedy = "save the vectors again with save(..., '-v7')"
     with damage_reported(path, "MATLAB (.mat)", remedy):
-        order = "<" if content[126:_HEADER_BYTES] == b"IM" else ">"
+        order = "<" if header.endswith(b"IM") else ">"
         vectors: dict[str, Floats] = {}
         for matrix in _matrices(path, content[_HEADER_BYTES:], order):
             vectors |= _vector(path, matrix, order)
+    return _table(path, vectors)
 
+
+def _table(path: Path, vectors: Mapping[str, Floats]) -> LogTable:
+    """Table of the vectors of the commonest length; InputError for none."""
     lengths = [values.size for values in vectors.values()]
     length = max(lengths, key=lengths.count, default=0)
     if not length:
@@ -89,7 +95,7 @@ def read_matlab(path: Path) -> LogTable:
 
 
 def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:
-    """Contents of the matrices of a file, unpacked; `order` is that of its bytes, "<" or ">"."""
+    """Contents of the matrices of a file, unpacked; `order` is "<" or ">"."""
     most = 10_000  # a file of zeros holds millions of empty ones
     unpacked = 0
     for number, element in enumerate(_elements(content, order)):
@@ -100,8 +106,8 @@ def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:
             )
         if element.type == _COMPRESSED:
             unpacker = zlib.decompressobj()
-            rest = LARGEST_UNPACKED + 1 - unpacked
-            inner = unpacker.decompress(element.content, rest)
+            just_too_many = LARGEST_UNPACKED + 1 - unpacked
+            inner = unpacker.decompress(element.content, just_too_many)
             unpacked += len(inner)
             check_unpacked(path, unpacked)
             element = next(_elements(inner, order))
@@ -112,13 +118,17 @@ def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:
 def _vector(path: Path, matrix: bytes, order: str) -> dict[str, Floats]:
     """Numbers of a matrix by its name, where it is a numeric vector."""
     parts = list(islice(_elements(matrix, order), 4))
-    if len(parts) < 4 or parts[-1].type not in _NUMBER_TYPES:
+    if len(parts) < 4:
         return {}
     flags, shape, name, numbers = parts
+    if numbers.type not in _NUMBER_TYPES:
+        return {}
+
     number_type = order + _NUMBER_TYPES[numbers.type]
     values = np.frombuffer(numbers.content, number_type)
     sizes = np.frombuffer(shape.content, f"{order}i4")
-    is_vector = np.count_nonzero(sizes != 1) == 1 and sizes.max() == values.size
+    long_sizes = sizes[sizes != 1]
+    is_vector = long_sizes.tolist() == [values.size]
     (about,) = struct.unpack(f"{order}I", flags.content[:4])
     is_numeric = (about & _CLASS) >= _FIRST_NUMERIC
     if not is_vector or not is_numeric:
@@ -142,7 +152,8 @@ def _elements(content: bytes, order: str) -> Iterator[Element]:
         small_size = kind >> 16  # of an element within its own tag
         if small_size:
             begin = at + 4
-            yield Element(kind & 0xFFFF, content[begin : begin + min(small_size, 4)])
+            end = begin + min(small_size, 4)
+            yield Element(kind & 0xFFFF, content[begin:end])
             at += tag_bytes
             continue
         begin = at + tag_bytes

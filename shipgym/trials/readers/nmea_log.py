@@ -1,6 +1,6 @@
-"""Logs of NMEA 0183: position, speeds, heading, rate of turn, rudder, shaft and wind, of any talkers.
+"""Logs of NMEA 0183, of any talkers: position, motion, rudder, shaft and wind.
 
-Which sentences say what stands in `shipgym/trials/nmea.toml`; those that hold no channel
+The sentences stand in `shipgym/trials/nmea.toml`; those without a channel
 (AIS, depth, satellites) are passed over.
 """
 
@@ -76,7 +76,7 @@ class _Heard:
 
 
 def read_nmea(path: Path) -> LogTable:
-    """Read the channels of a log: SI units, positions in degrees, nan where a row has none.
+    """Read a log's channels: SI units, positions in degrees, nan where absent.
 
     Of several sources of a channel the best is taken, and a note names the others.
     Raises InputError for a damaged log and one without time or channels.
@@ -91,11 +91,12 @@ def read_nmea(path: Path) -> LogTable:
     for channel, sources in heard.channels.items():
         best = _best_source(sources)
         tracks[channel] = _track(sources[best], clock)
-        others = sorted(sources.keys() - {best})
-        if others:
-            left_out = ", ".join(others)
-            notes.append(f"{channel} is from {best}; {left_out} left out")
-    winds = {name: tracks.pop(name) for name in _WINDS if name in tracks}
+        notes += _note_others(channel, best, sources)
+
+    winds = {}
+    for name in _WINDS:
+        if name in tracks:
+            winds[name] = tracks.pop(name)
     if winds and "psi" in tracks:
         tracks |= _wind_over_ground(winds, tracks)
     return _table(path, tracks, notes)
@@ -126,30 +127,31 @@ def _listen(lines: list[str]) -> _Heard:
 
 
 def _time(sentence: Sentence) -> float:
-    """Seconds since 1970 where a sentence has a date, else of the day; nan without a time."""
+    """Seconds since 1970 with a date, else of the day; nan without a time."""
     kind = NMEA_SENTENCES[sentence.kind]
     match = _TIME.fullmatch(_field(sentence, kind.time))
     if match is None:
         return np.nan
-    hours, minutes, seconds = match.groups()
-    of_day = 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds)
+    hours, minutes, seconds = map(float, match.groups())
+    of_day = 3600.0 * hours + 60.0 * minutes + seconds
 
     date = _field(sentence, kind.date)
     if not date:
         return of_day
-    midnight = datetime.strptime(date, "%d%m%y").replace(tzinfo=UTC)
+    midnight = datetime.strptime(date, "%d%m%y")
+    midnight = midnight.replace(tzinfo=UTC)
     return midnight.timestamp() + of_day
 
 
 def _field(sentence: Sentence, at: int | None) -> str:
-    """The field at a place; empty where the sentence ends before, or has no such field."""
+    """The field at a place; empty where a sentence is shorter or has no such field."""
     if at is None or at >= len(sentence.fields):
         return ""
     return sentence.fields[at]
 
 
 def _channel_values(sentence: Sentence) -> dict[str, float]:
-    """Values by channel, positions in degrees; winds are still from the bow, by quantity."""
+    """Values by channel, positions in degrees; winds from the bow by quantity."""
     numbers = logged_numbers(sentence)
     if "compass_heading" in numbers:
         numbers["compass_heading"] += numbers.get("deviation", 0.0)
@@ -204,11 +206,13 @@ class _Rank(NamedTuple):
 
 
 def _rank(source: str, values: list[_Value]) -> _Rank:
+    kind = source[2:]
     moments = set()
     for one in values:
-        moments.add(one.line if np.isnan(one.time) else one.time)
+        moment = one.line if np.isnan(one.time) else one.time
+        moments.add(moment)
     return _Rank(
-        preference=_PREFERENCE.get(source[2:], 0),
+        preference=_PREFERENCE.get(kind, 0),
         is_dated=values[0].time > 2.0 * DAY,
         is_original=not source.startswith("II"),
         moments=len(moments),
@@ -219,9 +223,21 @@ def _best_source(sources: _BySource) -> str:
     return max(sorted(sources), key=lambda source: _rank(source, sources[source]))
 
 
+def _note_others(channel: str, best: str, sources: _BySource) -> list[str]:
+    others = sorted(sources.keys() - {best})
+    if not others:
+        return []
+    left_out = ", ".join(others)
+    return [f"{channel} is from {best}; {left_out} left out"]
+
+
 def _main_clock(times: _BySource) -> _Track:
     """Times of the best source, s, which never go back, and go on at midnight."""
-    best = max(times, key=lambda source: _rank(source, times[source]))
+
+    def rank(source: str) -> _Rank:
+        return _rank(source, times[source])
+
+    best = max(times, key=rank)
     lines, clock, _ = np.array(times[best]).T
     is_dated = clock[0] > 2.0 * DAY
     if not is_dated:
@@ -232,39 +248,47 @@ def _main_clock(times: _BySource) -> _Track:
 
 
 def _track(values: list[_Value], clock: _Track) -> _Track:
-    """Values of a source at their own times, else at those of the lines between which they stand."""
+    """Values of a source at their own times, else at those of their lines."""
     lines, own_time, numbers = np.array(values).T
     by_line = np.interp(lines, clock.lines, clock.t)
     # a time of the day is that of the day on which its line stands
     days = np.round((by_line - own_time) / DAY)
-    t = own_time + DAY * days
-    has_none = np.isnan(own_time)
-    t[has_none] = by_line[has_none]
+    with_day = own_time + DAY * days
+    t = np.where(np.isnan(own_time), by_line, with_day)
 
     milliseconds = np.round(t, 3)
     t, first = np.unique(milliseconds, return_index=True)
-    return _Track(t, lines[first], numbers[first])
+    return _Track(
+        t=t,
+        lines=lines[first],
+        values=numbers[first],
+    )
 
 
 def _wind_over_ground(
     winds: dict[str, _Track], tracks: dict[str, _Track]
 ) -> dict[str, _Track]:
-    """The wind over ground, of that from the bow, where the velocity is known or not needed."""
+    """Wind over ground from that off the bow; empty where the velocity is missing."""
     if {"wind_angle", "wind_speed"} <= winds.keys():
         angle = winds["wind_angle"]
-        wind_from = angle.values + _angle_at(angle.t, tracks["psi"])
+        heading = _angle_at(angle.t, tracks["psi"])
         return {
-            "wind_from": angle._replace(values=wind_from),
+            "wind_from": angle._replace(values=angle.values + heading),
             "wind_speed": winds["wind_speed"],
         }
-    is_apparent = {"apparent_wind_angle", "apparent_wind_speed"} <= winds.keys()
-    if not is_apparent or not {"sog", "cog"} <= tracks.keys():
+    has_wind = {"apparent_wind_angle", "apparent_wind_speed"} <= winds.keys()
+    has_velocity = {"sog", "cog"} <= tracks.keys()
+    if not has_wind or not has_velocity:
         return {}
+
+    # complex: north + i east
     angle = winds["apparent_wind_angle"]
-    bearing = angle.values + _angle_at(angle.t, tracks["psi"])
+    heading = _angle_at(angle.t, tracks["psi"])
+    bearing = np.exp(1j * (angle.values + heading))
+    apparent = winds["apparent_wind_speed"].values * bearing
+    over_ground = tracks["sog"]
+    speed = np.interp(angle.t, over_ground.t, over_ground.values)
     course = _angle_at(angle.t, tracks["cog"])
-    speed = np.interp(angle.t, tracks["sog"].t, tracks["sog"].values)
-    apparent = winds["apparent_wind_speed"].values * np.exp(1j * bearing)
     wind = apparent - speed * np.exp(1j * course)
     return {
         "wind_from": angle._replace(values=np.angle(wind)),
@@ -279,8 +303,8 @@ def _angle_at(t: Floats, track: _Track) -> Floats:
 
 def _table(path: Path, tracks: dict[str, _Track], notes: list[str]) -> LogTable:
     """One row for each time at which some channel has a value."""
-    times = [track.t for track in tracks.values()]
-    t = np.unique(np.concatenate(times))
+    clocks = [track.t for track in tracks.values()]
+    t = np.unique(np.concatenate(clocks))
     columns = {"t": t}
     lines = np.zeros(t.size, dtype=int)
     for channel, track in tracks.items():

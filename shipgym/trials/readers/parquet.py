@@ -10,17 +10,22 @@ from shipgym.trials.readers.log_table import LogTable
 
 
 def read_parquet(path: Path) -> LogTable:
-    """Read a Parquet file; InputError for a damaged one, or one that unpacks to too much."""
+    """Read a Parquet file.
+
+    Raises InputError for a damaged one, or one that unpacks to too much.
+    """
     content = read_bytes(path, "Parquet file", LARGEST_CSV)
     with damage_reported(path, "Parquet", "it may be cut short: write it again"):
         arrow = import_module("pyarrow")
         parquet = import_module("pyarrow.parquet")
         file = parquet.ParquetFile(arrow.BufferReader(content))
-        shape = file.metadata
-        size = 0
-        for k in range(shape.num_row_groups):
-            size += shape.row_group(k).total_byte_size
-        check_unpacked(path, max(size, 8 * shape.num_rows * shape.num_columns))
+        metadata = file.metadata
+        as_numbers = 8 * metadata.num_rows * metadata.num_columns
+        as_declared = 0
+        for k in range(metadata.num_row_groups):
+            group = metadata.row_group(k)
+            as_declared += group.total_byte_size
+        check_unpacked(path, max(as_declared, as_numbers))
 
         table = file.read()
         table.validate(full=True)  # offsets beyond the data
