@@ -22,7 +22,6 @@ from shipgym.engine.records import Record
 from shipgym.errors import InputError
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.structures import GREY_BOX as GREY_BOX
 from shipgym.ships.term_functions import (
     accelerations_function,
     accelerations_source,

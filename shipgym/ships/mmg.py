@@ -24,7 +24,7 @@ from shipgym.ships import kvlcc2
 from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.kvlcc2 import Mass, planar_accelerations
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.structures import MMG as MMG
+from shipgym.ships.structures import MMG
 
 #: What the general form has beyond the standard method, with the values that make it
 #: the standard one.
