@@ -11,7 +11,7 @@ from identification.options import AUTO
 from identification.reading import identify_arguments, read_table, settings_of
 from shipgym import ShipFile, Trial
 from shipgym.checks import placed
-from shipgym.ships.grey_boxes import GREY_BOX
+from shipgym.ships.structures import GREY_BOX
 
 #: Options that may name a model's file.
 MODELS = ("reference_model", "prior", "method.anchor")

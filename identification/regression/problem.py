@@ -17,8 +17,7 @@ from identification.validation.checks import check_samples, check_trials
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.checks import check_choice
 from shipgym.ships import Envelope, Structure, Term, get_structure
-from shipgym.ships.grey_boxes import GREY_BOX
-from shipgym.ships.structures import MMG, get_dynamics
+from shipgym.ships.structures import GREY_BOX, MMG, get_dynamics
 from shipgym.trials.scale import check_scale
 
 #: Stands for the MMG form where channels, excitation and particulars are checked.
