@@ -138,14 +138,14 @@ def _rudder_offset(log: Log, rate: ClockOffset | None) -> ClockOffset | None:
 
 def _rate_on_heading_clock(log: Log, rate: ClockOffset | None) -> Floats:
     """Yaw rate with its own delay taken out, rad/s."""
-    t = log.t
     if not log.has("r"):
         psi = log.channels["psi"]
-        return time_derivative(t, psi)
+        return time_derivative(log.t, psi)
     r = log.channels["r"]
     if rate is None:
         return r
-    return np.interp(t + rate.late, t, r)
+    on_time = log.t + rate.late
+    return np.interp(on_time, log.t, r)
 
 
 def _is_against(offset: ClockOffset | None) -> bool:

@@ -44,9 +44,10 @@ def _refuse_time(t: Floats, row: int, locator: Locator) -> None:
     after = t[row]
     earlier = locator.in_file("t", before, digits=10)
     later = locator.in_file("t", after, digits=10)
-    change = f"stands still at {later}"
     if after < before:
         change = f"goes back from {earlier} to {later}"
+    else:
+        change = f"stands still at {later}"
     place = locator.place(row, "t")
     raise InputError(
         f"{place}: expected time to increase from row to row, got one that {change};"

@@ -304,7 +304,8 @@ def _angle_at(t: Floats, track: _Track) -> Floats:
 def _table(path: Path, tracks: dict[str, _Track], notes: list[str]) -> LogTable:
     """One row for each time at which some channel has a value."""
     clocks = [track.t for track in tracks.values()]
-    t = np.unique(np.concatenate(clocks))
+    all_times = np.concatenate(clocks)
+    t = np.unique(all_times)
     columns = {"t": t}
     lines = np.zeros(t.size, dtype=int)
     for channel, track in tracks.items():
