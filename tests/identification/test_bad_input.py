@@ -160,7 +160,8 @@ def test_values_that_are_none(cao_zigzag: Trial) -> None:
     sway[100] = np.nan
     with pytest.raises(
         InputError,
-        match=r"trial 'holes': v: expected finite numbers, got nan at sample 100",
+        match=r"trial 'holes': v: expected finite numbers, got nan at sample 100; "
+        r".*repair = \"interp",
     ):
         changed(cao_zigzag, "holes", v=sway)
 

@@ -272,7 +272,8 @@ def test_a_reference_ship_is_alike_by_a_correlation_of_a_half() -> None:
     check_alike("tanker", 0.51, "leave it")
     with pytest.raises(
         InputError,
-        match=r"at least 0\.5, got 'tanker' with 0\.49 as the best; leave it",
+        match=r"at least 0\.5, got 'tanker' with 0\.49 as the best; "
+        r"leave it, or name",
     ):
         check_alike("tanker", 0.49, "leave it")
 
