@@ -291,8 +291,8 @@ class _Search:
         for rows, held in held_out_rows(self.trials, stage.samples, self.folds):
             fitted = stage.samples.select(rows)
             coefficients = {}
-            for q, X in fitted.features.items():
-                coefficients[q] = _ridge(X, fitted.targets[q], C)
+            for q, X, y in fitted.by_equation():
+                coefficients[q] = _ridge(X, y, C)
             model = stage.model.with_accelerations(coefficients)
             errors.append(heading_error(model, held, "rmse"))
         return float(np.mean(errors))
@@ -322,9 +322,9 @@ class _Search:
         C = weight * self.unit(samples)
         estimators: Estimators = {}
         coefficients = {}
-        for q, X in samples.features.items():
+        for q, X, y in samples.by_equation():
             estimator = LSSVM(C=C, scale=False, fit_intercept=False)
-            estimators[q] = estimator.fit(X, samples.targets[q])
+            estimators[q] = estimator.fit(X, y)
             coefficients[q] = estimator.coef_
         model = stage.model.with_accelerations(coefficients)
         return KernelFit(model, samples, estimators)

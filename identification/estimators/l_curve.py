@@ -84,11 +84,12 @@ def corner_rank(curve: LCurve, n_samples: int, significance: float = 0.1) -> int
 def gcv_rank(curve: LCurve, n_samples: int) -> int:
     """Rank that minimises generalised cross-validation (Golub, Heath & Wahba 1979)."""
     n_ranks = len(curve.residual_norm)
-    freedom = n_samples - np.arange(1, n_ranks + 1)
+    ranks = np.arange(1, n_ranks + 1)
+    freedom = n_samples - ranks
     divisor = np.maximum(freedom, 1) ** 2
     score = curve.residual_norm**2 / divisor
     score[freedom <= 0] = np.inf
-    return int(np.argmin(score)) + 1
+    return int(ranks[np.argmin(score)])
 
 
 def variance_rank(singular_values: Floats, share: float) -> int:

@@ -57,7 +57,12 @@ def validated(estimator: Any, X: ArrayLike, y: ArrayLike) -> tuple[Floats, Float
             return X, y
 
     features, targets = validate_data(
-        estimator, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2
+        estimator,
+        X,
+        y,
+        dtype=np.float64,
+        y_numeric=True,
+        ensure_min_samples=2,
     )
     return features, np.asarray(targets, dtype=np.float64)
 

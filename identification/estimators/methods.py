@@ -44,8 +44,9 @@ METHODS: dict[str, tuple[str, dict[str, Any]]] = {
 def fit_all(make: Callable[[], Estimator], samples: Samples) -> Estimators:
     """One estimator for each equation, fitted."""
     estimators: Estimators = {}
-    for q, features in samples.features.items():
-        estimators[q] = make().fit(features, samples.targets[q])
+    for q, X, y in samples.by_equation():
+        estimator = make()
+        estimators[q] = estimator.fit(X, y)
     return estimators
 
 
@@ -123,13 +124,13 @@ def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Est
     window = float(np.mean(samples.duration))
     penalty = len(samples) * strength**2
     estimators: Estimators = {}
-    for q, features in samples.features.items():
+    for q, X, y in samples.by_equation():
         ridge = LSSVM(
             C=1.0 / penalty,
             scale=sizes[q] * window,
             fit_intercept=False,
         )
-        estimators[q] = ridge.fit(features, samples.targets[q])
+        estimators[q] = ridge.fit(X, y)
     return estimators
 
 

@@ -6,6 +6,7 @@ but insensitive band and solver are those of the epsilon-SVR that is fitted here
 (Drucker et al. 1997, Support vector regression estimators).
 """
 
+import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -280,8 +281,9 @@ class _Tuner:
         self.blank = task.blank
         self.trials = task.trials
         # sequential minimal optimisation takes the square of the number of rows
-        self.every = max(1, -(-len(task.samples) // most_rows))
-        self.everything = np.ones(len(task.samples), dtype=bool)
+        n_rows = len(task.samples)
+        self.every = max(1, math.ceil(n_rows / most_rows))
+        self.everything = np.ones(n_rows, dtype=bool)
         band = FIRST_BAND if asked.epsilon is None else asked.epsilon
         self.first_bands = [band] * len(task.samples.features)
         self._known: dict[tuple[Any, ...], RMSVM] = {}

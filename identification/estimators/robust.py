@@ -20,10 +20,10 @@ def hampel_weights(residuals: Floats, largest: float) -> Floats:
     by the median absolute deviation; residuals of the rounding of the `largest` target
     all have the weight 1.
     """
-    machine = np.finfo(float)
-    rounding = 64 * machine.eps * largest
-    deviations = np.abs(residuals - np.median(residuals))
+    middle = np.median(residuals)
+    deviations = np.abs(residuals - middle)
     scale = MAD * float(np.median(deviations))
+    rounding = 64 * np.finfo(float).eps * largest
     if scale <= rounding:
         return np.ones(len(residuals))
 

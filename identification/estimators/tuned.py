@@ -215,9 +215,9 @@ class TunedLSSVM(LinearRegressor):
             return _fit_free_running(self, task)
         samples = task.samples
         found: Estimators = {}
-        for q, features in samples.features.items():
+        for q, X, y in samples.by_equation():
             own = clone(self)
-            found[q] = own.fit(features, samples.targets[q], samples.trial)
+            found[q] = own.fit(X, y, groups=samples.trial)
         return found
 
 
@@ -256,10 +256,10 @@ def _fit_free_running(settings: TunedLSSVM, task: FitTask) -> Estimators:
     settings.check()
     samples = task.samples
     decomposed = {}
-    for q, X in samples.features.items():
+    for q, X, y in samples.by_equation():
         decomposed[q] = decompose(
             X,
-            y=samples.targets[q],
+            y=y,
             scale=settings.scale,
             fit_intercept=settings.fit_intercept,
         )
@@ -281,7 +281,7 @@ def _fit_free_running(settings: TunedLSSVM, task: FitTask) -> Estimators:
     search = optimiser.minimise(errors, bounds, settings.seed)
 
     found: Estimators = {}
-    for k, (q, features) in enumerate(samples.features.items()):
+    for k, (q, X, y) in enumerate(samples.by_equation()):
         own = clone(settings)
-        found[q] = own.fit_with(features, samples.targets[q], search.of(k))
+        found[q] = own.fit_with(X, y, search.of(k))
     return found

@@ -182,7 +182,8 @@ def _jackknife(
             residuals = fit.residuals[part, :, k].ravel()
             score = slopes.T @ residuals
             information_left = information - slopes.T @ slopes
-            changes.append(np.linalg.solve(information_left, score))
+            change = np.linalg.solve(information_left, score)
+            changes.append(change)
 
     n_changes = len(changes)
     inflation = (n_changes - 1) ** 2 / n_changes

@@ -7,7 +7,7 @@ of Cao 2015), the spline structure Gauss quadrature on splines through the sampl
 broken where the rudder has corners.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -92,6 +92,11 @@ class Samples:
 
     def __len__(self) -> int:
         return len(self.start)
+
+    def by_equation(self) -> Iterator[tuple[str, Floats, Floats]]:
+        """Name, features and targets of each equation."""
+        for q, features in self.features.items():
+            yield q, features, self.targets[q]
 
     def select(self, rows: NDArray[Any]) -> Self:
         """Some of the rows, by mask or index."""

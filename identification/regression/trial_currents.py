@@ -235,9 +235,9 @@ def _contradict(currents: Floats, covariance: Floats, chance: float = 1e-6) -> b
 
     The chance is small because their covariance is an average over few blocks.
     """
-    n_trials = len(currents) // 2
-    first, *others = np.eye(n_trials)
-    from_first = np.array(others) - first
+    n_others = len(currents) // 2 - 1
+    first = -np.ones((n_others, 1))
+    from_first = np.hstack([first, np.eye(n_others)])
     apart = np.kron(from_first, np.eye(2))
     differences = apart @ currents
     of_differences = apart @ covariance @ apart.T

@@ -9,6 +9,7 @@ from scipy.signal import savgol_coeffs, savgol_filter
 from identification.arrays import mean_square
 from identification.regression.preprocess.noise import NOISY, noise_ratio
 from shipgym.arrays import Floats
+from shipgym.trials.resampling import usual_step
 
 ORDER = 3  # of the local polynomials
 SHORTEST_WIDTH = ORDER + 2
@@ -95,8 +96,7 @@ def smooth(t: ArrayLike, values: ArrayLike) -> Floats:
     if len(t) < 5 or noise_ratio(t, values) < NOISY:
         return values
 
-    usual_step = np.median(np.diff(t))
-    spline = Reinsch(t / usual_step)
+    spline = Reinsch(t / usual_step(t))
     rng = np.random.default_rng(0)
     signs = rng.choice([-1.0, 1.0], len(t))
     both = np.stack([values, signs])

@@ -11,6 +11,7 @@ from identification.regression.preprocess.noise import noise_level
 from shipgym import InputError, Trial
 from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_number
+from shipgym.trials.resampling import usual_step
 
 WIDTH = 7  # samples of the running median
 OUTLYING = 6.0  # times the noise
@@ -112,9 +113,11 @@ def repaired(trial: Trial, threshold: float = OUTLYING) -> Trial:
         if sound.all():
             continue
 
-        known, good = trial.t[~wrong], values[~wrong]
+        known = trial.t[~wrong]
+        good = values[~wrong]
+        curve = PchipInterpolator(known, good)
         between = np.clip(times, known[0], known[-1])
-        channels[name] = PchipInterpolator(known, good)(between)
+        channels[name] = curve(between)
         channels[name][sound] = good  # to the bit as they were
         counts[name] = int((~sound).sum())
     if not counts:
@@ -144,8 +147,7 @@ def _outliers_of(trial: Trial, name: str, threshold: float) -> Flags:
 
 def _filled_times(t: Floats) -> Floats:
     """The times with those that are missing in short dropouts."""
-    steps = np.diff(t)
-    usual = float(np.median(steps))
+    usual = usual_step(t)
     times = [t]
     for start, end in pairwise(t):
         step = end - start
