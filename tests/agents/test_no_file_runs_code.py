@@ -344,8 +344,15 @@ def test_the_command_and_the_loops_take_no_code_of_a_model(evil):
     assert answer.exit_code == 0, answer.output
 
 
-@pytest.mark.parametrize("option", ["reference_model", "prior", "anchor"])
-def test_a_ship_file_names_models_and_no_code(evil, option):
+@pytest.mark.parametrize(
+    ("option", "full_name"),
+    [
+        ("reference_model", "reference_model"),
+        ("prior", "prior"),
+        ("anchor", "method.anchor"),
+    ],
+)
+def test_a_ship_file_names_models_and_no_code(evil, option, full_name):
     ship = evil.with_name("ship.toml")
     text = (
         '[ship]\nlength = 160.93\nspeed = 7.7\n[identify]\n{} = "{}"\n[[trials]]\nfile'
@@ -360,7 +367,7 @@ def test_a_ship_file_names_models_and_no_code(evil, option):
         ShipFile.load(ship)
     ship.write_text(text.format(option, "evil.json"))
     found = ShipFile.load(ship)
-    reference = identification_settings(found, {})[option]
+    reference = identification_settings(found, {})[full_name]
     box, _ = chosen_box(reference, found.particulars, [])
     assert box.reference.structure == TEXTS[0]
     box.compiled({}, False)
