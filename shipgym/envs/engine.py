@@ -290,8 +290,8 @@ class Engine(Lanes):
         reward = self.info(name)[lane]
         step = self.steps[lane]
         raise InputError(
-            f"{self.task.definition.reward_source}: {name} is {reward} in lane {lane} at"
-            f" step {step:g}, expected a finite number; look for a division by zero or"
+            f"{self.task.definition.reward_source}: {name} is {reward} in lane {lane}"
+            f" at step {step:g}, expected a finite number; look for a division by zero or"
             " a root of a negative number (shipgym.check_task helps)"
         )
 
