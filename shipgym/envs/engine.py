@@ -291,8 +291,8 @@ class Engine(Lanes):
         step = self.steps[lane]
         raise InputError(
             f"{self.task.definition.reward_source}: {name} is {reward} in lane {lane}"
-            f" at step {step:g}, expected a finite number; look for a division by zero or"
-            " a root of a negative number (shipgym.check_task helps)"
+            f" at step {step:g}, expected a finite number; look for a division by zero"
+            " or a root of a negative number (shipgym.check_task helps)"
         )
 
     @property
