@@ -113,8 +113,9 @@ def _line_of(code: CodeType, reason: str) -> int:
     """Line in which a function names what a reason quotes, or its first."""
     for instruction in dis.get_instructions(code):
         positions = instruction.positions
-        if f"'{instruction.argval}'" in reason and positions and positions.lineno:
-            return positions.lineno
+        line = positions.lineno if positions else None
+        if line and f"'{instruction.argval}'" in reason:
+            return line
     return code.co_firstlineno
 
 

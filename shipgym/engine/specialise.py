@@ -149,8 +149,10 @@ class Specialisation:
 
 
 def _refuse_container(function: Any, name: str, value: Any) -> None:
-    if isinstance(value, list | dict | set):
-        raise InputError(
-            f"{place_of(function)}: the global {name!r} is a {type(value).__name__},"
-            " expected a tuple or an array of numbers"
-        )
+    if not isinstance(value, list | dict | set):
+        return
+    kind = type(value).__name__
+    raise InputError(
+        f"{place_of(function)}: the global {name!r} is a {kind}, expected a tuple or an"
+        " array of numbers"
+    )

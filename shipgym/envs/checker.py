@@ -82,9 +82,17 @@ def _check_spaces(env: Vectors, n_steps: int) -> None:
     n = env.num_envs
     _expect(isinstance(n, int) and n >= 1, f"num_envs is {n!r}, expected >= 1")
     _check_batched(
-        "observation", env.single_observation_space, env.observation_space, n
+        "observation",
+        single=env.single_observation_space,
+        batch=env.observation_space,
+        n=n,
     )
-    _check_batched("action", env.single_action_space, env.action_space, n)
+    _check_batched(
+        "action",
+        single=env.single_action_space,
+        batch=env.action_space,
+        n=n,
+    )
 
 
 def _check_batched(which: str, single: Space, batch: Space, n: int) -> None:

@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import Any
+from typing import Any, NoReturn
 
 import gymnasium
 import numpy as np
@@ -166,12 +166,17 @@ class Engine(Lanes):
             n_ended = self._run_shares(asked)
         if n_ended < 0:  # `REFUSED`, in every share
             self.outputs = before
-            lane, which = np.argwhere(~np.isfinite(self._orders))[0]
-            raise InputError(
-                f"actions: expected numbers in [-1, 1], got"
-                f" {self._orders[lane, which]} in lane {lane}"
-            )
+            self._refuse_orders()
         return n_ended
+
+    def _refuse_orders(self) -> NoReturn:
+        """Raise an InputError that names the first command that is not finite."""
+        wrong = np.argwhere(~np.isfinite(self._orders))
+        lane, command = wrong[0]
+        found = self._orders[lane, command]
+        raise InputError(
+            f"actions: expected numbers in [-1, 1], got {found} in lane {lane}"
+        )
 
     def _run_shares(self, asked: int) -> int:
         """Let threads step their shares of the ships."""
@@ -285,9 +290,9 @@ class Engine(Lanes):
         reward = self.info(name)[lane]
         step = self.steps[lane]
         raise InputError(
-            f"{self.task.definition.reward_source}: {name} is {reward} in lane {lane} at"
-            f" step {step:g}, expected a finite number; look for a division by zero or"
-            " a root of a negative number (shipgym.check_task helps)"
+            f"{self.task.definition.reward_source}: {name} is {reward} in lane {lane}"
+            f" at step {step:g}, expected a finite number; look for a division by zero"
+            " or a root of a negative number (shipgym.check_task helps)"
         )
 
     @property

@@ -213,7 +213,9 @@ class ShipsEnv:
         for name, value in vars(self).items():
             if name not in self._by_arguments:
                 attributes[name] = value
-        state = self.get_state() if self._begun else None
+        state = None
+        if self._begun:
+            state = self.get_state()
         return rebuild, (type(self), self._arguments, state, attributes)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Any:
@@ -248,13 +250,15 @@ class ShipsEnv:
         names = ("asked", "engine", *counters)
         check_table(state, "state", names, required=names)
         for name in counters:
-            if np.asarray(state[name]).dtype.kind not in "biu":
+            counter = np.asarray(state[name])
+            if counter.dtype.kind not in "biu":
                 expected = "integers, as `get_state` gave them"
                 raise unexpected(f"state: {name}", expected, state[name])
 
         asked = check_table(state["asked"], "state: asked")
         engine = self._engine_for(asked)
         engine.set_state(state["engine"])
+        # nothing is refused from here on
         self._asked = dict(asked)
         self._begun = True
         self._use(engine)

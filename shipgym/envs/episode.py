@@ -125,10 +125,13 @@ class Episode:
             self._set_positive("turn_radius")
         self._set_series()
         if self.waypoints is not None:
-            path = PlannedPath(self.waypoints)
-            self._set("waypoints", path.waypoints)
-            if self.turn_radius is not None:
-                path.check_turns(self.turn_radius)
+            self._set_path(self.waypoints)
+
+    def _set_path(self, waypoints: Floats) -> None:
+        path = PlannedPath(waypoints)
+        self._set("waypoints", path.waypoints)
+        if self.turn_radius is not None:
+            path.check_turns(self.turn_radius)
 
     def _set_positive(self, name: str, at_most: float | None = None) -> None:
         value = getattr(self, name)

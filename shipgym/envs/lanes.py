@@ -134,8 +134,10 @@ class Lanes:
             least_shaft=task.least_shaft(self.model),
         )
         sensors = self.program.sensors
-        noise = bridge_noise(task.noise) if sensors.noise else {}
-        sensor_settings = task.sensor_settings or sensors.make_settings(noise)
+        sensor_settings = task.sensor_settings
+        if sensor_settings is None:
+            noise = bridge_noise(task.noise) if sensors.noise else {}
+            sensor_settings = sensors.make_settings(noise)
         return [*flat(rules), *flat(sensor_settings), *flat(task.settings)]
 
     def _output_rows(self) -> dict[str, NDArray[np.int64]]:

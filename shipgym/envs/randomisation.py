@@ -74,7 +74,8 @@ class Randomisation:
         models = [model]
         if self.ensemble:
             models += self._others(model)
-        if self.model_uncertainty or self.speed_range or self.loading_range:
+        ships_differ = self.model_uncertainty or self.speed_range or self.loading_range
+        if ships_differ:
             return self._drawn(models, seas)
         return list(product(models, seas))
 

@@ -120,12 +120,13 @@ class RecordEpisode(
         self._recorded = None
         if recorded is None or not recorded.rewards:
             return
-        name = f"{self._prefix}-{self.episode_number:05d}"
         episode = recorded.episode()
-        episode.save(self._folder / f"{name}.json")
+        name = f"{self._prefix}-{self.episode_number:05d}"
+        file = self._folder / name
+        episode.save(file.with_name(f"{name}.json"))
         if self._trials and episode.n_steps > 1:
             trial = episode.to_trial(name)
-            trial.to_csv(self._folder / f"{name}.csv")
+            trial.to_csv(file.with_name(f"{name}.csv"))
 
 
 class _Recorded:
@@ -217,8 +218,9 @@ class _Recorded:
 def _success(info: Mapping[str, Any]) -> bool | None:
     """Success that `info` reports; None without one."""
     for name in SUCCESS:
-        if info.get(name) is not None:
-            return bool(info[name])
+        success = info.get(name)
+        if success is not None:
+            return bool(success)
     return None
 
 
@@ -257,10 +259,12 @@ def _check_environment(env: Any) -> None:
 
 def _folder(folder: Path, prefix: str, overwrite: bool) -> Path:
     """Make the folder of recordings; InputError where it holds earlier ones."""
-    if Path(check_text(prefix, "name_prefix")).name != prefix:
+    name = Path(check_text(prefix, "name_prefix")).name
+    if name != prefix:
         raise unexpected("name_prefix", "the beginning of a file's name", prefix)
     make_folder(folder)
-    earlier = sorted(folder.glob(f"{escape(prefix)}-[0-9]*.json"))
+    pattern = f"{escape(prefix)}-[0-9]*.json"
+    earlier = sorted(folder.glob(pattern))
     if earlier and not overwrite:
         raise InputError(
             f"folder: {folder} holds '{earlier[0].name}' of an earlier recording;"

@@ -118,9 +118,9 @@ class Renderer:
     def __init__(self, mode: str) -> None:
         self.mode = check_choice(mode, RENDER_MODES, "render_mode")
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-        self._pygame = pygame = library(
-            "pygame", "render", f"render_mode {mode!r} needs it"
-        )
+        use = f"render_mode {mode!r} needs it"
+        pygame = library("pygame", "render", use)
+        self._pygame = pygame
         self._brush = _Brush(pygame)
         self._surface = pygame.Surface((SIZE, SIZE))
         self._window: Any = None
@@ -166,13 +166,14 @@ class Renderer:
         self._clock.tick(FRAMES_PER_SECOND)
 
     def _draw_grid(self, chart: _Chart) -> None:
-        line = self._brush.line
         for down in chart.grid_lines(axis=0):
             left = (0.0, down)
-            line(GRID, left, (SIZE, down))
-        for right in chart.grid_lines(axis=1):
-            top = (right, 0.0)
-            line(GRID, top, (right, SIZE))
+            right = (SIZE, down)
+            self._brush.line(GRID, left, right)
+        for across in chart.grid_lines(axis=1):
+            top = (across, 0.0)
+            bottom = (across, SIZE)
+            self._brush.line(GRID, top, bottom)
 
     def _draw_path(self, chart: _Chart, scene: Scene) -> None:
         if scene.waypoints is None:

@@ -153,10 +153,10 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         options = [given for given in self._options if given]
         self._reset_options()
         if options:
-            raise unexpected(
-                "options", "none", options[0], "name them when the ships are made"
-            )
+            remedy = "name them when the ships are made"
+            raise unexpected("options", "none", options[0], remedy)
 
+        # `seed` sets those of all rows, or there are none
         seeds = None if None in self._seeds else self._seeds
         observations: Observations
         observations, infos = self.vector_env.reset(seed=seeds)

@@ -190,9 +190,9 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
                 "options: reset_mask: expected True in one row at least, got none"
             )
         if not mask.all():
-            check_keys(
-                options, ["reset_mask"], "options with a reset_mask of some rows"
-            )
+            # other options hold for the engine, which is that of all rows
+            where = "options with a reset_mask of some rows"
+            check_keys(options, ["reset_mask"], where)
         return np.asarray(mask)
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:

@@ -131,7 +131,9 @@ def _sail_in_python(plain: Engine) -> None:
         try:
             asked(plain.step, orders)
         except InputError as error:
-            raise InputError(f"{error}, at step {step + 1} in plain Python") from error
+            # the step tells an error of the beginning from one of a rare event
+            where = f"at step {step + 1} in plain Python"
+            raise InputError(f"{error}, {where}") from error
 
 
 def _not_finite(engine: Engine) -> Iterator[str]:

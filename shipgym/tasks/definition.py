@@ -309,11 +309,12 @@ def _check_names(definition: TaskDefinition) -> None:
 
 def _check_differ(names: Iterable[str], where: str) -> None:
     for name, count in Counter(names).items():
-        if count > 1:
-            also = "; the engine has one of that name" if name == "end" else ""
-            raise InputError(
-                f"{where}: expected names that differ, got two fields {name!r}{also}"
-            )
+        if count < 2:
+            continue
+        also = "; the engine has one of that name" if name == "end" else ""
+        raise InputError(
+            f"{where}: expected names that differ, got two fields {name!r}{also}"
+        )
 
 
 def rewarded_step(

@@ -196,7 +196,7 @@ def on_leg(x: float, y: float, leg: Leg) -> OnLeg:
 
 
 def on_arc(past: float, aside: float, leg: Leg, radius: float) -> OnArc:
-    """Position on the turn behind a leg, `past` its beginning and `aside` the leg, m."""
+    """Position on the turn behind a leg, `past` its beginning and `aside` of it, m."""
     # from the centre of the turn: along the leg, and towards the leg
     side = copysign(1.0, leg.turn)
     outward = radius - side * aside
