@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     Agent: TypeAlias = Controller | LearnedPolicy
 
-RUN_AGENT = "agent.json"  # of a training's folder
 PRETRAINED = Path(__file__).parent / "pretrained"
 
 
@@ -71,7 +70,8 @@ def find_agent(name: str | Path) -> Path:
     path = Path(name)
     if path.suffix == ".json" or path.is_file():
         return path
-    of_run = path / RUN_AGENT
+    run_agent = "agent.json"  # of a training's folder
+    of_run = path / run_agent
     if of_run.is_file():
         return of_run
 

@@ -13,8 +13,6 @@ from shipgym import ShipFile, Trial
 from shipgym.checks import placed
 from shipgym.ships.structures import GREY_BOX
 
-#: Options that may name a model's file.
-MODELS = ("reference_model", "prior", "method.anchor")
 EXTRA_TRIALS = "method.extra_trials"
 
 
@@ -42,7 +40,9 @@ def identification_settings(
     table = ship.identify
     with_kernel = "kernel" in table or "kernel" in given
     of_file = read_table(table, f"{ship.path}: [identify]", with_kernel)
-    for option in MODELS:
+    # Options that may name a model's file.
+    models = ("reference_model", "prior", "method.anchor")
+    for option in models:
         model = str(of_file.get(option, ""))
         if model.endswith(".json"):
             path = ship.path.parent / model

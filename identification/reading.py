@@ -40,8 +40,6 @@ ARGUMENTS = tuple(
     for item in fields(Options)
     if item.name not in (*WORDS, "particulars", "steering")
 )
-#: Settings that are lists of names.
-LISTS = ("hold_out", "method.extra_trials")
 
 
 def stage_settings() -> dict[str, list[str]]:
@@ -147,7 +145,9 @@ def check_value(name: str, value: Any, method: Any = None) -> None:
 
     The message is that of the `method` named.
     """
-    if name in LISTS:
+    # Settings that are lists of names.
+    lists = ("hold_out", "method.extra_trials")
+    if name in lists:
         _check_names(value, name.rpartition(".")[2])
         return
 

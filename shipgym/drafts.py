@@ -16,7 +16,6 @@ from shipgym.errors import InputError
 
 #: Names of drafts: a checksum of the computer's name, and the number of the process.
 DRAFT = re.compile(r"\..+\.([0-9a-f]{8})-(\d+)\.draft", re.DOTALL)
-ABANDONED_S = 7 * 86400.0  # age of a draft whose process may be alive
 
 
 @contextmanager
@@ -74,13 +73,14 @@ def abandoned_drafts(folder: Path) -> list[Path]:
     a week.
     """
     found = []
+    abandoned_s = 7 * 86400.0  # age of a draft whose process may be alive
     with suppress(OSError):
         for path in folder.iterdir():
             name = DRAFT.fullmatch(path.name)
             if name is None:
                 continue
             age = time.time() - path.lstat().st_mtime
-            if _is_dead(*name.groups()) or age > ABANDONED_S:
+            if _is_dead(*name.groups()) or age > abandoned_s:
                 found.append(path)
     return found
 

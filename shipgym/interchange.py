@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 __all__ = ["from_frame", "from_minari", "to_frame", "to_minari"]
 
 ATTRIBUTE = "shipgym"
-TRIAL_FIELDS = ("name", "kind", "use", "length", "over_ground", "notes")
 #: Groups of an episode with a value for each step, one less than there are states.
 OF_STEPS = ("commands", "reward_parts", "rewards", "actions")
 
@@ -150,9 +149,10 @@ def _series(recorded: Trial | Episode) -> dict[str, Floats]:
 
 def _facts(recorded: Trial | Episode) -> str:
     """All of a trial or an episode that is no time series, as JSON."""
+    trial_fields = ("name", "kind", "use", "length", "over_ground", "notes")
     if isinstance(recorded, Trial):
         fields: dict[str, Any] = {
-            name: getattr(recorded, name) for name in TRIAL_FIELDS
+            name: getattr(recorded, name) for name in trial_fields
         }
         fields["derived"] = sorted(recorded.derived)
         fields["repaired"] = dict(recorded.repaired)

@@ -40,11 +40,6 @@ from agents.suites.suite import BenchmarkTask
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
 
-NOT_IN_NAMES = ",=/{}*"
-#: Attributes of a policy that may be policies themselves, and how many are looked at.
-INNER_POLICIES = ("policy", "fallback", "base", "autopilot")
-MOST_INNER_POLICIES = 1000
-
 
 @dataclass(frozen=True, eq=False)
 class Entry:
@@ -104,19 +99,23 @@ def _design_hashes(policy: Policy) -> set[str]:
     hashes = set()
     visited: set[int] = set()
     waiting: list[Any] = [policy]
+    # Attributes of a policy that may be policies themselves, and how many are looked
+    # at.
+    inner_policies = ("policy", "fallback", "base", "autopilot")
+    most_inner_policies = 1000
     while waiting:
         part = waiting.pop()
         if part is None or id(part) in visited:
             continue
         visited.add(id(part))
-        if len(visited) > MOST_INNER_POLICIES:
+        if len(visited) > most_inner_policies:
             raise InputError(
                 f"{type(policy).__name__}: expected a policy made of at most"
-                f" {MOST_INNER_POLICIES} policies, got more"
+                f" {most_inner_policies} policies, got more"
             )
 
         hashes.add(getattr(part, "model_sha256", ""))
-        for name in INNER_POLICIES:
+        for name in inner_policies:
             waiting.append(getattr(part, name, None))
     return hashes
 
@@ -182,10 +181,11 @@ def _read_entry(given: Any) -> Entry:
 
 
 def _named(name: str, source: Any) -> Entry:
-    forbidden = set(name) & set(NOT_IN_NAMES)
+    not_in_names = ",=/{}*"
+    forbidden = set(name) & set(not_in_names)
     if not name or forbidden:
         raise InputError(
-            f"controllers: expected a name without any of {' '.join(NOT_IN_NAMES)}, got"
+            f"controllers: expected a name without any of {' '.join(not_in_names)}, got"
             f" '{name}'"
         )
     if isinstance(source, str):

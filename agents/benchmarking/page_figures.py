@@ -41,9 +41,6 @@ DASHES = ("solid", "dash", "dot")
 SCORE = "wheel-over from the model 0, best known 1"
 #: Range of the axis of scores, and of relative costs; others stand at its ends.
 SCORE_RANGE, RELATIVE_RANGE = (-1.5, 1.5), (0.0, 4.0)
-#: Ratio of the largest to the smallest cost above which their axis is logarithmic.
-LOGARITHMIC_RATIO = 20.0
-MARGIN = {"l": 58, "r": 14, "t": 14, "b": 44}  # pixels
 
 
 class Look(NamedTuple):
@@ -68,7 +65,8 @@ def looks(names: Sequence[str]) -> dict[str, Look]:
 
 def page_panels(shown: Sequence[Panel], height: int, **changes: Any) -> Figure:
     """Return panels without a legend, since the page has one for all figures."""
-    usual: dict[str, Any] = {"margin": MARGIN, "showlegend": False, "hovermode": "x"}
+    margin = {"l": 58, "r": 14, "t": 14, "b": 44}  # pixels
+    usual: dict[str, Any] = {"margin": margin, "showlegend": False, "hovermode": "x"}
     return panels(shown, height, **{**usual, **changes})
 
 
@@ -192,7 +190,9 @@ def _is_wide(costs: Floats) -> bool:
     """Tell whether an axis of costs is logarithmic."""
     if not len(costs) or costs.min() <= 0.0:
         return False
-    return bool(costs.max() > LOGARITHMIC_RATIO * costs.min())
+    # Ratio of the largest to the smallest cost above which their axis is logarithmic.
+    logarithmic_ratio = 20.0
+    return bool(costs.max() > logarithmic_ratio * costs.min())
 
 
 def _box(name: str, costs: Floats, colour: str) -> Any:

@@ -13,8 +13,6 @@ from agents.rollouts.replay_page import PLAYER
 from agents.rollouts.replay_series import quantities, run
 from shipgym.pages import render
 
-MOST_RUNS = 300  # in a page, 5 kB each
-PLACEHOLDER = "@episodes@"  # in the player, where the page's script puts its runs
 #: Decimals of the histories in the page.
 DECIMALS = {
     "x": 1,
@@ -35,7 +33,6 @@ DECIMALS = {
     "current_speed": 2,
     "current_towards": 0,
 }
-REWARD_DECIMALS = 4
 #: Runs of the replay player, whole, by episode.
 Histories = dict[EpisodeId, dict[str, Any]]
 
@@ -129,12 +126,13 @@ def replayable(result: BenchmarkResult, wanted: int) -> tuple[int, list[EpisodeI
 
     At most `wanted` of each controller and task; at least one.
     """
+    most_runs = 300  # in a page, 5 kB each
     for count in range(wanted, 0, -1):
         shown: dict[EpisodeId, None] = {}  # in order, each once
         for task in result.tasks:
             for choice in choices(result, task, count):
                 shown |= dict.fromkeys(choice.episodes)
-        if len(shown) <= MOST_RUNS:
+        if len(shown) <= most_runs:
             break
     return count, list(shown)
 
@@ -157,9 +155,10 @@ def replay_data(result: BenchmarkResult, again: Rerun, count: int) -> dict[str, 
             entry = _entry(result, choice.controller, episodes, histories)
             entries[task].append(entry)
 
+    placeholder = "@episodes@"  # in the player, where the page's script puts its runs
     return {
-        "page": render(PLAYER, title="Replay", data=PLACEHOLDER),
-        "mark": f'"{PLACEHOLDER}"',
+        "page": render(PLAYER, title="Replay", data=placeholder),
+        "mark": f'"{placeholder}"',
         "quantities": quantities(list(histories.values())),
         "runs": _short_runs(result, histories),
         "entries": entries,
@@ -227,14 +226,15 @@ def short(whole: dict[str, Any]) -> dict[str, Any]:
     for name, values in whole["series"].items():
         series[name] = differences(values, DECIMALS[name])
     parts = {}
+    reward_decimals = 4
     for name, values in whole["parts"].items():
         if np.any(values):
-            parts[name] = differences(values, REWARD_DECIMALS)
+            parts[name] = differences(values, reward_decimals)
     return {
         **whole,
         "series": series,
         "parts": parts,
-        "rewards": differences(whole["rewards"], REWARD_DECIMALS),
+        "rewards": differences(whole["rewards"], reward_decimals),
         "other": {},
     }
 

@@ -10,7 +10,6 @@ from agents.benchmarking.sources import BEST_KNOWN
 from shipgym.pages.numbers import fixed, number, percent
 
 BETTER, WORSE = "#1d70b8", "#d9822b"  # tints of probabilities of improvement
-MOST_TINT = 42.0  # per cent of the colour
 
 
 class Metric(NamedTuple):
@@ -36,7 +35,6 @@ METRICS = (
     Metric("fuel", "fuel, straight run = 1", fixed),
     Metric("extrapolating", "outside model", percent),
 )
-RARE_METRICS = ("extrapolating",)  # shown only if not 0 throughout
 
 
 @dataclass(frozen=True)
@@ -231,7 +229,8 @@ def _improvement_cell(interval: Mapping[str, Any] | None) -> TableCell:
     low = 100.0 * interval["low"]
     high = 100.0 * interval["high"]
     colour = BETTER if value >= 0.5 else WORSE
-    share = MOST_TINT * abs(2.0 * value - 1.0)
+    most_tint = 42.0  # per cent of the colour
+    share = most_tint * abs(2.0 * value - 1.0)
     return TableCell(
         text=f"{100.0 * value:.0f}",
         key=value,
@@ -265,11 +264,12 @@ def metrics_table(result: BenchmarkResult, task: str, name: str) -> SortableTabl
 
 def _is_shown(metric: str, cells: Mapping[str, Any]) -> bool:
     """Tell whether a controller has a metric, not 0 if it is a rare one."""
+    rare_metrics = ("extrapolating",)  # shown only if not 0 throughout
     for cell in cells.values():
         figures = cell["metrics"].get(metric)
         if figures is None or figures["mean"] is None:
             continue
-        if figures["mean"] or metric not in RARE_METRICS:
+        if figures["mean"] or metric not in rare_metrics:
             return True
     return False
 

@@ -26,7 +26,6 @@ from scipy.stats import trim_mean
 from shipgym.arrays import Floats, Integers, finite
 
 N_DRAWS = 2000
-LEVEL = 0.95
 TRIMMED = 0.25  # of the scores at each end
 ScoreScale = tuple[float, float]  # costs whose scores are 0 and 1
 
@@ -99,7 +98,8 @@ def interval(value: float, draws: Floats) -> Interval:
     is_known = np.isfinite(value) and np.isfinite(draws).all()
     if not is_known:
         return Interval(value, np.nan, np.nan)
-    tail = (1.0 - LEVEL) / 2.0
+    level = 0.95
+    tail = (1.0 - level) / 2.0
     low, high = np.quantile(draws, [tail, 1.0 - tail])
     return Interval(value, float(low), float(high))
 

@@ -20,9 +20,6 @@ from shipgym.tasks.task import Task, course_keeping_task
 Observations = NDArray[np.float32]
 
 N_SHIPS = 3
-# of the rudder limit: matrix products of learned policies depend on how many rows there
-# are
-ROUNDING = 1e-5
 SIGNATURE = "predict(observation, state=None, episode_start=None, deterministic=True)"
 
 
@@ -194,7 +191,10 @@ class _Asking:
 
     def check_same(self, found: Any, expected: Any, where: str) -> None:
         """Refuse another answer than that to the same question otherwise."""
-        if not np.allclose(found, expected, rtol=0.0, atol=ROUNDING):
+        # of the rudder limit: matrix products of learned policies depend on how many
+        # rows there are
+        rounding = 1e-5
+        if not np.allclose(found, expected, rtol=0.0, atol=rounding):
             raise self._refusal(
                 where,
                 expected=f"{np.ravel(expected)} as otherwise",

@@ -39,7 +39,6 @@ Action = NDArray[np.float32]
 
 FORMAT = 1  # of the controller file
 SMALL = 1e-5  # rad, and other SI units, of motions about straight running
-SCALE_TOLERANCE = 1e-6  # relative difference of observation scales that is rounding
 UNKNOWN_MARGINS = Margins(np.nan, np.nan, np.nan, np.nan, np.nan)
 
 
@@ -471,8 +470,9 @@ def check_scales(
     remedy: str,
 ) -> None:
     """Refuse observations in other scales than an agent's own; InputError names one."""
+    scale_tolerance = 1e-6  # relative difference of observation scales that is rounding
     for name, scale, wanted in zip(names, scales, own, strict=False):
-        if abs(scale - wanted) > SCALE_TOLERANCE * abs(wanted):
+        if abs(scale - wanted) > scale_tolerance * abs(wanted):
             raise InputError(
                 f"{where}: scale of '{name}': expected {wanted:g}, got {scale:g}:"
                 f" {remedy}"

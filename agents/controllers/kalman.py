@@ -14,10 +14,6 @@ from shipgym.arrays import Floats
 from shipgym.ships.linear import StraightRunning, linearise
 from shipgym.trials.sensors import SEA_TRIAL
 
-# how much the course to steer may move between two measurements, rad
-COURSE_NOISE = np.radians(0.02)
-WAVE_DAMPING = 0.1  # of the model of first-order motion
-
 
 @dataclass(frozen=True, eq=False)
 class KalmanFilter:
@@ -71,7 +67,9 @@ def course_filter(
     """
     transition, effect = rudder_response(model, about, dt)
     pushed = disturbance * effect
-    pushed[ERROR] = np.hypot(pushed[ERROR], COURSE_NOISE)
+    # how much the course to steer may move between two measurements, rad
+    course_noise = np.radians(0.02)
+    pushed[ERROR] = np.hypot(pushed[ERROR], course_noise)
     states = np.eye(len(effect))
     return KalmanFilter(
         transition=transition,
@@ -140,7 +138,8 @@ def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floa
 
     frequency = 2.0 * np.pi / period
     spring = frequency**2
-    damping = 2.0 * WAVE_DAMPING * frequency
+    wave_damping = 0.1  # of the model of first-order motion
+    damping = 2.0 * wave_damping * frequency
     flow = np.array(
         [
             [0.0, 1.0],

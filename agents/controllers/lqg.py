@@ -25,7 +25,6 @@ from shipgym.checks import check_number
 from shipgym.engine.records import Record
 from shipgym.tasks.steering import RUDDER_WEIGHT
 
-N_STATES = (3, 5)  # sway, yaw rate and heading error; in waves two more
 # least jump of the heading error that is a new course, rad, and the same in standard
 # deviations of what noise explains
 NEW_COURSE, GATE = np.radians(1.0), 6.0
@@ -223,9 +222,10 @@ class LQG(Controller):
 
     def __post_init__(self) -> None:
         n = len(self.input)
-        if n not in N_STATES:
+        n_states = (3, 5)  # sway, yaw rate and heading error; in waves two more
+        if n not in n_states:
             raise InputError(
-                f"arrays.input: expected one of {N_STATES} states, got {n}"
+                f"arrays.input: expected one of {n_states} states, got {n}"
             )
         trusted = np.eye(n) - self.kalman @ self.output
         of_errors = trusted @ self.transition

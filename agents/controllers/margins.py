@@ -12,7 +12,6 @@ from shipgym.arrays import Floats
 
 Complexes = NDArray[np.complex128]
 
-FREQUENCIES = 500  # of the frequency response; splines lie between them
 SLOWEST, FASTEST = 1e-4, 0.999  # of them, over the Nyquist frequency
 
 
@@ -120,7 +119,8 @@ class Compensator:
             )
 
         nyquist = np.pi / ship.dt
-        omega = np.geomspace(SLOWEST * nyquist, FASTEST * nyquist, FREQUENCIES)
+        frequencies = 500  # of the frequency response; splines lie between them
+        omega = np.geomspace(SLOWEST * nyquist, FASTEST * nyquist, frequencies)
         response = self.responses(ship, omega)
         loop: Any = control.frd(response.broken, omega)
         found = control.stability_margins(loop, returnall=True)

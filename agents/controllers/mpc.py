@@ -45,8 +45,6 @@ KNOTS = 6  # of a plan
 KNOT_STEPS = int(STEPS_PER_LENGTH)  # control intervals from one knot to the next
 COARSE = 2  # control intervals in a step of the simulation
 CANDIDATES, ELITES, ROUNDS = 16, 4, 2
-LEAST_DEVIATION = np.radians(0.5)  # of a knot
-CURRENT_GAIN = 0.5  # share of the current's error that is taken over in an interval
 DEEP = 1e6  # m, of water that is not shallow
 
 
@@ -183,7 +181,9 @@ class MPC(WheelOver):
         ahead, aside = turned(known.ahead, known.aside, swung)
         # across the course over ground there is no velocity over ground
         _, across = turned(seen.surge + ahead, seen.sway + aside, seen.drift)
-        error = CURRENT_GAIN * across
+        # share of the current's error that is taken over in an interval
+        current_gain = 0.5
+        error = current_gain * across
         return Current(
             ahead=ahead + error * np.sin(seen.drift),
             aside=aside - error * np.cos(seen.drift),
@@ -198,6 +198,7 @@ class MPC(WheelOver):
         least = np.full(len(plans), np.inf)
         mean = plans
         deviation = np.full(plans.shape, self.design["deviation"])
+        least_deviation = np.radians(0.5)  # of a knot
         for drawn in draws():
             candidates = mean[:, None] + deviation[:, None] * drawn
             candidates[:, 0] = best
@@ -207,7 +208,7 @@ class MPC(WheelOver):
             costs = self.simulated_costs(seen, current, candidates)
             elites = cheapest(candidates, costs)
             mean = elites.mean(axis=1)
-            deviation = np.maximum(elites.std(axis=1), LEAST_DEVIATION)
+            deviation = np.maximum(elites.std(axis=1), least_deviation)
 
             cost = costs.min(axis=1)
             cheaper = cost < least

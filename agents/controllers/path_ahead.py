@@ -8,8 +8,6 @@ from agents.controllers.law import Turns
 from shipgym.arrays import Flags, Floats
 
 FAR = 1e9  # m, of a turn that is behind
-# of the radius: nearer to the centre of an arc no position is taken
-INNERMOST = 0.1
 
 
 class PathPoint(NamedTuple):
@@ -68,7 +66,9 @@ class Arc:
         radius = self.radius
         past = leg.x - self.distance
         to_centre = radius - self.side * leg.y
-        swept = np.arctan2(past, np.maximum(to_centre, INNERMOST * radius))
+        # of the radius: nearer to the centre of an arc no position is taken
+        innermost = 0.1
+        swept = np.arctan2(past, np.maximum(to_centre, innermost * radius))
 
         entered = leg.reached & (past > 0.0) & (self.angle > 0.0)
         leaves = entered & (swept >= self.angle)

@@ -18,13 +18,6 @@ from shipgym.checks import check_number
 from shipgym.ships.linear import Nomoto, linearise, nomoto_of
 from shipgym.tasks.steering import RUDDER_WEIGHT
 
-# Measured by the environment's cost on ships stable and unstable, gears slow and fast,
-# and lags up to half a ship length: with these the PID costs at most 1.1 times its
-# best, 1.2 times in course changes of 5 deg.
-LAG_SHARE = 0.5  # of the gear's lag that is made up for; all would make the ship slow
-# of the optimal regulator, which feeds back the rudder too and can be faster
-FREQUENCY_SHARE = 0.85
-
 
 @dataclass(frozen=True, eq=False)
 class PID(Controller):
@@ -77,18 +70,25 @@ class PID(Controller):
         interval = checked_interval(model, dt)
         ship = sample_ship(model, interval)
         response = nomoto_of(*linearise(model, ship.about))
-        lag = LAG_SHARE * model.steering.time_constant + 0.5 * interval
+        # Measured by the environment's cost on ships stable and unstable, gears slow
+        # and fast, and lags up to half a ship length: with these the PID costs at most
+        # 1.1 times its best, 1.2 times in course changes of 5 deg. of the gear's lag
+        # that is made up for; all would make the ship slow
+        lag_share = 0.5
+        lag = lag_share * model.steering.time_constant + 0.5 * interval
         slow = 1.0 / (integral_lengths * model.travel_time)
 
         optimal = optimal_poles(response, rate_weight(model))
         if damping is None:
             damping = optimal.damping
         check_number(damping, "damping", above=0.0)
+        # of the optimal regulator, which feeds back the rudder too and can be faster
+        frequency_share = 0.85
         if frequency is None:
             # the gear's pole must stay no slower than the pair
             sum_of_roots = 1.0 / lag + 1.0 / response.T
             largest = (sum_of_roots - slow) / (2.0 * damping + 1.0)
-            frequency = min(FREQUENCY_SHARE * optimal.frequency, largest)
+            frequency = min(frequency_share * optimal.frequency, largest)
         else:
             check_number(frequency, "frequency", above=0.0)
 

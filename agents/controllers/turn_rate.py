@@ -32,7 +32,6 @@ LARGEST_RUDDER = 0.6
 COURSE_RUDDER = 0.3
 # of the pair of poles: damping ratio, frequency times lag, and times length over speed
 DAMPING, PER_LAG, PER_LENGTH = 0.9, 0.3, 2.0
-SLOWER = 4.0  # time of the heading over that of the rate
 
 
 class TurnRateGains(NamedTuple):
@@ -162,9 +161,10 @@ class TurnRate(Controller):
             check_number(rate_deg_min, "rate_deg_min", above=0.0, at_most=most)
             rate = float(np.radians(rate_deg_min)) / 60.0
 
+        slower = 4.0  # time of the heading over that of the rate
         gains = {
             **rate_gains(form, frequency),
-            "heading_time": SLOWER / frequency,
+            "heading_time": slower / frequency,
             "rate": rate,
         }
         design = {"frequency": frequency, "nomoto_K": form.K, "nomoto_T": form.T}

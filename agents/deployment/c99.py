@@ -15,9 +15,6 @@ from agents.deployment.variables import Variables
 from shipgym import InputError
 from shipgym.trials.units import UNITS
 
-LONGEST_NAME = 31  # characters, so that what is made of it stays within the 63 of C99
-LONGEST_TITLE = 120
-
 
 @dataclass(frozen=True)
 class Source:
@@ -49,9 +46,11 @@ def checked_name(name: str) -> str:
     """
     allowed = re.sub(r"\W", "_", name, flags=re.ASCII)
     starts_with_letter = re.match("[A-Za-z]", allowed)
-    if not starts_with_letter or allowed in KEYWORDS or len(allowed) > LONGEST_NAME:
+    # characters, so that what is made of it stays within the 63 of C99
+    longest_name = 31
+    if not starts_with_letter or allowed in KEYWORDS or len(allowed) > longest_name:
         raise InputError(
-            f"name: expected at most {LONGEST_NAME} letters, digits and underscores, a"
+            f"name: expected at most {longest_name} letters, digits and underscores, a"
             f" letter first, and no word of C, got {name[:60]!r}; give another with"
             " --name"
         )
@@ -60,7 +59,8 @@ def checked_name(name: str) -> str:
 
 def comment(text: str) -> str:
     """A text as a comment of C may hold it."""
-    return re.sub(r"[^\w .,()+-]", "_", text, flags=re.ASCII)[:LONGEST_TITLE]
+    longest_title = 120
+    return re.sub(r"[^\w .,()+-]", "_", text, flags=re.ASCII)[:longest_title]
 
 
 def render(template: str, name: str = "", **data: Any) -> str:

@@ -16,10 +16,6 @@ from shipgym import InputError
 from shipgym.checks import check_choice
 from shipgym.drafts import atomic_path
 
-VERSIONS = ("2.0", "3.0")
-FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")
-COMPILING_S = 120.0
-
 
 def write_fmu(source: Source, path: str | Path, fmi: str = "3.0") -> None:
     """Write a ship or an autopilot as an FMU.
@@ -29,7 +25,8 @@ def write_fmu(source: Source, path: str | Path, fmi: str = "3.0") -> None:
     its place, or if there is no C compiler or no FMPy, whose headers of the standard
     are needed.
     """
-    check_choice(fmi, VERSIONS, "fmi")
+    versions = ("2.0", "3.0")
+    check_choice(fmi, versions, "fmi")
     path = Path(path)
     if path.suffix != ".fmu":
         raise InputError(
@@ -98,7 +95,9 @@ def _compiled(files: dict[str, str], name: str) -> bytes:
             "no C compiler for Linux found, expected gcc, or the one that CC names: an"
             " FMU holds a binary"
         )
-    command = [compiler, *FLAGS, "fmu.c", f"{name}.c", "-o", "fmu.so", "-lm"]
+    flags = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")
+    command = [compiler, *flags, "fmu.c", f"{name}.c", "-o", "fmu.so", "-lm"]
+    compiling_s = 120.0
     with tempfile.TemporaryDirectory() as folder:
         for file, text in files.items():
             path = Path(folder, Path(file).name)
@@ -108,7 +107,7 @@ def _compiled(files: dict[str, str], name: str) -> bytes:
             cwd=folder,
             capture_output=True,
             text=True,
-            timeout=COMPILING_S,
+            timeout=compiling_s,
             check=False,
         )
         if done.returncode:

@@ -17,7 +17,6 @@ from shipgym.tasks.guidance import wrapped
 from shipgym.trials.nmea import NMEA_QUANTITIES
 
 STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
-POSITION = ("latitude", "longitude")
 
 
 class Helm:
@@ -80,8 +79,9 @@ class Helm:
         for name in (*self.pilot.inputs, "rudder"):
             if name not in provided:
                 needed.append(name)
+        position = ("latitude", "longitude")
         if self.route is not None:
-            needed += POSITION
+            needed += position
         return needed
 
     def _check(self, agent: Any) -> None:

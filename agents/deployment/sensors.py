@@ -9,8 +9,6 @@ from shipgym.checks import check_number
 from shipgym.tasks.guidance import wrapped
 from shipgym.trials.nmea import NMEA_QUANTITIES
 
-ANGLES = ("heading", "course", "leg", "to_steer", "rudder", "waypoint_bearing")
-
 
 @dataclass(frozen=True)
 class Limits:
@@ -113,6 +111,7 @@ class HelmSensors:
 
     def _disagreement(self, now: float) -> str:
         """Describe two talkers of one quantity that differ."""
+        angles = ("heading", "course", "leg", "to_steer", "rudder", "waypoint_bearing")
         for quantity in self.newest:
             fresh = self._fresh(quantity, now)
             if not fresh:
@@ -122,7 +121,7 @@ class HelmSensors:
             tolerance *= self.limits.disagreement
             for talker, value in fresh.items():
                 apart = value - fresh[first]
-                if quantity in ANGLES:
+                if quantity in angles:
                     apart = float(wrapped(apart))
                 differs = abs(apart) > tolerance
                 if self._lasts(f"{quantity} {talker}", differs, now):

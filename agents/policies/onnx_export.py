@@ -15,9 +15,6 @@ from shipgym import InputError
 from shipgym.extras import library
 
 OPSET, IR_VERSION = 17, 8  # of 2022: runtimes on ships are not the newest
-OPERATORS = {"relu": "Relu", "tanh": "Tanh"}
-#: Fields of a policy's file that say nothing to someone who runs the graph.
-LEFT_OUT = ("format", "kind", "network", "training")
 
 
 class _Graph:
@@ -98,7 +95,8 @@ def _graph(policy: LearnedPolicy, onnx: Any) -> Any:
 
 def _add_network(graph: _Graph, network: Network, inputs: str) -> str:
     """Dense layers; returns the name of their output."""
-    activation = OPERATORS[network.activation]
+    operators = {"relu": "Relu", "tanh": "Tanh"}
+    activation = operators[network.activation]
     last = len(network.layers) - 1
     x = inputs
     for i, layer in enumerate(network.layers):
@@ -142,8 +140,10 @@ def _add_action(graph: _Graph, policy: LearnedPolicy, output: str) -> None:
 def _metadata(policy: LearnedPolicy) -> dict[str, str]:
     """Fields of the policy's file, each as JSON."""
     content, _ = policy.file_fields()
+    # Fields of a policy's file that say nothing to someone who runs the graph.
+    left_out = ("format", "kind", "network", "training")
     return {
         name: json.dumps(value)
         for name, value in content.items()
-        if name not in LEFT_OUT
+        if name not in left_out
     }

@@ -45,10 +45,7 @@ from shipgym.tasks.task import ACTIONS, RUDDER_ORDERS, Task
 ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
 #: Number of the network's outputs by the kind of action.
 OUTPUTS = {"rudder": 1, "rudder-discrete": len(RUDDER_ORDERS), "rudder-shaft": 2}
-LARGEST_AUTHORITY = 2.0
 NO_LIMIT = 2.0  # of the rate: outputs are in [-1, 1]
-#: Options of an environment that decide what is observed and in which scales.
-SHOWING = ("action", "roll", "corridor", "ground")
 
 
 class Memory(NamedTuple):
@@ -325,8 +322,10 @@ class LearnedPolicy:
             **self.env_options,
         }
         options = {}
+        # Options of an environment that decide what is observed and in which scales.
+        showing = ("action", "roll", "corridor", "ground")
         for name in Task.option_names(definition):
-            if name in SHOWING and name in known:
+            if name in showing and name in known:
                 options[name] = known[name]
         task = Task.of(definition, **options)
         task.check_fits(model)
@@ -369,7 +368,8 @@ def check_part(agent: Any) -> None:
 
     `agent`: a policy, or the ships among which it learns (`ResidualVecEnv`).
     """
-    check_number(agent.authority, "authority", above=0.0, at_most=LARGEST_AUTHORITY)
+    largest_authority = 2.0
+    check_number(agent.authority, "authority", above=0.0, at_most=largest_authority)
     check_whole(agent.frame_stack, "frame_stack", at_least=1)
     check_whole(agent.action_repeat, "action_repeat", at_least=1)
     check_number(agent.rate_limit, "rate_limit", above=0.0, at_most=NO_LIMIT)

@@ -49,8 +49,6 @@ NOT_ACTING = (
     "actor_target.",
     "critic",
 )
-ACTIVATION_OF = {"ReLU": "relu", "Tanh": "tanh"}
-DENSE = "dense layers with ReLU or Tanh between them"
 #: Keywords of a vector environment that say how it runs, not what is asked.
 RUNNING = (
     "model",
@@ -69,8 +67,6 @@ RESIDUAL = {
     "action_repeat": int,
     "rate_limit": float,
 }
-N_COMPARED = 16
-AGREEMENT = 1e-4  # of the commands found with torch and without, far above rounding
 
 
 def sb3_fields(agent: Any, env: Any = None) -> dict[str, Any]:
@@ -225,8 +221,10 @@ def actor_network(
         )
     actor = known[0]
     between = activation or actor.activation
-    if between not in ACTIVATION_OF:
-        raise InputError(f"agent: expected {DENSE}, got {between} as layer 1")
+    activation_of = {"ReLU": "relu", "Tanh": "tanh"}
+    dense = "dense layers with ReLU or Tanh between them"
+    if between not in activation_of:
+        raise InputError(f"agent: expected {dense}, got {between} as layer 1")
 
     names = _dense_layers(actor, weights)
     acting = {name for name in weights if not name.startswith(NOT_ACTING)}
@@ -235,7 +233,7 @@ def actor_network(
         used |= {f"{name}.weight", f"{name}.bias"}
     if used != acting:
         raise InputError(
-            f"agent: expected {DENSE}, got weights missing or unknown:"
+            f"agent: expected {dense}, got weights missing or unknown:"
             f" {quoted(sorted(used ^ acting))}"
         )
 
@@ -244,7 +242,7 @@ def actor_network(
         weight = _array(weights[f"{name}.weight"])
         bias = _array(weights[f"{name}.bias"])
         layers.append(Layer(weight, bias))
-    return Network(tuple(layers), ACTIVATION_OF[between], actor.output)
+    return Network(tuple(layers), activation_of[between], actor.output)
 
 
 def _dense_layers(actor: Actor, weights: Mapping[str, Any]) -> list[str]:
@@ -276,15 +274,17 @@ def _check_extraction(network: Network, agent: Any, action: str) -> None:
         )
 
     random = np.random.default_rng(0)
-    uniform = random.uniform(-1.0, 1.0, (N_COMPARED, n_inputs))
+    n_compared = 16
+    uniform = random.uniform(-1.0, 1.0, (n_compared, n_inputs))
     inputs = uniform.astype(np.float32)
     commands, _ = agent.predict(inputs, deterministic=True)
     output = network(inputs)
+    agreement = 1e-4  # of the commands found with torch and without, far above rounding
     if action == "rudder-discrete":
         agrees = np.array_equal(output.argmax(axis=-1), commands)
     else:
         deviation = np.abs(np.clip(output, -1.0, 1.0) - commands)
-        agrees = bool(deviation.max() < AGREEMENT)
+        agrees = bool(deviation.max() < agreement)
     if not agrees:
         raise InputError(
             "agent: expected 'MlpPolicy' with actions in [-1, 1], got"

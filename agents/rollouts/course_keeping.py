@@ -20,9 +20,6 @@ from shipgym.tasks.scales import observation_scales
 from shipgym.tasks.task import Task, course_keeping_task
 
 RECORDED = ("psi", "delta", "set_point", *course_keeping_task().info_names)
-AT_ONCE = 1024  # ships, of a structure and its recordings, that fit into little memory
-STEP_LENGTHS = 16.0  # duration of a step response, in times to travel one ship length
-LARGEST_STEP_DEG = 60.0  # so that an overshoot is not yet loss of control
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +117,10 @@ def sail(
     flat = numbers.ravel()
     per_ship = numbers.size // len(ships)
     groups = []
-    for first in range(0, numbers.size, AT_ONCE):
-        some = flat[first : first + AT_ONCE]
+    # ships, of a structure and its recordings, that fit into little memory
+    at_once = 1024
+    for first in range(0, numbers.size, at_once):
+        some = flat[first : first + at_once]
         models_of_group = ships
         if len(ships) > 1:
             lanes = first + np.arange(len(some))
@@ -203,14 +202,17 @@ def step_response(
     """
     ships = _ships(models)
     first = ships[0]
+    largest_step_deg = 60.0  # so that an overshoot is not yet loss of control
     check_number(
         step_deg,
         "step_deg",
-        at_least=-LARGEST_STEP_DEG,
-        at_most=LARGEST_STEP_DEG,
+        at_least=-largest_step_deg,
+        at_most=largest_step_deg,
     )
+    # duration of a step response, in times to travel one ship length
+    step_lengths = 16.0
     if duration is None:
-        duration = STEP_LENGTHS * first.travel_time
+        duration = step_lengths * first.travel_time
     check_number(duration, "duration", above=0.0)
     asked = task or course_keeping_task()
     check_fits(controller, asked, first, f"model '{first.name}'")

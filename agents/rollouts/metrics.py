@@ -24,12 +24,8 @@ from shipgym.python_files import asked
 from shipgym.tasks.guidance import wrapped
 from shipgym.tasks.task import Task
 
-#: Physical states that `metrics` needs, beside all of `info`.
-STATES = ("psi", "u", "v", "n", "delta", "set_point")
 DEAD_BAND = np.radians(0.5)  # the rudder has turned round once it came back by so much
-SMALLEST_CHANGE = np.radians(5.0)  # of course, whose overshoot and settling count
 SETTLED_SHARE, SETTLED_LEAST = 0.05, np.radians(1.0)  # of the change of course, and rad
-OF_PATHS = ("cross_track_rmse_m", "outside_corridor", "left_corridor", "grounded")
 #: Entries of `info` from which the figures of paths are computed.
 PATH_INFO = (
     "cross_track",
@@ -50,7 +46,9 @@ class CourseChange(NamedTuple):
 
 def recorded_for_metrics(task: Task) -> tuple[str, ...]:
     """What a rollout has to record for `metrics`."""
-    return (*STATES, *task.info_names)
+    # Physical states that `metrics` needs, beside all of `info`.
+    states = ("psi", "u", "v", "n", "delta", "set_point")
+    return (*states, *task.info_names)
 
 
 def worst_step_cost(task: Task) -> float:
@@ -82,7 +80,8 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         reached, else whether control was kept.
     """
     nowhere = np.full(len(run.seeds), np.nan)
-    undefined = dict.fromkeys((*CourseChange._fields, *OF_PATHS), nowhere)
+    of_paths = ("cross_track_rmse_m", "outside_corridor", "left_corridor", "grounded")
+    undefined = dict.fromkeys((*CourseChange._fields, *of_paths), nowhere)
     own = task_figures(run)
     succeeded = own["success"] > 0.0
     lost = run.terminated & ~succeeded
@@ -218,8 +217,9 @@ def changes_of_course(course: Floats, heading: Floats, dt: float) -> list[Course
     limits = [0, *altered.tolist(), last]
 
     changes = []
+    smallest_change = np.radians(5.0)  # of course, whose overshoot and settling count
     for begin, end in pairwise(limits):
-        is_small = abs(error[begin]) < SMALLEST_CHANGE
+        is_small = abs(error[begin]) < smallest_change
         if is_small or begin == end:
             continue
         # the error at the end may already be that against the next course

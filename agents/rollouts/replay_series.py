@@ -9,10 +9,6 @@ from shipgym import Episode
 from shipgym.arrays import Floats
 from shipgym.tasks.guidance import wrapped
 
-# significant digits of the numbers in the page: a millimetre in a kilometre
-DIGITS = 7
-MOST_DECIMALS = 9
-BEAM = 1.0 / 6.5  # of the length, drawn where the beam is not known
 COURSE_ORDERS = (
     "set_point",
     "course_order",
@@ -60,6 +56,7 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
     for part, values in episode.reward_parts.items():
         parts[part] = np.append(0.0, values)
     seed = None if episode.seed is None else str(episode.seed)
+    beam = 1.0 / 6.5  # of the length, drawn where the beam is not known
     return {
         "name": name,
         "environment": episode.environment,
@@ -69,7 +66,7 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
         "dt": episode.dt,
         "steps": episode.n_steps,
         "length": episode.length,
-        "beam": episode.beam or BEAM * episode.length,
+        "beam": episode.beam or beam * episode.length,
         "rudderLimit": float(np.degrees(episode.rudder_limit)),
         "outcome": outcome(episode),
         "total": float(np.sum(episode.rewards)),
@@ -231,7 +228,10 @@ def rounded(values: Floats) -> list[Any]:
     smallest = np.finfo(np.float64).tiny  # zero has no logarithm
     size = np.maximum(np.abs(array), smallest)
     before_point = 1.0 + np.floor(np.log10(size))
-    decimals = np.clip(DIGITS - before_point, 0.0, MOST_DECIMALS)
+    # significant digits of the numbers in the page: a millimetre in a kilometre
+    digits = 7
+    most_decimals = 9
+    decimals = np.clip(digits - before_point, 0.0, most_decimals)
 
     factor = 10.0**decimals
     scaled = np.round(array * factor)

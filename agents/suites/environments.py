@@ -12,7 +12,6 @@ from shipgym.python_files import working_folder
 
 #: Tasks of the shipped environments by their short names.
 SHORT_NAMES = {"course-keeping": "CourseKeeping", "path-following": "PathFollowing"}
-ENTRY_POINT = "shipgym.envs.ship_env:ShipEnv"  # of every environment of shipgym
 
 
 class Environment(NamedTuple):
@@ -88,8 +87,9 @@ def _import(module: str, text: str, where: str) -> None:
 def _registered(name: str, where: str) -> dict[str, Any]:
     """Keywords of an environment of shipgym by its id."""
     registered = {}
+    entry_point = "shipgym.envs.ship_env:ShipEnv"  # of every environment of shipgym
     for env_id, spec in gymnasium.registry.items():
-        if spec.entry_point == ENTRY_POINT and "task" in spec.kwargs:
+        if spec.entry_point == entry_point and "task" in spec.kwargs:
             registered[env_id] = spec.kwargs
     if name in registered:
         return registered[name]

@@ -48,7 +48,6 @@ __all__ = [
 DEFAULT_SUITE = "shipgym-v1"
 FOLDER = Path(__file__).parent
 FIELDS = ("environment", "model", "why", "sea", "options", "ship", "far")
-LARGEST_SUITE = 1_000_000  # bytes
 
 
 @dataclass(frozen=True)
@@ -114,7 +113,8 @@ def load_suite(
         return _shipped(where)
 
     path = Path(where).resolve()
-    content = read_bytes(path, "TOML file of a suite", LARGEST_SUITE)
+    largest_suite = 1_000_000  # bytes
+    content = read_bytes(path, "TOML file of a suite", largest_suite)
     try:
         text = content.decode()
     except UnicodeDecodeError:

@@ -11,9 +11,6 @@ from agents.training.settings import (
 )
 from shipgym.extras import library
 
-#: Parameters that stand for a setting of another name.
-STANDS_FOR = {"one_minus_gamma": "gamma", "minibatches": "batch_size"}
-
 
 def search_space(algorithm: str, fixed: Sequence[str] = ()) -> dict[str, Any]:
     """Return Optuna's distributions by parameter, without those whose setting is fixed.
@@ -62,8 +59,10 @@ def search_space(algorithm: str, fixed: Sequence[str] = ()) -> dict[str, Any]:
             "policy_delay": integer(1, 8),
         }
     varied = {}
+    # Parameters that stand for a setting of another name.
+    stands_for = {"one_minus_gamma": "gamma", "minibatches": "batch_size"}
     for name, distribution in space.items():
-        setting = STANDS_FOR.get(name, name)
+        setting = stands_for.get(name, name)
         if setting not in fixed:
             varied[name] = distribution
     return varied

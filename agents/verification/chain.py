@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
 
 FILES = ("report.html", "metrics.json", "model.json")  # beside those of the autopilots
-LARGEST_SEED = 2**32
 
 
 def build_autopilot(
@@ -69,7 +68,8 @@ def build_autopilot(
     arguments; nothing is written then.
     """
     check_number(draws, "draws", at_least=2)
-    check_number(seed, "seed", at_least=0, at_most=LARGEST_SEED)
+    largest_seed = 2**32
+    check_number(seed, "seed", at_least=0, at_most=largest_seed)
     for kind in designs:
         controller_class(kind, "autopilots")
     graph_objects()  # a missing extra is reported now, not after the work

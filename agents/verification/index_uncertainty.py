@@ -20,9 +20,6 @@ from shipgym.manoeuvres.turning import full_rudder_deg
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
 
-SAMPLES_PER_LENGTH = 10.0
-PATHS_KEPT = 40  # turning circles of draws that a report draws
-
 
 @dataclass(frozen=True)
 class ManoeuvreUncertainty:
@@ -68,16 +65,17 @@ def nominal_runs(model: ShipModel) -> NominalRuns:
     Raises UnstableModelError if it runs away.
     """
     travel = float(model.particulars["length"] / model.particulars["speed"])
-    dt = travel / SAMPLES_PER_LENGTH
+    samples_per_length = 10.0
+    dt = travel / samples_per_length
     run = zigzag(
         model,
         20.0,
         20.0,
-        duration=25.0 * SAMPLES_PER_LENGTH * dt,
+        duration=25.0 * samples_per_length * dt,
         dt=dt,
         must_reverse=False,
     )
-    duration = 30.0 * SAMPLES_PER_LENGTH * dt
+    duration = 30.0 * samples_per_length * dt
     circle = turning_circle(model, full_rudder_deg(model), duration, dt)
     return NominalRuns(run, circle)
 
@@ -174,11 +172,12 @@ def with_paths(
     stable = ~unstable[~sailed.lost]  # of those that were kept
     headings = np.array(sailed.headings)
     paths = np.array(sailed.paths)[stable]
+    paths_kept = 40  # turning circles of draws that a report draws
     return ManoeuvreUncertainty(
         criteria=criteria,
         unstable=unstable,
         zigzag=nominal.zigzag,
         zigzag_headings=headings[stable],
         circle=nominal.circle,
-        circle_paths=tuple(paths[:PATHS_KEPT]),
+        circle_paths=tuple(paths[:paths_kept]),
     )

@@ -35,8 +35,6 @@ from shipgym.ships import ShipModel
 REQUIREMENTS = read_toml(
     Path(__file__).with_name("standards.toml"), "table of standards"
 )
-TURN_DEG = 30.0  # change of heading
-RUDDER_DEG = 10.0  # the limit set to the rudder
 OFF_TRACK_M = 50.0  # the limit of the warning
 
 
@@ -83,9 +81,11 @@ def standards(
 
 def heading_control(model: ShipModel, pilot: Controller) -> dict[str, float]:
     """Values of heading control in calm water."""
-    narrow = Limits(order_deg=RUDDER_DEG)
-    turn = steer_to_heading(model, pilot, heading=TURN_DEG)
-    small = steer_to_heading(model, pilot, heading=TURN_DEG, limits=narrow)
+    rudder_deg = 10.0  # the limit set to the rudder
+    narrow = Limits(order_deg=rudder_deg)
+    turn_deg = 30.0  # change of heading
+    turn = steer_to_heading(model, pilot, heading=turn_deg)
+    small = steer_to_heading(model, pilot, heading=turn_deg, limits=narrow)
     straight = steer_to_heading(model, pilot)
     silent = steer_to_heading(model, pilot, lost=["heading"])
     return heading_values(turn, small, straight, silent)

@@ -19,9 +19,6 @@ from shipgym.sea.current_wind_waves import Current
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 
-TURNS_DEG = (30.0, -60.0, 90.0, -90.0, 45.0)  # changes of course, to starboard positive
-LEG_LENGTHS = 12.0  # of each leg
-SETTLED_LENGTHS = 6.0  # way after the start that does not count
 RECORDED = (
     "x",
     "y",
@@ -52,9 +49,12 @@ class Track:
 
 def track_task(model: ShipModel) -> Task:
     """The track for a ship, in a current of a tenth of her speed."""
-    courses = np.radians(np.cumsum([0.0, *TURNS_DEG]))
+    # changes of course, to starboard positive
+    turns_deg = (30.0, -60.0, 90.0, -90.0, 45.0)
+    courses = np.radians(np.cumsum([0.0, *turns_deg]))
     directions = np.column_stack([np.cos(courses), np.sin(courses)])
-    legs = LEG_LENGTHS * model.particulars["length"] * directions
+    leg_lengths = 12.0  # of each leg
+    legs = leg_lengths * model.particulars["length"] * directions
     ends = np.cumsum(legs, axis=0)
     waypoints = np.vstack([np.zeros(2), ends])
     current = Current(0.1 * model.particulars["speed"], towards_deg=90.0)
@@ -74,7 +74,8 @@ def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:
     run = rollout(guide, engine, seeds, record=RECORDED)
     figures = path_following(run)
 
-    settled = SETTLED_LENGTHS * models[0].particulars["length"]
+    settled_lengths = 6.0  # way after the start that does not count
+    settled = settled_lengths * models[0].particulars["length"]
     made_good = run.infos["distance_made_good"][1:]
     cross_track = run.infos["cross_track"]
     counts = run.sailing & (made_good > settled)

@@ -36,8 +36,6 @@ from shipgym.manoeuvres import prbs_rudder, turning_circle, zigzag
 #: Simulates a manoeuvre with a model.
 Candidate = Callable[[ShipModel], Trial]
 
-CRITERIA = ("c", "D", "E")
-
 
 @dataclass(frozen=True, eq=False)
 class Advice:
@@ -188,7 +186,8 @@ def standard_candidates(model: ShipModel) -> dict[str, Candidate]:
 
 def check_criterion(criterion: str, coefficient: str | None) -> None:
     """Refuse an unknown criterion, and a coefficient for one of all coefficients."""
-    check_choice(criterion, CRITERIA, "criterion")
+    criteria = ("c", "D", "E")
+    check_choice(criterion, criteria, "criterion")
     if coefficient is not None and criterion != "c":
         raise InputError(
             f"coefficient: expected none with criterion '{criterion}', which is of all"

@@ -13,8 +13,6 @@ from shipgym.checks import check_number
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import Structure
 
-SENSED = ("u", "v", "r", "psi")
-
 
 def table_of(model: ShipModel) -> Structure:
     """The table of terms of a model; InputError for equations written by hand."""
@@ -53,7 +51,8 @@ def sensitivity(
     table_of(model)
     base = manoeuvre(model)
     spans = {}
-    for name in SENSED:
+    sensed = ("u", "v", "r", "psi")
+    for name in sensed:
         span = float(np.ptp(base[name]))
         if span > 0.0:
             spans[name] = span

@@ -33,9 +33,6 @@ from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_flag, check_number, check_whole
 
-KERNELS = ("linear", "rbf", "poly")
-SELECTIONS = ("l-curve", "gcv", "explained-variance", "full")
-
 
 @dataclass(eq=False, repr=False)
 class LSSVM(LinearRegressor):
@@ -109,7 +106,8 @@ class LSSVM(LinearRegressor):
 
     def check(self) -> None:
         """Refuse settings that cannot be, by an InputError that names the setting."""
-        check_choice(self.kernel, KERNELS, "kernel")
+        kernels = ("linear", "rbf", "poly")
+        check_choice(self.kernel, kernels, "kernel")
         check_weight(self.C)
         check_scale(self.scale)
         if self.gamma is not None:
@@ -247,7 +245,8 @@ class TruncatedLSSVM(LinearRegressor):
 
     def check(self) -> None:
         """Refuse settings that cannot be, by an InputError that names the setting."""
-        check_choice(self.selection, SELECTIONS, "selection")
+        selections = ("l-curve", "gcv", "explained-variance", "full")
+        check_choice(self.selection, selections, "selection")
         check_weight(self.C)
         check_scale(self.scale)
         if self.rank is not None:

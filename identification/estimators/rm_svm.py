@@ -31,8 +31,6 @@ from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_flag, check_number, check_whole
 from shipgym.ships import GreyBox
 
-OBJECTIVES = ("rmse", "correlation")
-REGRESSIONS = ("svr", "ls-svm")
 #: Weight of the errors at which nothing is added to the reference ship.
 NO_CORRECTION = 0.0
 WEAKEST = 0.01  # weight of the errors of the weakest correction
@@ -107,8 +105,10 @@ class RMSVM(LinearRegressor):
 
     def check(self) -> None:
         """Refuse settings that cannot be, by an InputError that names the setting."""
-        check_choice(self.objective, OBJECTIVES, "objective")
-        check_choice(self.regression, REGRESSIONS, "regression")
+        objectives = ("rmse", "correlation")
+        check_choice(self.objective, objectives, "objective")
+        regressions = ("svr", "ls-svm")
+        check_choice(self.regression, regressions, "regression")
         check_choice(self.folds, FOLDS, "folds")
         check_flag(self.free_constant, "free_constant")
         if self.constant is not None:

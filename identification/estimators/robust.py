@@ -10,7 +10,6 @@ from shipgym.arrays import Floats
 MAD = 1.4826
 #: Residuals, by their scale, of full weight up to the first, of least from the second.
 INNER, OUTER = 2.5, 3.0
-LEAST_WEIGHT = 1e-4
 
 
 def hampel_weights(residuals: Floats, largest: float) -> Floats:
@@ -29,7 +28,8 @@ def hampel_weights(residuals: Floats, largest: float) -> Floats:
 
     sizes = np.abs(residuals) / scale
     ramp = (OUTER - sizes) / (OUTER - INNER)
-    return np.clip(ramp, LEAST_WEIGHT, 1.0)
+    least_weight = 1e-4
+    return np.clip(ramp, least_weight, 1.0)
 
 
 def fit_weighted(

@@ -27,7 +27,6 @@ from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_flag, check_whole
 
-OBJECTIVES = ("k-fold", "training", "free-running")
 #: Names of the methods by their search.
 METHOD_NAMES = {
     "abc": "abc-lssvr",
@@ -110,7 +109,8 @@ class TunedLSSVM(LinearRegressor):
     def check(self) -> None:
         """Refuse settings that cannot be, by an InputError that names the setting."""
         get_optimiser(self.optimiser)
-        check_choice(self.objective, OBJECTIVES, "objective")
+        objectives = ("k-fold", "training", "free-running")
+        check_choice(self.objective, objectives, "objective")
         self.log_bounds()
         check_folds(self.folds)
         check_whole(self.seed, "seed", at_least=0)

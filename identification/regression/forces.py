@@ -25,9 +25,6 @@ from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
 
 FORCES = ("X", "Y", "N")
 NEEDED = ("u", "v", "r", *FORCES)
-#: Times the usual change of a velocity from sample to sample: another angle of a static
-#: test.
-JUMP = 20.0
 FEWEST = 4  # samples between jumps
 #: How each method chooses the directions that it keeps.
 METHODS = {"ls": "full", "tls-svm": "l-curve"}
@@ -151,12 +148,15 @@ def between_jumps(trial: Trial) -> list[slice]:
     the test; stretches of fewer than 4 samples are left out.
     """
     is_jump = np.zeros(len(trial) - 1, dtype=bool)
+    # Times the usual change of a velocity from sample to sample: another angle of a
+    # static test.
+    jump = 20.0
     for name in AXES:
         velocity = trial[name]
         changes = np.abs(np.diff(velocity))
         usual = float(np.median(changes))
         rounding = 1e-9 * float(np.abs(velocity).max())
-        largest = max(JUMP * usual, rounding)
+        largest = max(jump * usual, rounding)
         is_jump |= changes > largest + rounding
 
     return stretches(is_jump, FEWEST)

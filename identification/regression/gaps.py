@@ -7,10 +7,6 @@ from identification.arrays import stretches
 from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Flags, Floats
 
-LARGEST_STEPS = 5.0  # of the usual time step; a longer one is a gap,
-#: unless it is shorter than this part of the time to sail one ship length
-SHORTEST_GAP = 0.15
-NEIGHBOURS = 11  # steps whose median is the usual one
 FEWEST_SAMPLES = 10  # between gaps; fewer are left out
 
 
@@ -46,10 +42,14 @@ def between_gaps(
 def _gaps(t: Floats, particulars: Particulars) -> Flags:
     """Whether each step between samples is a gap, shape (n_samples - 1,)."""
     steps = np.diff(t)
-    around = median_filter(steps, NEIGHBOURS, mode="mirror")
+    neighbours = 11  # steps whose median is the usual one
+    around = median_filter(steps, neighbours, mode="mirror")
     usual = np.maximum(np.median(steps), around)
 
     one_length = particulars["length"] / particulars["speed"]
-    longest = np.maximum(LARGEST_STEPS * usual, SHORTEST_GAP * one_length)
+    largest_steps = 5.0  # of the usual time step; a longer one is a gap,
+    # unless it is shorter than this part of the time to sail one ship length
+    shortest_gap = 0.15
+    longest = np.maximum(largest_steps * usual, shortest_gap * one_length)
     is_gap: Flags = steps > (1.0 + 1e-6) * longest
     return is_gap

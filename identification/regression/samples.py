@@ -35,9 +35,6 @@ from shipgym.checks import check_choice, check_whole
 from shipgym.ships import GreyBox, Structure
 from shipgym.trials.resampling import usual_step
 
-SAMPLE_STRUCTURES = ("euler", "integral", "spline")
-LONGEST_WINDOW = 1.0 / 3.0  # of the time to sail one ship length
-
 
 @dataclass(frozen=True)
 class Sampling:
@@ -58,7 +55,8 @@ class Sampling:
     window: int | None = None
 
     def __post_init__(self) -> None:
-        check_choice(self.rule, SAMPLE_STRUCTURES, "samples")
+        sample_structures = ("euler", "integral", "spline")
+        check_choice(self.rule, sample_structures, "samples")
         if self.window is not None:
             check_whole(self.window, "window", at_least=1, hint="in sampling steps")
 
@@ -309,7 +307,8 @@ def default_window(trial: Trial, particulars: Particulars) -> int:
     twentieth of the trial.
     """
     one_length = particulars["length"] / particulars["speed"]
-    by_travel = int(LONGEST_WINDOW * one_length / usual_step(trial.t))
+    longest_window = 1.0 / 3.0  # of the time to sail one ship length
+    by_travel = int(longest_window * one_length / usual_step(trial.t))
     longest = min(by_travel, len(trial) // 20)
 
     window = 1

@@ -10,13 +10,12 @@ from identification.regression.wind import measured_wind
 from shipgym import InputError, Particulars, Trial
 from shipgym.checks import check_choice, check_keys, check_number
 
-CURRENTS = ("auto", "shared", "trial", "none")
-
 
 def check_current(option: Any) -> None:
     """Refuse a current that is neither a word nor a table of north and east, m/s."""
+    currents = ("auto", "shared", "trial", "none")
     if not isinstance(option, Mapping):
-        check_choice(option, CURRENTS, "current", " or a table of north and east")
+        check_choice(option, currents, "current", " or a table of north and east")
         return
     check_keys(option, ("north", "east"), "current", ("north", "east"))
     for name, value in option.items():

@@ -10,8 +10,6 @@ from shipgym.manoeuvres.quantiles import NORMAL_95
 from shipgym.plots import Panel, axis, compact, panels, points
 from shipgym.plots.style import LIMIT, MODEL, Figure
 
-PALE = "#b3bcc7"
-
 
 class _Bar(NamedTuple):
     """95 % interval of a coefficient, per cent of its size, of one that is 0 of 1."""
@@ -59,9 +57,10 @@ def _bar(fit: Fit, name: str) -> _Bar:
 
 def _panel(bars: Sequence[_Bar], rows: int) -> Panel:
     """A column of intervals, the first coefficient on top."""
+    pale = "#b3bcc7"
     traces = [
         _trace(bars, True, "significant", MODEL),
-        _trace(bars, False, "not significant", PALE),
+        _trace(bars, False, "not significant", pale),
     ]
     labels = axis(
         tickvals=list(range(len(bars))),

@@ -35,7 +35,6 @@ from shipgym.plots import (
 from shipgym.plots.style import LIMIT, MEASURED, MODEL, MUTED, Figure
 
 UNITS = {"u": "m/s²", "v": "m/s²", "r": "deg/s²", "p": "deg/s²"}
-MOST_ROWS = 2500  # drawn of one equation
 LAGS = 24  # windows
 
 
@@ -79,7 +78,8 @@ class Accelerations(NamedTuple):
 def fit_figure(fit: Fit) -> Figure:
     """Mean acceleration over each window, as measured and as the regression has it."""
     samples = fit.samples
-    every = max(len(samples) // MOST_ROWS, 1)
+    most_rows = 2500  # drawn of one equation
+    every = max(len(samples) // most_rows, 1)
     drawn = slice(None, None, every)
     trial = samples.trial[drawn]
     breaks = np.flatnonzero(np.diff(trial)) + 1

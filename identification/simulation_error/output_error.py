@@ -19,9 +19,6 @@ from identification.simulation_error.shooting import Shooter, Shooting
 from identification.uncertainty.covariance import newey_west
 from shipgym.arrays import Floats
 
-# of fits, between which scales of the residuals and starts of the segments are renewed
-ROUNDS = 3
-
 
 @dataclass(frozen=True, eq=False)
 class Solution:
@@ -108,7 +105,10 @@ class OutputError:
         parameters = self.start
         segments = [*self.fitted, *self.further]
         evaluations = 0
-        for _ in range(ROUNDS):
+        # of fits, between which scales of the residuals and starts of the segments are
+        # renewed
+        rounds = 3
+        for _ in range(rounds):
             last_scales, last_segments = scales, segments
             fit = self._fit(parameters, segments, scales, weights)
             parameters = fit.x

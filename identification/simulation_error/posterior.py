@@ -25,9 +25,6 @@ from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES
 from shipgym.ships.mmg import IDENTIFIED
 
-SEGMENT_LENGTHS = 1.7  # of a segment, ship lengths at service speed
-SAMPLE_LENGTHS = 0.067  # between the samples that are compared
-CORRELATED_LENGTHS = 1.0  # over which errors are one error
 #: Least scales of the errors: velocities by service speed U0, yaw rate by U0 / L,
 #: heading in rad.
 FLOORS = {"u": 0.0017, "v": 0.0017, "r": 0.0021, "psi": np.radians(0.1)}
@@ -69,13 +66,15 @@ class Posterior:
         self.channels = compared_channels(blank, trials)
         floors = np.array([FLOORS[name] for name in self.channels])
         self.floors = floors * channel_units(blank, self.channels)
+        segment_lengths = 1.7  # of a segment, ship lengths at service speed
+        sample_lengths = 0.067  # between the samples that are compared
         self.segments = cut(
             trials,
             self.blank,
             self.channels,
-            SEGMENT_LENGTHS,
+            segment_lengths,
             staggered=False,
-            interval=SAMPLE_LENGTHS,
+            interval=sample_lengths,
         )
         self._last: tuple[bytes, tuple[Floats, Floats]] | None = None
 
@@ -150,7 +149,8 @@ class Posterior:
 
     def independent_errors(self, segment: Segment) -> float:
         """Times over which errors are one error that a segment has."""
-        correlated = CORRELATED_LENGTHS * self.blank.travel_time
+        correlated_lengths = 1.0  # over which errors are one error
+        correlated = correlated_lengths * self.blank.travel_time
         return segment.duration / correlated
 
     def scales(self, errors: Floats, which: Integers) -> Floats:

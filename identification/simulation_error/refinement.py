@@ -8,8 +8,6 @@ from identification.estimators.lssvm import TruncatedLSSVM
 from shipgym import ShipModel, Trial
 from shipgym.checks import check_choice, check_flag, check_number
 
-STARTS = ("free", "measured")
-
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
@@ -78,7 +76,8 @@ class Refinement:
             hint="in ship lengths",
         )
         check_flag(self.staggered, "staggered")
-        check_choice(self.segment_start, STARTS, "segment_start")
+        starts = ("free", "measured")
+        check_choice(self.segment_start, starts, "segment_start")
         check_number(self.pull, "pull", at_least=0.0)
         check_flag(self.rudder_offsets, "rudder_offsets")
         check_number(self.extra_weight, "extra_weight", above=0.0)

@@ -10,8 +10,6 @@ from identification.regression.samples import Samples
 from shipgym import InputError, Trial
 from shipgym.ships import Structure
 
-MOTIONS = {"u": "surge speed", "v": "sway speed", "r": "yaw rate", "p": "roll rate"}
-
 
 def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
     """Refuse trials from which a structure cannot be identified.
@@ -100,9 +98,10 @@ def check_samples(
     samples: Samples, trials: Sequence[Trial], structure: Structure
 ) -> None:
     """Refuse too few rows for the terms, and a motion that never changes."""
+    motions = {"u": "surge speed", "v": "sway speed", "r": "yaw rate", "p": "roll rate"}
     for q, change in samples.targets.items():
         if not np.any(change):
-            motion = MOTIONS.get(q, q)
+            motion = motions.get(q, q)
             raise InputError(
                 f"trial {trials[0].name!r}: expected the {motion} to be"
                 f" excited and measured, got a channel {q!r} that never changes, in"

@@ -20,8 +20,6 @@ from shipgym.ships.orders import checked_orders, two_commands
 from shipgym.ships.simulate import Conditions, Passage
 
 STEP = 0.02  # of the time to sail one ship length
-# times the measured one; a heading that is not reached by then is never reached
-LONGEST_LEG = 2.0
 
 
 class ZigzagLeg(NamedTuple):
@@ -114,8 +112,10 @@ def _sail(
     """Sail a leg from a time and a state; None where its target is not reached."""
     model, dt = passage.model, passage.dt
     longest = leg.duration
+    # times the measured one; a heading that is not reached by then is never reached
+    longest_leg = 2.0
     if leg.target is not None:
-        longest *= LONGEST_LEG
+        longest *= longest_leg
     n_steps = max(int(np.ceil(longest / dt)), 2)
     steps = np.arange(n_steps + 1, dtype=float)
     t = begin + dt * steps

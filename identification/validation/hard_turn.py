@@ -6,14 +6,7 @@ from shipgym import Particulars
 from shipgym.arrays import Floats
 from shipgym.ships import Structure
 
-#: KVLCC2 of SIMMAN 2008 slows down to 0.37 of her speed at r L / U = 0.8 and a drift of
-#: 20 degrees. The shaft turns somewhat slower under its load.
-SPEED_RATIO = 0.47
-DRIFT_DEG = 20.5
-YAW_RATE = 0.8  # r L / U
-HEEL_DEG = 5.0
 RUDDER_DEG = 35.0
-SHAFT_RATIO = 0.9
 
 
 def hard_turn_features(
@@ -21,17 +14,24 @@ def hard_turn_features(
 ) -> dict[str, Floats]:
     """Size of each term in a hard turn, by equation, SI units, shape (n_terms,)."""
     length = particulars["length"]
-    speed = SPEED_RATIO * particulars["speed"]
-    drift = np.radians(DRIFT_DEG)
-    heel = np.radians(HEEL_DEG)
+    # KVLCC2 of SIMMAN 2008 slows down to 0.37 of her speed at r L / U = 0.8 and a drift
+    # of 20 degrees. The shaft turns somewhat slower under its load.
+    speed_ratio = 0.47
+    speed = speed_ratio * particulars["speed"]
+    drift_deg = 20.5
+    drift = np.radians(drift_deg)
+    heel_deg = 5.0
+    heel = np.radians(heel_deg)
+    yaw_rate = 0.8  # r L / U
+    shaft_ratio = 0.9
     state = {
         "u": speed * np.cos(drift),
         "v": -speed * np.sin(drift),
-        "r": YAW_RATE * speed / length,
-        "p": heel * SPEED_RATIO * particulars["speed"] / length,
+        "r": yaw_rate * speed / length,
+        "p": heel * speed_ratio * particulars["speed"] / length,
         "phi": heel,
         "delta": np.radians(RUDDER_DEG),
-        "n": SHAFT_RATIO * shaft_speed,
+        "n": shaft_ratio * shaft_speed,
     }
     channels = {name: np.array([state[name]]) for name in structure.required_channels}
 

@@ -13,7 +13,6 @@ from shipgym.ships.simulate import open_loop
 
 COMPARED = ("u", "v", "r", "psi")
 ZIGZAG = ("overshoot_1_deg", "overshoot_2_deg")
-TURNING = ("advance_lengths", "transfer_lengths", "tactical_diameter_lengths")
 
 #: From a run of a trial's manoeuvre, or None for one that ran away, to its indices.
 IndexReader = Callable[[Trial | None], Any]
@@ -41,11 +40,12 @@ def trial_metrics(
     reversed at the measured headings), None where the manoeuvre has no such index or
     never got there.
     """
+    turning = ("advance_lengths", "transfer_lengths", "tactical_diameter_lengths")
     metrics: dict[str, Any] = {
         "use": trial.use,
         "diverged": prediction is None,
         "rmse": _errors(trial, prediction),
-        **dict.fromkeys((*ZIGZAG, *TURNING)),
+        **dict.fromkeys((*ZIGZAG, *turning)),
     }
     read = index_reader(model, trial)
     if read is None:
@@ -55,7 +55,7 @@ def trial_metrics(
         return metrics
 
     runs = {"measured": measured, "predicted": read(prediction)}
-    names: tuple[str, ...] = TURNING
+    names: tuple[str, ...] = turning
     if trial.kind == "zigzag":
         names = ZIGZAG
         again = None if prediction is None else closed_loop(model, trial)

@@ -10,7 +10,6 @@ from identification.fit import Fit
 from shipgym import InputError, ShipModel, Trial
 from shipgym.ships.linear import is_course_stable, steering_state_space
 
-LOST_HEADING_DEG = 10.0  # rms error beyond which a prediction says nothing
 EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw", "p": "roll"}
 
 
@@ -257,10 +256,11 @@ def _first_speed(trial: Trial) -> float:
 
 def _lost_headings(fit: Fit) -> list[str]:
     """The trials whose heading the model does not predict, and the likely cause."""
+    lost_heading_deg = 10.0  # rms error beyond which a prediction says nothing
     lost = {
         name: error
         for name, error in heading_errors_deg(fit).items()
-        if error > LOST_HEADING_DEG
+        if error > lost_heading_deg
     }
     if not lost:
         return []
@@ -271,7 +271,7 @@ def _lost_headings(fit: Fit) -> list[str]:
     cause = why_lost(fit.model, fitted)
     return [
         "the predicted heading drifts from the measured one by more than"
-        f" {LOST_HEADING_DEG:.0f} deg rms on {trials}: {cause}"
+        f" {lost_heading_deg:.0f} deg rms on {trials}: {cause}"
     ]
 
 

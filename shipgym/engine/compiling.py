@@ -21,15 +21,10 @@ from shipgym.engine.numba_errors import explanation
 from shipgym.engine.specialise import Hooks, Specialisation
 from shipgym.errors import InputError
 
-SECONDS = 7  # about what a loop takes to compile on a laptop; what who waits is told
-
 # error_model "numpy" keeps loops free of branches; contraction is the only fast-math
 # liberty taken, because the others would optimise NaN checks away and make results
 # depend on the batch size
 SEMANTICS = {"error_model": "numpy", "fastmath": {"contract"}}
-# functions that loops call need no entries for Python and C, which take longer to
-# compile than many a function
-INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 #: Compiled functions that loops call, by all that they depend on: loops share them.
 SHARED: dict[Any, Any] = {}
@@ -122,9 +117,12 @@ class Compilation(Specialisation):
         code = function.__code__
         place = (code.co_filename, code.co_firstlineno)  # which errors name
         key = (tag, records, inlined, checked, place)
+        # functions that loops call need no entries for Python and C, which take longer
+        # to compile than many a function
+        inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         if key not in SHARED:
             options = {"forceinline": inlined, "boundscheck": checked}
-            jit = numba.njit(**options, **INNER, **SEMANTICS)
+            jit = numba.njit(**options, **inner, **SEMANTICS)
             SHARED[key] = jit(_named(self.copy(function, checked)))
         return SHARED[key]
 
@@ -161,7 +159,9 @@ def announce(what: str, folder: Path | None) -> None:
     kept = "kept in memory only"
     if folder:
         kept = f"kept in {folder} (beforehand: shipgym warm)"
-    tell_who_waits(f"shipgym: compiling {what}, once, about {SECONDS} s; {kept}")
+    # about what a loop takes to compile on a laptop; what who waits is told
+    seconds = 7
+    tell_who_waits(f"shipgym: compiling {what}, once, about {seconds} s; {kept}")
 
 
 def tell_who_waits(words: str) -> None:

@@ -26,9 +26,6 @@ from shipgym.engine.specialise import (
     nested_code,
 )
 
-#: Modules that decide how machine code is written.
-COMPILER = ("compiling", "specialise")
-
 
 def fingerprint(function: Any, hooks: Hooks) -> str:
     """Hash a function with its hooks filled."""
@@ -161,7 +158,9 @@ def _compiler() -> str:
     from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
 
     sources = hashlib.sha256()
-    for name in COMPILER:
+    # Modules that decide how machine code is written.
+    compiler = ("compiling", "specialise")
+    for name in compiler:
         sources.update(Path(__file__).with_name(f"{name}.py").read_bytes())
     config = numba.config
     versions = (sources.hexdigest(), platform.python_version(), numba.__version__)

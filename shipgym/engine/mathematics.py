@@ -16,20 +16,8 @@ import numpy as np
 Choice = TypeVar("Choice")
 
 TWO_OVER_PI = 2.0 / pi
-HALF_PI_HIGH = 1.57079632673412561417e00
-HALF_PI_LOW = 6.07710050650619224932e-11
-PER_LN_2 = 1.44269504088896338700e00
-LN_2_HIGH = 6.93147180369123816490e-01
-LN_2_LOW = 1.90821492927058770002e-10
-# exponents beyond which the exponential is 0 or infinite
-LOWEST = -746.0
-HIGHEST = 710.0
 # 1.5 * 2^52: a number added to it loses what is behind the point
 SHIFT = 6755399441055744.0
-# added to a whole number: its biased exponent in the lowest bits
-EXPONENT = 4503599627370496.0 + 1023.0
-TAN_3_PI_OVER_8 = 2.41421356237309504880
-HALF_PI_REST = 6.12323399573676588613e-17  # pi / 2 less its double
 
 
 def pick(condition: bool, yes: Choice, no: Choice) -> Choice:
@@ -73,7 +61,9 @@ def cosine_polynomial(z: float) -> float:
 def sin_cos(x: float) -> tuple[float, float]:
     """Sine and cosine of an angle in rad."""
     quarter = nearest(x * TWO_OVER_PI)
-    y = (x - quarter * HALF_PI_HIGH) - quarter * HALF_PI_LOW
+    half_pi_high = 1.57079632673412561417e00
+    half_pi_low = 6.07710050650619224932e-11
+    y = (x - quarter * half_pi_high) - quarter * half_pi_low
     z = y * y
     s = sine_polynomial(y, z)
     c = cosine_polynomial(z)
@@ -128,15 +118,23 @@ def power_of_bits(biased: float) -> float:
 
 def power_of_two(k: float) -> float:
     """2 to the power of a whole number in [-1022, 1023]."""
-    return power_of_bits(k + EXPONENT)
+    # added to a whole number: its biased exponent in the lowest bits
+    exponent = 4503599627370496.0 + 1023.0
+    return power_of_bits(k + exponent)
 
 
 def exponential(x: float) -> float:
     """Exponential of x; 0 and infinity beyond the range of numbers."""
-    within = min(max(x, LOWEST), HIGHEST)
-    k = nearest(within * PER_LN_2)
-    high = within - k * LN_2_HIGH
-    low = k * LN_2_LOW
+    # exponents beyond which the exponential is 0 or infinite
+    lowest = -746.0
+    highest = 710.0
+    within = min(max(x, lowest), highest)
+    per_ln_2 = 1.44269504088896338700e00
+    k = nearest(within * per_ln_2)
+    ln_2_high = 6.93147180369123816490e-01
+    high = within - k * ln_2_high
+    ln_2_low = 1.90821492927058770002e-10
+    low = k * ln_2_low
     y = high - low
     z = y * y
     series = -1.65339022054652515390e-06 + z * 4.13813679705723846039e-08
@@ -174,7 +172,8 @@ def arctan2(y: float, x: float) -> float:
     """Angle in [-pi, pi] of the point with the finite coordinates x and y, rad."""
     a = fabs(y)
     b = fabs(x)
-    steep = a > TAN_3_PI_OVER_8 * b
+    tan_3_pi_over_8 = 2.41421356237309504880
+    steep = a > tan_3_pi_over_8 * b
     middling = a > 0.66 * b
     # by picks, not by branches, which a loop over lanes would have to undo
     above = pick(steep, -b, pick(middling, a - b, a))
@@ -194,7 +193,8 @@ def arctan2(y: float, x: float) -> float:
     arc = q + q * (z * p / d)
 
     quarters = pick(steep, 0.5, pick(middling, 0.25, 0.0))
-    rest = 2.0 * HALF_PI_REST
+    half_pi_rest = 6.12323399573676588613e-17  # pi / 2 less its double
+    rest = 2.0 * half_pi_rest
     ahead = quarters * pi + (arc + quarters * rest)
     behind = pi - (ahead - rest)
     angle = pick(copysign(1.0, x) < 0.0, behind, ahead)

@@ -9,12 +9,6 @@ from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import clip, sin_cos, small_cosine, turn_sin_cos
 
-# a state beyond these multiples of service speed and of yaw rate U0 / L belongs to no
-# ship
-RUNAWAY_SPEED = 3.0
-RUNAWAY_YAW_RATE = 6.0
-CAPSIZED = 1.5707963267948966  # rad; nor does it heel beyond a right angle
-
 # What ship, gear and sea have. Set when a loop is compiled, like hooks, so that what
 # they lack costs nothing.
 HAS_ROLL = True
@@ -331,11 +325,16 @@ def lost(motion: Motion, ship: Ship) -> bool:
     """
     u = motion.u
     v = motion.v
-    fastest = RUNAWAY_SPEED * ship.speed
-    quickest = RUNAWAY_YAW_RATE * ship.speed
+    # a state beyond these multiples of service speed and of yaw rate U0 / L belongs to
+    # no ship
+    runaway_speed = 3.0
+    fastest = runaway_speed * ship.speed
+    runaway_yaw_rate = 6.0
+    quickest = runaway_yaw_rate * ship.speed
     slow = u * u + v * v < fastest * fastest
     steady = fabs(motion.r) * ship.length < quickest
+    capsized = 1.5707963267948966  # rad; nor does it heel beyond a right angle
     if HAS_ROLL:
-        upright = fabs(motion.phi) < CAPSIZED
+        upright = fabs(motion.phi) < capsized
         return not (slow & steady & upright)
     return not (slow & steady)

@@ -11,8 +11,6 @@ from shipgym.engine.motion import Motion, Push, Ship, lost, sail
 from shipgym.engine.specialise import called
 from shipgym.engine.trajectories import follow, push_now, replaced
 
-SWITCH_ITERATIONS = 12
-
 
 @called
 def sail_step(
@@ -54,7 +52,8 @@ def switched(
     miss_low = side * motion.psi - threshold
     miss_high = side * end.psi - threshold
     part = 1.0
-    for _ in range(SWITCH_ITERATIONS):
+    switch_iterations = 12
+    for _ in range(switch_iterations):
         part = low - miss_low * (high - low) / (miss_high - miss_low)
         after = sail_step(motion, command, n, part * h, pushed, coefficients, ship)
         miss = side * after.psi - threshold

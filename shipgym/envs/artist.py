@@ -10,9 +10,6 @@ from shipgym.envs.engine import Engine
 from shipgym.envs.rendering import Renderer, Scene
 from shipgym.trials.units import KNOT
 
-WAKE_POINTS = 400  # kept of the wake
-USUAL_BEAM = 0.15  # of the length, where the beam is not known
-
 
 class Artist:
     """Draws one lane of an engine; modes as in `Renderer`."""
@@ -33,7 +30,8 @@ class Artist:
         north = float(state["x"][self._lane])
         east = float(state["y"][self._lane])
         self._wake.append((north, east))
-        del self._wake[:-WAKE_POINTS]
+        wake_points = 400  # kept of the wake
+        del self._wake[:-wake_points]
 
     def picture(self, engine: Engine) -> NDArray[np.uint8]:
         """Draw the lane, uint8 array of shape (600, 600, 3)."""
@@ -61,13 +59,14 @@ def scene(engine: Engine, lane: int, wake: Floats) -> Scene:
     east = state.get("current_east", 0.0)
     if north or east:
         current = (hypot(north, east), atan2(east, north))
+    usual_beam = 0.15  # of the length, where the beam is not known
     return Scene(
         x=state["x"],
         y=state["y"],
         heading=state["psi"],
         rudder=state["delta"],
         length=length,
-        beam=particulars.get("beam") or USUAL_BEAM * length,
+        beam=particulars.get("beam") or usual_beam * length,
         rudder_limit=engine.model.steering.limit,
         wake=wake,
         course_order=state.get("set_point", state["psi"]),

@@ -18,7 +18,6 @@ MakeSingle = Callable[[], gymnasium.Env[Any, Any]]
 Episode = list[tuple[Any, Any, Any, Any]]
 SEED = 1234
 STEPS = 200
-STAGGER = 5  # step at which a row is begun anew by hand
 
 
 def check_vector_env(
@@ -248,6 +247,7 @@ def _check_autoreset(env: Vectors, n_steps: int) -> None:
     env.action_space.seed(SEED)
     env.reset(seed=SEED)
     ended = np.zeros(env.num_envs, dtype=np.bool_)
+    stagger = 5  # step at which a row is begun anew by hand
     for step in range(n_steps):
         action = env.action_space.sample()
         observations, rewards, terminated, truncated, infos = env.step(action)
@@ -265,7 +265,7 @@ def _check_autoreset(env: Vectors, n_steps: int) -> None:
             if np.any(done):
                 _check_final(env, infos, done)
         else:
-            if step == STAGGER:  # so that episodes do not all end together
+            if step == stagger:  # so that episodes do not all end together
                 done = done.copy()
                 done[0] = True
             if np.any(done):

@@ -27,9 +27,6 @@ from shipgym.tasks.guidance import track
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
 
-#: What has to be recorded of any ship.
-REQUIRED_STATES = ("x", "y", "psi", "delta")
-
 
 @dataclass(frozen=True, eq=False)
 class Episode:
@@ -154,10 +151,12 @@ class Episode:
         self._set_table("info", n_steps + 1)
         self._set_table("commands", n_steps)
         self._set_table("reward_parts", n_steps)
-        missing = [name for name in REQUIRED_STATES if name not in self.states]
+        # What has to be recorded of any ship.
+        required_states = ("x", "y", "psi", "delta")
+        missing = [name for name in required_states if name not in self.states]
         if missing:
             raise InputError(
-                f"states: expected {quoted(REQUIRED_STATES)} at least, got"
+                f"states: expected {quoted(required_states)} at least, got"
                 f" {quoted(self.states)}"
             )
 

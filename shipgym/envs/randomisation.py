@@ -16,7 +16,6 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.term_table import Structure
 
 POOL_SIZE = 256  # ships drawn from what is continuous
-POOL_SEED = 20260101
 N_SPEEDS = 9  # approach speeds, evenly over their range
 Range = tuple[float, float]
 Pool = list[tuple[ShipModel, Weather]]
@@ -95,7 +94,8 @@ class Randomisation:
 
     def _drawn(self, models: Sequence[ShipModel], seas: Sequence[Weather]) -> Pool:
         """Draw ships of each model in turn, and give each round a sea."""
-        random = np.random.default_rng(POOL_SEED)
+        pool_seed = 20260101
+        random = np.random.default_rng(pool_seed)
         n_rounds = -(-POOL_SIZE // len(models))
         samples = []
         for model in models:

@@ -20,9 +20,6 @@ Point = tuple[float, float]
 Colour = tuple[int, int, int]
 
 SIZE = 600  # pixels of a side
-CHART_LENGTHS = 14.0  # ship lengths across the chart
-RENDER_MODES = ("human", "rgb_array")
-FRAMES_PER_SECOND = 30
 FINER = 2  # pixels drawn for one that is shown, so that edges are smooth
 
 WATER = (234, 241, 245)
@@ -79,7 +76,8 @@ class _Chart:
     """Map from metres north and east to pixels, north up, the ship in the middle."""
 
     def __init__(self, scene: Scene) -> None:
-        width = CHART_LENGTHS * scene.length
+        chart_lengths = 14.0  # ship lengths across the chart
+        width = chart_lengths * scene.length
         self.metres = width / SIZE  # of a pixel
         # of the grid: the largest of 1, 2, 5 times a power of ten that is not above a
         # sixth of the chart
@@ -116,7 +114,8 @@ class Renderer:
     """
 
     def __init__(self, mode: str) -> None:
-        self.mode = check_choice(mode, RENDER_MODES, "render_mode")
+        render_modes = ("human", "rgb_array")
+        self.mode = check_choice(mode, render_modes, "render_mode")
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
         use = f"render_mode {mode!r} needs it"
         pygame = library("pygame", "render", use)
@@ -163,7 +162,8 @@ class Renderer:
         pygame.event.pump()
         self._window.blit(self._surface, (0, 0))
         pygame.display.flip()
-        self._clock.tick(FRAMES_PER_SECOND)
+        frames_per_second = 30
+        self._clock.tick(frames_per_second)
 
     def _draw_grid(self, chart: _Chart) -> None:
         for down in chart.grid_lines(axis=0):

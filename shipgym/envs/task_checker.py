@@ -26,7 +26,6 @@ PLAIN_STEPS = 40  # in plain Python
 PLAIN_LANES = 3
 AGREEMENT = 1e-5  # of compiled and plain results, whose last digits differ
 BEYOND = 1e-6  # of a bound, what rounding makes
-OFTEN = 0.05  # part of the observations beyond their bounds that is worth a remark
 
 
 class TaskCheck(Findings):
@@ -226,12 +225,13 @@ def _differ(
 
 def _often_clipped(task: Task, seen: dict[str, list[float]]) -> Iterator[str]:
     """Observations that are often beyond their bounds."""
+    often = 0.05  # part of the observations beyond their bounds that is worth a remark
     for path, observed in seen.items():
         spec = task.definition.observations[path]
         values = np.array(observed)
         is_beyond = (values < spec.low - BEYOND) | (values > spec.high + BEYOND)
         part = np.mean(is_beyond)
-        if part > OFTEN:
+        if part > often:
             beyond = values[is_beyond]
             furthest = beyond[np.abs(beyond).argmax()]
             yield (

@@ -19,7 +19,6 @@ from shipgym.tasks.contract import Interval, Random, Readings
 INSTRUMENTS_STREAM = np.uint64(0xE7037ED1A0B428DB)
 #: Damping ratios a and b of the notch's numerator and denominator.
 DEEP, WIDE = 0.1, 0.7
-STEEPEST = 2.8  # largest angle between samples that the filter is tuned to, rad
 
 HAS_NOISE, HAS_FILTER = True, True  # known when compiled
 
@@ -86,8 +85,9 @@ def measure(
     r = sea.r_wave + noise.r
     heading = memory.heading
     rate = memory.rate
+    steepest = 2.8  # largest angle between samples that the filter is tuned to, rad
     if HAS_FILTER:
-        turn = clip(frequency * interval.dt, 0.0, STEEPEST)
+        turn = clip(frequency * interval.dt, 0.0, steepest)
         first = interval.steps == 0.0
         heading = notched(motion.psi + psi, turn, first, memory.heading)
         rate = notched(motion.r + r, turn, first, memory.rate)

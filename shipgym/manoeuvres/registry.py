@@ -16,9 +16,6 @@ from shipgym.trials.trial import KINDS, Trial
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-# duration of a standard zigzag or turning circle, in times to travel one ship length
-LENGTHS = 40.0
-STEPS_PER_LENGTH = 50  # of their simulation
 FASTEST = 1.5  # speed by that of service that no manoeuvre at service power exceeds
 QUICKEST_TURN = 3.0  # likewise the yaw rate by U / L
 SIDES = (("starboard", 1.0), ("port", -1.0))
@@ -170,4 +167,8 @@ def standard_manoeuvres(
 
 def standard_time(model: ShipModel) -> tuple[float, float]:
     """Duration and step of a standard zigzag or turning circle, s."""
-    return LENGTHS * model.travel_time, model.travel_time / STEPS_PER_LENGTH
+    # duration of a standard zigzag or turning circle, in times to travel one ship
+    # length
+    lengths = 40.0
+    steps_per_length = 50  # of their simulation
+    return lengths * model.travel_time, model.travel_time / steps_per_length

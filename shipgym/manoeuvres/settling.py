@@ -12,12 +12,6 @@ from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Conditions, Passage, as_trial
 from shipgym.trials.trial import Trial
 
-STEPS_PER_LENGTH = 40  # simulation steps in the time to travel one ship length
-STRETCH = 5.0  # ship lengths at service speed over which the motion is averaged
-MOST_STRETCHES = 60  # after which a leg ends, steady or not
-# largest change of (u, v, r L) / U0 and rudder from one stretch to the next
-STEADY = 2e-5
-
 #: Fills states of shape (n_steps + 1, n_columns), which begin with the start, and
 #: commands (n_steps, 2).
 Sail = Callable[[Floats, Floats], None]
@@ -48,7 +42,8 @@ class Voyage:
         self.model = model
         self.water_depth = conditions.water_depth
         self.length_time = model.travel_time
-        self.dt = self.length_time / STEPS_PER_LENGTH
+        steps_per_length = 40  # simulation steps in the time to travel one ship length
+        self.dt = self.length_time / steps_per_length
         if dt is not None:
             self.dt = check_number(dt, "dt", above=0.0, at_most=self.length_time)
         self.passage = Passage(model, conditions, self.dt)
@@ -123,18 +118,22 @@ class Voyage:
         speed = self.model.particulars["speed"]
         units = np.array([speed, speed, 1.0 / self.length_time, 1.0])
         motion = np.full(len(units), np.inf)
-        for _ in range(MOST_STRETCHES):
+        most_stretches = 60  # after which a leg ends, steady or not
+        # largest change of (u, v, r L) / U0 and rudder from one stretch to the next
+        steady = 2e-5
+        for _ in range(most_stretches):
             before = motion
             motion = self._stretch(sail)
             change = np.abs(motion - before) / units
-            if change.max() < STEADY:
+            if change.max() < steady:
                 break
         _, _, yaw_rate, rudder = motion.tolist()
         return SteadyMotion(rudder, yaw_rate)
 
     def _stretch(self, sail: Sail) -> Floats:
         """Sail a stretch; means of u, v, r and the ordered rudder, shape (4,)."""
-        n_steps = round(STRETCH * self.length_time / self.dt)
+        stretch = 5.0  # ship lengths at service speed over which the motion is averaged
+        n_steps = round(stretch * self.length_time / self.dt)
         states, commands = self.go(sail, n_steps)
         names = self.model.state_names
         columns = [names.index(name) for name in ("u", "v", "r")]

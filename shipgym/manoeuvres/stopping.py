@@ -18,8 +18,6 @@ from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
 
-LONGEST = 300  # of a stopping trial, L / U0
-
 
 @dataclass(frozen=True)
 class StoppingIndices:
@@ -78,7 +76,8 @@ def stopping(
     n_steps = max(round(voyage.length_time / voyage.dt), 2)  # of a ship length
     target = speed_ratio * model.particulars["speed"]
     column = model.state_names.index("u")
-    for stretch in range(LONGEST):
+    longest = 300  # of a stopping trial, L / U0
+    for stretch in range(longest):
         states, _ = voyage.go(leg, n_steps)
         is_slow = states[:, column] <= target
         if is_slow.any():

@@ -22,9 +22,6 @@ from shipgym.ships.envelope import ENVELOPE_CHANNELS
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
 
-#: Share of the draws on one side of a limit, from which on a criterion is decided.
-SURE = 0.975
-
 
 @dataclass(frozen=True)
 class Criterion:
@@ -141,7 +138,9 @@ def _on_both_sides(criterion: Criterion) -> bool:
     passes = drawn.values <= criterion.limit
     fails = ~passes & ~drawn.ran_away
     larger_share = max(passes.mean(), fails.mean())
-    return bool(larger_share < SURE)
+    # Share of the draws on one side of a limit, from which on a criterion is decided.
+    sure = 0.975
+    return bool(larger_share < sure)
 
 
 def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:

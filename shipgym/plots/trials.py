@@ -40,11 +40,6 @@ CHANNEL_AXES = {
     "wind_speed": ChannelAxis("wind, m/s"),
 }
 
-ROW_HEIGHT = 150  # of one channel's time history, pixels
-#: Samples of one line that are drawn, more than a page has pixels; spirals have many
-#: more.
-MOST_SAMPLES = 1500
-
 
 def quantity(trial: Trial, name: str) -> Floats | None:
     """Channel of a trial, or speed (m/s) or drift angle (rad); None without them.
@@ -66,7 +61,10 @@ def quantity(trial: Trial, name: str) -> Floats | None:
 
 def thinned(trial: Trial) -> slice:
     """The samples that a figure draws."""
-    step = math.ceil(len(trial) / MOST_SAMPLES)
+    # Samples of one line that are drawn, more than a page has pixels; spirals have many
+    # more.
+    most_samples = 1500
+    step = math.ceil(len(trial) / most_samples)
     return slice(None, None, step)
 
 
@@ -87,7 +85,8 @@ def history_figure(
             " got none"
         )
     grid = {"shared_xaxes": True, "vertical_spacing": 0.16 / len(shown)}
-    height = ROW_HEIGHT * len(shown) + 70
+    row_height = 150  # of one channel's time history, pixels
+    height = row_height * len(shown) + 70
     return panels(shown, height, outer=True, grid=grid)
 
 

@@ -9,8 +9,6 @@ from typing import NamedTuple
 
 from shipgym.engine.mathematics import sin_cos
 
-SMALLEST_VARIANCE = 1e-12
-
 
 class Filter(NamedTuple):
     """A first-order process in its discrete form."""
@@ -82,7 +80,8 @@ def oscillator_step(turn: float, damping: float, ringing: float) -> OscillatorSt
     c22 = 1.0 - swing * swing - p22 * p22
 
     # and its Cholesky factor
-    n22 = sqrt(max(c22, SMALLEST_VARIANCE))
+    smallest_variance = 1e-12
+    n22 = sqrt(max(c22, smallest_variance))
     n12 = c12 / n22
     n11 = sqrt(max(c11 - n12 * n12, 0.0))
     return OscillatorStep(

@@ -27,11 +27,6 @@ from shipgym.sea.filters import (
 )
 from shipgym.sea.series import Cosines, Sines, sum_of_cosines, sum_of_sines
 
-#: Lowest frequency of encounter by that of the waves: in a following sea the filter
-#: keeps turning.
-SLOWEST_ENCOUNTER = 0.1
-SLOWEST_WIND = 1e-6  # m/s, below which the relative wind has no direction
-
 
 class SeaParameters(NamedTuple):
     """The sea of a ship; a direction that is NaN is drawn for each episode."""
@@ -138,7 +133,8 @@ def relative_wind(
     aside = from_aside + motion.v
 
     squared = ahead * ahead + aside * aside
-    least = SLOWEST_WIND * SLOWEST_WIND
+    slowest_wind = 1e-6  # m/s, below which the relative wind has no direction
+    least = slowest_wind * slowest_wind
     per_speed = 1.0 / sqrt(max(squared, least))
     angle = FromBow(cosine=ahead * per_speed, sine=aside * per_speed)
     return RelativeWind(squared, angle)
@@ -205,7 +201,10 @@ def encounter(waves: FromBow, u: float, v: float, p: SeaParameters) -> float:
     """Frequency at which a ship meets the peak's waves, rad/s; Fossen 2011, (8.106)."""
     ahead = u * waves.cosine + v * waves.sine
     met = p.wave_frequency + p.wave_number * ahead
-    return max(fabs(met), SLOWEST_ENCOUNTER * p.wave_frequency)
+    # Lowest frequency of encounter by that of the waves: in a following sea the filter
+    # keeps turning.
+    slowest_encounter = 0.1
+    return max(fabs(met), slowest_encounter * p.wave_frequency)
 
 
 def encounter_frequency(motion: Motion, sea: Sea, p: SeaParameters) -> float:

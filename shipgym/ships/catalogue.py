@@ -26,8 +26,6 @@ if TYPE_CHECKING:  # imported with the ships that need them
 
 LIBRARY = Path(__file__).parent / "library"
 
-#: Terms of Mei, Sun & Shi 2019 in each equation of a grey box.
-MEI = "du, v, r, delta, 1"
 
 Form = Literal["published", "shipmmg"]
 
@@ -226,7 +224,9 @@ def grey_box(
 
     ship = reference if isinstance(reference, ShipModel) else load_model(reference)
     table = {}
-    given = equations or dict.fromkeys("uvr", MEI)
+    # Terms of Mei, Sun & Shi 2019 in each equation of a grey box.
+    mei = "du, v, r, delta, 1"
+    given = equations or dict.fromkeys("uvr", mei)
     for equation, terms in given.items():
         if isinstance(terms, str):
             terms = read_terms(terms)

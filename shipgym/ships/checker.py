@@ -18,7 +18,6 @@ from shipgym.ships.term_checks import EQUATION_NAMES
 from shipgym.ships.term_table import ANGULAR, Structure
 from shipgym.trials.trial import Trial
 
-SAMPLES = 512
 STRAIGHT_LENGTHS = 30.0  # ship lengths of a run
 
 
@@ -82,7 +81,8 @@ def _states(model: ShipModel) -> dict[str, Floats]:
     random = np.random.default_rng(0)
     L = model.particulars["length"]
     U0 = model.particulars["speed"]
-    u = U0 * random.uniform(0.2, 1.1, SAMPLES)
+    samples = 512
+    u = U0 * random.uniform(0.2, 1.1, samples)
     largest = {
         "delta": model.steering.limit,
         "v": 0.3 * u,
@@ -91,9 +91,9 @@ def _states(model: ShipModel) -> dict[str, Floats]:
         "phi": np.radians(15.0),
         "q": 0.5 * (U0 / L) ** 2,
     }
-    states = {"u": u, "n": np.full(SAMPLES, model.service_shaft_speed)}
+    states = {"u": u, "n": np.full(samples, model.service_shaft_speed)}
     for name, amplitude in largest.items():
-        states[name] = amplitude * random.uniform(-1.0, 1.0, SAMPLES)
+        states[name] = amplitude * random.uniform(-1.0, 1.0, samples)
     return states
 
 

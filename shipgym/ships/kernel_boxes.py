@@ -38,11 +38,6 @@ SLOWEST = 0.05  # of service speed; slower, v and r are divided by it
 # distance from the origin, 3 weights
 ROW = 8
 
-SOURCE = (
-    "Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares"
-    " support vector machines, chapter 6; Mei, Sun & Shi 2019"
-)
-
 
 @dataclass(frozen=True)
 class KernelTerm(Term):
@@ -259,9 +254,13 @@ def _kernel_fields(
     terms: tuple[Term, ...] = ()
     for number in range(kernel.basis.shape[1]):
         terms += (KernelTerm(f"k{number + 1}", (), number),)
+    source = (
+        "Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares"
+        " support vector machines, chapter 6; Mei, Sun & Shi 2019"
+    )
     return {
         "name": name,
-        "source": SOURCE,
+        "source": source,
         "equations": {"u": terms, "v": terms, "r": terms},
         "normalisation": "prime",
         "quantity": "acceleration",

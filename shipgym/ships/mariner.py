@@ -17,9 +17,6 @@ from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
 
 LENGTH = 160.93  # m
-# prime system, about midship
-MASS = 798e-5
-INERTIA = 39.2e-5
 XG = -0.023
 
 X = {
@@ -77,14 +74,17 @@ def mariner(service_speed: float = 7.7175) -> ShipModel:
         for term, value in table.items():
             turned = (-1.0) ** term.count("d")
             coefficients[f"{force}_{term}"] = value * 1e-5 * turned
+    # prime system, about midship
+    mass = 798e-5
+    inertia = 39.2e-5
     particulars = Particulars(
         name="Mariner class cargo ship",
         length=LENGTH,
         beam=23.17,
         draught=8.23,
-        mass=MASS * 0.5 * SEA_WATER * LENGTH**3,
+        mass=mass * 0.5 * SEA_WATER * LENGTH**3,
         xg=XG * LENGTH,
-        yaw_gyradius=LENGTH * sqrt(INERTIA / MASS - XG**2),
+        yaw_gyradius=LENGTH * sqrt(inertia / mass - XG**2),
         speed=service_speed,
         water_density=SEA_WATER,
         X_udot=-42e-5,

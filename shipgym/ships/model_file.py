@@ -56,7 +56,6 @@ if TYPE_CHECKING:  # few models have equations
 
 Model = TypeVar("Model", bound=ManoeuvringModel)
 
-REQUIRED = ("format", "name", "structure", "coefficients", "particulars", "steering")
 OPTIONAL = (
     "normalisation",
     "covariance",
@@ -75,7 +74,15 @@ def read_model(
     Raises InputError that starts with `where` and names the field at fault.
     """
     check_format(fields, MODEL_FORMAT, where)
-    check_keys(fields, (*REQUIRED, *OPTIONAL), where, REQUIRED)
+    required = (
+        "format",
+        "name",
+        "structure",
+        "coefficients",
+        "particulars",
+        "steering",
+    )
+    check_keys(fields, (*required, *OPTIONAL), where, required)
     dynamics = _read_dynamics(fields["structure"], f"{where}: structure", make)
     own_unit = dynamics.normalisation
     unit = fields.get("normalisation", own_unit)

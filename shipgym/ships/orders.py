@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 
-FASTEST_SHAFT = 5.0  # times the speed in service; beyond it stands in other units
-
 
 class Commanded(Protocol):
     """A model that takes orders."""
@@ -74,9 +72,10 @@ def check_units(model: Commanded, orders: Floats, where: str = "commands") -> No
             "a rudder in rad (not degrees) between -pi/2 and pi/2",
             where,
         )
+    fastest_shaft = 5.0  # times the speed in service; beyond it stands in other units
     if "n" in names:
         service = model.service_shaft_speed
-        most = FASTEST_SHAFT * service
+        most = fastest_shaft * service
         least = -most if model.turns_astern else 0.0
         _check_within(
             orders[:, names.index("n")],

@@ -49,12 +49,7 @@ VELOCITIES = (*SPEEDS, *TURN_RATES, *SHAFT_SPEEDS)
 FACTOR = re.compile(
     r"(?P<stroke>/?)(?P<symbol>\|?[A-Za-z]+\|?|1)(?:\^(?P<exponent>[1-9]))?"
 )
-SHORT_NAMES = {"delta": "d", "|delta|": "|d|", "phi": "f", "|phi|": "|f|"}
 
-#: Limits of what a file may ask for: power of a symbol, factors of a term, terms of an
-#: equation.
-LARGEST_POWER = 9
-MOST_FACTORS = 20
 MOST_TERMS = 200
 
 
@@ -84,6 +79,9 @@ class Term:
         """Refuse symbols and powers that cannot be computed, naming the term."""
         place = f"{where}: term '{self.name}'"
         factors = 0
+        # Limits of what a file may ask for: power of a symbol, factors of a term, terms
+        # of an equation.
+        largest_power = 9
         for symbol, power in self.powers:
             if symbol not in SYMBOLS:
                 raise InputError(
@@ -94,15 +92,16 @@ class Term:
             whole = check_whole(
                 power,
                 at,
-                at_least=-LARGEST_POWER if symbol == "U" else 1,
-                at_most=LARGEST_POWER,
+                at_least=-largest_power if symbol == "U" else 1,
+                at_most=largest_power,
             )
             if whole == 0:
                 raise unexpected(at, "an integer other than 0", power)
             factors += abs(whole)
-        if factors > MOST_FACTORS:
+        most_factors = 20
+        if factors > most_factors:
             raise InputError(
-                f"{place}: expected at most {MOST_FACTORS} factors, got {factors}"
+                f"{place}: expected at most {most_factors} factors, got {factors}"
             )
 
     def to_dict(self) -> dict[str, Any]:
@@ -150,6 +149,7 @@ def _read_term(formula: str) -> Term:
     powers: dict[str, int] = {}
     name = ""
     spaced = re.sub(r"\s*/\s*", " /", formula)
+    short_names = {"delta": "d", "|delta|": "|d|", "phi": "f", "|phi|": "|f|"}
     for factor in spaced.split():
         parts = FACTOR.fullmatch(factor)
         if parts is None or parts["symbol"] not in ("1", *SYMBOLS):
@@ -161,7 +161,7 @@ def _read_term(formula: str) -> Term:
         stroke = parts["stroke"]
         symbol = parts["symbol"]
         exponent = parts["exponent"] or ""
-        name += stroke + SHORT_NAMES.get(symbol, symbol) + exponent
+        name += stroke + short_names.get(symbol, symbol) + exponent
         if symbol == "1":
             continue
         power = int(exponent or 1)

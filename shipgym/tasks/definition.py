@@ -47,7 +47,6 @@ FUNCTIONS = {
     "check": ("settings", "model"),
     "listed": ("value",),
 }
-NEEDED = ("begin", "step", "observe")
 #: Options of an environment that observations are made for.
 OPTIONS = ("", "roll", "shaft", "shaft speed")
 #: Names in `info` that are the engine's.
@@ -252,12 +251,13 @@ def _definition_of(namespace: Any, where: str) -> TaskDefinition:
 
 def _check_task(namespace: Any, where: str) -> None:
     """Refuse a namespace that lacks what a task defines, or has it in another form."""
+    needed = ("begin", "step", "observe")
     check_namespace(
         namespace,
         where,
         records=RECORDS,
         functions=FUNCTIONS,
-        optional=[name for name in FUNCTIONS if name not in NEEDED],
+        optional=[name for name in FUNCTIONS if name not in needed],
     )
     _check_reported(namespace, where)
     if hasattr(namespace, "NAME"):

@@ -65,9 +65,6 @@ REPORTED = (
 )
 EPISODE_STEPS = 1500
 
-# numbers of random numbers, apart from those of a drawn path
-START_DRAW = 1 << 20
-PATH_DRAW = 1 << 21
 PREVIEW = 20.0  # ship lengths along the path within which turns are observed
 WORST_PROGRESS = 2.0  # cost of a step against the path
 
@@ -278,7 +275,8 @@ def lay_path(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> N
         return
     size = len(plan)
     n_paths = (len(waypoints) - 1) // size
-    chosen = int(drawn(random, PATH_DRAW, 0.0, float(n_paths)))
+    path_draw = 1 << 21
+    chosen = int(drawn(random, path_draw, 0.0, float(n_paths)))
     first = 1 + size * chosen
     for k in range(size):
         plan[k] = waypoints[first + k]
@@ -307,8 +305,10 @@ def start(leg: Leg, ship: Ship, settings: Settings, random: Random) -> Motion:
     """Near the first waypoint and about along the first leg."""
     furthest = 0.5 * settings.corridor * ship.length
     largest = pi / 12.0
-    aside = drawn(random, START_DRAW, -furthest, furthest)
-    askew = drawn(random, START_DRAW + 1, -largest, largest)
+    # numbers of random numbers, apart from those of a drawn path
+    start_draw = 1 << 20
+    aside = drawn(random, start_draw, -furthest, furthest)
+    askew = drawn(random, start_draw + 1, -largest, largest)
     return at_service_speed(
         x=leg.north - aside * leg.sine,
         y=leg.east + aside * leg.cosine,

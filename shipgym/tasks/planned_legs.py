@@ -13,9 +13,6 @@ from shipgym.engine.motion import Ship
 from shipgym.tasks.contract import Numbers
 from shipgym.tasks.guidance import NO_TURN
 
-# of the turn radius: nearer to the centre of a turn no position on the arc is taken
-INNERMOST = 0.1
-
 
 class Leg(NamedTuple):
     """Leg that a ship is on, and the two turns ahead; places along the track in m."""
@@ -203,7 +200,9 @@ def on_arc(past: float, aside: float, leg: Leg, radius: float) -> OnArc:
     # from there to the middle of the arc, and across that
     across = past * leg.half_cosine - outward * leg.half_sine
     to_middle = past * leg.half_sine + outward * leg.half_cosine
-    reach = max(to_middle, INNERMOST * radius)
+    # of the turn radius: nearer to the centre of a turn no position on the arc is taken
+    innermost = 0.1
+    reach = max(to_middle, innermost * radius)
 
     half_turn = 0.5 * fabs(leg.turn)
     from_centre = sqrt(across * across + reach * reach)

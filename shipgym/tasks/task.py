@@ -33,7 +33,6 @@ VECTOR_OPTIONS = (
 ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft")
 #: Rudder orders of a discrete action, parts of the rudder limit.
 RUDDER_ORDERS = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0)
-MEASUREMENTS = ("raw", "filtered")
 
 
 class Observed(NamedTuple):
@@ -113,7 +112,8 @@ class Task:
         check_whole(self.episode_steps, "episode_steps", at_least=1)
         check_number(self.max_envelope_distance, "max_envelope_distance", at_least=1.0)
         check_choice(self.action, ACTIONS, "action")
-        check_choice(self.measurement, MEASUREMENTS, "measurement")
+        measurements = ("raw", "filtered")
+        check_choice(self.measurement, measurements, "measurement")
         check_number(self.noise, "noise", at_least=0.0)
         if self.sensors is not None and (self.noise > 0.0 or self.measurement != "raw"):
             raise InputError(

@@ -14,7 +14,6 @@ from shipgym.arrays import Floats
 HEADING = ("psi", "r")
 PLANE = ("x", "y", "u", "v")
 LONGEST_SEARCH = 500  # samples, from which the roughness of the motion is found
-DECADES = 4.0  # to either side of the first guess of the roughness
 #: Covariance of position, velocity and acceleration after a step h of a twice
 #: integrated random walk: factors times powers of h.
 WALK_FACTORS = np.array(
@@ -25,7 +24,6 @@ WALK_FACTORS = np.array(
     ]
 )
 WALK_POWERS = np.array([[5, 4, 3], [4, 3, 2], [3, 2, 1]])
-LEAST_NOISE = 1e-4  # of the range of a channel: resolution, and channels without noise
 
 
 def smooth_kinematics(trial: Trial) -> Trial:
@@ -171,9 +169,10 @@ def _smoothed(trial: Trial, names: Sequence[str], motion: Motion) -> dict[str, F
         first = measured[:LONGEST_SEARCH]
         return -system(decade, len(first)).filtered(first).log_likelihood
 
+    decades = 4.0  # to either side of the first guess of the roughness
     best = minimize_scalar(
         unlikelihood,
-        bounds=(-DECADES, DECADES),
+        bounds=(-decades, decades),
         method="bounded",
         options={"xatol": 0.1},
     )
@@ -192,5 +191,7 @@ def _guessed_roughness(trial: Trial, motion: Motion) -> float:
 
 def _least_noise(trial: Trial, name: str) -> float:
     """Standard deviation of a channel's noise, at least that of its resolution."""
-    resolution = LEAST_NOISE * float(np.ptp(trial[name]))
+    # of the range of a channel: resolution, and channels without noise
+    least_noise = 1e-4
+    resolution = least_noise * float(np.ptp(trial[name]))
     return max(noise_level(trial.t, trial[name]), resolution, 1e-9)

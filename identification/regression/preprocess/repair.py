@@ -15,8 +15,6 @@ from shipgym.trials.resampling import usual_step
 
 WIDTH = 7  # samples of the running median
 OUTLYING = 6.0  # times the noise
-MEASURED = ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n")
-STEPPING = ("delta", "n")  # without the inertia of a ship
 
 
 def outliers(
@@ -127,9 +125,11 @@ def repaired(trial: Trial, threshold: float = OUTLYING) -> Trial:
 
 def _outliers_of(trial: Trial, name: str, threshold: float) -> Flags:
     """Outliers of a channel; of one that is not measured none."""
-    if name not in MEASURED:
+    measured = ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n")
+    if name not in measured:
         return np.zeros(len(trial), dtype=bool)
-    may_step = name in STEPPING
+    stepping = ("delta", "n")  # without the inertia of a ship
+    may_step = name in stepping
     wrong = outliers(
         trial.t,
         values=trial[name],
