@@ -26,7 +26,7 @@ from typing import Any
 from agents.agent_file import PRETRAINED, load_agent
 from agents.benchmarking.results import BenchmarkResult, load_results
 from agents.benchmarking.sources import BEST_KNOWN
-from agents.benchmarking.statistics import Draws, Interval, interval
+from agents.benchmarking.statistics import ConfidenceInterval, Draws, interval
 from agents.policies.policy import LearnedPolicy
 from agents.suites.suite import SETS, BenchmarkTask, find_task, load_suite
 from agents.training import run_folder
@@ -198,7 +198,9 @@ def best_baseline(
     return min(baselines, key=lambda name: float(cells[name]["cost"]["value"]))
 
 
-def gain_of(learned: Floats, baseline: Floats, draws: Draws, task: int) -> Interval:
+def gain_of(
+    learned: Floats, baseline: Floats, draws: Draws, task: int
+) -> ConfidenceInterval:
     """Share of a baseline's cost that the agents save, over episodes and seeds."""
     drawn_costs = draws.means(learned, task, 1).mean(axis=1)
     drawn_baseline = draws.means(baseline, task, 0).mean(axis=1)
@@ -206,14 +208,14 @@ def gain_of(learned: Floats, baseline: Floats, draws: Draws, task: int) -> Inter
     return interval(float(gain), 1.0 - drawn_costs / drawn_baseline)
 
 
-def aim_of(gain: Interval) -> str:
+def aim_of(gain: ConfidenceInterval) -> str:
     """Tell whether an aim is met, and which."""
     if gain.value >= GAIN and gain.low > 0.0:
         return "gain"
     return "near" if gain.value >= -CLOSE else "missed"
 
 
-def shown(gain: Interval) -> str:
+def shown(gain: ConfidenceInterval) -> str:
     """Write a gain with its interval, in percent."""
     value, low, high = (100.0 * share for share in gain)
     return f"{value:.1f} ({low:.1f} to {high:.1f})"

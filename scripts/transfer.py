@@ -32,7 +32,7 @@ from direct_search import tune
 import shipgym
 from agents.agent_file import load_agent
 from agents.benchmarking.sources import pretrained
-from agents.benchmarking.statistics import Draws, Interval, interval
+from agents.benchmarking.statistics import ConfidenceInterval, Draws, interval
 from agents.controllers.controller import Controller, Policy
 from agents.controllers.designs import NO_BASES, design, tuned
 from agents.rollouts.metrics import evaluate
@@ -80,7 +80,7 @@ class Transfer:
     made_on_ship: Floats  # on the ship
 
     @property
-    def loss(self) -> Interval:
+    def loss(self) -> ConfidenceInterval:
         """Share that the controller made on the model costs more on the ship."""
         draws = Draws(1, self.on_ship.shape[1])
         ours = draws.means(self.on_ship, 0, 0).mean(axis=1)

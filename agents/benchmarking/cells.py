@@ -27,7 +27,7 @@ CELL: Shape = {"refused": (str,), "runs": [RUN]}
 
 
 @dataclass(frozen=True, eq=False)
-class TrainingRun:
+class ScoredRun:
     """Scored episodes of one training run; a controller that does not learn has one.
 
     Attributes
@@ -54,13 +54,13 @@ class Cell:
 
     Attributes
     ----------
-    runs : sequence of TrainingRun
+    runs : sequence of ScoredRun
         None where it could not run the task.
     refused : str
         Why it could not; empty if it could.
     """
 
-    runs: Sequence[TrainingRun] = ()
+    runs: Sequence[ScoredRun] = ()
     refused: str = ""
 
     @property
@@ -86,7 +86,7 @@ class Cell:
         Raises InputError, beginning with `where`, if it is not of so many episodes.
         """
         check_shape(content, CELL, where)
-        runs = [TrainingRun(**run) for run in content["runs"]]
+        runs = [ScoredRun(**run) for run in content["runs"]]
         for run in runs:
             same_figures = run.figures.keys() == runs[0].figures.keys()
             if not same_figures or not _has_figures(run, n_episodes):
@@ -96,7 +96,7 @@ class Cell:
         return cls(runs, content["refused"])
 
 
-def _has_figures(run: TrainingRun, n_episodes: int) -> bool:
+def _has_figures(run: ScoredRun, n_episodes: int) -> bool:
     """Tell whether a run has costs, and only numbers of so many episodes."""
     if "cost" not in run.figures:
         return False
@@ -111,7 +111,7 @@ def run_cell(entry: Entry, task: BenchmarkTask, n_episodes: int) -> Cell:
     try:
         if entry.source == BEST_KNOWN:
             costs = best_costs(task)[:n_episodes]
-            return Cell([TrainingRun({"cost": costs})])
+            return Cell([ScoredRun({"cost": costs})])
         policies = entry.policies(task)
     except InputError as error:
         return Cell(refused=str(error))
@@ -123,9 +123,9 @@ def run_cell(entry: Entry, task: BenchmarkTask, n_episodes: int) -> Cell:
     return Cell([_run(policy, task, n_episodes) for policy in policies])
 
 
-def _run(policy: Policy, task: BenchmarkTask, n_episodes: int) -> TrainingRun:
+def _run(policy: Policy, task: BenchmarkTask, n_episodes: int) -> ScoredRun:
     evaluation = evaluate(policy, task, task.seeds[:n_episodes])
-    return TrainingRun(
+    return ScoredRun(
         figures=evaluation.figures,
         failure=evaluation.run.failure,
         seconds_per_action=evaluation.run.seconds_per_action,

@@ -30,7 +30,7 @@ TRIMMED = 0.25  # of the scores at each end
 ScoreScale = tuple[float, float]  # costs whose scores are 0 and 1
 
 
-class Interval(NamedTuple):
+class ConfidenceInterval(NamedTuple):
     """A statistic and its 95 % interval."""
 
     value: float
@@ -42,7 +42,7 @@ class Interval(NamedTuple):
         return {name: finite(number) for name, number in self._asdict().items()}
 
 
-NOTHING = Interval(np.nan, np.nan, np.nan)
+NOTHING = ConfidenceInterval(np.nan, np.nan, np.nan)
 
 
 def interquartile_mean(values: ArrayLike, axis: int | None = None) -> Floats:
@@ -93,18 +93,20 @@ class Draws:
         return np.take_along_axis(by_run, runs, axis=1)
 
 
-def interval(value: float, draws: Floats) -> Interval:
+def interval(value: float, draws: Floats) -> ConfidenceInterval:
     """A statistic with its percentile interval over draws of shape (n_draws,)."""
     is_known = np.isfinite(value) and np.isfinite(draws).all()
     if not is_known:
-        return Interval(value, np.nan, np.nan)
+        return ConfidenceInterval(value, np.nan, np.nan)
     level = 0.95
     tail = (1.0 - level) / 2.0
     low, high = np.quantile(draws, [tail, 1.0 - tail])
-    return Interval(value, float(low), float(high))
+    return ConfidenceInterval(value, float(low), float(high))
 
 
-def mean_cost(costs: Floats, draws: Draws, task: int, controller: int = 0) -> Interval:
+def mean_cost(
+    costs: Floats, draws: Draws, task: int, controller: int = 0
+) -> ConfidenceInterval:
     """Mean over runs and episodes of one task."""
     drawn = draws.means(costs, task, controller).mean(axis=1)
     return interval(float(costs.mean()), drawn)
@@ -112,7 +114,7 @@ def mean_cost(costs: Floats, draws: Draws, task: int, controller: int = 0) -> In
 
 def interquartile_cost(
     costs: Floats, draws: Draws, task: int, controller: int = 0
-) -> Interval:
+) -> ConfidenceInterval:
     """Interquartile mean over runs and episodes of one task, without rare bad ends."""
     n_runs, _ = costs.shape
     runs = draws.runs(task, n_runs, controller)
@@ -170,7 +172,7 @@ def aggregate_score(
     draws: Draws,
     tasks: Sequence[int],
     controller: int,
-) -> Interval:
+) -> ConfidenceInterval:
     """Interquartile mean of the scores of all runs and tasks.
 
     Parameters
@@ -204,7 +206,7 @@ def improvement(
     other_costs: Mapping[int, Floats],
     draws: Draws,
     controllers: tuple[int, int],
-) -> Interval:
+) -> ConfidenceInterval:
     """Probability that a controller costs less than another in the same episode.
 
     Of a run of each, ties counting half; the mean over the tasks that both could run.

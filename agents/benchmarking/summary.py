@@ -14,8 +14,8 @@ from agents.benchmarking.cells import Cell
 from agents.benchmarking.sources import BEST_KNOWN
 from agents.benchmarking.statistics import (
     NOTHING,
+    ConfidenceInterval,
     Draws,
-    Interval,
     ScoreScale,
     score,
 )
@@ -185,7 +185,7 @@ class _Costs:
             "failed": sum(cell["failed"] for cell in cells),
         }
 
-    def _score(self, controller: int, tasks: Sequence[int]) -> Interval:
+    def _score(self, controller: int, tasks: Sequence[int]) -> ConfidenceInterval:
         """Score of a controller over tasks."""
         costs = self.costs[controller]
         return statistics.aggregate_score(
@@ -245,13 +245,15 @@ class _Costs:
         return all_scores[np.isfinite(all_scores)]
 
 
-def _score_of(cost: Interval, reference: ScoreScale | None) -> Interval:
+def _score_of(
+    cost: ConfidenceInterval, reference: ScoreScale | None
+) -> ConfidenceInterval:
     """Score of a mean cost; it falls as the cost rises, so that the bounds swap."""
     if reference is None:
         return NOTHING
     costs = [cost.value, cost.high, cost.low]
     scores = score(costs, *reference)
-    return Interval(*scores.tolist())
+    return ConfidenceInterval(*scores.tolist())
 
 
 def _relative_cost(cells: Sequence[Mapping[str, Any]]) -> float | None:

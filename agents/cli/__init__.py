@@ -21,7 +21,7 @@ from agents.cli.autopilot import autopilot_command
 from agents.cli.benchmark import benchmark_command
 from agents.cli.command import (
     FAILED,
-    Commands,
+    CommandGroup,
     report_os_error,
     shared_options,
 )
@@ -35,7 +35,7 @@ from agents.cli.trials import trials_command
 from agents.cli.warm import warm_command
 
 app = typer.Typer(
-    cls=Commands,
+    cls=CommandGroup,
     epilog=(
         "Example: shipgym new-ship zigzag.csv, then shipgym autopilot ship.toml --out"
         " report/"

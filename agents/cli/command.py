@@ -125,7 +125,7 @@ def fail(message: str, code: int) -> NoReturn:
     raise typer.Exit(code) from None
 
 
-class Commands(TyperGroup):
+class CommandGroup(TyperGroup):
     """The commands; an empty argument is refused before any of them runs."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:

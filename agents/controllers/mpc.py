@@ -48,7 +48,7 @@ CANDIDATES, ELITES, ROUNDS = 16, 4, 2
 DEEP = 1e6  # m, of water that is not shallow
 
 
-class Current(NamedTuple):
+class BodyCurrent(NamedTuple):
     """Current in the ship's axes, each number of shape (n_ships,)."""
 
     ahead: Number  # m/s
@@ -59,7 +59,7 @@ class PlanMemory(NamedTuple):
     """What MPC remembers of each ship."""
 
     steps: Number  # control intervals since the last search
-    current: Current
+    current: BodyCurrent
     plan: table_of(KNOTS)  # type: ignore[valid-type]  # rad, added to the course at the knots
 
 
@@ -172,7 +172,7 @@ class MPC(WheelOver):
         steps = (memory.steps + 1.0) % KNOT_STEPS
         return course, PlanMemory(steps, current, plans.T)
 
-    def estimated_current(self, seen: PathSignals, known: Current) -> Current:
+    def estimated_current(self, seen: PathSignals, known: BodyCurrent) -> BodyCurrent:
         """Estimate the current by the last estimate, which turns with the ship.
 
         The observed course over ground corrects it.
@@ -184,12 +184,14 @@ class MPC(WheelOver):
         # share of the current's error that is taken over in an interval
         current_gain = 0.5
         error = current_gain * across
-        return Current(
+        return BodyCurrent(
             ahead=ahead + error * np.sin(seen.drift),
             aside=aside - error * np.cos(seen.drift),
         )
 
-    def improved(self, seen: PathSignals, current: Current, plans: Floats) -> Floats:
+    def improved(
+        self, seen: PathSignals, current: BodyCurrent, plans: Floats
+    ) -> Floats:
         """Improve plans by the cross-entropy method, rad, shape (n_ships, KNOTS).
 
         The first knot stays as it is.
@@ -217,7 +219,7 @@ class MPC(WheelOver):
         return best
 
     def simulated_costs(
-        self, seen: PathSignals, current: Current, plans: Floats
+        self, seen: PathSignals, current: BodyCurrent, plans: Floats
     ) -> Floats:
         """Costs of plans on the design model, shape (n_ships, n_plans).
 
@@ -309,7 +311,7 @@ class DesignModels:
         rad.
     """
 
-    def __init__(self, guide: MPC, seen: PathSignals, current: Current) -> None:
+    def __init__(self, guide: MPC, seen: PathSignals, current: BodyCurrent) -> None:
         n = len(seen.cross_track)
         self.dt = COARSE * guide.design["dt"]
         self.time = 0.0

@@ -27,7 +27,7 @@ class Place(NamedTuple):
     turns: Turns
 
 
-class Leg(NamedTuple):
+class PathLeg(NamedTuple):
     """Straight leg that ships may be on, each number of shape (n,)."""
 
     x: Floats  # m, along it from where it begins
@@ -58,7 +58,7 @@ class Arc:
         self.radius = radius
         self.passed = np.zeros(len(turn), dtype=np.bool_)
 
-    def fix(self, leg: Leg, before: PathPoint) -> tuple[PathPoint, Floats, Floats]:
+    def fix(self, leg: PathLeg, before: PathPoint) -> tuple[PathPoint, Floats, Floats]:
         """Points of the ships that are on the arc, of the others those from before.
 
         Also the distance to the arc, m, and the angle that is left of it, rad.
@@ -91,7 +91,7 @@ class Arc:
             np.where(passed, 0.0, left),
         )
 
-    def next_leg(self, leg: Leg) -> Leg:
+    def next_leg(self, leg: PathLeg) -> PathLeg:
         """Leg behind the arc, for the ships that have passed it."""
         passed = self.passed
         radius = self.radius
@@ -99,7 +99,7 @@ class Arc:
         aside = leg.y - self.side * radius * (1.0 - np.cos(self.angle))
         x, y = turned(ahead, aside, self.turn)
         course = leg.course + self.turn
-        return Leg(
+        return PathLeg(
             x=np.where(passed, x, leg.x),
             y=np.where(passed, y, leg.y),
             begins=leg.begins + self.distance + radius * self.angle,
@@ -127,7 +127,7 @@ class PathAhead:
         """
         nowhere = np.zeros_like(x)
         everywhere = np.ones(len(x), dtype=np.bool_)
-        leg = Leg(x, y, begins=nowhere, course=nowhere, reached=everywhere)
+        leg = PathLeg(x, y, begins=nowhere, course=nowhere, reached=everywhere)
         point = PathPoint(along_track=x, cross_track=y, course=nowhere)
         to_come: list[Floats] = []
 

@@ -48,7 +48,7 @@ OUTPUTS = {"rudder": 1, "rudder-discrete": len(RUDDER_ORDERS), "rudder-shaft": 2
 NO_LIMIT = 2.0  # of the rate: outputs are in [-1, 1]
 
 
-class Memory(NamedTuple):
+class PolicyMemory(NamedTuple):
     """Memory of a policy of n ships; for a single ship without the first axis."""
 
     seen: (
@@ -224,7 +224,7 @@ class LearnedPolicy:
         commands = commands.reshape(*shape, commands.shape[1])
         return commands, _shaped(memory, tuple(shape))
 
-    def _decided(self, inputs: Numbers, memory: Memory) -> Memory:
+    def _decided(self, inputs: Numbers, memory: PolicyMemory) -> PolicyMemory:
         """Ask the network for ships whose last output is over, or was not a number."""
         left = memory.left
         output = memory.output
@@ -258,12 +258,12 @@ class LearnedPolicy:
 
     def _recalled(
         self, state: Any, starts: Any, rows: Numbers, shape: tuple[int, ...]
-    ) -> Memory:
+    ) -> PolicyMemory:
         """Memory of each ship; where an episode begins, the present fills the past."""
         n, n_observed = rows.shape
         past = self.frame_stack - 1
         output = np.zeros((n, OUTPUTS[self.action]), dtype=np.float32)
-        fresh = Memory(
+        fresh = PolicyMemory(
             seen=np.repeat(rows[:, None], past, axis=1),
             base=None,
             left=np.zeros((n, 1), dtype=np.float32),
@@ -272,7 +272,7 @@ class LearnedPolicy:
         )
         if state is None:
             return fresh
-        if not isinstance(state, Memory):
+        if not isinstance(state, PolicyMemory):
             raise InputError(
                 "state: expected what the last predict returned, or None where episodes"
                 f" begin, got {type(state).__name__}"
@@ -281,7 +281,7 @@ class LearnedPolicy:
 
         begins = checked_starts(starts, (n,))[:, None]
         kept = _shaped(state, (n,))
-        return Memory(
+        return PolicyMemory(
             seen=np.where(begins[:, None], fresh.seen, kept.seen),
             base=kept.base,
             left=np.where(begins, fresh.left, kept.left),
@@ -391,11 +391,11 @@ def combined(proposed: Any, part: Any, authority: float) -> Any:
     return np.clip(proposed + authority * part, -1.0, 1.0)
 
 
-def _shaped(memory: Memory, shape: tuple[int, ...]) -> Memory:
+def _shaped(memory: PolicyMemory, shape: tuple[int, ...]) -> PolicyMemory:
     """Memory with other first axes: (n,) ships, or () for a single one."""
     *_, past, n_observed = memory.seen.shape
     *_, n_outputs = memory.output.shape
-    return Memory(
+    return PolicyMemory(
         seen=memory.seen.reshape(*shape, past, n_observed),
         base=memory.base,
         left=memory.left.reshape(*shape, 1),

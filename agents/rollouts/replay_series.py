@@ -21,7 +21,7 @@ CROSS_TRACK = ("cross_track_error", "cross_track")
 SHOWN = ("x", "y", "psi", "r", "phi", "delta", "n", "heading_error")
 
 
-class Quantity(NamedTuple):
+class ReplayQuantity(NamedTuple):
     """A quantity that the page may show over time and as a read-out."""
 
     label: str
@@ -34,15 +34,17 @@ class Quantity(NamedTuple):
 
 #: In the order of the page; a quantity that no episode has is left out.
 QUANTITIES = (
-    Quantity("heading", "deg", 1, "psi", order="course_order"),
-    Quantity("cross-track error", "m", 1, "cross_track_error", short="cross-track"),
-    Quantity("heading error", "deg", 1, "heading_error"),
-    Quantity("rudder", "deg", 1, "delta", order="rudder_order"),
-    Quantity("speed through water", "m/s", 2, "speed", short="speed"),
-    Quantity("yaw rate", "deg/s", 2, "yaw_rate"),
-    Quantity("heel", "deg", 1, "heel"),
-    Quantity("shaft speed", "1/min", 1, "shaft_speed"),
-    Quantity("reward so far", "", 2, "reward_so_far"),
+    ReplayQuantity("heading", "deg", 1, "psi", order="course_order"),
+    ReplayQuantity(
+        "cross-track error", "m", 1, "cross_track_error", short="cross-track"
+    ),
+    ReplayQuantity("heading error", "deg", 1, "heading_error"),
+    ReplayQuantity("rudder", "deg", 1, "delta", order="rudder_order"),
+    ReplayQuantity("speed through water", "m/s", 2, "speed", short="speed"),
+    ReplayQuantity("yaw rate", "deg/s", 2, "yaw_rate"),
+    ReplayQuantity("heel", "deg", 1, "heel"),
+    ReplayQuantity("shaft speed", "1/min", 1, "shaft_speed"),
+    ReplayQuantity("reward so far", "", 2, "reward_so_far"),
 )
 
 

@@ -73,7 +73,7 @@ class TuningResult:
     best: TuningTrial
 
 
-class Proposal(NamedTuple):
+class TuningProposal(NamedTuple):
     """Parameters of a trial to come, and all its settings."""
 
     parameters: dict[str, Any]
@@ -150,7 +150,7 @@ def _check_progress(
 
 
 def _jobs(
-    plan: TrainingPlan, done: Sequence[TuningTrial], proposals: Sequence[Proposal]
+    plan: TrainingPlan, done: Sequence[TuningTrial], proposals: Sequence[TuningProposal]
 ) -> list[dict[str, Any]]:
     bounds = limits(done, plan.settings.total_steps)
     jobs = []
@@ -247,7 +247,7 @@ def lowest(curve: Curve, steps: float) -> float:
     return min((cost for mark, cost in curve if mark <= steps), default=np.inf)
 
 
-def _as_trial(number: int, proposal: Proposal, result: Any) -> TuningTrial:
+def _as_trial(number: int, proposal: TuningProposal, result: Any) -> TuningTrial:
     expected: Shape = {
         "cost": (int, float, NoneType),
         "curve": [[(int,), (int, float)]],
@@ -279,7 +279,7 @@ def propose(
     done: Sequence[TuningTrial],
     number: int,
     fixed: Sequence[str] = (),
-) -> list[Proposal]:
+) -> list[TuningProposal]:
     """Propose trials; they follow from those before and the seed."""
     space = search_space(plan.algorithm, fixed)
     sampler = optuna.samplers.TPESampler(
@@ -288,14 +288,14 @@ def propose(
     study = optuna.create_study(sampler=sampler)
     study.add_trials([_frozen(trial, space) for trial in done])
 
-    proposals: list[Proposal] = []
+    proposals: list[TuningProposal] = []
     for _ in range(number):
         parameters: dict[str, Any] = {}
         if done or proposals:  # the first has the settings as they are
             asked = study.ask(space)
             parameters = dict(asked.params)
         settings = with_parameters(plan.settings, parameters)
-        proposals.append(Proposal(parameters, settings.to_dict()))
+        proposals.append(TuningProposal(parameters, settings.to_dict()))
     return proposals
 
 

@@ -86,7 +86,7 @@ MEAN, DEVIATION = np.array(PRIOR).T
 N_COEFFICIENTS = len(PRIOR)
 
 
-class Inputs(NamedTuple):
+class SurgeSwayInputs(NamedTuple):
     """Measured quantities that move a ship in surge and sway."""
 
     r: Any
@@ -96,7 +96,9 @@ class Inputs(NamedTuple):
     aside: Any
 
 
-def accelerations(u: Any, v: Any, at: Inputs, c: Coefficients) -> tuple[Any, Any]:
+def accelerations(
+    u: Any, v: Any, at: SurgeSwayInputs, c: Coefficients
+) -> tuple[Any, Any]:
     """Surge and sway acceleration by quadratic equations of any ship."""
     surge = (
         c.X_0
@@ -194,7 +196,7 @@ class _Record(NamedTuple):
     """A trial in units of length and service speed, arrays of shape (n_samples,)."""
 
     t: Floats
-    inputs: Inputs
+    inputs: SurgeSwayInputs
     psi: Floats
     #: velocity north and east over ground, and ahead through the water; NaN where not
     #: measured
@@ -210,7 +212,7 @@ def _record(trial: Trial, travel_time: float, speed: float) -> _Record:
     if "v" in trial.derived and "u" not in trial.derived:
         logged = trial["u"]
 
-    inputs = Inputs(
+    inputs = SurgeSwayInputs(
         r=trial["r"] * travel_time,
         delta=trial["delta"],
         n=shaft,
@@ -345,7 +347,7 @@ class _Problem:
 
     def _starts_by_lane(self, x: Floats, n_lanes: int) -> tuple[Floats, Floats]:
         """Starting u and v, shape (n_lanes, n_trials), each moved in its own lane."""
-        at_start = Inputs(*self.runs.inputs[0])
+        at_start = SurgeSwayInputs(*self.runs.inputs[0])
         u, v = x[self.start_columns].T
         u = np.tile(u + at_start.n, (n_lanes, 1))
         v = np.tile(v, (n_lanes, 1))
@@ -466,11 +468,11 @@ def _midpoint_step(
     c: Coefficients,
 ) -> tuple[Floats, Floats]:
     """One step of the midpoint rule, kept within what a ship does."""
-    surge, sway = accelerations(u, v, Inputs(*now), c)
+    surge, sway = accelerations(u, v, SurgeSwayInputs(*now), c)
     u_half = u + 0.5 * STEP * surge
     v_half = v + 0.5 * STEP * sway
     halfway = 0.5 * (now + then)
-    surge, sway = accelerations(u_half, v_half, Inputs(*halfway), c)
+    surge, sway = accelerations(u_half, v_half, SurgeSwayInputs(*halfway), c)
     u = np.clip(u + STEP * surge, -2.0, 3.0)
     v = np.clip(v + STEP * sway, -2.0, 2.0)
     return u, v

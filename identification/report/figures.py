@@ -68,7 +68,7 @@ def regression_figures(fit: Fit) -> dict[str, Figure]:
     return found
 
 
-class Accelerations(NamedTuple):
+class WindowAccelerations(NamedTuple):
     """Mean acceleration of some windows, m/s^2 or deg/s^2."""
 
     measured: Floats
@@ -104,20 +104,20 @@ def fit_figure(fit: Fit) -> Figure:
     )
 
 
-def mean_accelerations(fit: Fit, q: str, rows: slice) -> Accelerations:
+def mean_accelerations(fit: Fit, q: str, rows: slice) -> WindowAccelerations:
     """Mean accelerations of an equation over some windows."""
     samples = fit.samples
     unit = np.degrees(1.0) if q in "rp" else 1.0
     factor = unit / samples.duration
     explained = fit.estimators[q].predict(samples.features[q])
     measured = samples.targets[q]
-    return Accelerations(
+    return WindowAccelerations(
         measured=(measured * factor)[rows],
         explained=(explained * factor)[rows],
     )
 
 
-def _history_panel(found: Accelerations, breaks: Integers, title: str) -> Panel:
+def _history_panel(found: WindowAccelerations, breaks: Integers, title: str) -> Panel:
     """Accelerations window after window, with gaps between the trials."""
     measured = np.insert(found.measured, breaks, np.nan)
     explained = np.insert(found.explained, breaks, np.nan)
@@ -133,7 +133,7 @@ def _history_panel(found: Accelerations, breaks: Integers, title: str) -> Panel:
     )
 
 
-def _cloud_panel(found: Accelerations) -> Panel:
+def _cloud_panel(found: WindowAccelerations) -> Panel:
     """Measured over explained accelerations, with the line of equality."""
     both = np.concatenate(found)
     ends = [both.min(), both.max()]

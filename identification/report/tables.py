@@ -58,7 +58,7 @@ class TrialRow:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ParticularRow:
     """A particular of the ship."""
 
     name: str
@@ -126,7 +126,7 @@ def trial_row(trial: Trial, name: str) -> TrialRow:
     )
 
 
-def particulars(model: ShipModel) -> list[Quantity]:
+def particulars(model: ShipModel) -> list[ParticularRow]:
     """Particulars of the ship that are known."""
     ship = model.particulars
     rows = []
@@ -135,7 +135,7 @@ def particulars(model: ShipModel) -> list[Quantity]:
         if value is None:
             continue
         digits = f"{factor * value:.5g}".replace("-", MINUS)
-        row = Quantity(
+        row = ParticularRow(
             name=words,
             estimated=name in ship.estimated,
             value=f"{digits} {unit}",
@@ -144,7 +144,7 @@ def particulars(model: ShipModel) -> list[Quantity]:
     return rows
 
 
-def added_masses(model: ShipModel) -> list[Quantity]:
+def added_masses(model: ShipModel) -> list[ParticularRow]:
     """Added masses that are known, in the prime system times 1e-5."""
     ship = model.particulars
     rows = []
@@ -152,7 +152,7 @@ def added_masses(model: ShipModel) -> list[Quantity]:
         value = ship[name]
         if value is None:
             continue
-        row = Quantity(
+        row = ParticularRow(
             name=name,
             estimated=name in ship.estimated,
             value=fixed(value / PRIME, 1),

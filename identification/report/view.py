@@ -14,7 +14,7 @@ from identification.report.summary import are_derivatives, kernel_text
 from identification.report.tables import (
     CoefficientRow,
     ErrorRow,
-    Quantity,
+    ParticularRow,
     TrialRow,
     added_masses,
     coefficient_tables,
@@ -69,8 +69,8 @@ class FitView:
     undetermined: list[str]  # terms that the data cannot separate
     trials: list[TrialRow]
     equations: dict[str, EquationDiagnostics]  # by their names in words
-    particulars: list[Quantity]
-    added_masses: list[Quantity]
+    particulars: list[ParticularRow]
+    added_masses: list[ParticularRow]
     gear: dict[str, str]
     gear_source: str  # "given" or "estimated"
     estimated: str  # names of the particulars that were estimated; empty without any

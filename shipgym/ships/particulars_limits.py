@@ -13,7 +13,7 @@ ADDED_MASSES = ("X_udot", "Y_vdot", "Y_rdot", "N_vdot", "N_rdot")
 
 
 @dataclass(frozen=True)
-class Limits:
+class ParticularLimits:
     """Limits of one value, and how it changes from a ship to a similar one."""
 
     above: float | None = None
@@ -27,32 +27,32 @@ _IN_PRIME_SYSTEM = (
     "in the prime system (mass by rho L^3 / 2), as a derivative: Y_vdot is minus the"
     " added mass"
 )
-_ADDED_MASS = Limits(-1.0, 0.0, _IN_PRIME_SYSTEM)
-_COUPLING = Limits(-1.0, 1.0, _IN_PRIME_SYSTEM)
+_ADDED_MASS = ParticularLimits(-1.0, 0.0, _IN_PRIME_SYSTEM)
+_COUPLING = ParticularLimits(-1.0, 1.0, _IN_PRIME_SYSTEM)
 
 LIMITS = {
-    "length": Limits(0.01, 2000.0, "between perpendiculars, in m"),
-    "beam": Limits(above=0.0, growth=1.0, share=1.0),
-    "draught": Limits(above=0.0, growth=1.0, share=0.5),
-    "mass": Limits(above=0.0),
-    "xg": Limits(growth=1.0, share=0.5),
-    "yaw_gyradius": Limits(above=0.0, growth=1.0, share=0.7),
-    "block_coefficient": Limits(above=0.0, below=1.0),
-    "speed": Limits(0.0, 50.0, "in m/s; a knot is 0.514 m/s"),
-    "rudder_area": Limits(above=0.0, growth=2.0),
-    "propeller_diameter": Limits(above=0.0, growth=1.0, share=0.5),
-    "rudder_aspect_ratio": Limits(above=0.0, below=10.0),
-    "propeller_pitch_ratio": Limits(above=0.0, below=3.0),
-    "rudders": Limits(above=0.0, below=9.0),
-    "propellers": Limits(above=0.0, below=9.0),
-    "length_overall": Limits(above=0.0, growth=1.0, share=2.0),
-    "frontal_area": Limits(above=0.0, growth=2.0, share=0.5),
-    "lateral_area": Limits(above=0.0, growth=2.0, share=0.5),
-    "lateral_centroid": Limits(growth=1.0, share=0.5),
-    "lateral_centroid_height": Limits(above=0.0, growth=1.0, share=0.5),
-    "metacentric_height": Limits(above=0.0, growth=1.0, share=0.2),
-    "roll_period": Limits(above=0.0, below=200.0, growth=0.5),
-    "water_density": Limits(
+    "length": ParticularLimits(0.01, 2000.0, "between perpendiculars, in m"),
+    "beam": ParticularLimits(above=0.0, growth=1.0, share=1.0),
+    "draught": ParticularLimits(above=0.0, growth=1.0, share=0.5),
+    "mass": ParticularLimits(above=0.0),
+    "xg": ParticularLimits(growth=1.0, share=0.5),
+    "yaw_gyradius": ParticularLimits(above=0.0, growth=1.0, share=0.7),
+    "block_coefficient": ParticularLimits(above=0.0, below=1.0),
+    "speed": ParticularLimits(0.0, 50.0, "in m/s; a knot is 0.514 m/s"),
+    "rudder_area": ParticularLimits(above=0.0, growth=2.0),
+    "propeller_diameter": ParticularLimits(above=0.0, growth=1.0, share=0.5),
+    "rudder_aspect_ratio": ParticularLimits(above=0.0, below=10.0),
+    "propeller_pitch_ratio": ParticularLimits(above=0.0, below=3.0),
+    "rudders": ParticularLimits(above=0.0, below=9.0),
+    "propellers": ParticularLimits(above=0.0, below=9.0),
+    "length_overall": ParticularLimits(above=0.0, growth=1.0, share=2.0),
+    "frontal_area": ParticularLimits(above=0.0, growth=2.0, share=0.5),
+    "lateral_area": ParticularLimits(above=0.0, growth=2.0, share=0.5),
+    "lateral_centroid": ParticularLimits(growth=1.0, share=0.5),
+    "lateral_centroid_height": ParticularLimits(above=0.0, growth=1.0, share=0.5),
+    "metacentric_height": ParticularLimits(above=0.0, growth=1.0, share=0.2),
+    "roll_period": ParticularLimits(above=0.0, below=200.0, growth=0.5),
+    "water_density": ParticularLimits(
         500.0, 1500.0, "in kg/m3; fresh water has 1000, sea water 1025"
     ),
     "X_udot": _ADDED_MASS,

@@ -23,8 +23,8 @@ from shipgym.tasks.contract import (
 )
 from shipgym.tasks.steering import (
     Extras,
-    Helm,
     SteeringReward,
+    SteeringSignals,
     Weights,
     extras,
     helm,
@@ -96,7 +96,7 @@ class Reward(NamedTuple):
 class Observation(NamedTuple):
     """What the autopilot sees."""
 
-    helm: Helm
+    helm: SteeringSignals
     extras: Extras
 
 

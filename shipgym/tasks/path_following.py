@@ -41,9 +41,9 @@ from shipgym.tasks.planned_legs import (
 )
 from shipgym.tasks.steering import (
     Extras,
-    Helm,
     RudderActivity,
     SteeringReward,
+    SteeringSignals,
     Weights,
     extras,
     helm,
@@ -177,7 +177,7 @@ def preview(ship: Ship, settings: Settings) -> float:
 class Observation(NamedTuple):
     """What the autopilot sees."""
 
-    helm: Helm
+    helm: SteeringSignals
     cross_track: Annotated[float, ObservationSpec(-5.0, 5.0, "m", half_corridor)]
     course_error_sin: Annotated[float, ObservationSpec(-1.0, 1.0)]  # over ground
     course_error_cos: Annotated[float, ObservationSpec(-1.0, 1.0)]

@@ -12,12 +12,12 @@ from shipgym.engine.records import field_types
 from shipgym.ships.manoeuvring_model import ship_of
 from shipgym.ships.ship_model import ShipModel
 from shipgym.tasks.contract import ObservationSpec
-from shipgym.tasks.steering import Helm, Weights
+from shipgym.tasks.steering import SteeringSignals, Weights
 
 #: Control intervals in the time to travel one ship length, about.
 STEPS_PER_LENGTH = 20.0
 #: Names of the observations of every autopilot, in order.
-OBSERVATION_NAMES: tuple[str, ...] = Helm._fields
+OBSERVATION_NAMES: tuple[str, ...] = SteeringSignals._fields
 
 
 class _Settings(NamedTuple):
@@ -37,7 +37,7 @@ def observation_scales(model: ShipModel) -> Floats:
     ship = ship_of(model)
     settings = _Settings()
     scales = []
-    for annotation in field_types(Helm, notes=True).values():
+    for annotation in field_types(SteeringSignals, notes=True).values():
         spec: ObservationSpec = annotation.__metadata__[0]
         scale = spec.scale
         if callable(scale):

@@ -113,7 +113,7 @@ def largest_integral(ship: Ship, settings: Any) -> float:
     return integral_scale(ship, settings.weights)
 
 
-class Helm(NamedTuple):
+class SteeringSignals(NamedTuple):
     """Observations of every autopilot."""
 
     heading_error_sin: Annotated[float, ObservationSpec(-1.0, 1.0)]
@@ -147,10 +147,10 @@ def helm(
     readings: Readings,
     interval: Interval,
     ship: Ship,
-) -> Helm:
+) -> SteeringSignals:
     """Observe the ship against a heading to steer, rad."""
     sine, cosine = sin_cos(heading_setpoint - readings.psi)
-    return Helm(
+    return SteeringSignals(
         heading_error_sin=sine,
         heading_error_cos=cosine,
         yaw_rate=readings.r,

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from agents import LQ, PID, WheelOver, benchmark, load_results
 from agents.agent_file import PRETRAINED
-from agents.benchmarking.cells import Cell, TrainingRun, run_cell
+from agents.benchmarking.cells import Cell, ScoredRun, run_cell
 from agents.benchmarking.entries import Entry, check_agents, read_entries
 from agents.benchmarking.replays import EpisodeId, rerun
 from agents.benchmarking.results import BenchmarkResult, check_new
@@ -278,7 +278,7 @@ def test_a_summary_of_a_hundred_episodes_by_hand(tmp_path):
 
     def cell(*costs, times=(1e-6,)):
         figures = {"cost": np.array(costs * 50)}
-        return Cell([TrainingRun(figures, seconds_per_action=time) for time in times])
+        return Cell([ScoredRun(figures, seconds_per_action=time) for time in times])
 
     cells = {
         ("a", "calm"): cell(25.0, 20.0, times=(1e-6, 3e-6)),
@@ -330,7 +330,7 @@ def test_controllers_that_could_run_more_tasks_come_first(tmp_path):
         found = {("part", "two"): Cell(refused="no")}
         for name, means in costs.items():
             for task, mean in zip(best, means, strict=False):
-                run = TrainingRun({"cost": np.full(n_episodes, mean)})
+                run = ScoredRun({"cost": np.full(n_episodes, mean)})
                 found[name, task] = Cell([run])
         return found
 
@@ -342,7 +342,7 @@ def test_controllers_that_could_run_more_tasks_come_first(tmp_path):
 
 
 def test_episodes_without_a_figure_are_not_counted():
-    run = TrainingRun({"terminated": np.array([1.0, 0.0, np.nan])})
+    run = ScoredRun({"terminated": np.array([1.0, 0.0, np.nan])})
     assert Cell([run, run]).count("terminated") == 2
     assert Cell([run]).count("failed") == 0
 

@@ -6,7 +6,7 @@ import pytest
 from pyarrow import parquet
 
 from agents.benchmarking import episode_table as module
-from agents.benchmarking.cells import Cell, TrainingRun
+from agents.benchmarking.cells import Cell, ScoredRun
 from agents.benchmarking.episode_table import (
     episode_table,
     read_episodes,
@@ -20,7 +20,7 @@ KEYS = {"controller": ["a"], "task": ["c"], "run": [0], "seed": [1]}
 
 def run(**figures):
     arrays = {name: np.array(values) for name, values in figures.items()}
-    return TrainingRun(arrays)
+    return ScoredRun(arrays)
 
 
 CELLS = {

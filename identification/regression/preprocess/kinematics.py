@@ -58,7 +58,7 @@ def smooth_kinematics(trial: Trial) -> Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RandomWalkMotion:
     """States that follow from accelerations that are random walks.
 
     Attributes
@@ -82,7 +82,7 @@ class Motion:
     start_variances: Floats
 
 
-def heading_motion(t: Floats) -> Motion:
+def heading_motion(t: Floats) -> RandomWalkMotion:
     """Heading and yaw rate, whose yaw acceleration is a random walk."""
     h = np.diff(t)
     psi, r, rdot = range(3)
@@ -90,7 +90,7 @@ def heading_motion(t: Floats) -> Motion:
     transitions[:, psi, r] = h
     transitions[:, r, rdot] = h
     transitions[:, psi, rdot] = 0.5 * h**2
-    return Motion(
+    return RandomWalkMotion(
         states=(*HEADING, "rdot"),
         guessed_by=("r", "psi"),
         transitions=transitions,
@@ -99,7 +99,7 @@ def heading_motion(t: Floats) -> Motion:
     )
 
 
-def plane_motion(t: Floats, psi: Floats) -> Motion:
+def plane_motion(t: Floats, psi: Floats) -> RandomWalkMotion:
     """Position, surge and sway at a known heading, whose accelerations random-walk.
 
     The mean of the heading's cosine and sine holds over each step. The random walk acts
@@ -126,7 +126,7 @@ def plane_motion(t: Floats, psi: Floats) -> Motion:
     walk = heading_motion(t).process[:, 1:, 1:]
     for axis in ([u, udot], [v, vdot]):
         process[:, np.array(axis)[:, None], axis] = walk
-    return Motion(
+    return RandomWalkMotion(
         states=(*PLANE, "udot", "vdot"),
         guessed_by=("u", "x", "v"),
         transitions=transitions,
@@ -140,7 +140,9 @@ def _midpoints(values: Floats) -> Floats:
     return 0.5 * (values[1:] + values[:-1])
 
 
-def _smoothed(trial: Trial, names: Sequence[str], motion: Motion) -> dict[str, Floats]:
+def _smoothed(
+    trial: Trial, names: Sequence[str], motion: RandomWalkMotion
+) -> dict[str, Floats]:
     """States of the motion by the recorded channels.
 
     The roughness is that of greatest likelihood on the first samples.
@@ -180,7 +182,7 @@ def _smoothed(trial: Trial, names: Sequence[str], motion: Motion) -> dict[str, F
     return dict(zip(motion.states, states.T, strict=True))
 
 
-def _guessed_roughness(trial: Trial, motion: Motion) -> float:
+def _guessed_roughness(trial: Trial, motion: RandomWalkMotion) -> float:
     """Roughness as if velocity changed by its range in a twentieth of the trial."""
     recorded = [name for name in motion.guessed_by if name in trial]
     guessed_by = recorded[0]
