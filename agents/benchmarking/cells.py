@@ -106,12 +106,18 @@ def _has_figures(run: TrainingRun, n_episodes: int) -> bool:
     return True
 
 
+#: Names of the controller and the task of a cell.
+CellName = tuple[str, str]
+Cells = Mapping[CellName, Cell]
+
+
 def run_cell(entry: Entry, task: BenchmarkTask, n_episodes: int) -> Cell:
     """Run the first scored episodes of a task with every training run of an entry."""
     try:
         if entry.source == BEST_KNOWN:
-            costs = best_costs(task)[:n_episodes]
-            return Cell([TrainingRun({"cost": costs})])
+            costs = best_costs(task)
+            run = TrainingRun({"cost": costs[:n_episodes]})
+            return Cell([run])
         policies = entry.policies(task)
     except InputError as error:
         return Cell(refused=str(error))
