@@ -106,6 +106,11 @@ def _has_figures(run: ScoredRun, n_episodes: int) -> bool:
     return True
 
 
+#: Names of the controller and the task of a cell.
+CellName = tuple[str, str]
+Cells = Mapping[CellName, Cell]
+
+
 def run_cell(entry: Entry, task: BenchmarkTask, n_episodes: int) -> Cell:
     """Run the first scored episodes of a task with every training run of an entry."""
     try:

@@ -1,6 +1,5 @@
 """The table of episodes as columns, and its Parquet file."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from agents.benchmarking.cells import Cell
+from agents.benchmarking.cells import Cells
 from shipgym.arrays import Integers
 from shipgym.checks import quoted
 from shipgym.drafts import atomic_path
@@ -25,7 +24,7 @@ FLAGS = ("left_corridor", "grounded", "success", "terminated", "failed")
 MOST_NUMBERS = 5_000_000  # in a table; characters in a column of texts
 
 
-def episode_table(cells: Mapping[tuple[str, str], Cell], seeds: Integers) -> Columns:
+def episode_table(cells: Cells, seeds: Integers) -> Columns:
     """Return a row for each episode of cells, which are by controller and task.
 
     Figures that a cell lacks are NaN.
@@ -46,9 +45,12 @@ def episode_table(cells: Mapping[tuple[str, str], Cell], seeds: Integers) -> Col
     columns: Columns = {}
     for name in table:
         kind: Any = np.float64
-        if name in KEYS:
-            kind = np.str_ if name in TEXT_KEYS else np.int64
-        columns[name] = table[name].to_numpy().astype(kind)
+        if name in TEXT_KEYS:
+            kind = np.str_
+        elif name in KEYS:
+            kind = np.int64
+        values = table[name].to_numpy()
+        columns[name] = values.astype(kind)
     return columns
 
 

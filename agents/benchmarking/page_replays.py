@@ -62,8 +62,8 @@ def best_controllers(result: BenchmarkResult, task: str) -> list[str]:
         if cost is not None:
             costs[name] = cost
 
-    lowest = min(costs.values(), default=np.nan)
     best = []
+    lowest = min(costs.values(), default=np.nan)
     for name, cost in costs.items():
         if np.isclose(cost, lowest, rtol=SAME_COST):
             best.append(name)

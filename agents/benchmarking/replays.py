@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from agents.benchmarking.cells import CellName
 from agents.benchmarking.entries import Entry, read_entries
 from agents.benchmarking.results import BenchmarkResult
 from agents.jobs import JobEngine, run_jobs
@@ -17,6 +18,8 @@ from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
 
 SAME_COST = 1e-9  # relative difference of costs that is rounding
+#: What was run again of a cell, or of one of its training runs, ready for JSON.
+Record = dict[str, Any]
 
 
 class EpisodeId(NamedTuple):
@@ -43,7 +46,7 @@ class Rerun:
     """
 
     episodes: dict[EpisodeId, Episode] = field(default_factory=dict)
-    refused: dict[tuple[str, str], str] = field(default_factory=dict)
+    refused: dict[CellName, str] = field(default_factory=dict)
     different: tuple[EpisodeId, ...] = ()
 
 
@@ -70,8 +73,8 @@ def rerun(
     """
     entries = result.entries if controllers is None else read_entries(controllers)
     entry_of = {entry.name: entry for entry in entries}
-    jobs: dict[tuple[str, str], dict[str, Any]] = {}
-    records: dict[tuple[str, str], dict[str, Any]] = {}
+    jobs: dict[CellName, dict[str, Any]] = {}
+    records: dict[CellName, Record] = {}
     for cell, runs in _by_cell(episodes).items():
         name, task_name = cell
         try:
@@ -105,32 +108,28 @@ def _given(name: str, entry_of: Mapping[str, Entry]) -> Entry:
     return entry_of[name]
 
 
-def _by_cell(
-    episodes: Sequence[EpisodeId],
-) -> dict[tuple[str, str], list[dict[str, Any]]]:
+def _by_cell(episodes: Sequence[EpisodeId]) -> dict[CellName, list[Record]]:
     """Training runs by controller and task, each with its seeds."""
-    cells: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    known: dict[tuple[str, str, int], dict[str, Any]] = {}
-    for name, task, run, seed in episodes:
-        key = name, task, run
-        if key not in known:
-            known[key] = {"run": run, "seeds": []}
-            runs = cells.setdefault((name, task), [])
-            runs.append(known[key])
-        known[key]["seeds"].append(seed)
+    cells: dict[CellName, list[Record]] = {}
+    known: dict[EpisodeId, Record] = {}
+    for episode in episodes:
+        run = episode._replace(seed=0)  # a training run, whatever the episode
+        if run not in known:
+            known[run] = {"run": run.run, "seeds": []}
+            of_cell = cells.setdefault((run.controller, run.task), [])
+            of_cell.append(known[run])
+        known[run]["seeds"].append(episode.seed)
     return cells
 
 
-def rerun_job(job: dict[str, Any]) -> dict[str, Any]:
+def rerun_job(job: dict[str, Any]) -> Record:
     """Run chosen episodes of a controller and task, in any process; see `_record`."""
     entry = Entry(job["entry"], job["source"])
     task = BenchmarkTask.from_dict(job["task"])
     return _record(entry, task, job["runs"])
 
 
-def _record(
-    entry: Entry, task: BenchmarkTask, runs: Sequence[Mapping[str, Any]]
-) -> dict[str, Any]:
+def _record(entry: Entry, task: BenchmarkTask, runs: Sequence[Record]) -> Record:
     """Return `refused`, or for each of `runs` the costs and fields of its episodes."""
     records = []
     try:
@@ -148,11 +147,9 @@ def _record(
     return {"refused": "", "runs": records}
 
 
-def _collect(
-    result: BenchmarkResult, records: Mapping[tuple[str, str], Mapping[str, Any]]
-) -> Rerun:
+def _collect(result: BenchmarkResult, records: Mapping[CellName, Record]) -> Rerun:
     episodes: dict[EpisodeId, Episode] = {}
-    refused: dict[tuple[str, str], str] = {}
+    refused: dict[CellName, str] = {}
     different: list[EpisodeId] = []
     for cell, record in records.items():
         if record["refused"]:

@@ -16,7 +16,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from agents.benchmarking.cells import Cell
+from agents.benchmarking.cells import CellName, Cells
 from agents.benchmarking.entries import Entry
 from agents.benchmarking.episode_table import (
     Columns,
@@ -198,7 +198,7 @@ def collect(
     suite: Suite,
     tasks: Sequence[BenchmarkTask],
     entries: Sequence[Entry],
-    cells: Mapping[tuple[str, str], Cell],
+    cells: Cells,
     n_episodes: int,
 ) -> BenchmarkResult:
     """Put together what was run.
@@ -272,7 +272,7 @@ def _about_task(task: BenchmarkTask) -> dict[str, Any]:
 def _about_entry(
     entry: Entry,
     tasks: Sequence[BenchmarkTask],
-    cells: Mapping[tuple[str, str], Cell],
+    cells: Cells,
 ) -> dict[str, Any]:
     files: dict[str, str] = {}
     refused: dict[str, str] = {}
@@ -341,7 +341,7 @@ def _read_summary(path: Path) -> dict[str, Any]:
 
 def _check_rows(summary: Mapping[str, Any], episodes: Columns, where: Path) -> None:
     """Refuse a table whose rows are not those that the summary counts."""
-    runs: Counter[tuple[str, str]] = Counter()
+    runs: Counter[CellName] = Counter()
     for task, cells in summary["tasks"].items():
         for name, cell in cells.items():
             runs[name, task] = cell["runs"]

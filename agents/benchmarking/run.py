@@ -8,7 +8,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from agents.benchmarking.cells import Cell, job_of, run_cell, run_job
+from agents.benchmarking.cells import Cell, CellName, job_of, run_cell, run_job
 from agents.benchmarking.entries import Entry, check_agents, read_entries
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, collect
 from agents.jobs import JobEngine, run_jobs
@@ -120,10 +120,10 @@ def _run_cells(
     n_episodes: int,
     where: JobEngine,
     progress: Progress | None,
-) -> dict[tuple[str, str], Cell]:
+) -> dict[CellName, Cell]:
     """Run every entry in every task; cells by the names of both."""
-    cells: dict[tuple[str, str], Cell] = {}
-    jobs: dict[tuple[str, str], dict[str, Any]] = {}
+    cells: dict[CellName, Cell] = {}
+    jobs: dict[CellName, dict[str, Any]] = {}
     for entry, task in product(entries, tasks):
         if entry.is_text:
             jobs[entry.name, task.name] = job_of(entry, task, n_episodes)

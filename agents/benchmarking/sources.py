@@ -18,7 +18,6 @@ from agents.controllers.registry import (
     controller_kinds,
     register_controller,
 )
-from agents.policies.sb3_zip import read_sb3
 from agents.suites.suite import BenchmarkTask
 from shipgym.errors import InputError
 from shipgym.files import LARGEST_TENSORS, read_bytes
@@ -129,13 +128,16 @@ def load_source(path: Path) -> Source:
     """Read a policy; of a zip, a function that makes one for a task."""
     if path.suffix != ".zip":
         return load_agent(path)
+
+    from agents.policies.sb3_zip import read_sb3
+
     agent = read_sb3(path)
     return lambda task: agent.policy(task.task, task.ship)
 
 
 def source_files(text: str, task: BenchmarkTask) -> list[Path]:
     """Files from which a text's controllers are made for a task."""
-    name = task.design_task.name
+    name = task.design_name or task.name
     if text in LEARNED:
         return pretrained(name, text)
     if names_code(text):

@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import trim_mean
 
+from agents.suites.reference import ScoreScale
 from shipgym.arrays import Floats, Integers, finite
 
 N_DRAWS = 2000
 TRIMMED = 0.25  # of the scores at each end
-ScoreScale = tuple[float, float]  # costs whose scores are 0 and 1
 
 
 class ConfidenceInterval(NamedTuple):

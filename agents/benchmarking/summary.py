@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 
 from agents.benchmarking import statistics
-from agents.benchmarking.cells import Cell
+from agents.benchmarking.cells import Cell, Cells
 from agents.benchmarking.sources import BEST_KNOWN
 from agents.benchmarking.statistics import (
     NOTHING,
     ConfidenceInterval,
     Draws,
-    ScoreScale,
     score,
 )
-from agents.suites.reference import reference_costs
+from agents.suites.reference import ScoreScale, reference_costs
 from agents.suites.suite import N_EPISODES, SETS, BenchmarkTask
 from shipgym.arrays import Floats, finite
 
@@ -29,7 +28,7 @@ THRESHOLDS = np.arange(-20, 31) / 20.0  # scores of the performance profile
 def summarise(
     tasks: Sequence[BenchmarkTask],
     names: Sequence[str],
-    cells: Mapping[tuple[str, str], Cell],
+    cells: Cells,
 ) -> dict[str, Any]:
     """Return the fields `tasks`, `reference`, `ranking`, `improvement` and `profile`.
 
@@ -69,7 +68,7 @@ class _Costs:
 
     tasks: tuple[BenchmarkTask, ...]
     names: tuple[str, ...]
-    cells: Mapping[tuple[str, str], Cell]
+    cells: Cells
 
     @cached_property
     def costs(self) -> dict[int, dict[int, Floats]]:
@@ -121,18 +120,19 @@ class _Costs:
         task_name = self.tasks[task].name
         for controller, name in enumerate(self.names):
             if task in self.costs[controller]:
+                cell = self.cells[name, task_name]
                 costs = self._cost_figures(controller, task, lowest)
-                figures[name] = {**costs, **_run_figures(self.cells[name, task_name])}
+                figures[name] = costs | _run_figures(cell)
         return figures
 
     def _lowest(self, task: int) -> float:
         """Lowest mean cost in a task among controllers that are usable at sea."""
-        lowest = np.inf
+        means = []
         for controller, name in enumerate(self.names):
-            costs = self.costs[controller].get(task)
-            if costs is not None and name != BEST_KNOWN:
-                lowest = min(lowest, costs.mean())
-        return lowest if np.isfinite(lowest) else np.nan
+            costs = self.costs[controller]
+            if task in costs and name != BEST_KNOWN:
+                means.append(costs[task].mean())
+        return min(means, default=np.nan)
 
     def _cost_figures(
         self, controller: int, task: int, lowest: float

@@ -28,7 +28,7 @@ from shipgym.engine.records import field_types
 from shipgym.tasks import path_following
 from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.scales import rounded_interval
-from shipgym.tasks.steering import Extras, Helm
+from shipgym.tasks.steering import Extras
 
 #: Inputs that show a signal or an observation of another name.
 SHOWN_BY = {"drift": "course", **dict.fromkeys(COURSE_ERROR, "course")}
@@ -216,7 +216,7 @@ def policy_observations(
 def observation_bounds() -> dict[str, tuple[float, float]]:
     """Bounds of observations by name, in multiples of their scale."""
     kinds: dict[str, Any] = {}
-    for record in (Helm, Extras, path_following.Observation):
+    for record in (SteeringSignals, Extras, path_following.Observation):
         kinds |= field_types(record, notes=True)
 
     bounds = {}

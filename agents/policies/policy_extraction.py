@@ -89,7 +89,11 @@ def sb3_fields(agent: Any, env: Any = None) -> dict[str, Any]:
 
     network = _network(agent)
     _check_extraction(network, agent, learned_in["action"])
-    return {"network": network, **learned_in, **_residual(stack)}
+    return {
+        "network": network,
+        **learned_in,
+        **_residual(stack),
+    }
 
 
 def _stack(env: Any) -> Iterator[Any]:

@@ -186,7 +186,8 @@ def _bounds(about: Mapping[str, Any]) -> Floats:
     try:
         low = str(space["low"]).strip("[]")
         high = str(space["high"]).strip("[]")
-        return np.array([low.split(), high.split()], dtype=np.float64).T
+        bounds = [low.split(), high.split()]
+        return np.array(bounds, dtype=np.float64).T
     except (KeyError, ValueError):
         raise InputError(
             "data: observation_space: expected the flat Box of a task, got another"

@@ -181,10 +181,9 @@ class BenchmarkTask:
         named = [self.environment, self.model, self.true_ship, *options.values()]
         files = []
         for name in named:
-            if isinstance(name, str) and name.endswith((".py", ".json")):
-                path = Path(name)
-                if path.is_file():
-                    files.append(path)
+            path = Path(name if isinstance(name, str) else "")
+            if path.suffix in (".py", ".json") and path.is_file():
+                files.append(path)
         return files
 
     def to_dict(self) -> dict[str, Any]:

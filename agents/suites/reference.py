@@ -20,6 +20,8 @@ from shipgym.arrays import Floats
 from shipgym.checks import ANY_KEY, Shape, check_shape, check_table
 from shipgym.files import read_json
 
+#: Costs whose scores are 0 and 1.
+ScoreScale = tuple[float, float]
 BEST: Shape = {ANY_KEY: {"zero": (int, float), "costs": [(int, float)], "by": [(str,)]}}
 
 
@@ -34,8 +36,7 @@ def best_known(suite: str) -> dict[str, dict[str, Any]]:
     content = read_json(path, "file of best known costs", "take another copy")
     check_shape(content, BEST, str(path))
     for task, known in content.items():
-        n_costs = len(known["costs"])
-        n_by = len(known["by"])
+        n_costs, n_by = len(known["costs"]), len(known["by"])
         if n_costs != N_EPISODES or n_by != N_EPISODES:
             raise InputError(
                 f"{path}: {task}: expected costs of {N_EPISODES} episodes and what"
@@ -44,16 +45,17 @@ def best_known(suite: str) -> dict[str, dict[str, Any]]:
     return dict(content)
 
 
-def reference_costs(suite: str) -> dict[str, tuple[float, float]]:
+def reference_costs(suite: str) -> dict[str, ScoreScale]:
     """Return the mean costs whose scores are 0 and 1, by task.
 
     The first is that of wheel-over designed on the model, the second the best known.
     """
-    costs = {}
+    scales = {}
     for task, known in best_known(suite).items():
-        best = np.mean(known["costs"])
-        costs[task] = (float(known["zero"]), float(best))
-    return costs
+        zero = float(known["zero"])
+        best = float(np.mean(known["costs"]))
+        scales[task] = (zero, best)
+    return scales
 
 
 def best_costs(task: BenchmarkTask) -> Floats:
@@ -67,7 +69,7 @@ def best_costs(task: BenchmarkTask) -> Floats:
     return np.array(known[task.name]["costs"], dtype=np.float64)
 
 
-def load_tuned(suite: str) -> dict[str, dict[str, dict[str, Any]]]:
+def load_tuned(suite: str) -> dict[str, dict[str, Any]]:
     """Return the settings of classical controllers found by direct search.
 
     By task and controller. Raises InputError if the suite has none, or the file is

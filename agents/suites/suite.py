@@ -77,12 +77,16 @@ class Suite:
         if not names:
             raise InputError("tasks: expected at least one, got none")
 
-        selected: list[BenchmarkTask] = []
+        selected: dict[str, BenchmarkTask] = {}
         for name in names:
-            sets = [task for task in self.tasks if task.design_name == name]
-            selected += sets or [self.task(name)]
-        each_once = {task.name: task for task in selected}
-        return tuple(each_once.values())
+            for task in self._sets(name):
+                selected[task.name] = task
+        return tuple(selected.values())
+
+    def _sets(self, name: str) -> list[BenchmarkTask]:
+        """Return the sets of episodes of a task, or the one of this name."""
+        sets = [task for task in self.tasks if task.design_name == name]
+        return sets or [self.task(name)]
 
 
 def list_suites() -> list[str]:

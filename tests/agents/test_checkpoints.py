@@ -118,12 +118,9 @@ def kept(table, *path):
     ("path", "value", "said"),
     [
         (["parameters"], "/etc/passwd", "expected a table of 4, got '/etc/passwd'"),
-        (["parameters", "policy"], "/dev/zero", "expected a table of"),
         (WEIGHT, "/etc/passwd", "expected Tensor of torch.float32, shape (1, 8), got"),
         (WEIGHT, torch.zeros(8, 1), "got Tensor of torch.float32, shape (8, 1)"),
-        (WEIGHT, torch.zeros(1, 8, dtype=torch.float64), "got Tensor of torch.float64"),
         (WEIGHT, np.zeros((1, 8), np.float32), "got ndarray of float32, shape (1, 8)"),
-        (["parameters", "policy", "more"], torch.zeros(1), "expected a table of"),
         (["parameters", "actor.optimizer", "state", 99], {}, "expected a table of"),
         (
             ["parameters", "actor.optimizer", "state", 0, "exp_avg"],
@@ -135,54 +132,30 @@ def kept(table, *path):
             [],
             "param_groups: expected list of 1, got list of 0",
         ),
-        (["variables"], {}, "agent.variables: expected a table of 1, got a table of 0"),
         (["variables", "log_ent_coef"], 0.5, "expected Tensor of torch.float32"),
         (["counters", "num_timesteps"], -1, "num_timesteps: expected int, got -1"),
-        (["counters", "num_timesteps"], 1.5, "num_timesteps: expected int, got float"),
-        (["counters", "num_timesteps"], True, "num_timesteps: expected int, got bool"),
         (["counters", "_last_obs"], None, "expected ndarray of float32, shape (4, 8)"),
-        (["counters", "__class__"], 1, "agent.counters: expected a table of 6"),
         (["episodes"], [{"r": 1.0, "l": 5}], "episodes[0]: expected a table of 3"),
         (["episodes"], "rlt", "agent.episodes: expected list of 0, got 'rlt'"),
-        (["successes"], ["x"], "agent.successes[0]: expected float, got 'x'"),
         (["successes"], [float("inf")], "agent.successes[0]: expected float, got inf"),
-        (["ships"], [], "agent.ships: expected list of 2, got list of 0"),
         (["ships", 0, "var"], "x", "agent.ships[0].var: expected float, got 'x'"),
         (["ships", 1, "states"], np.zeros(3), "got ndarray of float64, shape (3,)"),
         (["replay"], None, "agent.replay: expected a table of 8, got None"),
         (["replay", "actions"], None, "expected ndarray of float32, shape (0, 4, 1)"),
-        (["replay", "actions"], np.zeros((), np.float32), "replay.actions: expected"),
-        (
-            ["replay", "actions"],
-            np.zeros((10, 4, 2), np.float32),
-            "replay.actions: exp",
-        ),
         (
             ["replay", "actions"],
             np.zeros((99, 4, 1), np.float32),
             "replay.actions: exp",
         ),
         (["replay", "pos"], 11, "agent.replay: expected 11 steps by its position 11"),
-        (["replay", "pos"], 10**9, "agent.replay: expected 1000000000 steps"),
         (["replay", "full"], True, "agent.replay: expected 20 steps"),
         (
             ["random", "numpy"],
             ("MT19937", np.zeros(624, np.uint32), 10**6, 0, 0.0),
             "expected a position of at most 624, got 1000000",
         ),
-        (
-            ["random", "numpy"],
-            ("PCG64", np.zeros(624, np.uint32), 0, 0, 0.0),
-            "random.numpy[0]: expected 'MT19937', got 'PCG64'",
-        ),
         (["random", "python"], (3, (1, 2), None), "expected tuple of 625"),
-        (["random", "python"], (3, (2**100,) * 625, None), "agent.random: "),
         (["random", "torch"], torch.zeros(5056, dtype=torch.uint8), "agent.random: "),
-        (
-            ["random", "torch"],
-            torch.zeros(3, dtype=torch.uint8),
-            "torch: expected Tens",
-        ),
         (["random", "actions", "bit_generator"], "os", "expected 'PCG64', got 'os'"),
     ],
 )
@@ -209,14 +182,11 @@ def test_weights_with_which_outputs_overflow_are_refused(fresh, memory):
     ("path", "where"),
     [
         (("ships", 1, "states"), "agent.ships[1].states"),
-        (("ships", 1, "returns"), "agent.ships[1].returns"),
-        (("ships", 0, "returns"), "agent.ships[0].returns"),
         (("ships", 0, "old_obs"), "agent.ships[0].old_obs"),
         (("replay", "rewards"), "agent.replay.rewards"),
         (("counters", "_last_obs"), "agent.counters._last_obs"),
         (WEIGHT, "agent.parameters.policy.actor.mu.weight"),
         (("parameters", "actor.optimizer", "state", 0, "exp_avg"), "state[0].exp_avg"),
-        (("variables", "log_ent_coef"), "agent.variables.log_ent_coef"),
     ],
 )
 def test_numbers_that_are_infinite_or_nan_are_refused(
@@ -277,10 +247,8 @@ def test_what_is_no_memory_is_refused(fresh, memory):
     ("change", "said"),
     [
         ({"curve": [{"steps": 1}]}, r"run.curve\[0\]: expected a table of 4"),
-        ({"curve": {}}, "run.curve: expected list of 0, got a table of 0"),
         ({"curve": [{**ROW, "mean_return": "low"}]}, "mean_return: .*got 'low'"),
         ({"curve": [{**ROW, "cost": None}]}, r"run.curve\[0\].cost: expected float"),
-        ({"best_cost": "low"}, "run.best_cost: expected float, got 'low'"),
         ({"best_steps": -1}, "run.best_steps: expected int, got -1"),
         ({"seconds": float("nan")}, "run.seconds: expected float, got nan"),
         ({"more": 1}, "run: expected a table of 4, got a table of 5"),
@@ -343,18 +311,6 @@ def test_what_cannot_be_written_is_named(tmp_path):
     with pytest.raises(TypeError, match=r"^a\.b\.1: object cannot be written$"):
         write_values({"a": {"b": [1, object()]}}, tmp_path / "values.safetensors")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_what_is_found_is_told_in_short():
-    with pytest.raises(ValueError, match=r"^place: expected int, got 'x{79}$"):
-        check_like("x" * 500, 0, "place")
-    many = {f"{'n' * 9}{k:03}": 0 for k in range(99)}
-    own = {"steps": 0, **dict.fromkeys(list(many)[:98], 0)}
-    with pytest.raises(
-        ValueError, match=r"^place\.steps: expected, got only "
-    ) as error:
-        check_like(many, own, "place")
-    assert len(str(error.value)) == len("place.steps: expected, got only ") + 200
 
 
 @pytest.mark.parametrize(
@@ -424,11 +380,7 @@ def test_tensors_of_other_types_are_refused_in_one_message(file, kind):
         "",
         "[",
         '{"array": "none"}',
-        '{"array": ["a"]}',
-        '{"tensor": 3}',
         '{"code": "x"}',
-        '{"dict": [["a"]]}',
-        '{"dict": [[["a"], 1]]}',
         '{"dict": 3}',
         '{"list": 3}',
         '{"list": [], "dict": []}',
@@ -523,12 +475,3 @@ def test_a_new_run_begins_in_a_new_or_an_empty_folder(run, tmp_path):
     ):
         with pytest.raises(InputError, match=said):
             run_folder.check_new(wrong)
-
-
-def test_a_package_that_is_not_installed_has_no_version():
-    found = run_folder.versions(("numpy", "no-such-package-of-shipgym"))
-    assert found.pop("python").startswith("3.")
-    assert found == {
-        "numpy": np.__version__,
-        "no-such-package-of-shipgym": "not installed",
-    }

@@ -17,7 +17,7 @@ import typer
 from typer.testing import CliRunner
 
 from agents.cli import app, main, reproduction
-from agents.cli.command import Commands, report_os_error, shared_options
+from agents.cli.command import Commands, shared_options
 from agents.jobs import JobError
 from agents.training.run_folder import CHECKPOINT
 from shipgym import InputError, ManoeuvreError, UnstableModelError, load_model
@@ -261,36 +261,6 @@ def test_trials_writes_figures_that_work_offline(tmp_path):
     ):
         assert caption in page
     assert 'src="http' not in page
-
-
-@pytest.mark.parametrize(
-    ("error", "code", "said"),
-    [
-        (OSError(errno.ENOENT, "No such file", "a.toml"), 2, "a.toml: No such file"),
-        (
-            OSError(errno.ENOENT, "No such file", "a" * 5000),
-            2,
-            "a" * 200 + ": No such file",
-        ),
-        (OSError(errno.EIO, "Input/output error"), 2, "Input/output error"),
-        (OSError("odd"), 2, "odd"),
-        (
-            OSError(errno.ENOSPC, "No space left"),
-            1,
-            "the output cannot be written (No space left)",
-        ),
-        (OSError(errno.EPIPE, "Broken pipe"), 1, ""),
-    ],
-)
-def test_what_cannot_be_read_or_written_is_one_line(
-    error, code, said, monkeypatch, capsys
-):
-    closed = []
-    monkeypatch.setattr(os, "dup2", lambda *ends: closed.append(ends[1]))
-    assert report_os_error(error) == code
-    assert closed == ([1] if code == 1 else [])
-    told = capsys.readouterr().err.replace("\n", "")
-    assert told == (f"error: {said}" if said else "")
 
 
 @pytest.mark.parametrize(
