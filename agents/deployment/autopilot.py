@@ -28,7 +28,7 @@ from shipgym.engine.records import field_types
 from shipgym.tasks import path_following
 from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.scales import rounded_interval
-from shipgym.tasks.steering import Extras
+from shipgym.tasks.steering import Extras, SteeringSignals
 
 #: Inputs that show a signal or an observation of another name.
 SHOWN_BY = {"drift": "course", **dict.fromkeys(COURSE_ERROR, "course")}
