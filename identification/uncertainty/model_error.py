@@ -165,12 +165,9 @@ def error_sizes(models: Sequence[ShipModel], trials: Sequence[Trial]) -> ErrorSi
     indices: list[PredictionError] = []
     predicted = 0
     for model, trial in zip(models, trials, strict=True):
-        names = [name for name in COMPARED if name in trial]
-        # extremes are read from smoothed channels
-        clean = trial.with_channels(smoothed_channels(trial, names, "spline"))
+        clean = _smoothed(trial)
         own = replace(model, covariance=None)
         drawn = model.sample(DRAWS, 0)
-
         errors = motion_errors(own, drawn, trial, clean)
         if errors:
             predicted += 1
@@ -187,6 +184,13 @@ def error_sizes(models: Sequence[ShipModel], trials: Sequence[Trial]) -> ErrorSi
         sizes = np.array(list(by_kind.values()))
         factor = root_mean_square(sizes)
     return ErrorSizes(factor, by_kind, predicted)
+
+
+def _smoothed(trial: Trial) -> Trial:
+    """The trial that extremes are read from."""
+    names = [name for name in COMPARED if name in trial]
+    channels = smoothed_channels(trial, names, "spline")
+    return trial.with_channels(channels)
 
 
 def scale_of(errors: Sequence[PredictionError]) -> float:
@@ -228,12 +232,12 @@ def motion_errors(
     found = []
     for name, level in levels.items():
         mine = predicted[name]
-        scatter = np.array([run[name] for run in runs]) - mine
-        variance = float(np.mean(_robust_variance(scatter)))
+        variance = _mean_variance(runs, name, mine)
         if variance <= 0.0:
             continue
         by_start = [mean_square(run[name] - mine) for run in from_shifted]
-        by_timing = mean_square(timing * np.gradient(clean[name], clean.t))
+        slope = np.gradient(clean[name], clean.t)
+        by_timing = mean_square(timing * slope)
         error = PredictionError(
             square=mean_square(mine - trial[name]),
             variance=variance,
@@ -241,6 +245,13 @@ def motion_errors(
         )
         found.append(error)
     return found
+
+
+def _mean_variance(runs: Sequence[Trial], name: str, mine: Floats) -> float:
+    """Variance of a channel of the draws about the own prediction, mean over time."""
+    scatter = np.array([run[name] for run in runs]) - mine
+    variance = _robust_variance(scatter)
+    return float(np.mean(variance))
 
 
 def _runs(cases: Sequence[tuple[ShipModel, Trial]]) -> list[Trial]:
@@ -295,8 +306,7 @@ def index_errors(
     for name in INDICES:
         truth = getattr(measured, name, None)
         mine = getattr(predicted, name, None)
-        values = [getattr(indices, name, None) for indices in draws]
-        known = np.array([value for value in values if value is not None])
+        known = _known_values(draws, name)
         if truth is None or mine is None or len(known) < DRAWS / 2:
             continue
         variance = float(_robust_variance(known - mine))
@@ -310,6 +320,16 @@ def index_errors(
     return found
 
 
+def _known_values(draws: Sequence[Any], name: str) -> Floats:
+    """Values of an index in the draws that have it."""
+    values = []
+    for indices in draws:
+        value = getattr(indices, name, None)
+        if value is not None:
+            values.append(value)
+    return np.array(values)
+
+
 def _timing(trial: Trial) -> float:
     """Standard deviation of a time that is known to a step, s."""
     return usual_step(trial.t) / math.sqrt(12.0)
@@ -321,11 +341,15 @@ def _reading_noise(trial: Trial, index: str, model: ShipModel) -> float:
     if index.endswith("_deg"):
         noise = noise_level(trial.t, trial["psi"])
         fastest = float(np.abs(trial["r"]).max())
-        error = np.hypot(noise, timing * fastest)
+        by_timing = timing * fastest
+        error = np.hypot(noise, by_timing)
         return float(np.degrees(error)) ** 2
 
     noise = 0.0
     if "x" in trial and trial.kind != "zigzag":
         noise = noise_level(trial.t, trial["x"])
-    error = np.hypot(noise, timing * trial["u"].max())
-    return float(error / model.particulars["length"]) ** 2
+    fastest = trial["u"].max()
+    by_timing = timing * fastest
+    error = np.hypot(noise, by_timing)
+    length = model.particulars["length"]
+    return float(error / length) ** 2
