@@ -1,7 +1,7 @@
-"""What trials say about each coefficient of a model.
+"""Fisher information of trials on each coefficient of a model.
 
-The Fisher information of a linear regression with white errors, X'X / sigma^2, adds up
-over trials. Its inverse is the least covariance of the coefficients.
+That of a linear regression with white errors is X'X / sigma^2, which adds up over
+trials. Its inverse is the least covariance of the coefficients.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ WINDOW = 0.2  # over which velocities are integrated, of the time to sail a ship
 
 @dataclass(frozen=True, eq=False)
 class TrialInformation:
-    """What one trial says about the coefficients."""
+    """Information of one trial on the coefficients."""
 
     name: str  # of the trial
     #: by equation, of the features scaled to a root mean square of 1
@@ -63,7 +63,8 @@ def noise_variance(
     for q, rows in table_of(model).regression_rows.items():
         targets = np.concatenate([samples.targets[q] for samples in regressions])
         features = np.concatenate([samples.features[q] for samples in regressions])
-        errors = targets - features @ accelerations[rows]
+        predicted = features @ accelerations[rows]
+        errors = targets - predicted
         # data without noise leave rounding errors only
         rounding = JITTER * mean_square(targets)
         noise[q] = max(mean_square(errors), rounding, smallest)
@@ -92,7 +93,7 @@ def fisher_information(
 def trial_information(
     model: ShipModel, name: str, samples: Samples, noise: Mapping[str, float]
 ) -> TrialInformation:
-    """What a trial of a name and a regression says."""
+    """Information of a trial, from its name and its regression."""
     condition = dict[str, float]()
     inflation = dict[str, float]()
     for q, X in samples.features.items():
@@ -117,12 +118,15 @@ def relative_covariance(information: Floats, size: Floats) -> Floats:
 
     What is not excited gets a large one instead of an infinite.
     """
-    relative = information * np.outer(size, size)
+    units = np.outer(size, size)
+    relative = information * units
     values, vectors = np.linalg.eigh(relative)
-    largest = max(values[-1], np.finfo(float).tiny)
+
+    smallest = np.finfo(float).tiny
+    largest = max(values[-1], smallest)
     regular = np.maximum(values, 1e-14 * largest)
-    inverse = (vectors / regular) @ vectors.T
-    return np.asarray(inverse)
+    scaled = vectors / regular
+    return np.asarray(scaled @ vectors.T)
 
 
 def relative_errors(information: Floats, size: Floats) -> Floats:
@@ -132,7 +136,7 @@ def relative_errors(information: Floats, size: Floats) -> Floats:
 
 
 def uncertainty(information: Floats, size: Floats, criterion: str, place: int) -> float:
-    """What a criterion shrinks, in the units of a relative standard error.
+    """The measure that a criterion shrinks, in units of a relative standard error.
 
     The standard error of the coefficient at a place ("c"), the mean axis ("D") or the
     longest axis ("E") of the ellipsoid of the relative errors.
@@ -143,7 +147,8 @@ def uncertainty(information: Floats, size: Floats, criterion: str, place: int) -
         return float(np.sqrt(variance))
 
     variances = np.linalg.eigvalsh(covariance)
-    positive = np.maximum(variances, np.finfo(float).tiny)
+    smallest = np.finfo(float).tiny
+    positive = np.maximum(variances, smallest)
     axes = np.sqrt(positive)
     if criterion == "D":
         mean_log = np.mean(np.log(axes))
