@@ -67,7 +67,7 @@ def _check_steps(trial: Trial) -> None:
 
 
 def is_still(trial: Trial) -> bool:
-    """Whether a rudder does nothing but scatter.
+    """Tell whether a rudder does nothing but scatter.
 
     Its running median over five samples, in which shorter excursions are outliers,
     moves by less than half a degree, or six times the noise up to 3 degrees.

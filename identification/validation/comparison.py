@@ -127,18 +127,17 @@ def compare_methods(
     found = list[tuple[RankedFit, IdentificationResult]]()
     refused = dict[str, str]()
     for structure, method in counted("structures and methods", pairs):
-        own = dict(arguments)
         name = get_method(method).name
         method = _with_settings(method, settings, left_out.get(name, ()))
+        own = dict(arguments)
         if several:
             name = fit_name(name_of(structure), name)
             reference = own.get("reference_model")
             own["reference_model"] = reference_of(structure, reference)
         try:
             result = identify(trials, structure, method, **own)
-            seen = result.metrics["trials"]
             if held:
-                seen = {trial.name: seen[trial.name] for trial in held}
+                seen = _of_trials(held, result)
             else:
                 seen = _each_in_turn(fitted, structure, method, own)
         except InputError as error:
@@ -152,6 +151,12 @@ def compare_methods(
         raise InputError(first_reason)
     ranked, results = _sorted(found, several)
     return Comparison(ranked, results, refused, left_out, in_turn=not held)
+
+
+def _of_trials(trials: Sequence[Trial], result: IdentificationResult) -> dict[str, Any]:
+    """Metrics of some trials that a result has predicted."""
+    metrics = result.metrics["trials"]
+    return {trial.name: metrics[trial.name] for trial in trials}
 
 
 def _with_settings(

@@ -1,4 +1,4 @@
-"""What the data can determine and what a fit left over: collinearity and residuals."""
+"""Collinearity of the data, and residuals that a fit left over."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -75,22 +75,27 @@ def _of_equation(
 ) -> EquationDiagnostics:
     """Diagnostics of an equation; `apart`: rows whose windows do not overlap."""
     scaled, condition = scaled_features(features)
-    smallest = np.finfo(float).tiny
-    power = max(float(target @ target), smallest)
-    unexplained = float(error @ error) / power
     rank = getattr(estimator, "rank_", min(features.shape))
     return EquationDiagnostics(
         samples=len(target),
         terms=len(names),
         rank=int(rank),
         condition_number=condition,
-        r_squared=1.0 - unexplained,
+        r_squared=_r_squared(target, error),
         residual_rms=root_mean_square(error),
         residual_autocorrelation=autocorrelation(error[apart], 10),
         variance_inflation=by_name(names, variance_inflation(scaled)),
         collinear_pairs=collinear_pairs(scaled, names),
         dropped=_dropped(estimator, names),
     )
+
+
+def _r_squared(target: Floats, error: Floats) -> float:
+    """Share of the target's mean square that a fit explains."""
+    smallest = np.finfo(float).tiny
+    power = max(float(target @ target), smallest)
+    unexplained = float(error @ error)
+    return 1.0 - unexplained / power
 
 
 def _dropped(estimator: Estimator, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:

@@ -1,4 +1,4 @@
-"""What a choice is validated on: each trial in turn, or those of the largest rudder."""
+"""Trials that validate a choice: each in turn, or those of the largest rudder."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
