@@ -56,7 +56,7 @@ def _verdict(first: RankedFit) -> tuple[str, str]:
 
 
 def _errors_notes(ranked: tuple[RankedFit, ...], ran_away: list[str]) -> str:
-    """What the figure of the errors does not show as it is."""
+    """Notes on what the figure of the errors does not show as it is."""
     notes = "."
     for fit in ranked:
         known = [error for error in fit.errors.values() if error is not None]

@@ -86,23 +86,24 @@ def current_text(row: Mapping[str, Any]) -> str:
 
 def _current_interval(row: Mapping[str, Any]) -> list[str]:
     """95 % interval of a current, and whether it differs from zero."""
+    north, east = row["north"], row["east"]
     north_error, east_error = row["standard_errors"]
-    north = NORMAL_95 * north_error
-    east = NORMAL_95 * east_error
+    north_margin = NORMAL_95 * north_error
+    east_margin = NORMAL_95 * east_error
     differs = row["probability"] < SIGNIFICANT
     verb = "differs" if differs else "does not differ"
     return [
-        f"north {row['north']:.3f} ± {north:.3f}",
-        f"east {row['east']:.3f} ± {east:.3f} m/s (95 %)",
+        f"north {north:.3f} ± {north_margin:.3f}",
+        f"east {east:.3f} ± {east_margin:.3f} m/s (95 %)",
         f"which {verb} from zero",
     ]
 
 
 def _set_and_drift(north: float, east: float) -> str:
     speed = np.hypot(north, east)
-    bearing = np.degrees(np.arctan2(east, north))
-    towards = bearing % 360.0
     knots = speed / KNOT
+    bearing = np.arctan2(east, north)
+    towards = np.degrees(bearing) % 360.0
     return f"{speed:.2f} m/s ({knots:.2f} knots) towards {towards:03.0f} deg"
 
 

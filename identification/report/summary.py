@@ -60,7 +60,7 @@ def _headline(fit: Fit) -> str:
 
 
 def kernel_text(report: Mapping[str, Any]) -> str:
-    """What was added to the reference ship, whose weights tell a reader nothing."""
+    """Kernel added to the reference ship, in words: its weights tell nothing."""
     errors = []
     for name, error in report["heading_errors_held_out"].items():
         angle = _heading_error(error, ".2g", " deg")
@@ -81,7 +81,7 @@ def _heading_error(error: float | None, digits: str, unit: str = "") -> str:
 
 
 def are_derivatives(model: ShipModel) -> bool:
-    """Whether coefficients are hydrodynamic derivatives in the prime system.
+    """Tell whether coefficients are hydrodynamic derivatives in the prime system.
 
     Such are printed times 1e-5.
     """
