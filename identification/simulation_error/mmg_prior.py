@@ -1,4 +1,4 @@
-"""What is known beforehand of the coefficients of the MMG form.
+"""Prior of the coefficients of the MMG form.
 
 Those of a reference ship, or from main dimensions.
 """
@@ -140,7 +140,8 @@ def completed(particulars: Particulars) -> Particulars:
     L = ship.length
     B = ship.require("beam")
     T = ship.require("draught")
-    area = ship.rudder_area or L * T / 100.0 * (1.0 + 25.0 * (B / L) ** 2)
+    usual_area = L * T / 100.0 * (1.0 + 25.0 * (B / L) ** 2)
+    area = ship.rudder_area or usual_area
     span = 0.76 * T
     rudders = ship.rudders or 1.0
     usual = {
@@ -153,7 +154,8 @@ def completed(particulars: Particulars) -> Particulars:
     for name, value in usual.items():
         if ship[name] is None:
             absent[name] = value
-    return replace(ship, **absent, estimated=ship.estimated | absent.keys())
+    estimated = ship.estimated | absent.keys()
+    return replace(ship, **absent, estimated=estimated)
 
 
 def _formula_prior(hull: str, ship: Particulars) -> MMGPrior:

@@ -5,7 +5,7 @@ fitting w - w0 to the samples and to the root of S as further samples (Hoerl & K
 1970; Tikhonov 1963). w0 and S are those of a `Prior`.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +18,7 @@ from identification.regression.samples import Samples
 from identification.simulation_error.formulas import FORMULAS
 from identification.simulation_error.prior import Prior, formula_prior, reference_prior
 from identification.simulation_error.prior_knowledge import PriorKnowledge
-from identification.validation.folds import TRIALS, sample_folds
+from identification.validation.folds import TRIALS, Fold, sample_folds
 from identification.validation.guard import reasons_unstable, with_coefficients
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats
@@ -115,19 +115,20 @@ class Pulled:
         error of each strength too, a mean square by that of no change at all.
         """
         splits = sample_folds(self.task.trials, self.task.samples, folds)
-        rows = []
-        for strength in STRENGTHS:
-            row = []
-            for split in splits:
-                estimators = self.at(strength, split.fit)
-                row.append(relative_error(estimators, split.held))
-            rows.append(row)
-        errors = np.array(rows)
-
+        errors = np.array([self._held_out(strength, splits) for strength in STRENGTHS])
         names = [f"{strength:.3g}" for strength in STRENGTHS]
         scores = by_name(names, errors.mean(axis=1))
         chosen = strongest_as_good(errors)
         return float(STRENGTHS[chosen]), scores
+
+    def _held_out(self, strength: float, splits: Sequence[Fold]) -> list[float]:
+        """Errors of fits with a strength on what each split holds out."""
+        errors = []
+        for split in splits:
+            estimators = self.at(strength, split.fit)
+            error = relative_error(estimators, split.held)
+            errors.append(error)
+        return errors
 
 
 def strongest_as_good(errors: Floats) -> int:
@@ -160,10 +161,7 @@ def pulled_estimator(
     if np.isinf(strength):
         return _prior_itself(estimator, X, rest, centre, prior.known[q])
 
-    # so that the prior counts as the samples do, whatever their number
-    window = float(np.mean(samples.duration))
-    weight = strength * np.sqrt(len(X)) * window
-    pull = weight * prior.roots[q]
+    pull = _pull(samples.duration, prior.roots[q], strength)
     no_change = np.zeros(len(pull))
     estimator.fit(
         np.vstack([X, pull]),
@@ -173,6 +171,17 @@ def pulled_estimator(
     if hasattr(estimator, "weights_"):
         estimator.weights_ = estimator.weights_[: len(X)]
     return estimator
+
+
+def _pull(durations: Floats, root: Floats, strength: float) -> Floats:
+    """Features of the prior, which count as samples do, whatever their number.
+
+    `durations`: of the samples, s.
+    """
+    n_samples = len(durations)
+    window = float(np.mean(durations))
+    weight = strength * np.sqrt(n_samples) * window
+    return np.asarray(weight * root)
 
 
 def _prior_itself(

@@ -43,7 +43,7 @@ class Segment:
 
     @property
     def has_wind(self) -> bool:
-        """Whether wind accelerates the ship in it."""
+        """True where wind accelerates the ship in it."""
         return bool(self.inputs[:, 3:].any())
 
     @property
@@ -180,11 +180,10 @@ def _segment(
     longest_step = LONGEST_STEP * model.travel_time
     grid = _grid(t, longest_step, recorded.rudder.corners)
     samples = np.full(len(grid), -1)
-    samples[np.searchsorted(grid, t)] = np.arange(len(t))
+    sampled = np.searchsorted(grid, t)
+    samples[sampled] = np.arange(len(t))
 
-    sampling = float(np.median(np.diff(t)))
-    per_block = max(int(BLOCK * model.travel_time / sampling), 1)
-    blocks = np.arange(0, len(t), per_block)
+    blocks = _block_starts(t, BLOCK * model.travel_time)
     return Segment(
         trial=recorded.index,
         inputs=_inputs(recorded, grid, model),
@@ -196,8 +195,15 @@ def _segment(
     )
 
 
+def _block_starts(t: Floats, duration: float) -> Integers:
+    """First sample of each block of a duration, s, at most, or of one sample."""
+    sampling = float(np.median(np.diff(t)))
+    per_block = max(int(duration / sampling), 1)
+    return np.arange(0, len(t), per_block)
+
+
 def _inputs(recorded: _Recorded, grid: Floats, model: ShipModel) -> Floats:
-    """What drives a ship at times of a grid, as in `Segment.inputs`."""
+    """Rudder, shaft and wind at times of a grid, as in `Segment.inputs`."""
     trial = recorded.trial
     rudder = recorded.rudder(grid)
     shaft = np.zeros(len(grid))
@@ -212,17 +218,17 @@ def _inputs(recorded: _Recorded, grid: Floats, model: ShipModel) -> Floats:
 
 def _grid(t: Floats, longest_step: float, corners: Floats) -> Floats:
     """Times of integration, s: samples, points between, and corners of the rudder."""
-    first, last = t[0], t[-1]
-    steps = np.ceil(np.diff(t) / longest_step - 1e-9)
+    sampling = np.diff(t)
+    steps = np.ceil(sampling / longest_step - 1e-9)
     counts = np.maximum(steps, 1).astype(int)
 
-    points = [last]
-    for (begin, end), count in zip(pairwise(t), counts, strict=True):
+    points = [t[-1]]
+    for begin, duration, count in zip(t[:-1], sampling, counts, strict=True):
         parts = np.arange(count)
-        between = begin + (end - begin) * parts / count
+        between = begin + duration * parts / count
         points.extend(between)
 
-    after_first = corners > first
-    before_last = corners < last
+    after_first = corners > t[0]
+    before_last = corners < t[-1]
     inside = corners[after_first & before_last]
     return np.union1d(points, inside)

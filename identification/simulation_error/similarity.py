@@ -18,7 +18,7 @@ LEAST_SIMILARITY = 0.5
 
 
 class Features(NamedTuple):
-    """What ships are compared by; nan for what is not known."""
+    """Quantities that ships are compared by; nan for what is not known."""
 
     block_coefficient: float
     length_by_beam: float
@@ -104,7 +104,7 @@ def select_reference(
     alike = [name for name in similarity if similarity[name] > least]
 
     def distance(name: str) -> tuple[float, float]:
-        """How far apart the lengths are; of one length the most similar comes first."""
+        """Distance of the lengths; of one length the most similar comes first."""
         scale = ships[name].particulars.length / particulars.length
         return abs(float(np.log(scale))), -similarity[name]
 
