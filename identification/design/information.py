@@ -19,6 +19,7 @@ from identification.validation.diagnostics import (
 )
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
+from shipgym.trials.resampling import usual_step
 
 WINDOW = 0.2  # over which velocities are integrated, of the time to sail a ship length
 
@@ -40,8 +41,8 @@ class TrialInformation:
 
 def trial_regression(model: ShipModel, trial: Trial) -> Samples:
     """Regression of a trial over windows of the same time, whatever the sampling."""
-    sampling = float(np.median(np.diff(trial.t)))
-    window = max(round(WINDOW * model.travel_time / sampling), 1)
+    sampling_steps = WINDOW * model.travel_time / usual_step(trial.t)
+    window = max(round(sampling_steps), 1)
     tenth = max(len(trial) // 10, 1)
     return build_samples(
         [trial],

@@ -81,7 +81,13 @@ def errors_figure(comparison: Ranking) -> Figure:
         x=axis("error, in standard deviations of the measurement", rangemode="tozero"),
         y=axis(autorange="reversed"),
     )
-    return panels([panel], 34 * len(names) + 130, left=96, hovermode="closest")
+    n_methods = len(names)
+    return panels(
+        [panel],
+        height=34 * n_methods + 130,
+        left=96,
+        hovermode="closest",
+    )
 
 
 def _mean_bars(ranked: Sequence[RankedFit], names: Sequence[str]) -> Any:

@@ -66,10 +66,13 @@ def kernel_text(report: Mapping[str, Any]) -> str:
         angle = _heading_error(error, ".2g", " deg")
         errors.append(f"{name} {angle}")
     held_out = ", ".join(errors)
+    centres = report["centres"]
+    length = report["length"]
+    features = report["features"]
+    C = report["C"]
     return (
-        f"Kernel: {report['centres']} radial basis functions of length"
-        f" {report['length']:g} in {report['features']} features an equation, C"
-        f" {report['C']:g}; heading held out, rms: {held_out}"
+        f"Kernel: {centres} radial basis functions of length {length:g} in"
+        f" {features} features an equation, C {C:g}; heading held out, rms: {held_out}"
     )
 
 
@@ -102,10 +105,17 @@ def coefficients_table(fit: Fit) -> Table:
         t = "-"
         if error > 0.0:
             t = f"{value / error:.1f}"
-        shown = f"{value:.6g}", f"{error:.2g}"
+        digits = ".6g"
         if derivatives:
-            shown = f"{value / PRIME:.2f}", f"{error / PRIME:.2g}"
-        table.add_row(name, *shown, t)
+            value = value / PRIME
+            error = error / PRIME
+            digits = ".2f"
+        table.add_row(
+            name,
+            f"{value:{digits}}",
+            f"{error:.2g}",
+            t,
+        )
     return table
 
 

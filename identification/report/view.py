@@ -179,14 +179,14 @@ def _ship_card(fit: Fit) -> Card:
 
 def _data_card(fit: Fit) -> Card:
     uses = [trial.use for trial in fit.trials]
-    to_fit = uses.count("fit")
+    to_fit = counted(uses.count("fit"), "trial")
     to_validate = uses.count("validate")
     samples = sum(len(trial) for trial in fit.trials)
     seconds = sum(trial.duration for trial in fit.trials)
     minutes = number(seconds / 60, 2)
     return Card(
         label="Data",
-        value=f"{counted(to_fit, 'trial')} to fit",
+        value=f"{to_fit} to fit",
         detail=f"{to_validate} to validate; {samples} samples, {minutes} min",
     )
 

@@ -118,11 +118,10 @@ def _errors(
     fit_intercept: bool,
 ) -> ErrorOfC:
     """Errors of fits on the samples of which the triangles are given."""
-    first = int(fit_intercept)
     n_folds = len(fits)
     n_rows = len(triangles[0])
-    n_features = n_rows - 1 - first
-    offset = np.empty((n_folds, 1, n_rows))
+    n_features = n_rows - 1 - int(fit_intercept)
+    offset = np.zeros((n_folds, 1, n_rows))
     gain = np.zeros((n_folds, n_features, n_rows))
     squares = np.zeros((n_folds, 1, n_features))
 

@@ -75,7 +75,8 @@ def _of_equation(
 ) -> EquationDiagnostics:
     """Diagnostics of an equation; `apart`: rows whose windows do not overlap."""
     scaled, condition = scaled_features(features)
-    rank = getattr(estimator, "rank_", min(features.shape))
+    full_rank = min(features.shape)
+    rank = getattr(estimator, "rank_", full_rank)
     return EquationDiagnostics(
         samples=len(target),
         terms=len(names),
@@ -100,11 +101,12 @@ def _r_squared(target: Floats, error: Floats) -> float:
 
 def _dropped(estimator: Estimator, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
     """Terms that make up each direction that an estimator dropped."""
-    groups = []
-    for group in getattr(estimator, "collinear_groups_", ()):
+    groups = getattr(estimator, "collinear_groups_", ())
+    dropped = []
+    for group in groups:
         terms = tuple(names[term] for term in group)
-        groups.append(terms)
-    return tuple(groups)
+        dropped.append(terms)
+    return tuple(dropped)
 
 
 def scaled_features(features: Floats) -> tuple[Floats, float]:
@@ -134,7 +136,9 @@ def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
     most = min(lags, len(values) - 1)
     correlations = []
     for lag in range(1, most + 1):
-        product = float(centred[lag:] @ centred[:-lag])
+        later = centred[lag:]
+        earlier = centred[:-lag]
+        product = float(later @ earlier)
         correlations.append(product / power)
     return tuple(correlations)
 

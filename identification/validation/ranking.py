@@ -155,7 +155,8 @@ def _relative_error(metrics: Mapping[str, Any], trial: Trial) -> float | None:
             continue
         deviation = float(np.std(trial[name]))
         if deviation > 0.0:
-            ratios.append(error / deviation)
+            ratio = error / deviation
+            ratios.append(ratio)
     if not ratios:
         return None
     return float(np.mean(ratios))

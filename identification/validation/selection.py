@@ -96,16 +96,16 @@ class _Attempts:
         for structure in counted("structures", structures):
             method = self.options.method
             if free:
-                method = methods_of(structure, method)[0]
+                method, *_ = methods_of(structure, method)
             self.add(structure, method)
         if not self.ranked:
             first_reason = next(iter(self.refused.values()))
             raise InputError(first_reason)
 
-        first = self.by_rank()[0].structure
-        if free and first in TABLES:
+        best, *_ = self.by_rank()
+        if free and best.structure in TABLES:
             for method in OTHERS:
-                self.add(first, method)
+                self.add(best.structure, method)
 
     def add(self, structure: str, method: Any) -> None:
         """Try a structure and a method, or remember why it cannot be fitted."""

@@ -26,7 +26,8 @@ def with_start(model: ShipModel, trial: Trial) -> Trial:
     if not names or "psi" not in trial:
         return trial
 
-    length, speed = model.particulars["length"], model.particulars["speed"]
+    length = model.particulars["length"]
+    speed = model.particulars["speed"]
     end = trial.t[0] + WINDOW * length / speed
     window = trial.t <= end
     if np.sum(window) < 3:
@@ -64,7 +65,8 @@ class _Opening:
             start = start + self._correction(start, scales)
             left = self._errors(start)
             mean_squares = np.mean(left**2, axis=1, keepdims=True)
-            scales = np.maximum(np.sqrt(mean_squares), self.floors)
+            rms = np.sqrt(mean_squares)
+            scales = np.maximum(rms, self.floors)
         return start
 
     def _correction(self, start: Floats, scales: Floats) -> Floats:
@@ -92,7 +94,8 @@ class _Opening:
         Shape (n_channels, n_samples - 1).
         """
         trial = self.trial
-        run = open_loop(self.model, _begun(trial, self.names, start))
+        begun = _begun(trial, self.names, start)
+        run = open_loop(self.model, begun)
         errors = []
         for name in self.channels:
             error = run[name] - trial[name]
