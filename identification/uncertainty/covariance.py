@@ -43,8 +43,10 @@ def joint_covariance(
         X = samples.features[q]
         counts = weights(estimator, X)
         # scaled to the variance of errors, of which fitting takes a part
-        scale = np.sqrt(len(samples) / effective_freedom(estimator, X))
-        errors.append(unweighted[q] * counts * scale)
+        freedom = effective_freedom(estimator, X)
+        scale = np.sqrt(len(samples) / freedom)
+        weighted = unweighted[q] * counts
+        errors.append(weighted * scale)
         maps.append(X @ estimator.inverse_moment_)
     if memory <= 0.0:
         return _without_memory(maps, errors)
@@ -74,7 +76,8 @@ def _with_memory(
     """Covariance for errors that last, each trial by itself."""
     by_equation = []
     for own_map, own_errors in zip(maps, errors, strict=True):
-        by_equation.append(own_map * own_errors[:, None])
+        moved = own_map * own_errors[:, None]
+        by_equation.append(moved)
     scores = np.hstack(by_equation)
 
     n_coefficients = scores.shape[1]

@@ -8,7 +8,7 @@ standard errors are scaled until these errors are of size one.
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -119,7 +119,8 @@ def model_error(
     covariance shrinks with each trial while the error of the equations does not.
     Returns `factor`, `how` it was found, and what it is made of, for the provenance.
     """
-    fitted = error_sizes([own] * len(trials), trials)
+    n_trials = len(trials)
+    fitted = error_sizes([own] * n_trials, trials)
     error = _generalisation(left_out, trials)
     if fitted.factor > error["factor"]:
         error["factor"] = fitted.factor
@@ -174,16 +175,24 @@ def error_sizes(models: Sequence[ShipModel], trials: Sequence[Trial]) -> ErrorSi
             motion += errors
             indices += index_errors(own, drawn, trial, clean)
 
-    by_kind: dict[str, float] = {}
+    by_kind = dict[str, float]()
     if motion:
         by_kind["motion"] = scale_of(motion)
     if indices:
         by_kind["indices"] = scale_of(indices)
-    factor = 0.0
-    if by_kind:
-        sizes = np.array(list(by_kind.values()))
-        factor = root_mean_square(sizes)
-    return ErrorSizes(factor, by_kind, predicted)
+    return ErrorSizes(
+        factor=_common_factor(by_kind),
+        by_kind=by_kind,
+        predicted=predicted,
+    )
+
+
+def _common_factor(by_kind: Mapping[str, float]) -> float:
+    """Root mean square of the factors by kind; 0 without any."""
+    if not by_kind:
+        return 0.0
+    sizes = np.array(list(by_kind.values()))
+    return root_mean_square(sizes)
 
 
 def _smoothed(trial: Trial) -> Trial:
@@ -306,10 +315,9 @@ def index_errors(
     for name in INDICES:
         truth = getattr(measured, name, None)
         mine = getattr(predicted, name, None)
-        known = _known_values(draws, name)
-        if truth is None or mine is None or len(known) < DRAWS / 2:
+        if truth is None or mine is None:
             continue
-        variance = float(_robust_variance(known - mine))
+        variance = _index_variance(draws, name, mine)
         if variance > 0.0:
             error = PredictionError(
                 square=(truth - mine) ** 2,
@@ -320,14 +328,17 @@ def index_errors(
     return found
 
 
-def _known_values(draws: Sequence[Any], name: str) -> Floats:
-    """Values of an index in the draws that have it."""
+def _index_variance(draws: Sequence[Any], name: str, mine: float) -> float:
+    """Variance of an index of the draws about the own one; 0 where most have none."""
     values = []
     for indices in draws:
         value = getattr(indices, name, None)
         if value is not None:
             values.append(value)
-    return np.array(values)
+    if len(values) < DRAWS / 2:
+        return 0.0
+    scatter = np.array(values) - mine
+    return float(_robust_variance(scatter))
 
 
 def _timing(trial: Trial) -> float:
