@@ -120,7 +120,8 @@ def mmg_prior(source: str | ShipModel, particulars: Particulars) -> MMGPrior:
     else:
         prior = _reference_prior(source, ship)
 
-    prior.mean.update(_given_added_mass(particulars))
+    given = _given_added_mass(particulars)
+    prior.mean.update(given)
     prior.mean["nD_U0"] = _self_propulsion(prior.mean, ship)
     return prior
 
@@ -204,10 +205,12 @@ def _reference(
     vectors = {model.name: similarity_vector(model.particulars)}
     for name, make in REFERENCE_SHIPS.items():
         if name != "mariner":
-            particulars = make().particulars.completed()
+            candidate = make()
+            particulars = candidate.particulars.completed()
             vectors[name] = similarity_vector(particulars)
+    own = similarity_vector(ship)
     try:
-        similarity = correlations(similarity_vector(ship), vectors)
+        similarity = correlations(own, vectors)
     except InputError:  # too little is known to compare
         return model, {}
     if source == AUTO:
@@ -255,7 +258,8 @@ def _given_added_mass(p: Particulars) -> dict[str, float]:
         if derivative is None or name in p.estimated:
             continue
         # the prime system is by rho L^3 / 2
-        given[symbol] = -derivative * p.length / p.require("draught")
+        draught = p.require("draught")
+        given[symbol] = -derivative * p.length / draught
     return given
 
 

@@ -18,6 +18,7 @@ from identification.simulation_error.segments import BLOCK, Segment
 from identification.simulation_error.shooting import Shooter, Shooting
 from identification.uncertainty.covariance import newey_west
 from shipgym.arrays import Floats
+from shipgym.trials.resampling import usual_step
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +62,8 @@ class OutputError:
         width = float(BLOCK * travel_time)
         for segment in self.fitted:
             if len(segment.times) > 1:
-                step = np.median(np.diff(segment.times))
-                width = max(width, float(step))
+                step = usual_step(segment.times)
+                width = max(width, step)
         return width
 
     def start_scales(self) -> Floats:

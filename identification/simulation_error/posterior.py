@@ -130,19 +130,22 @@ class Posterior:
 
     def _weighted_errors(self, segment: Segment, ships: Floats) -> Floats:
         """Errors of ships in a segment, by the root of their share."""
-        blank = self.blank
-        columns = [blank.state_names.index(name) for name in self.channels]
+        names = self.blank.state_names
+        columns = [names.index(name) for name in self.channels]
         used = 1 + len(IDENTIFIED)
         states = sail_lanes(
-            blank,
+            self.blank,
             segment,
             ships=ships,
             starts=in_all_lanes(segment.start),
             offsets=np.zeros(LANES),
         )
         # at the first sample the ships have not moved yet
-        off = states[1:, columns, :used] - segment.measured[1:, :, None]
-        share = self.independent_errors(segment) / len(off)
+        simulated = states[1:, columns, :used]
+        measured = segment.measured[1:, :, None]
+        off = simulated - measured
+        n_compared = len(off)
+        share = self.independent_errors(segment) / n_compared
         return np.asarray(off * np.sqrt(share))
 
     def _lanes(self, z: Floats, step: float) -> Floats:
@@ -206,9 +209,11 @@ class Posterior:
         By `strength` the standard deviations of the prior are divided.
         """
         data = self.scaled_errors(z, which, scales)
-        prior_slopes = strength * np.eye(len(z))
+        n_parameters = len(z)
+        from_prior = strength * z
+        prior_slopes = strength * np.eye(n_parameters)
         return Linearised(
-            residuals=np.append(data.residuals, strength * z),
+            residuals=np.append(data.residuals, from_prior),
             jacobian=np.vstack([data.jacobian, prior_slopes]),
         )
 

@@ -87,7 +87,8 @@ def _prior_of(name: str, samples: Samples) -> Prior:
 
     prior = Prior(name, centre={}, roots={}, known={})
     for q, X in samples.features.items():
-        root = np.linalg.qr(X * weight, mode="r")
+        weighted = X * weight
+        root = np.linalg.qr(weighted, mode="r")
         n_terms = X.shape[1]
         prior.centre[q] = fitted[q].coef_
         prior.known[q] = np.ones(n_terms, dtype=bool)
@@ -145,8 +146,13 @@ def virtual_trials(model: ShipModel) -> list[Trial]:
         )
         runs.append(run)
     for rudder in turns:
-        angle = float(np.clip(rudder, -limit, limit))
-        run = turning_circle(model, angle, duration, dt)
+        angle = np.clip(rudder, -limit, limit)
+        run = turning_circle(
+            model,
+            rudder_deg=float(angle),
+            duration=duration,
+            dt=dt,
+        )
         runs.append(run)
     return [_virtual(model, run, index) for index, run in enumerate(runs)]
 

@@ -24,7 +24,7 @@ from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats
 from shipgym.ships import GreyBox
 
-STRENGTHS = (0.0, *np.geomspace(1e-4, 10.0, 11).tolist(), np.inf)
+STRENGTHS: tuple[float, ...] = (0.0, *np.geomspace(1e-4, 10.0, 11).tolist(), np.inf)
 
 
 def with_prior(method: Method, knowledge: PriorKnowledge, blank: ShipModel) -> Method:
@@ -82,12 +82,14 @@ class Pulled:
         """Fit with the strength given, or chosen; `prior_` of each reports on it."""
         report: dict[str, Any] = {"prior_source": self.prior.name}
         if strength is None:
-            best, report["prior_scores"] = self.chosen_strength(folds)
+            best, scores = self.chosen_strength(folds)
+            report["prior_scores"] = scores
             strength = self.steady_strength(best)
             if strength > best:
                 report["prior_raised_from"] = best
         # JSON knows no infinity
-        report["prior_strength"] = None if np.isinf(strength) else strength
+        is_finite = np.isfinite(strength)
+        report["prior_strength"] = strength if is_finite else None
 
         estimators = self.at(strength)
         for estimator in estimators.values():
@@ -102,9 +104,10 @@ class Pulled:
         task = self.task
         first = STRENGTHS.index(least)
         for strength in STRENGTHS[first:]:
-            model = with_coefficients(task.blank, self.at(strength))
+            estimators = self.at(strength)
+            model = with_coefficients(task.blank, estimators)
             if not reasons_unstable(model, task.trials):
-                return float(strength)
+                return strength
         return least
 
     def chosen_strength(self, folds: str = TRIALS) -> tuple[float, dict[str, float]]:
@@ -152,7 +155,11 @@ def strongest_as_good(errors: Floats) -> int:
 
 
 def pulled_estimator(
-    estimator: Estimator, samples: Samples, q: str, prior: Prior, strength: float
+    estimator: Estimator,
+    samples: Samples,
+    q: str,
+    prior: Prior,
+    strength: float,
 ) -> Estimator:
     """Fit the samples of an equation, and the prior as further ones."""
     X = samples.features[q]
@@ -185,7 +192,11 @@ def _pull(durations: Floats, root: Floats, strength: float) -> Floats:
 
 
 def _prior_itself(
-    estimator: Estimator, X: Floats, rest: Floats, centre: Floats, known: Flags
+    estimator: Estimator,
+    X: Floats,
+    rest: Floats,
+    centre: Floats,
+    known: Flags,
 ) -> Estimator:
     """The prior's own coefficients; those it leaves open are fitted."""
     n_terms = len(known)

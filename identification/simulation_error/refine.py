@@ -51,8 +51,10 @@ def refine(
     _check_refinable(start.model, settings.extra_trials)
     problem = _posed(start, task, settings)
     scales = problem.start_scales()
-    if not (start.stable and np.isfinite(scales).all()):
-        return _kept(start, settings, {"decision": "not refined: the start runs away"})
+    simulated = np.isfinite(scales).all()
+    if not (start.stable and simulated):
+        report: dict[str, Any] = {"decision": "not refined: the start runs away"}
+        return _kept(start, settings, report)
 
     rejected = list[dict[str, Any]]()
     pull = settings.pull
@@ -62,12 +64,10 @@ def refine(
         reasons = reasons_unstable(model, task.trials)
         if not reasons:
             report = settings.plain() | _report(problem, solution, task.trials)
-            report |= {"pull": pull, "decision": "refined"}
             if rejected:
                 report["rejected"] = rejected
-            estimators = _estimators(start, problem, solution.parameters)
             return _refined(
-                replace(start, model=model, estimators=estimators),
+                replace(start, model=model),
                 problem=problem,
                 solution=solution,
                 memory=memory,
@@ -87,10 +87,11 @@ def _refined(
     memory: float,
     report: dict[str, Any],
 ) -> Refined:
-    """A refined fit with its covariance."""
+    """A fit, its model refined already, with estimators and covariance."""
+    estimators = _estimators(fit, problem, solution.parameters)
     covariance, influences = problem.covariance(solution, memory)
     return Refined(
-        fit=fit,
+        fit=replace(fit, estimators=estimators),
         covariance=covariance,
         influences=influences,
         report=report,
@@ -134,9 +135,13 @@ def _posed(start: GuardedFit, task: FitTask, settings: Refinement) -> OutputErro
     sizes = np.concatenate([term_sizes(task.samples, q) for q in equations])
     n_trials = len(task.trials)
     n_offsets = n_trials if settings.rudder_offsets else 0
-    free = settings.segment_start == "free"
     return OutputError(
-        shooter=Shooter(blank, channels, sizes, free),
+        shooter=Shooter(
+            blank,
+            channels,
+            term_sizes=sizes,
+            free=settings.segment_start == "free",
+        ),
         fitted=_segments(task.trials, blank, channels, settings),
         further=_further(blank, channels, settings, n_trials),
         start=_start_parameters(start, sizes, n_offsets),
@@ -176,7 +181,11 @@ def _further(
     further = []
     for segment in _segments(extra, blank, channels, settings):
         index = segment.trial
-        weighted = replace(segment, trial=n_fitted + index, weight=weights[index])
+        weighted = replace(
+            segment,
+            trial=n_fitted + index,
+            weight=weights[index],
+        )
         further.append(weighted)
     return further
 
@@ -228,4 +237,6 @@ def _report(
         "evaluations": solution.evaluations,
         "residual_rms": by_name(shooter.channels, solution.scales),
         "rudder_offsets_deg": by_name(names, np.degrees(offsets)),
+        "pull": solution.pull,
+        "decision": "refined",
     }

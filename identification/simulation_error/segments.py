@@ -13,6 +13,7 @@ from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats, Integers
 from shipgym.ships import Structure
 from shipgym.ships.simulate import LONGEST_STEP, wind_accelerations
+from shipgym.trials.resampling import usual_step
 
 BLOCK = 0.05  # time over which residuals are averaged, of that to sail one ship length
 
@@ -98,8 +99,8 @@ def _segment_rows(
     t: Floats, duration: float, shifts: Sequence[float], least_step: float
 ) -> Iterator[slice]:
     """Samples of each segment of a record, a least step apart, s."""
-    sampling = float(np.median(np.diff(t)))
-    every = max(int(least_step / sampling + 1e-9), 1)
+    sampling_steps = least_step / usual_step(t)
+    every = max(int(sampling_steps + 1e-9), 1)
     for shift in shifts:
         edges = segment_edges(t, duration, shift)
         for first, last in pairwise(edges):
@@ -197,8 +198,8 @@ def _segment(
 
 def _block_starts(t: Floats, duration: float) -> Integers:
     """First sample of each block of a duration, s, at most, or of one sample."""
-    sampling = float(np.median(np.diff(t)))
-    per_block = max(int(duration / sampling), 1)
+    sampling_steps = duration / usual_step(t)
+    per_block = max(int(sampling_steps), 1)
     return np.arange(0, len(t), per_block)
 
 
@@ -209,10 +210,12 @@ def _inputs(recorded: _Recorded, grid: Floats, model: ShipModel) -> Floats:
     shaft = np.zeros(len(grid))
     if "n" in trial:
         shaft = np.interp(grid, trial.t, trial["n"])
+
     columns = [grid, rudder, shaft]
     wind = wind_accelerations(trial, model.dynamics)
     for acceleration in wind.T:
-        columns.append(np.interp(grid, trial.t, acceleration))
+        column = np.interp(grid, trial.t, acceleration)
+        columns.append(column)
     return np.column_stack(columns)
 
 

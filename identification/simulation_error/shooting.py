@@ -47,7 +47,11 @@ class Shooter:
     """
 
     def __init__(
-        self, model: ShipModel, channels: Sequence[str], term_sizes: Floats, free: bool
+        self,
+        model: ShipModel,
+        channels: Sequence[str],
+        term_sizes: Floats,
+        free: bool,
     ) -> None:
         self.model = model
         self.channels = tuple(channels)
@@ -124,8 +128,9 @@ class Shooter:
         """The segments with their starts moved."""
         found = []
         for segment, move in zip(segments, moves, strict=True):
+            step = move * self.start_units
             start = segment.start.copy()
-            start[self.free] += move * self.start_units
+            start[self.free] += step
             found.append(replace(segment, start=start))
         return found
 
@@ -218,7 +223,11 @@ def channel_units(model: ShipModel, channels: Sequence[str]) -> Floats:
 
 
 def sail_lanes(
-    model: ShipModel, segment: Segment, ships: Floats, starts: Floats, offsets: Floats
+    model: ShipModel,
+    segment: Segment,
+    ships: Floats,
+    starts: Floats,
+    offsets: Floats,
 ) -> Floats:
     """States of the ships of all lanes at the samples of a segment.
 
