@@ -117,9 +117,8 @@ class Advice:
     def _candidates(self) -> Table:
         shrunk = f" for {self.coefficient}" if self.criterion == "c" else ""
         title = f"Run next ({self.criterion}-optimal{shrunk})"
-        headings = []
-        for number, _ in enumerate(self.chosen, start=1):
-            headings.append(f">gain, choice {number}")
+        numbers = range(1, len(self.chosen) + 1)
+        headings = [f">gain, choice {number}" for number in numbers]
         table = lined_table(title, "candidate", *headings)
         for name, _ in _descending(self.steps[0]):
             cells = []

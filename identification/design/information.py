@@ -61,7 +61,8 @@ def noise_variance(
     accelerations = model.acceleration_matrix @ coefficient_values(model)
     smallest = np.finfo(float).tiny
     noise = {}
-    for q, rows in table_of(model).regression_rows.items():
+    rows_of = table_of(model).regression_rows
+    for q, rows in rows_of.items():
         targets = np.concatenate([samples.targets[q] for samples in regressions])
         features = np.concatenate([samples.features[q] for samples in regressions])
         predicted = features @ accelerations[rows]

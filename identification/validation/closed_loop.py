@@ -130,19 +130,16 @@ def _sail(
     passage: Passage, trial: Trial, leg: ZigzagLeg, begin: float, state: Floats
 ) -> _Sailed | None:
     """Sail a leg from a time and a state; None where its target is not reached."""
-    model, dt = passage.model, passage.dt
+    dt = passage.dt
     n_steps = max(int(np.ceil(leg.longest / dt)), 2)
     steps = np.arange(n_steps + 1, dtype=float)
     t = begin + dt * steps
-
-    commands = _commands(model, trial, leg, t[:-1])
-    orders = two_commands(checked_orders(model, commands))
-    states = passage.states(state, n_steps)
-    passage.run("simulate", states, orders, dt)
+    commands = _commands(passage.model, trial, leg, t[:-1])
+    states = _simulated(passage, state, commands)
 
     last = n_steps
     if leg.target is not None:
-        heading = model.state_names.index("psi")
+        heading = passage.model.state_names.index("psi")
         psi = states[:, heading]
         last = _end_at(leg.target, psi, t, states)
         if last == 0:
@@ -153,6 +150,14 @@ def _sail(
         states=states[sailed],
         orders=np.full(last, leg.order),
     )
+
+
+def _simulated(passage: Passage, state: Floats, commands: Floats) -> Floats:
+    """States from a first one on, a step for each row of commands."""
+    orders = two_commands(checked_orders(passage.model, commands))
+    states = passage.states(state, len(commands))
+    passage.run("simulate", states, orders, passage.dt)
+    return states
 
 
 def _commands(

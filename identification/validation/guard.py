@@ -122,8 +122,9 @@ def why_unphysical(model: ShipModel, simulation: Simulation) -> str | None:
 
     length = model.particulars["length"]
     speed = model.particulars["speed"]
-    slowest = trial["u"].min()
-    fastest = trial["u"].max()
+    surge = trial["u"]
+    slowest = surge.min()
+    fastest = surge.max()
     least_surge = min(simulation.least_surge, 0.0)
     if slowest < least_surge or fastest > FASTEST * speed:
         return f"surge speed from {slowest:.3g} to {fastest:.3g} m/s"
