@@ -9,7 +9,7 @@ E-optimal for its longest axis. Coefficients count relative to their size.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.table import Table
@@ -117,9 +117,8 @@ class Advice:
     def _candidates(self) -> Table:
         shrunk = f" for {self.coefficient}" if self.criterion == "c" else ""
         title = f"Run next ({self.criterion}-optimal{shrunk})"
-        headings = []
-        for number, _ in enumerate(self.chosen, start=1):
-            headings.append(f">gain, choice {number}")
+        numbers = range(1, len(self.chosen) + 1)
+        headings = [f">gain, choice {number}" for number in numbers]
         table = lined_table(title, "candidate", *headings)
         for name, _ in _descending(self.steps[0]):
             cells = []
@@ -245,6 +244,36 @@ def advise(
 
     names = list(model.coefficients)
     place = names.index(coefficient)
+    plan = _plan(total, offers, size, criterion, place, number)
+    after = relative_errors(plan.information, size)
+    return Advice(
+        criterion=criterion,
+        coefficient=coefficient,
+        trials=known,
+        before=by_name(names, before),
+        steps=tuple(plan.steps),
+        chosen=tuple(plan.chosen),
+        after=by_name(names, after),
+    )
+
+
+class _Plan(NamedTuple):
+    """Candidates chosen one after the other."""
+
+    steps: list[dict[str, float]]  # gain of each candidate, by choice
+    chosen: list[str]
+    information: Floats  # with those chosen
+
+
+def _plan(
+    total: Floats,
+    offers: Mapping[str, Floats],
+    size: Floats,
+    criterion: str,
+    place: int,
+    number: int,
+) -> _Plan:
+    """Choose a number of candidates, each the best after those before it."""
     steps = list[dict[str, float]]()
     chosen = list[str]()
     for _ in range(number):
@@ -253,15 +282,7 @@ def advise(
         steps.append(gains)
         chosen.append(best)
         total = total + offers[best]
-    return Advice(
-        criterion=criterion,
-        coefficient=coefficient,
-        trials=known,
-        before=by_name(names, before),
-        steps=tuple(steps),
-        chosen=tuple(chosen),
-        after=by_name(names, relative_errors(total, size)),
-    )
+    return _Plan(steps, chosen, total)
 
 
 def _check_advisable(
@@ -294,20 +315,30 @@ def most_felt(model: ShipModel, errors: Floats) -> str:
 
     `errors`: standard errors, shape (n_coefficients,).
     """
+    felt = _felt_per_unit(model)
+    worst = int(np.argmax(felt * errors))
+    names = list(model.coefficients)
+    return names[worst]
+
+
+def _felt_per_unit(model: ShipModel) -> Floats:
+    """Change of an acceleration in a hard turn by a unit of each coefficient.
+
+    By the size of all its terms, in the equation where it is largest, shape
+    (n_coefficients,).
+    """
     table = table_of(model)
     sizes = hard_turn_features(table, model.particulars, model.service_shaft_speed)
     matrix = model.acceleration_matrix
     terms = matrix @ coefficient_values(model)
 
-    felt = np.zeros(len(errors))
+    felt = np.zeros(matrix.shape[1])
     for q, rows in table.regression_rows.items():
         by_coefficient = np.abs(matrix[rows]).T @ sizes[q]
         whole = np.abs(terms[rows]) @ sizes[q]
         share = by_coefficient / whole
         felt = np.maximum(felt, share)
-    worst = int(np.argmax(felt * errors))
-    names = list(model.coefficients)
-    return names[worst]
+    return felt
 
 
 def gains_of(

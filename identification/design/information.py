@@ -1,7 +1,7 @@
-"""What trials say about each coefficient of a model.
+"""Fisher information of trials on each coefficient of a model.
 
-The Fisher information of a linear regression with white errors, X'X / sigma^2, adds up
-over trials. Its inverse is the least covariance of the coefficients.
+That of a linear regression with white errors is X'X / sigma^2, which adds up over
+trials. Its inverse is the least covariance of the coefficients.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,13 +19,14 @@ from identification.validation.diagnostics import (
 )
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
+from shipgym.trials.resampling import usual_step
 
 WINDOW = 0.2  # over which velocities are integrated, of the time to sail a ship length
 
 
 @dataclass(frozen=True, eq=False)
 class TrialInformation:
-    """What one trial says about the coefficients."""
+    """Information of one trial on the coefficients."""
 
     name: str  # of the trial
     #: by equation, of the features scaled to a root mean square of 1
@@ -40,8 +41,8 @@ class TrialInformation:
 
 def trial_regression(model: ShipModel, trial: Trial) -> Samples:
     """Regression of a trial over windows of the same time, whatever the sampling."""
-    sampling = float(np.median(np.diff(trial.t)))
-    window = max(round(WINDOW * model.travel_time / sampling), 1)
+    sampling_steps = WINDOW * model.travel_time / usual_step(trial.t)
+    window = max(round(sampling_steps), 1)
     tenth = max(len(trial) // 10, 1)
     return build_samples(
         [trial],
@@ -60,10 +61,12 @@ def noise_variance(
     accelerations = model.acceleration_matrix @ coefficient_values(model)
     smallest = np.finfo(float).tiny
     noise = {}
-    for q, rows in table_of(model).regression_rows.items():
+    rows_of = table_of(model).regression_rows
+    for q, rows in rows_of.items():
         targets = np.concatenate([samples.targets[q] for samples in regressions])
         features = np.concatenate([samples.features[q] for samples in regressions])
-        errors = targets - features @ accelerations[rows]
+        predicted = features @ accelerations[rows]
+        errors = targets - predicted
         # data without noise leave rounding errors only
         rounding = JITTER * mean_square(targets)
         noise[q] = max(mean_square(errors), rounding, smallest)
@@ -92,7 +95,7 @@ def fisher_information(
 def trial_information(
     model: ShipModel, name: str, samples: Samples, noise: Mapping[str, float]
 ) -> TrialInformation:
-    """What a trial of a name and a regression says."""
+    """Information of a trial, from its name and its regression."""
     condition = dict[str, float]()
     inflation = dict[str, float]()
     for q, X in samples.features.items():
@@ -117,12 +120,15 @@ def relative_covariance(information: Floats, size: Floats) -> Floats:
 
     What is not excited gets a large one instead of an infinite.
     """
-    relative = information * np.outer(size, size)
+    units = np.outer(size, size)
+    relative = information * units
     values, vectors = np.linalg.eigh(relative)
-    largest = max(values[-1], np.finfo(float).tiny)
+
+    smallest = np.finfo(float).tiny
+    largest = max(values[-1], smallest)
     regular = np.maximum(values, 1e-14 * largest)
-    inverse = (vectors / regular) @ vectors.T
-    return np.asarray(inverse)
+    scaled = vectors / regular
+    return np.asarray(scaled @ vectors.T)
 
 
 def relative_errors(information: Floats, size: Floats) -> Floats:
@@ -132,7 +138,7 @@ def relative_errors(information: Floats, size: Floats) -> Floats:
 
 
 def uncertainty(information: Floats, size: Floats, criterion: str, place: int) -> float:
-    """What a criterion shrinks, in the units of a relative standard error.
+    """The measure that a criterion shrinks, in units of a relative standard error.
 
     The standard error of the coefficient at a place ("c"), the mean axis ("D") or the
     longest axis ("E") of the ellipsoid of the relative errors.
@@ -143,7 +149,8 @@ def uncertainty(information: Floats, size: Floats, criterion: str, place: int) -
         return float(np.sqrt(variance))
 
     variances = np.linalg.eigvalsh(covariance)
-    positive = np.maximum(variances, np.finfo(float).tiny)
+    smallest = np.finfo(float).tiny
+    positive = np.maximum(variances, smallest)
     axes = np.sqrt(positive)
     if criterion == "D":
         mean_log = np.mean(np.log(axes))

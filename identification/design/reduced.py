@@ -132,8 +132,10 @@ def _name_by_terms(structure: Structure) -> str:
     for q in structure.equations:
         names = [term.name for term in structure.terms(q)]
         terms.append((q, names))
-    digest = hashlib.sha256(repr(terms).encode()).hexdigest()
-    return f"{structure.name}-{digest[:6]}"
+    text = repr(terms)
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    short = digest[:6]
+    return f"{structure.name}-{short}"
 
 
 def reduce(

@@ -274,9 +274,14 @@ def forward_selection(
         path.append(step)
         explained = step.r_squared
 
-    best = max(step.held_out for step in path)
-    near_best = [k for k, step in enumerate(path) if step.held_out >= best - tolerance]
-    return Reduction(tuple(path), chosen=near_best[0])
+    return Reduction(tuple(path), chosen=_first_near_best(path, tolerance))
+
+
+def _first_near_best(path: Sequence[ReductionStep], tolerance: float) -> int:
+    """The first model whose held-out R2 is within a tolerance of the best."""
+    held_out = np.array([step.held_out for step in path])
+    near_best = held_out >= held_out.max() - tolerance
+    return int(np.argmax(near_best))
 
 
 def _by_error_reduction(regression: _Regression) -> list[int]:

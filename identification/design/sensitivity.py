@@ -1,4 +1,4 @@
-"""How much a manoeuvre depends on each coefficient of a model."""
+"""Sensitivity of a manoeuvre to each coefficient of a model."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -49,14 +49,7 @@ def sensitivity(
     """
     check_number(change, "change", above=0.0, below=1.0)
     table_of(model)
-    base = manoeuvre(model)
-    spans = {}
-    sensed = ("u", "v", "r", "psi")
-    for name in sensed:
-        span = float(np.ptp(base[name]))
-        if span > 0.0:
-            spans[name] = span
-
+    spans = _spans(manoeuvre(model))
     effects = {}
     for name in model.coefficients:
         more = _scaled(model, name, 1.0 + change)
@@ -70,6 +63,17 @@ def sensitivity(
     return dict(sorted(effects.items(), key=lambda effect: effect[1], reverse=True))
 
 
+def _spans(run: Trial) -> dict[str, float]:
+    """Span of each channel in which runs are compared, of those that move."""
+    spans = {}
+    compared = ("u", "v", "r", "psi")
+    for name in compared:
+        span = float(np.ptp(run[name]))
+        if span > 0.0:
+            spans[name] = span
+    return spans
+
+
 def _scaled(model: ShipModel, name: str, factor: float) -> ShipModel:
     """The model with one coefficient times a factor."""
     changed = {name: model.coefficients[name] * factor}
@@ -79,10 +83,11 @@ def _scaled(model: ShipModel, name: str, factor: float) -> ShipModel:
 def _difference(up: Trial, down: Trial, spans: dict[str, float]) -> float:
     """Root mean square difference of two runs over the channels, each by its span."""
     n_common = min(len(up), len(down))
+    common = slice(n_common)
     squares = []
     for name, span in spans.items():
-        apart = up[name][:n_common] - down[name][:n_common]
-        square = mean_square(apart)
+        difference = up[name][common] - down[name][common]
+        square = mean_square(difference)
         squares.append(square / span**2)
     mean = np.mean(squares)
     return float(np.sqrt(mean))

@@ -1,10 +1,12 @@
 """From trials to a ship model by the regression of each equation of motion."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from identification.estimators.estimator import FitTask
-from identification.estimators.methods import get_method
+from identification.estimators.methods import Method, get_method
 from identification.options import Options, name_of
 from identification.pipeline.evaluation import (
     MEMORY,
@@ -14,31 +16,24 @@ from identification.pipeline.evaluation import (
 from identification.regression.problem import pose
 from identification.result import IdentificationResult
 from identification.validation.guard import GuardedFit, guarded_fit
-from shipgym import Trial
+from shipgym import ShipModel, Trial
+
+if TYPE_CHECKING:
+    from identification.simulation_error.refine import Refined
 
 
 def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationResult:
     """Fit the regression of each equation, guard the model, and refine it if asked."""
     problem = pose(trials, options)
     task = FitTask(problem.samples, problem.blank, problem.used)
-    method = get_method(options.method)
-    if options.prior is not None:
-        from identification.simulation_error.pulled import with_prior
-
-        method = with_prior(method, options.prior, task.blank)
+    method = _asked_method(options, task.blank)
     fit = guarded_fit(method, task, options.guarded)
-    refined = None
-    if method.refinement is not None:
-        from identification.simulation_error.refine import refine
-
-        memory = MEMORY * task.blank.travel_time
-        refined = refine(fit, task, method.refinement, memory)
+    refined = _refined(fit, task, method)
+    if refined is not None:
         fit = refined.fit
 
     provenance = provenance_of(options, method.name, fit, problem)
-    if options.prior is not None:
-        provenance["prior"] = name_of(options.prior.source)
-        provenance |= _prior_report(fit)
+    provenance |= _prior_report(options, fit)
     if refined is not None:
         provenance["refinement"] = refined.report
     if options.uncertainty.covariance != "analytic":
@@ -46,8 +41,34 @@ def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationRe
     return with_uncertainty(fit, refined, problem, provenance, options)
 
 
-def _prior_report(fit: GuardedFit) -> dict[str, Any]:
-    """How strong a prior was; every estimator has the same report."""
+def _asked_method(options: Options, blank: ShipModel) -> Method:
+    """The method of the options, pulled toward their prior if there is one."""
+    method = get_method(options.method)
+    if options.prior is None:
+        return method
+
+    from identification.simulation_error.pulled import with_prior
+
+    return with_prior(method, options.prior, blank)
+
+
+def _refined(fit: GuardedFit, task: FitTask, method: Method) -> Refined | None:
+    """The fit refined as the method asks for; None where it does not."""
+    if method.refinement is None:
+        return None
+
+    from identification.simulation_error.refine import refine
+
+    memory = MEMORY * task.blank.travel_time
+    return refine(fit, task, method.refinement, memory)
+
+
+def _prior_report(options: Options, fit: GuardedFit) -> dict[str, Any]:
+    """Name and strength of a prior; every estimator has the same report."""
+    if options.prior is None:
+        return {}
+    report: dict[str, Any] = {"prior": name_of(options.prior.source)}
     for estimator in fit.estimators.values():
-        return dict(getattr(estimator, "prior_", {}))
-    return {}
+        report |= getattr(estimator, "prior_", {})
+        break
+    return report

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -49,21 +49,14 @@ MEMORY = 1.0  # of residuals, in the time to sail one ship length
 def provenance_of(
     options: Options, method: str, fit: GuardedFit, problem: Problem
 ) -> dict[str, Any]:
-    """How a model came about, for its file."""
+    """Provenance of a model, for its file."""
     further: dict[str, Any] = {}
     if isinstance(problem.table, GreyBox):
-        further["reference"] = {
-            "name": problem.table.ship.name,
-            "similarity": problem.similarity,
-            "shaft": problem.table.shaft,
-        }
+        further["reference"] = _reference(problem.table, problem)
     searched = _attributes(fit, "chosen_")
     if searched:
         further["search"] = searched
 
-    ranks = {}
-    for q, estimator in fit.estimators.items():
-        ranks[q] = int(getattr(estimator, "rank_", len(estimator.coef_)))
     return {
         "structure": name_of(options.structure),
         "method": method,
@@ -72,11 +65,29 @@ def provenance_of(
         **further,
         "software": f"shipgym {shipgym.__version__}",
         "steps_per_window": problem.samples.window,
-        "ranks": ranks,
+        "ranks": _ranks(fit),
         "guard": fit.report,
         "stable": fit.stable,
         "trials": [_trial_record(trial) for trial in problem.used],
     }
+
+
+def _reference(box: GreyBox, problem: Problem) -> dict[str, Any]:
+    """The reference ship of a grey box for the provenance."""
+    return {
+        "name": box.ship.name,
+        "similarity": problem.similarity,
+        "shaft": box.shaft,
+    }
+
+
+def _ranks(fit: GuardedFit) -> dict[str, int]:
+    """Directions that each estimator kept; all of one that drops none."""
+    ranks = {}
+    for q, estimator in fit.estimators.items():
+        n_terms = len(estimator.coef_)
+        ranks[q] = int(getattr(estimator, "rank_", n_terms))
+    return ranks
 
 
 def _attributes(fit: GuardedFit, name: str) -> dict[str, Any]:
@@ -170,15 +181,24 @@ def left_out_models(
     if refined is None or refined.covariance is None:
         return [_without(trial, fit, problem) for trial in range(n_trials)]
 
-    # each trial moved the refined coefficients by its influence
+    full = replace(fit.model, covariance=covariance)
+    return _less_influences(full, refined.influences)
+
+
+def _less_influences(model: ShipModel, influences: Sequence[Floats]) -> list[ShipModel]:
+    """The refined model less what each trial moved its coefficients by."""
+    n_trials = len(influences)
     inflation = n_trials / (n_trials - 1)
-    matrix = problem.blank.acceleration_matrix
-    values = np.array(list(fit.model.coefficients.values()))
+    covariance = inflation * np.asarray(model.covariance)
+    matrix = model.acceleration_matrix
+    values = np.array(list(model.coefficients.values()))
+
     models = []
-    for influence in refined.influences:
-        change = np.linalg.solve(matrix, influence.sum(axis=0))
-        model = fit.model.with_coefficients(values - inflation * change)
-        models.append(replace(model, covariance=inflation * covariance))
+    for influence in influences:
+        by_trial = influence.sum(axis=0)
+        change = np.linalg.solve(matrix, by_trial)
+        others = model.with_coefficients(values - inflation * change)
+        models.append(replace(others, covariance=covariance))
     return models
 
 
@@ -215,21 +235,12 @@ def evaluated(
     complete["steering"] = "estimated" if options.steering is None else "given"
     if lost:
         complete |= {"stable": False, "runs_away_on": lost}
-    stable = bool(complete["stable"])
     model = replace(model, provenance=complete)
-    metrics: dict[str, Any] = {
-        "stable": stable,
-        "instability": None if stable else _instability(complete, lost),
-        "trials": {
-            trial.name: trial_metrics(model, trial, predictions[trial.name])
-            for trial in trials
-        },
-    }
-    if isinstance(problem.table, GreyBox):
-        metrics["reference"] = bare_metrics(model, trials)
+    metrics = _stability(complete, lost)
+    metrics |= _accuracy(model, problem, trials, predictions)
     return IdentificationResult(
         model=model,
-        stable=stable,
+        stable=metrics["stable"],
         metrics=metrics,
         predictions=predictions,
         trials=trials,
@@ -241,10 +252,31 @@ def evaluated(
     )
 
 
-def _instability(provenance: Mapping[str, Any], lost: list[str]) -> str:
-    """What an unstable model runs away in."""
+def _accuracy(
+    model: ShipModel,
+    problem: Problem,
+    trials: Sequence[Trial],
+    predictions: Mapping[str, Trial | None],
+) -> dict[str, Any]:
+    """Metrics of the predictions, of a grey box those of its bare reference too."""
+    metrics: dict[str, Any] = {}
+    metrics["trials"] = {
+        trial.name: trial_metrics(model, trial, predictions[trial.name])
+        for trial in trials
+    }
+    if isinstance(problem.table, GreyBox):
+        metrics["reference"] = bare_metrics(model, trials)
+    return metrics
+
+
+def _stability(provenance: Mapping[str, Any], lost: list[str]) -> dict[str, Any]:
+    """Metrics of stability: yes or no, and simulations that ran away."""
+    if provenance["stable"]:
+        return {"stable": True, "instability": None}
+
     reasons = [f"trial {name!r}, open loop" for name in lost]
     if not reasons:
-        reasons = provenance["guard"].get("rejected", [])
+        guard = provenance["guard"]
+        reasons = guard.get("rejected", [])
     causes = "; ".join(reasons)
-    return f"runs away: {causes}"
+    return {"stable": False, "instability": f"runs away: {causes}"}

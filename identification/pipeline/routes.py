@@ -7,6 +7,7 @@ from typing import Any
 from identification.estimators.estimator import Estimators
 from identification.estimators.kernel_fit import (
     INPUT_CHANNELS,
+    KernelFit,
     fit_kernel,
     inputs_of,
     stabilised,
@@ -22,7 +23,7 @@ from identification.pipeline.evaluation import (
 )
 from identification.regression.grey_box import explained_samples
 from identification.regression.preprocess import smoothed_channels
-from identification.regression.problem import held_out, pose
+from identification.regression.problem import Problem, held_out, pose
 from identification.result import IdentificationResult
 from identification.simulation_error.maximum_a_posteriori import (
     checked_mmg,
@@ -75,25 +76,8 @@ def by_kernel(
     """A reference ship, fitted or named, and a kernel on what she leaves."""
     beneath = reference_options(options)
     problem = pose(trials, beneath)
-    blank, box = problem.blank, problem.table
-    if not isinstance(box, GreyBox):
-        blank = identified(trials, beneath).model
-        if beneath.structure == BLACK_BOX:
-            blank = stabilised(blank)
-        box = fitted_box(blank)
-
-    smoothing = options.preprocessing.smoothing
-    channels = [
-        smoothed_channels(trial, INPUT_CHANNELS, smoothing) for trial in problem.used
-    ]
-    found = fit_kernel(
-        kernel,
-        blank,
-        problem.used,
-        box,
-        inputs_of(channels, blank.particulars),
-        lambda table: problem.rows_of(table, blank),
-    )
+    reference, box = _reference_box(trials, beneath, problem)
+    found = _fitted_kernel(kernel, reference, box, problem, options)
     problem = replace(
         problem,
         blank=found.model,
@@ -105,6 +89,40 @@ def by_kernel(
     provenance = provenance_of(named, name_of(options.method), fit, problem)
     provenance["kernel"] = found.report
     return with_uncertainty(fit, None, problem, provenance, options)
+
+
+def _reference_box(
+    trials: Sequence[Trial], options: Options, problem: Problem
+) -> tuple[ShipModel, GreyBox]:
+    """The reference ship beneath a kernel, and her table; fitted where none is named."""
+    if isinstance(problem.table, GreyBox):
+        return problem.blank, problem.table
+
+    model = identified(trials, options).model
+    if options.structure == BLACK_BOX:
+        model = stabilised(model)
+    return model, fitted_box(model)
+
+
+def _fitted_kernel(
+    kernel: KernelResidual,
+    reference: ShipModel,
+    box: GreyBox,
+    problem: Problem,
+    options: Options,
+) -> KernelFit:
+    """The kernel on a reference ship, from inputs smoothed as the options ask for."""
+    used = problem.used
+    smoothing = options.preprocessing.smoothing
+    channels = [smoothed_channels(trial, INPUT_CHANNELS, smoothing) for trial in used]
+    return fit_kernel(
+        kernel,
+        reference,
+        used,
+        box,
+        inputs_of(channels, reference.particulars),
+        lambda table: problem.rows_of(table, reference),
+    )
 
 
 def reference_options(options: Options) -> Options:

@@ -94,14 +94,13 @@ def search_figure(searches: Mapping[str, SearchResult]) -> Figure:
 
     By equation; the objective relative to the final one.
     """
-    histories = {id(search.history) for search in searches.values()}
-    one_for_all = len(histories) == 1
-
     objectives, best = list[Any](), list[Any]()
+    one_for_all = _is_one_for_all(searches)
     for (q, search), colour in zip(searches.items(), PALETTE, strict=False):
         name = EQUATIONS.get(q, q)
         rounds = np.arange(len(search.history))
-        best.append(line(rounds, _best_settings(search), name, colour))
+        setting = line(rounds, _best_settings(search), name, colour)
+        best.append(setting)
         if not objectives or not one_for_all:
             relative = _relative_objective(search)
             curve = line(rounds, relative, name, colour, showlegend=False)
@@ -118,6 +117,12 @@ def search_figure(searches: Mapping[str, SearchResult]) -> Figure:
         grid={"horizontal_spacing": 0.1},
         hovermode="closest",
     )
+
+
+def _is_one_for_all(searches: Mapping[str, SearchResult]) -> bool:
+    """Tell whether all equations share one search."""
+    histories = {id(search.history) for search in searches.values()}
+    return len(histories) == 1
 
 
 def _setting_axis(searches: Mapping[str, SearchResult]) -> tuple[Any, str]:

@@ -20,7 +20,7 @@ class _Bar(NamedTuple):
 
     @property
     def significant(self) -> bool:
-        """Whether the interval does not reach 0."""
+        """True where the interval does not reach 0."""
         return self.half < self.centre
 
 

@@ -56,7 +56,7 @@ def _verdict(first: RankedFit) -> tuple[str, str]:
 
 
 def _errors_notes(ranked: tuple[RankedFit, ...], ran_away: list[str]) -> str:
-    """What the figure of the errors does not show as it is."""
+    """Notes on what the figure of the errors does not show as it is."""
     notes = "."
     for fit in ranked:
         known = [error for error in fit.errors.values() if error is not None]
@@ -81,7 +81,13 @@ def errors_figure(comparison: Ranking) -> Figure:
         x=axis("error, in standard deviations of the measurement", rangemode="tozero"),
         y=axis(autorange="reversed"),
     )
-    return panels([panel], 34 * len(names) + 130, left=96, hovermode="closest")
+    n_methods = len(names)
+    return panels(
+        [panel],
+        height=34 * n_methods + 130,
+        left=96,
+        hovermode="closest",
+    )
 
 
 def _mean_bars(ranked: Sequence[RankedFit], names: Sequence[str]) -> Any:

@@ -162,15 +162,17 @@ def residual_figure(fit: Fit) -> Figure:
     lags = np.arange(-LAGS, LAGS + 1)
 
     shown = []
-    titles = ("with themselves", "with the rudder")
+    own_title, rudder_title = "with themselves", "with the rudder"
     for q, error in errors.items():
         own = autocorrelation(error[rows], LAGS)
         after = np.arange(1, len(own) + 1)
-        shown.append(_bars_panel(after, own, bound, EQUATIONS[q], titles[0]))
+        panel = _bars_panel(after, own, bound, EQUATIONS[q], own_title)
+        shown.append(panel)
         if rudder is not None:
             found = cross_correlation(error[rows], rudder[rows], lags)
-            shown.append(_bars_panel(lags, found, bound, "", titles[1]))
-        titles = ("", "")  # above the first row only
+            panel = _bars_panel(lags, found, bound, "", rudder_title)
+            shown.append(panel)
+        own_title = rudder_title = ""  # above the first row only
 
     count = len(errors)
     return panels(

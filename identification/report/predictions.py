@@ -26,8 +26,14 @@ def overview_figure(
         if "psi" not in trial or "delta" not in trial:
             return None
         predicted = predictions.get(trial.name)
-        shown.append(_overview_panel(trial, predicted))
-    return panels(shown, 230 * rows_of_two(shown) + 80, columns=2, outer=True)
+        panel = _overview_panel(trial, predicted)
+        shown.append(panel)
+    return panels(
+        shown,
+        height=230 * rows_of_two(shown) + 80,
+        columns=2,
+        outer=True,
+    )
 
 
 def rows_of_two(shown: Sequence[Panel]) -> int:

@@ -46,17 +46,20 @@ def _wind_sentences(wind: Mapping[str, Any]) -> list[str]:
     sentences = []
     if "mean_speeds" in wind:
         speeds = wind["mean_speeds"].values()
-        low, high = min(speeds), max(speeds)
+        low = min(speeds)
+        high = max(speeds)
         sentences.append(
             f"wind of {low:.2g} to {high:.2g} m/s on average: its forces are removed"
         )
 
     units = {"wind_vdot": "m/s²", "wind_rdot": "rad/s²"}
-    for trial, row in wind.get("accelerations", {}).items():
+    accelerations = wind.get("accelerations", {})
+    for trial, row in accelerations.items():
         parts = []
         for channel, value in row.items():
             motion = channel.removeprefix("wind_")
-            parts.append(f"{motion} {value:.2g} {units[channel]}")
+            unit = units[channel]
+            parts.append(f"{motion} {value:.2g} {unit}")
         name = PurePath(trial).name
         removed = ", ".join(parts)
         sentences.append(f"{name}: constant acceleration removed, {removed}")
@@ -86,23 +89,24 @@ def current_text(row: Mapping[str, Any]) -> str:
 
 def _current_interval(row: Mapping[str, Any]) -> list[str]:
     """95 % interval of a current, and whether it differs from zero."""
+    north, east = row["north"], row["east"]
     north_error, east_error = row["standard_errors"]
-    north = NORMAL_95 * north_error
-    east = NORMAL_95 * east_error
+    north_margin = NORMAL_95 * north_error
+    east_margin = NORMAL_95 * east_error
     differs = row["probability"] < SIGNIFICANT
     verb = "differs" if differs else "does not differ"
     return [
-        f"north {row['north']:.3f} ± {north:.3f}",
-        f"east {row['east']:.3f} ± {east:.3f} m/s (95 %)",
+        f"north {north:.3f} ± {north_margin:.3f}",
+        f"east {east:.3f} ± {east_margin:.3f} m/s (95 %)",
         f"which {verb} from zero",
     ]
 
 
 def _set_and_drift(north: float, east: float) -> str:
     speed = np.hypot(north, east)
-    bearing = np.degrees(np.arctan2(east, north))
-    towards = bearing % 360.0
     knots = speed / KNOT
+    bearing = np.arctan2(east, north)
+    towards = np.degrees(bearing) % 360.0
     return f"{speed:.2f} m/s ({knots:.2f} knots) towards {towards:03.0f} deg"
 
 
@@ -140,10 +144,11 @@ def _track_panel(trial: Trial, current: Mapping[str, Any], number: int) -> Panel
     drift_north = current["north"] * trial.duration
     water_east = [east[-1], east[-1] + drift_east]
     water_north = [north[-1], north[-1] + drift_north]
+    width = 1.7
     tracks = [
-        line(raw["y"], raw["x"], "over ground", MEASURED, 1.7),
-        line(east, north, "through the water", MODEL, 1.7),
-        line(water_east, water_north, "the water meanwhile", LIMIT, 1.7),
+        line(raw["y"], raw["x"], "over ground", MEASURED, width),
+        line(east, north, "through the water", MODEL, width),
+        line(water_east, water_north, "the water meanwhile", LIMIT, width),
     ]
 
     own_x = f"x{number + 1}" if number else "x"

@@ -60,16 +60,19 @@ def _headline(fit: Fit) -> str:
 
 
 def kernel_text(report: Mapping[str, Any]) -> str:
-    """What was added to the reference ship, whose weights tell a reader nothing."""
+    """Kernel added to the reference ship, in words: its weights tell nothing."""
     errors = []
     for name, error in report["heading_errors_held_out"].items():
         angle = _heading_error(error, ".2g", " deg")
         errors.append(f"{name} {angle}")
     held_out = ", ".join(errors)
+    centres = report["centres"]
+    length = report["length"]
+    features = report["features"]
+    C = report["C"]
     return (
-        f"Kernel: {report['centres']} radial basis functions of length"
-        f" {report['length']:g} in {report['features']} features an equation, C"
-        f" {report['C']:g}; heading held out, rms: {held_out}"
+        f"Kernel: {centres} radial basis functions of length {length:g} in"
+        f" {features} features an equation, C {C:g}; heading held out, rms: {held_out}"
     )
 
 
@@ -81,7 +84,7 @@ def _heading_error(error: float | None, digits: str, unit: str = "") -> str:
 
 
 def are_derivatives(model: ShipModel) -> bool:
-    """Whether coefficients are hydrodynamic derivatives in the prime system.
+    """Tell whether coefficients are hydrodynamic derivatives in the prime system.
 
     Such are printed times 1e-5.
     """
@@ -102,10 +105,17 @@ def coefficients_table(fit: Fit) -> Table:
         t = "-"
         if error > 0.0:
             t = f"{value / error:.1f}"
-        shown = f"{value:.6g}", f"{error:.2g}"
+        digits = ".6g"
         if derivatives:
-            shown = f"{value / PRIME:.2f}", f"{error / PRIME:.2g}"
-        table.add_row(name, *shown, t)
+            value = value / PRIME
+            error = error / PRIME
+            digits = ".2f"
+        table.add_row(
+            name,
+            f"{value:{digits}}",
+            f"{error:.2g}",
+            t,
+        )
     return table
 
 

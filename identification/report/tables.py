@@ -180,9 +180,14 @@ def coefficient_tables(fit: Fit) -> dict[str, list[CoefficientRow]]:
         if derivatives:
             force, _, _ = name.partition("_")
             title = FORCES.get(force, title)
-        value = fit.coefficients[name]
-        row = _coefficient_row(name, value, error, derivatives)
-        tables.setdefault(title, []).append(row)
+        rows = tables.setdefault(title, [])
+        row = _coefficient_row(
+            name,
+            fit.coefficients[name],
+            error,
+            derivatives,
+        )
+        rows.append(row)
     return tables
 
 
@@ -238,7 +243,8 @@ def index_lines(metrics: Mapping[str, Any]) -> list[str]:
 
         closed_loop = values.get("closed_loop")
         if closed_loop is not None:
-            line += f" ({fixed(closed_loop)})"
+            in_loop = fixed(closed_loop)
+            line += f" ({in_loop})"
         lines.append(f"{line} {unit}")
     return lines or [NONE]
 

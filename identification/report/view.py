@@ -1,4 +1,4 @@
-"""What the templates of reports show of a fit: cards, sentences, rows and figures."""
+"""View of a fit for the templates of reports: cards, sentences, rows and figures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -56,7 +56,7 @@ class TrialFigure(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FitView:
-    """What the macros in `sections.html` show of a fit but for its figures."""
+    """View of a fit for the macros in `sections.html`, without its figures."""
 
     lead: str  # how the model was identified
     structure: str
@@ -83,7 +83,7 @@ class FitView:
 
 
 def fit_view(fit: Fit) -> FitView:
-    """What the templates show of a fit."""
+    """View of a fit for the templates."""
     model = fit.model
     provenance = model.provenance or {}
     short = short_names(fit.trials)
@@ -179,14 +179,14 @@ def _ship_card(fit: Fit) -> Card:
 
 def _data_card(fit: Fit) -> Card:
     uses = [trial.use for trial in fit.trials]
-    to_fit = uses.count("fit")
+    to_fit = counted(uses.count("fit"), "trial")
     to_validate = uses.count("validate")
     samples = sum(len(trial) for trial in fit.trials)
     seconds = sum(trial.duration for trial in fit.trials)
     minutes = number(seconds / 60, 2)
     return Card(
         label="Data",
-        value=f"{counted(to_fit, 'trial')} to fit",
+        value=f"{to_fit} to fit",
         detail=f"{to_validate} to validate; {samples} samples, {minutes} min",
     )
 
@@ -226,7 +226,7 @@ def quality_card(fit: Fit) -> Card:
 
 
 def _coefficient_notes(fit: Fit, tables: Mapping[str, list[CoefficientRow]]) -> str:
-    """How the table of coefficients is to be read."""
+    """Notes by which to read the table of coefficients."""
     dynamics = fit.model.dynamics
     kind = f"Coefficients of {dynamics.quantity}s, {dynamics.normalisation} units"
     if are_derivatives(fit.model):

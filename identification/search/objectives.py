@@ -118,24 +118,19 @@ def _errors(
     fit_intercept: bool,
 ) -> ErrorOfC:
     """Errors of fits on the samples of which the triangles are given."""
-    first = int(fit_intercept)
     n_folds = len(fits)
     n_rows = len(triangles[0])
-    n_features = n_rows - 1 - first
-    offset = np.empty((n_folds, 1, n_rows))
+    n_features = n_rows - 1 - int(fit_intercept)
+    offset = np.zeros((n_folds, 1, n_rows))
     gain = np.zeros((n_folds, n_features, n_rows))
     squares = np.zeros((n_folds, 1, n_features))
 
     for k, (fit, R) in enumerate(zip(fits, triangles, strict=True)):
-        features = R[:, first:-1]
-        target = R[:, -1]
-        if fit_intercept:
-            features = features - R[:, :1] * fit.centre
-            target = target - R[:, 0] * fit.mean
-
+        features, target = _centred(R, fit, fit_intercept)
         kept = fit.numerical_rank
+        singular_values = fit.singular_values[:kept]
         offset[k, 0] = target
-        squares[k, 0, :kept] = fit.singular_values[:kept] ** 2
+        squares[k, 0, :kept] = singular_values**2
         gain[k, :kept] = _explained(fit, features)
     return ErrorOfC(
         offset=offset,
@@ -145,12 +140,27 @@ def _errors(
     )
 
 
+def _centred(
+    R: Floats, fit: Decomposition, fit_intercept: bool
+) -> tuple[Floats, Floats]:
+    """Features and target of a triangle, less the means of a fit with intercept."""
+    target = R[:, -1]
+    if not fit_intercept:
+        return R[:, :-1], target
+
+    ones = R[:, 0]
+    features = R[:, 1:-1] - ones[:, None] * fit.centre
+    return features, target - ones * fit.mean
+
+
 def _explained(fit: Decomposition, features: Floats) -> Floats:
-    """What each direction explains of the targets, by 1 / (s^2 + 1/C)."""
+    """Part of the targets that each direction explains, by 1 / (s^2 + 1/C)."""
     kept = fit.numerical_rank
     directions = fit.directions[:kept] / fit.scale
+    projections = fit.projections[:kept]
+    singular_values = fit.singular_values[:kept]
     along = features @ directions.T
-    explained = along * fit.projections[:kept] * fit.singular_values[:kept]
+    explained = along * projections * singular_values
     return explained.T
 
 

@@ -92,13 +92,10 @@ class ParticleSwarm(Optimiser):
             high=high,
             rng=rng,
         )
-        shape = place.shape
-        velocity = np.zeros(shape)
+        velocity = np.zeros(place.shape)
         best = place.copy()
         for _ in range(self.rounds):
-            towards_own = self.own * rng.random(shape) * (best - place)
-            towards_common = self.common * rng.random(shape) * (record.x - place)
-            velocity = self.inertia * velocity + towards_own + towards_common
+            velocity = self._velocity(velocity, place, best, record.x, rng)
             place = place + velocity
 
             # a particle at a wall does not go on pushing against it
@@ -111,6 +108,21 @@ class ParticleSwarm(Optimiser):
             best[better] = place[better]
             values[better] = found[better]
             record.end_round()
+
+    def _velocity(
+        self,
+        velocity: Floats,
+        place: Floats,
+        best: Floats,
+        common_best: Floats,
+        rng: np.random.Generator,
+    ) -> Floats:
+        """Next velocity, towards the best place of each particle and of the swarm."""
+        by_own = self.own * rng.random(place.shape)
+        by_common = self.common * rng.random(place.shape)
+        towards_own = by_own * (best - place)
+        towards_common = by_common * (common_best - place)
+        return self.inertia * velocity + towards_own + towards_common
 
 
 @dataclass(frozen=True)
@@ -210,12 +222,9 @@ class ArtificialBeeColony(Optimiser):
             colony.send_bees(np.arange(n), record, low, high, rng)
             onlookers = colony.chances().searchsorted(rng.random(n), "right")
             colony.send_bees(onlookers, record, low, high, rng)
-
             left = np.flatnonzero(colony.idle > self.limit)
             if left.size:
-                colony.places[left] = _drawn(left.size, low, high, rng)
-                colony.values[left] = record(colony.places[left])
-                colony.idle[left] = 0
+                colony.renew(left, _drawn(left.size, low, high, rng), record)
             record.end_round()
 
 
@@ -230,13 +239,21 @@ class Colony:
     def chances(self) -> Floats:
         """Cumulative chance of each source, by its fitness, shape (n_sources,)."""
         values = self.values
-        of_positive = 1.0 / (1.0 + np.maximum(values, 0.0))
+        positive = np.maximum(values, 0.0)
+        of_positive = 1.0 / (1.0 + positive)
         of_negative = 1.0 - values
         fitness = np.where(values >= 0.0, of_positive, of_negative)
-        if not 0.0 < fitness.sum() < np.inf:
+        total = fitness.sum()
+        if not 0.0 < total < np.inf:
             fitness = np.ones(len(values))
         cumulative = fitness.cumsum()
         return np.asarray(cumulative / cumulative[-1])
+
+    def renew(self, left: Integers, places: Floats, record: Recorder) -> None:
+        """Put sources that are left at other places."""
+        self.places[left] = places
+        self.values[left] = record(places)
+        self.idle[left] = 0
 
     def send_bees(
         self,
@@ -253,7 +270,8 @@ class Colony:
 
         # of several bees at one source the best is last, and stays
         better = np.flatnonzero(found < self.values[chosen])
-        better = better[np.argsort(-found[better], kind="stable")]
+        falling = np.argsort(-found[better], kind="stable")
+        better = better[falling]
         improved = chosen[better]
         self.places[improved] = moved[better]
         self.values[improved] = found[better]
@@ -265,16 +283,18 @@ class Colony:
         That is x + a (x - x of the other), with a in [-1, 1].
         """
         n_sources, n_dimensions = self.places.shape
+        n_others = n_sources - 1
         n_bees = len(chosen)
         by_distance, by_axis, by_stride = rng.random((3, n_bees))
-        distance = (by_distance * (n_sources - 1)).astype(np.int64)
-        other = (chosen + 1 + distance) % n_sources
+        distance = 1 + (by_distance * n_others).astype(np.int64)
+        other = (chosen + distance) % n_sources
         axis = (by_axis * n_dimensions).astype(np.int64)
         stride = 2.0 * by_stride - 1.0
 
         moved = self.places[chosen]
-        away = self.places[chosen, axis] - self.places[other, axis]
-        moved[np.arange(n_bees), axis] += stride * away
+        bee = np.arange(n_bees)
+        away = moved[bee, axis] - self.places[other, axis]
+        moved[bee, axis] += stride * away
         return moved
 
 

@@ -56,9 +56,7 @@ def pattern_search(
     record(first[None])
     record.end_round()
 
-    axes = np.eye(len(lowest))
-    both_ways = np.vstack([axes, -axes])
-    directions = (highest - lowest) * both_ways
+    directions = _directions(highest - lowest)
     while mesh >= finest and value_at.cache_info().currsize < most_evaluations:
         before = record.value
         neighbours = record.x + mesh * directions
@@ -67,3 +65,10 @@ def pattern_search(
             mesh *= 0.5
         record.end_round()
     return replace(record.result(), evaluations=value_at.cache_info().currsize)
+
+
+def _directions(sides: Floats) -> Floats:
+    """Steps along both ways of each axis of a box, shape (2 n, n)."""
+    axes = np.eye(len(sides))
+    both_ways = np.vstack([axes, -axes])
+    return np.asarray(sides * both_ways)

@@ -122,20 +122,34 @@ def formula_coefficients(
     """
     ship = particulars.completed()
     _check_covered(formula, structure)
-    accelerations = _linear_accelerations(FORMULAS[formula](ship), ship)
+    derivatives = FORMULAS[formula](ship)
+    accelerations = _linear_accelerations(derivatives, ship)
 
     coefficients = {}
-    for q, terms in structure.equations.items():
-        values = np.zeros(len(terms))
-        known = np.zeros(len(terms), dtype=bool)
-        for i, term in enumerate(terms):
-            symbol = _linear_symbol(term)
-            if symbol is not None and q in accelerations:
-                scale = _feature_scale(structure, q, term, symbol, ship)
-                values[i] = accelerations[q][symbol] * scale
-                known[i] = True
-        coefficients[q] = FormulaCoefficients(values, known)
+    for q in structure.equations:
+        by_symbol = accelerations.get(q, {})
+        coefficients[q] = _equation_coefficients(structure, q, by_symbol, ship)
     return coefficients
+
+
+def _equation_coefficients(
+    structure: Structure,
+    q: str,
+    accelerations: dict[str, float],
+    ship: Particulars,
+) -> FormulaCoefficients:
+    """Coefficients of an equation from its accelerations by v, r and delta."""
+    terms = structure.equations[q]
+    values = np.zeros(len(terms))
+    known = np.zeros(len(terms), dtype=bool)
+    for i, term in enumerate(terms):
+        symbol = _linear_symbol(term)
+        if symbol is None or symbol not in accelerations:
+            continue
+        scale = _feature_scale(structure, q, term, symbol, ship)
+        values[i] = accelerations[symbol] * scale
+        known[i] = True
+    return FormulaCoefficients(values, known)
 
 
 def _check_covered(formula: str, structure: Structure) -> None:
@@ -158,7 +172,8 @@ def _linear_accelerations(
     derivatives: dict[str, float], ship: Particulars
 ) -> dict[str, dict[str, float]]:
     """Sway and yaw acceleration by v, r and delta, prime system."""
-    m, x_G = ship.mass_prime, ship.xg_prime
+    m = ship.mass_prime
+    x_G = ship.xg_prime
     sway_and_yaw = slice(1, 3)
     mass = prime_inertia(ship)[sway_and_yaw, sway_and_yaw]
 
@@ -192,7 +207,8 @@ def _feature_scale(
             speeds_in_feature += power
 
     missing = float(speeds - speeds_in_feature)
-    by_speed = ship.require("speed") ** missing
+    speed = ship.require("speed")
+    by_speed = speed**missing
     by_length = ship.length ** float(lengths)
     return float(by_speed * by_length)
 

@@ -3,8 +3,9 @@
 How much narrower the prior is made, the trials decide, each predicted from the others.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,13 @@ from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.ships.mmg import IDENTIFIED
+
+
+class _Candidate(NamedTuple):
+    """An estimate by one strength of the prior, and how it predicts what it omits."""
+
+    estimate: Estimate
+    held_out: HeldOutError
 
 
 def checked_mmg(options: Options) -> Options:
@@ -63,23 +71,24 @@ def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, An
     asked = options.prior or PriorKnowledge()
     source = options.reference_model or asked.source or YOSHIMURA
     posterior = _posterior(problem, source)
-    estimates = list[Estimate]()
-    z = np.zeros(len(IDENTIFIED))
-    for strength in _strengths(asked):
-        estimate = posterior.most_probable(z, strength)
-        estimates.append(estimate)
-        z = estimate.z
+    strengths = _strengths(asked)
+    candidates = _candidates(posterior, strengths)
+    errors = [candidate.held_out.error for candidate in candidates]
+    best = strongest_as_good(errors)
+    chosen = candidates[best]
 
-    scales = estimates[0].scales
-    held_out = [posterior.held_out(estimate, scales) for estimate in estimates]
-    chosen = strongest_as_good([found.error for found in held_out])
+    model = _chosen_model(posterior, chosen)
+    report = _report(posterior, candidates, chosen)
+    return model, report
 
-    best = estimates[chosen]
-    factor = held_out[chosen].factor
-    scaled = factor**2 * best.covariance
-    covariance = _coefficient_covariance(posterior.prior, scaled)
-    model = replace(posterior.model(best.z), covariance=covariance)
-    return model, _report(posterior, estimates, held_out, chosen)
+
+def _chosen_model(posterior: Posterior, chosen: _Candidate) -> ShipModel:
+    """The model of an estimate, its covariance widened by the errors held out."""
+    estimate, held_out = chosen
+    widened = held_out.factor**2 * estimate.covariance
+    model = posterior.model(estimate.z)
+    covariance = _coefficient_covariance(posterior.prior, widened)
+    return replace(model, covariance=covariance)
 
 
 def _posterior(problem: Problem, source: str | ShipModel) -> Posterior:
@@ -96,6 +105,24 @@ def _strengths(asked: PriorKnowledge) -> tuple[float, ...]:
         return 1.0, 2.0, 3.0
     check_number(asked.strength, "prior_strength", above=0.0)
     return (asked.strength,)
+
+
+def _candidates(posterior: Posterior, strengths: Sequence[float]) -> list[_Candidate]:
+    """Estimates by rising strength, each begun where the one before it ended."""
+    estimates = list[Estimate]()
+    z = np.zeros(len(IDENTIFIED))
+    for strength in strengths:
+        estimate = posterior.most_probable(z, strength)
+        estimates.append(estimate)
+        z = estimate.z
+
+    # errors are compared in the same scales
+    scales = estimates[0].scales
+    candidates = []
+    for estimate in estimates:
+        held_out = posterior.held_out(estimate, scales)
+        candidates.append(_Candidate(estimate, held_out))
+    return candidates
 
 
 def strongest_as_good(errors: list[float]) -> int:
@@ -116,31 +143,34 @@ def _coefficient_covariance(prior: MMGPrior, covariance: Floats) -> Floats:
 
 
 def _report(
-    posterior: Posterior,
-    estimates: list[Estimate],
-    held_out: list[HeldOutError],
-    chosen: int,
+    posterior: Posterior, candidates: Sequence[_Candidate], chosen: _Candidate
 ) -> dict[str, Any]:
     """For the provenance."""
-    prior, best = posterior.prior, estimates[chosen]
+    errors = dict[str, float]()
+    evaluations = 0
+    for estimate, held_out in candidates:
+        errors[f"{estimate.strength:g}"] = held_out.error
+        evaluations += estimate.evaluations
+
+    best = chosen.estimate
+    return _prior_report(posterior.prior) | {
+        "prior_strength": best.strength,
+        "errors_held_out": errors,
+        "model_error": {
+            "factor": chosen.held_out.factor,
+            "how": "simulated segments of trials left out in turn",
+        },
+        "segments": len(posterior.segments),
+        "evaluations": evaluations,
+        "residual_rms": by_name(posterior.channels, best.scales),
+        "deviations_from_prior": by_name(IDENTIFIED, best.z.round(3)),
+    }
+
+
+def _prior_report(prior: MMGPrior) -> dict[str, Any]:
     report: dict[str, Any] = {"prior": prior.source}
     if prior.similarity:
         report["similarity"] = dict(prior.similarity)
     if prior.remarks:
         report["prior_remarks"] = list(prior.remarks)
-
-    errors = dict[str, float]()
-    for estimate, found in zip(estimates, held_out, strict=True):
-        errors[f"{estimate.strength:g}"] = found.error
-    return report | {
-        "prior_strength": best.strength,
-        "errors_held_out": errors,
-        "model_error": {
-            "factor": held_out[chosen].factor,
-            "how": "simulated segments of trials left out in turn",
-        },
-        "segments": len(posterior.segments),
-        "evaluations": sum(one.evaluations for one in estimates),
-        "residual_rms": by_name(posterior.channels, best.scales),
-        "deviations_from_prior": by_name(IDENTIFIED, best.z.round(3)),
-    }
+    return report

@@ -1,4 +1,4 @@
-"""What is known beforehand of the coefficients of the MMG form.
+"""Prior of the coefficients of the MMG form.
 
 Those of a reference ship, or from main dimensions.
 """
@@ -120,7 +120,8 @@ def mmg_prior(source: str | ShipModel, particulars: Particulars) -> MMGPrior:
     else:
         prior = _reference_prior(source, ship)
 
-    prior.mean.update(_given_added_mass(particulars))
+    given = _given_added_mass(particulars)
+    prior.mean.update(given)
     prior.mean["nD_U0"] = _self_propulsion(prior.mean, ship)
     return prior
 
@@ -140,7 +141,8 @@ def completed(particulars: Particulars) -> Particulars:
     L = ship.length
     B = ship.require("beam")
     T = ship.require("draught")
-    area = ship.rudder_area or L * T / 100.0 * (1.0 + 25.0 * (B / L) ** 2)
+    usual_area = L * T / 100.0 * (1.0 + 25.0 * (B / L) ** 2)
+    area = ship.rudder_area or usual_area
     span = 0.76 * T
     rudders = ship.rudders or 1.0
     usual = {
@@ -153,7 +155,8 @@ def completed(particulars: Particulars) -> Particulars:
     for name, value in usual.items():
         if ship[name] is None:
             absent[name] = value
-    return replace(ship, **absent, estimated=ship.estimated | absent.keys())
+    estimated = ship.estimated | absent.keys()
+    return replace(ship, **absent, estimated=estimated)
 
 
 def _formula_prior(hull: str, ship: Particulars) -> MMGPrior:
@@ -202,10 +205,12 @@ def _reference(
     vectors = {model.name: similarity_vector(model.particulars)}
     for name, make in REFERENCE_SHIPS.items():
         if name != "mariner":
-            particulars = make().particulars.completed()
+            candidate = make()
+            particulars = candidate.particulars.completed()
             vectors[name] = similarity_vector(particulars)
+    own = similarity_vector(ship)
     try:
-        similarity = correlations(similarity_vector(ship), vectors)
+        similarity = correlations(own, vectors)
     except InputError:  # too little is known to compare
         return model, {}
     if source == AUTO:
@@ -253,7 +258,8 @@ def _given_added_mass(p: Particulars) -> dict[str, float]:
         if derivative is None or name in p.estimated:
             continue
         # the prime system is by rho L^3 / 2
-        given[symbol] = -derivative * p.length / p.require("draught")
+        draught = p.require("draught")
+        given[symbol] = -derivative * p.length / draught
     return given
 
 

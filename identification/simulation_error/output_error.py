@@ -18,6 +18,7 @@ from identification.simulation_error.segments import BLOCK, Segment
 from identification.simulation_error.shooting import Shooter, Shooting
 from identification.uncertainty.covariance import newey_west
 from shipgym.arrays import Floats
+from shipgym.trials.resampling import usual_step
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +27,7 @@ class Solution:
 
     parameters: Floats  # as `Shooter.shoot` takes them
     scales: Floats  # of the residuals by channel, shape (n_channels,)
+    pull: float  # to the start, as `OutputError.solve` takes it
     shooting: Shooting
     cost_before: float  # mean squared residual at the start, in these scales
     cost_after: float
@@ -49,14 +51,19 @@ class OutputError:
         return len(self.shooter.channels) * blocks
 
     @property
+    def n_samples(self) -> int:
+        """Samples of the trials to fit."""
+        return sum(len(segment.measured) for segment in self.fitted)
+
+    @property
     def bin_width(self) -> float:
         """Bins of time in which residuals are added up, s: blocks or sampling steps."""
         travel_time = self.shooter.model.travel_time
         width = float(BLOCK * travel_time)
         for segment in self.fitted:
             if len(segment.times) > 1:
-                step = np.median(np.diff(segment.times))
-                width = max(width, float(step))
+                step = usual_step(segment.times)
+                width = max(width, step)
         return width
 
     def start_scales(self) -> Floats:
@@ -76,8 +83,7 @@ class OutputError:
         errors = by_channel * scales
         squares = np.sum(errors**2, axis=0)
         # a residual is a mean over a block, times the root of its samples
-        n_samples = sum(len(segment.measured) for segment in self.fitted)
-        rms = np.sqrt(squares / n_samples)
+        rms = np.sqrt(squares / self.n_samples)
         smallest = 1e-9 * self.shooter.units
         return np.asarray(np.maximum(rms, smallest))
 
@@ -87,13 +93,12 @@ class OutputError:
         `pull`: cost of a coefficient by that of all samples being off by their scales.
         The zero of a rudder is known to a degree.
         """
-        compared = sum(segment.measured.size for segment in self.fitted)
-        of_coefficient = np.sqrt(pull * compared)
-        of_rudder_offset = 1.0 / np.radians(1.0)
-
+        n_compared = sum(segment.measured.size for segment in self.fitted)
         n_terms = len(self.shooter.term_sizes)
-        weights = np.full(len(self.start), of_coefficient)
-        weights[n_terms:] = of_rudder_offset
+        one_degree = np.radians(1.0)
+        weights = np.empty(len(self.start))
+        weights[:n_terms] = np.sqrt(pull * n_compared)
+        weights[n_terms:] = 1.0 / one_degree
         return weights
 
     def solve(self, scales: Floats, pull: float) -> Solution:
@@ -121,6 +126,7 @@ class OutputError:
         return Solution(
             parameters=parameters,
             scales=last_scales,
+            pull=pull,
             shooting=shooting,
             cost_before=self._mean_square(before),
             cost_after=self._mean_square(shooting),
@@ -158,7 +164,7 @@ class OutputError:
         return float(np.mean(fitted**2))
 
     def covariance(
-        self, solution: Solution, pull: float, memory: float
+        self, solution: Solution, memory: float
     ) -> tuple[Floats, list[Floats]]:
         """Sandwich covariance of the coefficients of the accelerations, and influences.
 
@@ -167,31 +173,36 @@ class OutputError:
         count as known. The influences, by trial, are what each bin of time added to the
         coefficients, shape (n_bins, n_coefficients).
         """
-        inverse = self._inverse_information(solution, pull)
+        inverse = self._inverse_information(solution)
         scores = self._scores(solution.shooting)
-        lags = round(memory / self.bin_width)
-        total = np.zeros_like(inverse)
-        for trial_scores in scores:
-            total += newey_west(trial_scores, lags)
-
-        # of the parameters, then of the coefficients in SI units
         factor = self._freedom_factor(solution.shooting, inverse)
-        sandwich = factor * inverse @ total @ inverse
         sizes = self.shooter.term_sizes
         terms = slice(len(sizes))
-        units = np.outer(sizes, sizes)
-        covariance = sandwich[terms, terms] * units
 
         influences = []
         for trial_scores in scores:
             moves = trial_scores @ inverse
             influence = -np.sqrt(factor) * moves[:, terms] * sizes
             influences.append(influence)
+
+        moment = self._score_moment(scores, memory)
+        of_parameters = factor * inverse @ moment @ inverse
+        units = np.outer(sizes, sizes)
+        covariance = of_parameters[terms, terms] * units
         return 0.5 * (covariance + covariance.T), influences
 
-    def _inverse_information(self, solution: Solution, pull: float) -> Floats:
+    def _score_moment(self, scores: Sequence[Floats], memory: float) -> Floats:
+        """Long-run second moment of the scores, each trial by itself."""
+        lags = round(memory / self.bin_width)
+        n_parameters = len(self.start)
+        moment = np.zeros((n_parameters, n_parameters))
+        for trial_scores in scores:
+            moment += newey_west(trial_scores, lags)
+        return moment
+
+    def _inverse_information(self, solution: Solution) -> Floats:
         """Inverse of the information of the samples and the pull."""
-        weights = self.pull_weights(pull)
+        weights = self.pull_weights(solution.pull)
         jacobian = solution.shooting.jacobian
         of_samples = jacobian.T @ jacobian
         of_pull = np.diag(weights**2)
@@ -229,7 +240,8 @@ class OutputError:
         leverage = (jacobian @ inverse) * jacobian
         parameters = float(leverage.sum())
 
-        moves = shooting.moves[: len(self.fitted)]
+        n_segments = len(self.fitted)
+        moves = shooting.moves[:n_segments]
         starts = sum(len(move) for move in moves) / repeats
         left = n_samples - parameters - starts
         return n_samples / max(left, 1.0)
@@ -241,16 +253,25 @@ def in_bins(scores: Floats, segments: Sequence[Segment], width: float) -> list[F
     Bins of time are `width` wide, s, from the first block of each trial on. Shapes
     (n_bins, n_parameters).
     """
+    trials = [segment.trial for segment in segments]
     counts = [len(segment.times) for segment in segments]
-    trial = np.repeat([segment.trial for segment in segments], counts)
+    trial = np.repeat(trials, counts)
     times = np.concatenate([segment.times for segment in segments])
-    bins = np.floor(times / width).astype(int)
 
-    found = []
+    by_trial = []
     for index in np.unique(trial):
         rows = trial == index
-        own_bins = bins[rows] - bins[rows].min()
-        sums = np.zeros((own_bins.max() + 1, scores.shape[1]))
-        np.add.at(sums, own_bins, scores[rows])
-        found.append(sums)
-    return found
+        sums = _sums_in_time(scores[rows], times[rows], width)
+        by_trial.append(sums)
+    return by_trial
+
+
+def _sums_in_time(scores: Floats, times: Floats, width: float) -> Floats:
+    """Scores of one trial, added up in bins of time."""
+    bins = np.floor(times / width).astype(int)
+    bins -= bins.min()
+    n_bins = bins.max() + 1
+    n_parameters = scores.shape[1]
+    sums = np.zeros((n_bins, n_parameters))
+    np.add.at(sums, bins, scores)
+    return sums

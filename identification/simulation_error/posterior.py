@@ -1,4 +1,4 @@
-"""How probable coefficients of the MMG form are, given segments of trials and a prior.
+"""Posterior probability of coefficients of the MMG form, by trials and a prior.
 
 The cost is that of the simulated states in segments back to back, each started from the
 smoothed measurement, by their own scatter, plus the squared distance from the prior
@@ -18,9 +18,13 @@ from identification.simulation_error.least_squares import (
 )
 from identification.simulation_error.mmg_prior import MMGPrior
 from identification.simulation_error.segments import Segment, compared_channels, cut
-from identification.simulation_error.shooting import channel_units, sail_lanes
+from identification.simulation_error.shooting import (
+    channel_units,
+    in_all_lanes,
+    sail_lanes,
+)
 from shipgym import ShipModel, Trial
-from shipgym.arrays import Floats, Integers
+from shipgym.arrays import Flags, Floats, Integers
 from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES
 from shipgym.ships.mmg import IDENTIFIED
@@ -44,10 +48,18 @@ class Estimate:
 
 
 class HeldOutError(NamedTuple):
-    """How segments are predicted by fits without them."""
+    """Size of the errors of segments that fits without them predict."""
 
     error: float  # root mean square, in scales
     factor: float  # on the standard errors, at which errors are of size one
+
+
+class _GroupErrors(NamedTuple):
+    """Errors of a group of segments by a fit of the others."""
+
+    mean_square: float  # in the scales that are given
+    excess: float  # sum of squares beyond the scatter, whose errors have a size of one
+    expected: float  # of that, by the covariance of the fit
 
 
 class Posterior:
@@ -106,8 +118,8 @@ class Posterior:
         ships = self._lanes(z, step)
         parts = []
         for index in which:
-            segment = self.segments[index]
-            parts.append(self._weighted_errors(segment, ships))
+            part = self._weighted_errors(self.segments[index], ships)
+            parts.append(part)
         lanes = np.concatenate(parts)
 
         errors = lanes[:, :, 0]
@@ -118,19 +130,22 @@ class Posterior:
 
     def _weighted_errors(self, segment: Segment, ships: Floats) -> Floats:
         """Errors of ships in a segment, by the root of their share."""
-        blank = self.blank
-        columns = [blank.state_names.index(name) for name in self.channels]
+        names = self.blank.state_names
+        columns = [names.index(name) for name in self.channels]
         used = 1 + len(IDENTIFIED)
         states = sail_lanes(
-            blank,
+            self.blank,
             segment,
             ships=ships,
-            starts=np.repeat(segment.start, LANES),
+            starts=in_all_lanes(segment.start),
             offsets=np.zeros(LANES),
         )
         # at the first sample the ships have not moved yet
-        off = states[1:, columns, :used] - segment.measured[1:, :, None]
-        share = self.independent_errors(segment) / len(off)
+        simulated = states[1:, columns, :used]
+        measured = segment.measured[1:, :, None]
+        off = simulated - measured
+        n_compared = len(off)
+        share = self.independent_errors(segment) / n_compared
         return np.asarray(off * np.sqrt(share))
 
     def _lanes(self, z: Floats, step: float) -> Floats:
@@ -142,7 +157,7 @@ class Posterior:
         row = len(Ship._fields) + varied
 
         nominal = self.blank.ship_numbers()
-        ships = np.repeat(nominal, LANES).reshape(-1, LANES)
+        ships = in_all_lanes(nominal)
         ships[row] = values[:, None]
         ships[row, lane] += step * deviation
         return ships
@@ -194,9 +209,11 @@ class Posterior:
         By `strength` the standard deviations of the prior are divided.
         """
         data = self.scaled_errors(z, which, scales)
-        prior_slopes = strength * np.eye(len(z))
+        n_parameters = len(z)
+        from_prior = strength * z
+        prior_slopes = strength * np.eye(n_parameters)
         return Linearised(
-            residuals=np.append(data.residuals, strength * z),
+            residuals=np.append(data.residuals, from_prior),
             jacobian=np.vstack([data.jacobian, prior_slopes]),
         )
 
@@ -243,29 +260,39 @@ class Posterior:
         """
         groups = held_out_groups(self.segments)
         mean_squares = []
-        excess = expected = 0.0
+        excess = 0.0
+        expected = 0.0
         for group in np.unique(groups):
-            others = np.flatnonzero(groups != group)
-            held = np.flatnonzero(groups == group)
-            z, covariance = self._without(others, whole)
-            errors, slopes = self.scaled_errors(z, held, whole.scales)
-            n_errors = self.count_errors(held) * len(scales)
-
-            by_channel = errors.reshape(-1, len(scales))
-            in_scales = by_channel * (whole.scales / scales)
-            square = np.sum(in_scales**2)
-            mean_squares.append(square / n_errors)
-
-            # beyond the scatter, whose errors have a size of one
-            excess += float(errors @ errors) - n_errors
-            variances = (slopes @ covariance) * slopes
-            expected += float(variances.sum())
+            found = self._group_errors(groups == group, whole, scales)
+            mean_squares.append(found.mean_square)
+            excess += found.excess
+            expected += found.expected
 
         mean_square = np.mean(mean_squares)
         variance_ratio = max(excess / expected, 1.0)
         return HeldOutError(
             error=float(np.sqrt(mean_square)),
             factor=float(np.sqrt(variance_ratio)),
+        )
+
+    def _group_errors(
+        self, held: Flags, whole: Estimate, scales: Floats
+    ) -> _GroupErrors:
+        """Errors of the segments that are held, by a fit of those that are not."""
+        z, covariance = self._without(np.flatnonzero(~held), whole)
+        which = np.flatnonzero(held)
+        errors, slopes = self.scaled_errors(z, which, whole.scales)
+        n_channels = len(scales)
+        n_errors = self.count_errors(which) * n_channels
+
+        by_channel = errors.reshape(-1, n_channels)
+        in_scales = by_channel * (whole.scales / scales)
+        square = float(np.sum(in_scales**2))
+        variances = (slopes @ covariance) * slopes
+        return _GroupErrors(
+            mean_square=square / n_errors,
+            excess=float(errors @ errors) - n_errors,
+            expected=float(variances.sum()),
         )
 
     def _without(self, others: Integers, whole: Estimate) -> tuple[Floats, Floats]:
@@ -276,7 +303,10 @@ class Posterior:
         z = whole.z
         for _ in range(2):
             residuals, jacobian = self.residuals(
-                z, others, whole.scales, whole.strength
+                z,
+                others,
+                scales=whole.scales,
+                strength=whole.strength,
             )
             moment = jacobian.T @ jacobian
             gradient = jacobian.T @ residuals
@@ -307,5 +337,6 @@ def held_out_groups(segments: Sequence[Segment]) -> Integers:
     several = trial.max() > trial.min()
     if several:
         return trial % 5
-    place = np.arange(len(segments))
-    return place * 3 // len(segments)
+    n_segments = len(segments)
+    place = np.arange(n_segments)
+    return place * 3 // n_segments

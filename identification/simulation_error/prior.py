@@ -1,4 +1,4 @@
-"""What is known of similar ships: coefficients, and how much they are known by.
+"""Prior knowledge from similar ships: coefficients, and how well they are known.
 
 Two kinds of prior. A reference ship: w0 is what the structure gives on its virtual
 trials at the target's scale, and S is the moment of those trials' features, so that
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.estimators.methods import fit_all, get_method
-from identification.regression.samples import build_samples
+from identification.regression.samples import Samples, build_samples
 from identification.simulation_error.formulas import formula_coefficients
 from identification.simulation_error.similarity import AUTO, select_reference
 from identification.validation.hard_turn import hard_turn_features
@@ -42,12 +42,13 @@ def formula_prior(formula: str, blank: ShipModel) -> Prior:
     """
     ship, table = blank.particulars, blank.table
     sizes = hard_turn_features(table, ship, blank.service_shaft_speed)
+    coefficients = formula_coefficients(formula, table, ship)
     prior = Prior(formula, centre={}, roots={}, known={})
-    for q, found in formula_coefficients(formula, table, ship).items():
+    for q, (values, known) in coefficients.items():
         weights = np.diag(sizes[q])
-        prior.centre[q] = found.values
-        prior.known[q] = found.known
-        prior.roots[q] = weights[found.known]
+        prior.centre[q] = values
+        prior.known[q] = known
+        prior.roots[q] = weights[known]
     return prior
 
 
@@ -61,7 +62,12 @@ def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
     model = _at_target(reference, blank)
     box = model.table
     assert isinstance(box, GreyBox)
-    samples = build_samples(
+    return _prior_of(box.ship.name, _virtual_samples(model, blank))
+
+
+def _virtual_samples(model: ShipModel, blank: ShipModel) -> Samples:
+    """Regression of the target's structure on virtual trials of a reference ship."""
+    return build_samples(
         virtual_trials(model),
         blank.table,
         blank.particulars,
@@ -70,15 +76,22 @@ def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
         window=1,
         shaft_speed=blank.service_shaft_speed,
     )
+
+
+def _prior_of(name: str, samples: Samples) -> Prior:
+    """The prior that counts as samples of a reference ship, which determine it all."""
     least_squares = get_method("ls")
     fitted = fit_all(least_squares.make, samples)
-    weight = 1.0 / (samples.duration[:, None] * np.sqrt(len(samples)))
+    n_samples = len(samples)
+    weight = 1.0 / (samples.duration[:, None] * np.sqrt(n_samples))
 
-    prior = Prior(box.ship.name, centre={}, roots={}, known={})
+    prior = Prior(name, centre={}, roots={}, known={})
     for q, X in samples.features.items():
-        root = np.linalg.qr(X * weight, mode="r")
+        weighted = X * weight
+        root = np.linalg.qr(weighted, mode="r")
+        n_terms = X.shape[1]
         prior.centre[q] = fitted[q].coef_
-        prior.known[q] = np.ones(X.shape[1], dtype=bool)
+        prior.known[q] = np.ones(n_terms, dtype=bool)
         prior.roots[q] = np.asarray(root)
     return prior
 
@@ -88,7 +101,12 @@ def _at_target(reference: str | ShipModel, blank: ShipModel) -> ShipModel:
     ship = blank.particulars
     if reference == AUTO:
         reference, _ = select_reference(ship.completed())
-    return converted_model(reference, ship, blank.steering, blank.service_shaft_speed)
+    return converted_model(
+        reference,
+        ship,
+        blank.steering,
+        blank.service_shaft_speed,
+    )
 
 
 def reference_turns(reference: str | ShipModel, blank: ShipModel) -> list[Trial]:
@@ -96,9 +114,10 @@ def reference_turns(reference: str | ShipModel, blank: ShipModel) -> list[Trial]
 
     Arguments as in `reference_prior`.
     """
+    model = _at_target(reference, blank)
     every_second = slice(None, None, 2)
     turns = []
-    for trial in virtual_trials(_at_target(reference, blank)):
+    for trial in virtual_trials(model):
         if trial.kind == "turning-circle":
             turns.append(trial.part(every_second))
     return turns
@@ -113,15 +132,27 @@ def virtual_trials(model: ShipModel) -> list[Trial]:
     dt = 0.05 * model.travel_time
     limit = model.steering.rudder_limit_deg
     zigzags = [(10.0, 10.0, False), (20.0, 20.0, True), (35.0, 20.0, False)]
+    turns = (35.0, -35.0, 15.0, -15.0)
 
     runs = []
     for rudder, heading, port_first in zigzags:
-        angle = min(rudder, limit)
-        run = zigzag(model, angle, heading, port_first, duration, dt)
+        run = zigzag(
+            model,
+            rudder_deg=min(rudder, limit),
+            heading_deg=heading,
+            port_first=port_first,
+            duration=duration,
+            dt=dt,
+        )
         runs.append(run)
-    for rudder in (35.0, -35.0, 15.0, -15.0):
-        angle = float(np.clip(rudder, -limit, limit))
-        run = turning_circle(model, angle, duration, dt)
+    for rudder in turns:
+        angle = np.clip(rudder, -limit, limit)
+        run = turning_circle(
+            model,
+            rudder_deg=float(angle),
+            duration=duration,
+            dt=dt,
+        )
         runs.append(run)
     return [_virtual(model, run, index) for index, run in enumerate(runs)]
 

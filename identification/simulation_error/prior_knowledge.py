@@ -1,4 +1,4 @@
-"""What is known of the coefficients before the trials."""
+"""Prior knowledge of the coefficients, before the trials."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from shipgym.checks import check_choice, check_number
 
 @dataclass(frozen=True, eq=False)
 class PriorKnowledge:
-    """What the coefficients are pulled toward.
+    """Prior toward which the coefficients are pulled.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ fitting w - w0 to the samples and to the root of S as further samples (Hoerl & K
 1970; Tikhonov 1963). w0 and S are those of a `Prior`.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,13 +18,13 @@ from identification.regression.samples import Samples
 from identification.simulation_error.formulas import FORMULAS
 from identification.simulation_error.prior import Prior, formula_prior, reference_prior
 from identification.simulation_error.prior_knowledge import PriorKnowledge
-from identification.validation.folds import TRIALS, sample_folds
+from identification.validation.folds import TRIALS, Fold, sample_folds
 from identification.validation.guard import reasons_unstable, with_coefficients
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats
 from shipgym.ships import GreyBox
 
-STRENGTHS = (0.0, *np.geomspace(1e-4, 10.0, 11).tolist(), np.inf)
+STRENGTHS: tuple[float, ...] = (0.0, *np.geomspace(1e-4, 10.0, 11).tolist(), np.inf)
 
 
 def with_prior(method: Method, knowledge: PriorKnowledge, blank: ShipModel) -> Method:
@@ -82,12 +82,14 @@ class Pulled:
         """Fit with the strength given, or chosen; `prior_` of each reports on it."""
         report: dict[str, Any] = {"prior_source": self.prior.name}
         if strength is None:
-            best, report["prior_scores"] = self.chosen_strength(folds)
+            best, scores = self.chosen_strength(folds)
+            report["prior_scores"] = scores
             strength = self.steady_strength(best)
             if strength > best:
                 report["prior_raised_from"] = best
         # JSON knows no infinity
-        report["prior_strength"] = None if np.isinf(strength) else strength
+        is_finite = np.isfinite(strength)
+        report["prior_strength"] = strength if is_finite else None
 
         estimators = self.at(strength)
         for estimator in estimators.values():
@@ -102,9 +104,10 @@ class Pulled:
         task = self.task
         first = STRENGTHS.index(least)
         for strength in STRENGTHS[first:]:
-            model = with_coefficients(task.blank, self.at(strength))
+            estimators = self.at(strength)
+            model = with_coefficients(task.blank, estimators)
             if not reasons_unstable(model, task.trials):
-                return float(strength)
+                return strength
         return least
 
     def chosen_strength(self, folds: str = TRIALS) -> tuple[float, dict[str, float]]:
@@ -115,19 +118,20 @@ class Pulled:
         error of each strength too, a mean square by that of no change at all.
         """
         splits = sample_folds(self.task.trials, self.task.samples, folds)
-        rows = []
-        for strength in STRENGTHS:
-            row = []
-            for split in splits:
-                estimators = self.at(strength, split.fit)
-                row.append(relative_error(estimators, split.held))
-            rows.append(row)
-        errors = np.array(rows)
-
+        errors = np.array([self._held_out(strength, splits) for strength in STRENGTHS])
         names = [f"{strength:.3g}" for strength in STRENGTHS]
         scores = by_name(names, errors.mean(axis=1))
         chosen = strongest_as_good(errors)
         return float(STRENGTHS[chosen]), scores
+
+    def _held_out(self, strength: float, splits: Sequence[Fold]) -> list[float]:
+        """Errors of fits with a strength on what each split holds out."""
+        errors = []
+        for split in splits:
+            estimators = self.at(strength, split.fit)
+            error = relative_error(estimators, split.held)
+            errors.append(error)
+        return errors
 
 
 def strongest_as_good(errors: Floats) -> int:
@@ -151,7 +155,11 @@ def strongest_as_good(errors: Floats) -> int:
 
 
 def pulled_estimator(
-    estimator: Estimator, samples: Samples, q: str, prior: Prior, strength: float
+    estimator: Estimator,
+    samples: Samples,
+    q: str,
+    prior: Prior,
+    strength: float,
 ) -> Estimator:
     """Fit the samples of an equation, and the prior as further ones."""
     X = samples.features[q]
@@ -160,10 +168,7 @@ def pulled_estimator(
     if np.isinf(strength):
         return _prior_itself(estimator, X, rest, centre, prior.known[q])
 
-    # so that the prior counts as the samples do, whatever their number
-    window = float(np.mean(samples.duration))
-    weight = strength * np.sqrt(len(X)) * window
-    pull = weight * prior.roots[q]
+    pull = _pull(samples.duration, prior.roots[q], strength)
     no_change = np.zeros(len(pull))
     estimator.fit(
         np.vstack([X, pull]),
@@ -175,8 +180,23 @@ def pulled_estimator(
     return estimator
 
 
+def _pull(durations: Floats, root: Floats, strength: float) -> Floats:
+    """Features of the prior, which count as samples do, whatever their number.
+
+    `durations`: of the samples, s.
+    """
+    n_samples = len(durations)
+    window = float(np.mean(durations))
+    weight = strength * np.sqrt(n_samples) * window
+    return np.asarray(weight * root)
+
+
 def _prior_itself(
-    estimator: Estimator, X: Floats, rest: Floats, centre: Floats, known: Flags
+    estimator: Estimator,
+    X: Floats,
+    rest: Floats,
+    centre: Floats,
+    known: Flags,
 ) -> Estimator:
     """The prior's own coefficients; those it leaves open are fitted."""
     n_terms = len(known)

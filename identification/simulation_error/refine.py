@@ -14,7 +14,7 @@ from identification.simulation_error.output_error import OutputError, Solution
 from identification.simulation_error.prior import reference_turns
 from identification.simulation_error.refinement import Refinement
 from identification.simulation_error.segments import Segment, compared_channels, cut
-from identification.simulation_error.shooting import Shooter, about_mean
+from identification.simulation_error.shooting import Shooter
 from identification.validation.guard import GuardedFit, reasons_unstable
 from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
@@ -51,8 +51,10 @@ def refine(
     _check_refinable(start.model, settings.extra_trials)
     problem = _posed(start, task, settings)
     scales = problem.start_scales()
-    if not (start.stable and np.isfinite(scales).all()):
-        return _kept(start, settings, {"decision": "not refined: the start runs away"})
+    simulated = np.isfinite(scales).all()
+    if not (start.stable and simulated):
+        report: dict[str, Any] = {"decision": "not refined: the start runs away"}
+        return _kept(start, settings, report)
 
     rejected = list[dict[str, Any]]()
     pull = settings.pull
@@ -61,24 +63,40 @@ def refine(
         model = _model(start.model, problem, solution.parameters)
         reasons = reasons_unstable(model, task.trials)
         if not reasons:
-            report = _report(problem, solution, task.trials)
-            report |= {"pull": pull, "decision": "refined"}
+            report = settings.plain() | _report(problem, solution, task.trials)
             if rejected:
                 report["rejected"] = rejected
-            estimators = _estimators(start, problem, solution.parameters)
-            covariance, influences = problem.covariance(solution, pull, memory)
-            return Refined(
-                fit=replace(start, model=model, estimators=estimators),
-                covariance=covariance,
-                influences=influences,
-                report=settings.plain() | report,
-                width=problem.bin_width,
+            return _refined(
+                replace(start, model=model),
+                problem=problem,
+                solution=solution,
+                memory=memory,
+                report=report,
             )
         rejected.append({"pull": pull, "reasons": reasons})
         pull = max(10.0 * pull, 1e-9)
 
     report = {"decision": "not refined: it runs away", "rejected": rejected}
     return _kept(start, settings, report)
+
+
+def _refined(
+    fit: GuardedFit,
+    problem: OutputError,
+    solution: Solution,
+    memory: float,
+    report: dict[str, Any],
+) -> Refined:
+    """A fit, its model refined already, with estimators and covariance."""
+    estimators = _estimators(fit, problem, solution.parameters)
+    covariance, influences = problem.covariance(solution, memory)
+    return Refined(
+        fit=replace(fit, estimators=estimators),
+        covariance=covariance,
+        influences=influences,
+        report=report,
+        width=problem.bin_width,
+    )
 
 
 def _kept(start: GuardedFit, settings: Refinement, report: dict[str, Any]) -> Refined:
@@ -115,20 +133,28 @@ def _posed(start: GuardedFit, task: FitTask, settings: Refinement) -> OutputErro
     channels = compared_channels(blank, [*task.trials, *settings.extra_trials])
     equations = blank.table.equations
     sizes = np.concatenate([term_sizes(task.samples, q) for q in equations])
-    values = np.concatenate([start.estimators[q].coef_ for q in equations])
-    n_offsets = len(task.trials) if settings.rudder_offsets else 0
+    n_trials = len(task.trials)
+    n_offsets = n_trials if settings.rudder_offsets else 0
     return OutputError(
         shooter=Shooter(
             blank,
             channels,
-            sizes,
+            term_sizes=sizes,
             free=settings.segment_start == "free",
         ),
         fitted=_segments(task.trials, blank, channels, settings),
-        further=_further(blank, channels, settings, len(task.trials)),
-        start=np.concatenate([values / sizes, np.zeros(n_offsets)]),
+        further=_further(blank, channels, settings, n_trials),
+        start=_start_parameters(start, sizes, n_offsets),
         staggered=settings.staggered,
     )
+
+
+def _start_parameters(start: GuardedFit, sizes: Floats, n_offsets: int) -> Floats:
+    """Coefficients of a fit by their sizes, then offsets of 0."""
+    equations = start.model.table.equations
+    values = np.concatenate([start.estimators[q].coef_ for q in equations])
+    offsets = np.zeros(n_offsets)
+    return np.concatenate([values / sizes, offsets])
 
 
 def _segments(
@@ -155,7 +181,11 @@ def _further(
     further = []
     for segment in _segments(extra, blank, channels, settings):
         index = segment.trial
-        weighted = replace(segment, trial=n_fitted + index, weight=weights[index])
+        weighted = replace(
+            segment,
+            trial=n_fitted + index,
+            weight=weights[index],
+        )
         further.append(weighted)
     return further
 
@@ -175,9 +205,7 @@ def term_sizes(samples: Samples, equation: str) -> Floats:
 
 
 def _model(blank: ShipModel, problem: OutputError, parameters: Floats) -> ShipModel:
-    sizes = problem.shooter.term_sizes
-    n_terms = len(sizes)
-    accelerations = parameters[:n_terms] * sizes
+    accelerations, _ = problem.shooter.split(parameters)
     values = np.linalg.solve(blank.acceleration_matrix, accelerations)
     return blank.with_coefficients(np.asarray(values, dtype=float))
 
@@ -186,11 +214,11 @@ def _estimators(
     start: GuardedFit, problem: OutputError, parameters: Floats
 ) -> Estimators:
     """The start's estimators with the refined coefficients, for the diagnostics."""
-    sizes = problem.shooter.term_sizes
+    coefficients, _ = problem.shooter.split(parameters)
     estimators = {}
     for q, rows in start.model.table.regression_rows.items():
         refined = copy.copy(start.estimators[q])
-        refined.coef_ = parameters[rows] * sizes[rows]
+        refined.coef_ = coefficients[rows]
         estimators[q] = refined
     return estimators
 
@@ -200,8 +228,7 @@ def _report(
 ) -> dict[str, Any]:
     """For the provenance."""
     shooter = problem.shooter
-    n_terms = len(shooter.term_sizes)
-    offsets = about_mean(solution.parameters[n_terms:])
+    _, offsets = shooter.split(solution.parameters)
     names = [trial.name for trial in trials[: len(offsets)]]
     return {
         "segments": len(problem.fitted),
@@ -210,4 +237,6 @@ def _report(
         "evaluations": solution.evaluations,
         "residual_rms": by_name(shooter.channels, solution.scales),
         "rudder_offsets_deg": by_name(names, np.degrees(offsets)),
+        "pull": solution.pull,
+        "decision": "refined",
     }

@@ -13,6 +13,7 @@ from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats, Integers
 from shipgym.ships import Structure
 from shipgym.ships.simulate import LONGEST_STEP, wind_accelerations
+from shipgym.trials.resampling import usual_step
 
 BLOCK = 0.05  # time over which residuals are averaged, of that to sail one ship length
 
@@ -43,7 +44,7 @@ class Segment:
 
     @property
     def has_wind(self) -> bool:
-        """Whether wind accelerates the ship in it."""
+        """True where wind accelerates the ship in it."""
         return bool(self.inputs[:, 3:].any())
 
     @property
@@ -98,8 +99,8 @@ def _segment_rows(
     t: Floats, duration: float, shifts: Sequence[float], least_step: float
 ) -> Iterator[slice]:
     """Samples of each segment of a record, a least step apart, s."""
-    sampling = float(np.median(np.diff(t)))
-    every = max(int(least_step / sampling + 1e-9), 1)
+    sampling_steps = least_step / usual_step(t)
+    every = max(int(sampling_steps + 1e-9), 1)
     for shift in shifts:
         edges = segment_edges(t, duration, shift)
         for first, last in pairwise(edges):
@@ -180,11 +181,10 @@ def _segment(
     longest_step = LONGEST_STEP * model.travel_time
     grid = _grid(t, longest_step, recorded.rudder.corners)
     samples = np.full(len(grid), -1)
-    samples[np.searchsorted(grid, t)] = np.arange(len(t))
+    sampled = np.searchsorted(grid, t)
+    samples[sampled] = np.arange(len(t))
 
-    sampling = float(np.median(np.diff(t)))
-    per_block = max(int(BLOCK * model.travel_time / sampling), 1)
-    blocks = np.arange(0, len(t), per_block)
+    blocks = _block_starts(t, BLOCK * model.travel_time)
     return Segment(
         trial=recorded.index,
         inputs=_inputs(recorded, grid, model),
@@ -196,33 +196,42 @@ def _segment(
     )
 
 
+def _block_starts(t: Floats, duration: float) -> Integers:
+    """First sample of each block of a duration, s, at most, or of one sample."""
+    sampling_steps = duration / usual_step(t)
+    per_block = max(int(sampling_steps), 1)
+    return np.arange(0, len(t), per_block)
+
+
 def _inputs(recorded: _Recorded, grid: Floats, model: ShipModel) -> Floats:
-    """What drives a ship at times of a grid, as in `Segment.inputs`."""
+    """Rudder, shaft and wind at times of a grid, as in `Segment.inputs`."""
     trial = recorded.trial
     rudder = recorded.rudder(grid)
     shaft = np.zeros(len(grid))
     if "n" in trial:
         shaft = np.interp(grid, trial.t, trial["n"])
+
     columns = [grid, rudder, shaft]
     wind = wind_accelerations(trial, model.dynamics)
     for acceleration in wind.T:
-        columns.append(np.interp(grid, trial.t, acceleration))
+        column = np.interp(grid, trial.t, acceleration)
+        columns.append(column)
     return np.column_stack(columns)
 
 
 def _grid(t: Floats, longest_step: float, corners: Floats) -> Floats:
     """Times of integration, s: samples, points between, and corners of the rudder."""
-    first, last = t[0], t[-1]
-    steps = np.ceil(np.diff(t) / longest_step - 1e-9)
+    sampling = np.diff(t)
+    steps = np.ceil(sampling / longest_step - 1e-9)
     counts = np.maximum(steps, 1).astype(int)
 
-    points = [last]
-    for (begin, end), count in zip(pairwise(t), counts, strict=True):
+    points = [t[-1]]
+    for begin, duration, count in zip(t[:-1], sampling, counts, strict=True):
         parts = np.arange(count)
-        between = begin + (end - begin) * parts / count
+        between = begin + duration * parts / count
         points.extend(between)
 
-    after_first = corners > first
-    before_last = corners < last
+    after_first = corners > t[0]
+    before_last = corners < t[-1]
     inside = corners[after_first & before_last]
     return np.union1d(points, inside)

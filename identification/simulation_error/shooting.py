@@ -6,6 +6,7 @@ coefficients.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,14 @@ class Shooting:
     moves: list[Floats]  # by segment: how its start would move, shape (n_free,)
 
 
+class _LaneNumbers(NamedTuple):
+    """Numbers of the ship, offset of the rudder and start that lanes sail with."""
+
+    nominal: Floats  # shape (n_numbers + 1 + n_state,)
+    varied: Integers  # places of those that have slopes, shape (n_varied,)
+    units: Floats  # by which they vary, shape (n_varied,)
+
+
 class Shooter:
     """Sails all segments with a model and with its neighbours, a lane each.
 
@@ -38,7 +47,11 @@ class Shooter:
     """
 
     def __init__(
-        self, model: ShipModel, channels: Sequence[str], term_sizes: Floats, free: bool
+        self,
+        model: ShipModel,
+        channels: Sequence[str],
+        term_sizes: Floats,
+        free: bool,
     ) -> None:
         self.model = model
         self.channels = tuple(channels)
@@ -53,6 +66,16 @@ class Shooter:
         """Units in which the starts of segments move, shape (n_free,)."""
         return self.units[: len(self.free)]
 
+    def split(self, parameters: Floats) -> tuple[Floats, Floats]:
+        """Coefficients of the accelerations, SI units, and offsets of the rudder, rad.
+
+        `parameters`: as for `shoot`.
+        """
+        n_terms = len(self.term_sizes)
+        coefficients = parameters[:n_terms] * self.term_sizes
+        offsets = about_mean(parameters[n_terms:])
+        return coefficients, offsets
+
     def shoot(
         self, parameters: Floats, segments: Sequence[Segment], scales: Floats
     ) -> Shooting:
@@ -66,26 +89,20 @@ class Shooter:
         n_offsets,); `scales`: residuals that count as 1, shape (n_channels,). Not
         finite where a ship ran away.
         """
-        n_terms = len(self.term_sizes)
-        coefficients = parameters[:n_terms] * self.term_sizes
-        offsets = about_mean(parameters[n_terms:])
-        offset_slopes = about_mean(np.eye(len(offsets)))
+        coefficients, offsets = self.split(parameters)
+        n_offsets = len(offsets)
+        n_free = len(self.free)
 
         residuals, jacobians, moves = [], [], []
         for segment in segments:
             trial = segment.trial
-            has_offset = trial < len(offsets)
-            offset = float(offsets[trial]) if has_offset else 0.0
+            offset = 0.0
+            if trial < n_offsets:
+                offset = float(offsets[trial])
             errors, slopes = self._block_errors(coefficients, offset, segment, scales)
-            residual, slopes, move = without_start(errors, slopes, len(self.free))
-
-            jacobian = np.zeros((len(residual), len(parameters)))
-            jacobian[:, :n_terms] = slopes[:, :n_terms]
-            if has_offset:
-                by_offset = slopes[:, n_terms]
-                jacobian[:, n_terms:] = np.outer(by_offset, offset_slopes[trial])
+            residual, slopes, move = without_start(errors, slopes, n_free)
             residuals.append(residual)
-            jacobians.append(jacobian)
+            jacobians.append(self._jacobian(slopes, trial, n_offsets))
             moves.append(move)
         return Shooting(
             residuals=np.concatenate(residuals),
@@ -93,14 +110,27 @@ class Shooter:
             moves=moves,
         )
 
+    def _jacobian(self, slopes: Floats, trial: int, n_offsets: int) -> Floats:
+        """Slopes by all parameters from those by coefficients and the own offset."""
+        n_terms = len(self.term_sizes)
+        n_rows = len(slopes)
+        jacobian = np.zeros((n_rows, n_terms + n_offsets))
+        jacobian[:, :n_terms] = slopes[:, :n_terms]
+        if trial < n_offsets:
+            about_others = about_mean(np.eye(n_offsets))
+            by_offset = slopes[:, n_terms]
+            jacobian[:, n_terms:] = np.outer(by_offset, about_others[trial])
+        return jacobian
+
     def moved(
         self, segments: Sequence[Segment], moves: Sequence[Floats]
     ) -> list[Segment]:
         """The segments with their starts moved."""
         found = []
         for segment, move in zip(segments, moves, strict=True):
+            step = move * self.start_units
             start = segment.start.copy()
-            start[self.free] += move * self.start_units
+            start[self.free] += step
             found.append(replace(segment, start=start))
         return found
 
@@ -117,10 +147,9 @@ class Shooter:
         factors = weights[:, None] / scales
 
         channels, slopes = self._channels(coefficients, offset, segment)
-        errors = averaged(channels - segment.measured, blocks, counts)
-        slopes = averaged(slopes, blocks, counts)
-        errors = errors * factors
-        slopes = slopes * factors[:, :, None]
+        errors = channels - segment.measured
+        errors = factors * averaged(errors, blocks, counts)
+        slopes = factors[:, :, None] * averaged(slopes, blocks, counts)
         return errors.ravel(), slopes.reshape(errors.size, -1)
 
     def _channels(
@@ -131,22 +160,15 @@ class Shooter:
         Forward differences of parameters that are about 1: in each lane but the first
         one number of the ship, the offset or the start is larger by a step.
         """
-        n_numbers = len(self.numbers)
-        first_term = n_numbers - len(coefficients)  # the terms' numbers come last
-        nominal = np.concatenate([self.numbers, [offset], segment.start])
-        nominal[first_term:n_numbers] = coefficients
-        starts = [n_numbers + 1 + column for column in self.free]
-        varied = [*range(first_term, n_numbers + 1), *starts]
-        units = np.concatenate([self.term_sizes, [1.0], self.start_units])
-
+        numbers = self._lane_numbers(coefficients, offset, segment)
         step = 1e-5
         parts = []
-        for begin in range(0, len(varied), LANES - 1):
+        for begin in range(0, len(numbers.varied), LANES - 1):
             batch = slice(begin, begin + LANES - 1)
-            rows = varied[batch]
+            rows = numbers.varied[batch]
             lane = 1 + np.arange(len(rows))
-            lanes = np.repeat(nominal, LANES).reshape(-1, LANES)
-            lanes[rows, lane] += step * units[batch]
+            lanes = in_all_lanes(numbers.nominal)
+            lanes[rows, lane] += step * numbers.units[batch]
 
             sailed = self._sailed(segment, lanes)
             channels = sailed[:, :, 0]
@@ -154,6 +176,24 @@ class Shooter:
                 changes = sailed[:, :, lane] - channels[:, :, None]
                 parts.append(changes / step)
         return channels, np.concatenate(parts, axis=2)
+
+    def _lane_numbers(
+        self, coefficients: Floats, offset: float, segment: Segment
+    ) -> _LaneNumbers:
+        """Numbers to sail with; those that have slopes are the ones that are fitted."""
+        n_numbers = len(self.numbers)
+        first_term = n_numbers - len(coefficients)  # the terms' numbers come last
+        nominal = np.concatenate([self.numbers, [offset], segment.start])
+        nominal[first_term:n_numbers] = coefficients
+
+        first_start = n_numbers + 1
+        terms_and_offset = np.arange(first_term, first_start)
+        starts = [first_start + column for column in self.free]
+        return _LaneNumbers(
+            nominal=nominal,
+            varied=np.append(terms_and_offset, starts).astype(int),
+            units=np.concatenate([self.term_sizes, [1.0], self.start_units]),
+        )
 
     def _sailed(self, segment: Segment, lanes: Floats) -> Floats:
         """Compared channels of all lanes, shape (n_samples, n_channels, LANES).
@@ -183,7 +223,11 @@ def channel_units(model: ShipModel, channels: Sequence[str]) -> Floats:
 
 
 def sail_lanes(
-    model: ShipModel, segment: Segment, ships: Floats, starts: Floats, offsets: Floats
+    model: ShipModel,
+    segment: Segment,
+    ships: Floats,
+    starts: Floats,
+    offsets: Floats,
 ) -> Floats:
     """States of the ships of all lanes at the samples of a segment.
 
@@ -202,6 +246,11 @@ def sail_lanes(
         states,
     )
     return states.reshape(n_samples, -1, LANES)
+
+
+def in_all_lanes(values: Floats) -> Floats:
+    """The same values in a column for each lane, shape (n_values, LANES)."""
+    return np.repeat(values, LANES).reshape(-1, LANES)
 
 
 def about_mean(values: Floats) -> Floats:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from identification.arrays import by_name
 from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
@@ -18,7 +19,7 @@ LEAST_SIMILARITY = 0.5
 
 
 class Features(NamedTuple):
-    """What ships are compared by; nan for what is not known."""
+    """Quantities that ships are compared by; nan for what is not known."""
 
     block_coefficient: float
     length_by_beam: float
@@ -74,10 +75,11 @@ def correlations(
         )
 
     features = table[:, known]
-    scaled = features / np.linalg.norm(features, axis=0)
+    norms = np.linalg.norm(features, axis=0)
+    scaled = features / norms
     between_ships = np.corrcoef(scaled)
     with_target = between_ships[0, 1:]
-    return dict(zip(candidates, with_target.tolist(), strict=True))
+    return by_name(candidates, with_target)
 
 
 def select_reference(
@@ -96,7 +98,8 @@ def select_reference(
     ships = _evaluable(candidates, channels)
     vectors = {}
     for name, ship in ships.items():
-        vectors[name] = similarity_vector(_with_rudder_area(name, ship))
+        candidate = _with_rudder_area(name, ship)
+        vectors[name] = similarity_vector(candidate)
     similarity = correlations(similarity_vector(particulars), vectors)
 
     same_hull = 0.01  # correlations so close are those of one hull form
@@ -104,7 +107,7 @@ def select_reference(
     alike = [name for name in similarity if similarity[name] > least]
 
     def distance(name: str) -> tuple[float, float]:
-        """How far apart the lengths are; of one length the most similar comes first."""
+        """Distance of the lengths; of one length the most similar comes first."""
         scale = ships[name].particulars.length / particulars.length
         return abs(float(np.log(scale))), -similarity[name]
 

@@ -1,1 +1,1 @@
-"""How certain coefficients are."""
+"""Uncertainty of the coefficients."""

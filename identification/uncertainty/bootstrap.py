@@ -1,6 +1,6 @@
 """Covariance of coefficients by refits to blocks of the record (bootstrap)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from sklearn.base import clone
@@ -33,9 +33,11 @@ def moving_blocks(
         n_rows = len(rows)
         block = min(length, n_rows)
         n_blocks = -(-n_rows // block)  # rounded up
-        starts = rng.integers(0, n_rows - block + 1, n_blocks)
+        last_start = n_rows - block
+        starts = rng.integers(0, last_start + 1, n_blocks)
         places = starts[:, None] + np.arange(block)
-        drawn.append(rows[places.ravel()[:n_rows]])
+        kept = places.ravel()[:n_rows]
+        drawn.append(rows[kept])
     return np.concatenate(drawn)
 
 
@@ -56,24 +58,34 @@ def bootstrap_covariance(
     (n_coefficients, n_coefficients).
     """
     rng = np.random.default_rng(seed)
-    groups = []
-    lengths = []
-    for trial in np.unique(samples.trial):
-        rows = np.flatnonzero(samples.trial == trial)
-        groups.append(rows)
-        lengths.append(rows_in(memory, samples.start[rows]))
+    groups = [np.flatnonzero(samples.trial == k) for k in np.unique(samples.trial)]
+    lengths = [rows_in(memory, samples.start[rows]) for rows in groups]
     errors = residuals(estimators, samples)
 
     refits = []
     for _ in counted("bootstrap", range(draws)):
         rows = moving_blocks(groups, lengths, rng)
-        coefficients = []
-        for q, estimator in estimators.items():
-            X = samples.features[q][rows]
-            y = samples.targets[q][rows]
-            coefficients.append(_refitted(estimator, X, y, errors[q][rows]))
-        refits.append(np.concatenate(coefficients))
+        refits.append(_all_refitted(estimators, samples, errors, rows))
     return np.asarray(np.cov(np.transpose(refits)))
+
+
+def _all_refitted(
+    estimators: Estimators,
+    samples: Samples,
+    errors: Mapping[str, Floats],
+    rows: Integers,
+) -> Floats:
+    """Coefficients of all equations from the drawn rows."""
+    coefficients = []
+    for q, estimator in estimators.items():
+        refit = _refitted(
+            estimator,
+            X=samples.features[q][rows],
+            y=samples.targets[q][rows],
+            errors=errors[q][rows],
+        )
+        coefficients.append(refit)
+    return np.concatenate(coefficients)
 
 
 def influence_covariance(
@@ -121,6 +133,7 @@ def _refitted(estimator: Estimator, X: Floats, y: Floats, errors: Floats) -> Flo
         refit = clone(estimator)
         if isinstance(estimator, TruncatedLSSVM):
             refit.set_params(rank=estimator.rank_)
-        return np.asarray(refit.fit(X, y).coef_)
+        refit.fit(X, y)
+        return np.asarray(refit.coef_)
     step = estimator.inverse_moment_ @ (X.T @ errors)
     return np.asarray(estimator.coef_ + step)

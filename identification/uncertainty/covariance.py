@@ -43,8 +43,10 @@ def joint_covariance(
         X = samples.features[q]
         counts = weights(estimator, X)
         # scaled to the variance of errors, of which fitting takes a part
-        scale = np.sqrt(len(samples) / effective_freedom(estimator, X))
-        errors.append(unweighted[q] * counts * scale)
+        freedom = effective_freedom(estimator, X)
+        scale = np.sqrt(len(samples) / freedom)
+        weighted = unweighted[q] * counts
+        errors.append(weighted * scale)
         maps.append(X @ estimator.inverse_moment_)
     if memory <= 0.0:
         return _without_memory(maps, errors)
@@ -57,8 +59,10 @@ def _without_memory(maps: list[Floats], errors: list[Floats]) -> Floats:
     for own_map, own_errors in zip(maps, errors, strict=True):
         blocks = []
         for other_map, other_errors in zip(maps, errors, strict=True):
-            moment = (own_errors @ other_errors) / len(own_errors)
-            blocks.append(moment * (own_map.T @ other_map))
+            n_rows = len(own_errors)
+            moment = (own_errors @ other_errors) / n_rows
+            block = moment * (own_map.T @ other_map)
+            blocks.append(block)
         rows.append(blocks)
     return np.block(rows)
 
@@ -72,17 +76,25 @@ def _with_memory(
     """Covariance for errors that last, each trial by itself."""
     by_equation = []
     for own_map, own_errors in zip(maps, errors, strict=True):
-        by_equation.append(own_map * own_errors[:, None])
+        moved = own_map * own_errors[:, None]
+        by_equation.append(moved)
     scores = np.hstack(by_equation)
+
     n_coefficients = scores.shape[1]
     total = np.zeros((n_coefficients, n_coefficients))
     for trial in np.unique(samples.trial):
         own = samples.trial == trial
-        start = samples.start[own]
-        spacing = usual_step(start) if len(start) > 1 else memory
-        lags = round(memory / spacing)
+        lags = _lags(memory, samples.start[own])
         total += newey_west(scores[own], lags)
     return 0.5 * (total + total.T)
+
+
+def _lags(memory: float, start: Floats) -> int:
+    """Rows over which errors of rows that start at some times are correlated."""
+    if len(start) < 2:
+        return 1
+    spacing = usual_step(start)
+    return round(memory / spacing)
 
 
 def effective_freedom(estimator: Estimator, features: Floats) -> float:
@@ -91,7 +103,10 @@ def effective_freedom(estimator: Estimator, features: Floats) -> float:
     weighted = features * counts[:, None]
     moment = features.T @ weighted
     hat = estimator.inverse_moment_ @ moment
-    return max(len(features) - float(np.trace(hat)), 1.0)
+
+    n_samples = len(features)
+    n_parameters = float(np.trace(hat))
+    return max(n_samples - n_parameters, 1.0)
 
 
 def coefficient_covariance(

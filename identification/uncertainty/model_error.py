@@ -8,7 +8,7 @@ standard errors are scaled until these errors are of size one.
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -119,7 +119,8 @@ def model_error(
     covariance shrinks with each trial while the error of the equations does not.
     Returns `factor`, `how` it was found, and what it is made of, for the provenance.
     """
-    fitted = error_sizes([own] * len(trials), trials)
+    n_trials = len(trials)
+    fitted = error_sizes([own] * n_trials, trials)
     error = _generalisation(left_out, trials)
     if fitted.factor > error["factor"]:
         error["factor"] = fitted.factor
@@ -165,28 +166,40 @@ def error_sizes(models: Sequence[ShipModel], trials: Sequence[Trial]) -> ErrorSi
     indices: list[PredictionError] = []
     predicted = 0
     for model, trial in zip(models, trials, strict=True):
-        names = [name for name in COMPARED if name in trial]
-        # extremes are read from smoothed channels
-        clean = trial.with_channels(smoothed_channels(trial, names, "spline"))
+        clean = _smoothed(trial)
         own = replace(model, covariance=None)
         drawn = model.sample(DRAWS, 0)
-
         errors = motion_errors(own, drawn, trial, clean)
         if errors:
             predicted += 1
             motion += errors
             indices += index_errors(own, drawn, trial, clean)
 
-    by_kind: dict[str, float] = {}
+    by_kind = dict[str, float]()
     if motion:
         by_kind["motion"] = scale_of(motion)
     if indices:
         by_kind["indices"] = scale_of(indices)
-    factor = 0.0
-    if by_kind:
-        sizes = np.array(list(by_kind.values()))
-        factor = root_mean_square(sizes)
-    return ErrorSizes(factor, by_kind, predicted)
+    return ErrorSizes(
+        factor=_common_factor(by_kind),
+        by_kind=by_kind,
+        predicted=predicted,
+    )
+
+
+def _common_factor(by_kind: Mapping[str, float]) -> float:
+    """Root mean square of the factors by kind; 0 without any."""
+    if not by_kind:
+        return 0.0
+    sizes = np.array(list(by_kind.values()))
+    return root_mean_square(sizes)
+
+
+def _smoothed(trial: Trial) -> Trial:
+    """The trial that extremes are read from."""
+    names = [name for name in COMPARED if name in trial]
+    channels = smoothed_channels(trial, names, "spline")
+    return trial.with_channels(channels)
 
 
 def scale_of(errors: Sequence[PredictionError]) -> float:
@@ -228,12 +241,12 @@ def motion_errors(
     found = []
     for name, level in levels.items():
         mine = predicted[name]
-        scatter = np.array([run[name] for run in runs]) - mine
-        variance = float(np.mean(_robust_variance(scatter)))
+        variance = _mean_variance(runs, name, mine)
         if variance <= 0.0:
             continue
         by_start = [mean_square(run[name] - mine) for run in from_shifted]
-        by_timing = mean_square(timing * np.gradient(clean[name], clean.t))
+        slope = np.gradient(clean[name], clean.t)
+        by_timing = mean_square(timing * slope)
         error = PredictionError(
             square=mean_square(mine - trial[name]),
             variance=variance,
@@ -241,6 +254,13 @@ def motion_errors(
         )
         found.append(error)
     return found
+
+
+def _mean_variance(runs: Sequence[Trial], name: str, mine: Floats) -> float:
+    """Variance of a channel of the draws about the own prediction, mean over time."""
+    scatter = np.array([run[name] for run in runs]) - mine
+    variance = _robust_variance(scatter)
+    return float(np.mean(variance))
 
 
 def _runs(cases: Sequence[tuple[ShipModel, Trial]]) -> list[Trial]:
@@ -295,11 +315,9 @@ def index_errors(
     for name in INDICES:
         truth = getattr(measured, name, None)
         mine = getattr(predicted, name, None)
-        values = [getattr(indices, name, None) for indices in draws]
-        known = np.array([value for value in values if value is not None])
-        if truth is None or mine is None or len(known) < DRAWS / 2:
+        if truth is None or mine is None:
             continue
-        variance = float(_robust_variance(known - mine))
+        variance = _index_variance(draws, name, mine)
         if variance > 0.0:
             error = PredictionError(
                 square=(truth - mine) ** 2,
@@ -308,6 +326,19 @@ def index_errors(
             )
             found.append(error)
     return found
+
+
+def _index_variance(draws: Sequence[Any], name: str, mine: float) -> float:
+    """Variance of an index of the draws about the own one; 0 where most have none."""
+    values = []
+    for indices in draws:
+        value = getattr(indices, name, None)
+        if value is not None:
+            values.append(value)
+    if len(values) < DRAWS / 2:
+        return 0.0
+    scatter = np.array(values) - mine
+    return float(_robust_variance(scatter))
 
 
 def _timing(trial: Trial) -> float:
@@ -321,11 +352,15 @@ def _reading_noise(trial: Trial, index: str, model: ShipModel) -> float:
     if index.endswith("_deg"):
         noise = noise_level(trial.t, trial["psi"])
         fastest = float(np.abs(trial["r"]).max())
-        error = np.hypot(noise, timing * fastest)
+        by_timing = timing * fastest
+        error = np.hypot(noise, by_timing)
         return float(np.degrees(error)) ** 2
 
     noise = 0.0
     if "x" in trial and trial.kind != "zigzag":
         noise = noise_level(trial.t, trial["x"])
-    error = np.hypot(noise, timing * trial["u"].max())
-    return float(error / model.particulars["length"]) ** 2
+    fastest = trial["u"].max()
+    by_timing = timing * fastest
+    error = np.hypot(noise, by_timing)
+    length = model.particulars["length"]
+    return float(error / length) ** 2

@@ -1,4 +1,4 @@
-"""How the covariance of the coefficients is found."""
+"""Choices by which the covariance of the coefficients is found."""
 
 from dataclasses import dataclass
 

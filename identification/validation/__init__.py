@@ -1,1 +1,1 @@
-"""How well a model predicts, and what speaks against it."""
+"""Quality of a model's predictions, and what speaks against it."""

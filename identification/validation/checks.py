@@ -67,7 +67,7 @@ def _check_steps(trial: Trial) -> None:
 
 
 def is_still(trial: Trial) -> bool:
-    """Whether a rudder does nothing but scatter.
+    """Tell whether a rudder does nothing but scatter.
 
     Its running median over five samples, in which shorter excursions are outliers,
     moves by less than half a degree, or six times the noise up to 3 degrees.
@@ -102,10 +102,12 @@ def check_samples(
     for q, change in samples.targets.items():
         if not np.any(change):
             motion = motions.get(q, q)
+            first = trials[0].name
+            n_trials = len(trials)
             raise InputError(
-                f"trial {trials[0].name!r}: expected the {motion} to be"
+                f"trial {first!r}: expected the {motion} to be"
                 f" excited and measured, got a channel {q!r} that never changes, in"
-                f" none of the {len(trials)} trials to fit; leave the column out if it"
+                f" none of the {n_trials} trials to fit; leave the column out if it"
                 " was not measured, or choose a structure without that equation"
             )
     terms = max(len(structure.regression_names(q)) for q in structure.regressed)

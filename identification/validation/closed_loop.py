@@ -31,12 +31,20 @@ class ZigzagLeg(NamedTuple):
     target: float | None
     approach: bool  # whether it is the first one, which may have any helm
 
+    @property
+    def longest(self) -> float:
+        """Time after which its heading is taken never to be reached, s."""
+        if self.target is None:
+            return self.duration
+        return 2.0 * self.duration
+
 
 class _Sailed(NamedTuple):
-    """Samples of a leg after its first one."""
+    """Samples of a leg after its first one, or of all legs."""
 
     t: Floats  # s, shape (n_samples,)
     states: Floats  # shape (n_samples, n_columns)
+    orders: Floats  # rudder angles ordered, rad, shape (n_samples,)
 
 
 def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
@@ -49,34 +57,46 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
     recorded = {*trial.channels, "x", "y"}
     if not recorded.issuperset(names):
         return None
+    try:
+        sailed = _sail_legs(model, trial)
+    except UnstableModelError:
+        return None
+    if sailed is None:
+        return None
 
+    channels = dict(zip(names, sailed.states.T, strict=True))
+    channels["delta_command"] = sailed.orders
+    return Trial(
+        sailed.t,
+        channels,
+        name=trial.name,
+        kind=trial.kind,
+        length=model.particulars["length"],
+    )
+
+
+def _sail_legs(model: ShipModel, trial: Trial) -> _Sailed | None:
+    """Sail all legs from the start of a trial; None where a target is not reached."""
     begun = with_start(model, trial)
-    start = [begun[name][0] if name in begun else 0.0 for name in names]
+    start = [begun[name][0] if name in begun else 0.0 for name in model.state_names]
     passage = Passage(model, Conditions(), STEP * model.travel_time)
     times = [trial.t[:1]]
     states = [np.array([start])]
     orders = list[float]()
     for leg in legs(trial):
-        begin, state = times[-1][-1], states[-1][-1]
-        try:
-            sailed = _sail(passage, trial, leg, begin, state)
-        except UnstableModelError:
-            return None
+        begin = times[-1][-1]
+        state = states[-1][-1]
+        sailed = _sail(passage, trial, leg, begin, state)
         if sailed is None:
             return None
         times.append(sailed.t)
         states.append(sailed.states)
-        orders += [leg.order] * len(sailed.t)
+        orders.extend(sailed.orders)
 
-    columns = np.vstack(states).T
-    channels = dict(zip(names, columns, strict=True))
-    channels["delta_command"] = np.array([*orders, orders[-1]])
-    return Trial(
-        np.concatenate(times),
-        channels,
-        name=trial.name,
-        kind=trial.kind,
-        length=model.particulars["length"],
+    return _Sailed(
+        t=np.concatenate(times),
+        states=np.vstack(states),
+        orders=np.array([*orders, orders[-1]]),
     )
 
 
@@ -110,26 +130,34 @@ def _sail(
     passage: Passage, trial: Trial, leg: ZigzagLeg, begin: float, state: Floats
 ) -> _Sailed | None:
     """Sail a leg from a time and a state; None where its target is not reached."""
-    model, dt = passage.model, passage.dt
-    longest = leg.duration
-    # times the measured one; a heading that is not reached by then is never reached
-    longest_leg = 2.0
-    if leg.target is not None:
-        longest *= longest_leg
-    n_steps = max(int(np.ceil(longest / dt)), 2)
+    dt = passage.dt
+    n_steps = max(int(np.ceil(leg.longest / dt)), 2)
     steps = np.arange(n_steps + 1, dtype=float)
     t = begin + dt * steps
+    commands = _commands(passage.model, trial, leg, t[:-1])
+    states = _simulated(passage, state, commands)
 
-    commands = _commands(model, trial, leg, t[:-1])
-    orders = two_commands(checked_orders(model, commands))
-    states = passage.states(state, n_steps)
-    passage.run("simulate", states, orders, dt)
-    if leg.target is None:
-        return _Sailed(t[1:], states[1:])
+    last = n_steps
+    if leg.target is not None:
+        heading = passage.model.state_names.index("psi")
+        psi = states[:, heading]
+        last = _end_at(leg.target, psi, t, states)
+        if last == 0:
+            return None
+    sailed = slice(1, last + 1)
+    return _Sailed(
+        t=t[sailed],
+        states=states[sailed],
+        orders=np.full(last, leg.order),
+    )
 
-    heading = model.state_names.index("psi")
-    psi = states[:, heading]
-    return _until(leg.target, psi, t, states)
+
+def _simulated(passage: Passage, state: Floats, commands: Floats) -> Floats:
+    """States from a first one on, a step for each row of commands."""
+    orders = two_commands(checked_orders(passage.model, commands))
+    states = passage.states(state, len(commands))
+    passage.run("simulate", states, orders, passage.dt)
+    return states
 
 
 def _commands(
@@ -147,17 +175,17 @@ def _commands(
     return commands
 
 
-def _until(target: float, psi: Floats, t: Floats, states: Floats) -> _Sailed | None:
-    """Samples up to the heading of the target; None where the leg never gets there.
+def _end_at(target: float, psi: Floats, t: Floats, states: Floats) -> int:
+    """Move the first sample beyond the target's heading onto it, and return its place.
 
-    Also None where it is passed already.
+    0 where the leg never gets there, and where the heading is passed already.
     """
     left = target - psi
     side = np.sign(left[0])
     beyond = left * side <= 0.0
     last = int(np.argmax(beyond))
     if last == 0:
-        return None
+        return 0
 
     # a step is a fiftieth of a length: between two the state is straight enough
     before = last - 1
@@ -167,5 +195,4 @@ def _until(target: float, psi: Floats, t: Floats, states: Floats) -> _Sailed | N
     t[last] = t[before] + part * step
     begin, end = states[before], states[last]
     states[last] = (1.0 - part) * begin + part * end
-    sailed = slice(1, last + 1)
-    return _Sailed(t[sailed], states[sailed])
+    return last

@@ -1,6 +1,7 @@
 """Structures and methods on the same trials, ranked by what they predict."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -124,34 +125,79 @@ def compare_methods(
     settings = settings or {}
     left_out = _left_out([method for _, method in pairs], settings)
 
-    found = list[tuple[RankedFit, IdentificationResult]]()
-    refused = dict[str, str]()
+    compared = _Compared(trials, fitted, held, arguments)
     for structure, method in counted("structures and methods", pairs):
-        own = dict(arguments)
         name = get_method(method).name
-        method = _with_settings(method, settings, left_out.get(name, ()))
+        own = _with_settings(method, settings, left_out.get(name, ()))
         if several:
-            name = fit_name(name_of(structure), name)
-            reference = own.get("reference_model")
-            own["reference_model"] = reference_of(structure, reference)
-        try:
-            result = identify(trials, structure, method, **own)
-            seen = result.metrics["trials"]
-            if held:
-                seen = {trial.name: seen[trial.name] for trial in held}
-            else:
-                seen = _each_in_turn(fitted, structure, method, own)
-        except InputError as error:
-            refused[name] = str(error)
-            continue
-        fit = ranked_fit([result], seen, trials)
-        found.append((fit, result))
+            compared.add_structure(structure, own, name)
+        else:
+            compared.add(structure, own, name, arguments)
 
-    if not found:
-        first_reason = next(iter(refused.values()))
-        raise InputError(first_reason)
-    ranked, results = _sorted(found, several)
+    ranked, results = compared.ranked(several)
+    refused = compared.refused
     return Comparison(ranked, results, refused, left_out, in_turn=not held)
+
+
+@dataclass(frozen=True, eq=False)
+class _Compared:
+    """Fits to the same trials."""
+
+    trials: Sequence[Trial]
+    fitted: list[Trial]
+    held: list[Trial]
+    arguments: Mapping[str, Any]  # of `identify` but for structure and method
+    found: list[tuple[RankedFit, IdentificationResult]] = field(default_factory=list)
+    refused: dict[str, str] = field(default_factory=dict)  # why, by name
+
+    def add_structure(self, structure: Any, method: Any, name: str) -> None:
+        """Fit one of several structures, with its own reference ship."""
+        reference = self.arguments.get("reference_model")
+        own = {"reference_model": reference_of(structure, reference)}
+        name = fit_name(name_of(structure), name)
+        self.add(structure, method, name, {**self.arguments, **own})
+
+    def add(
+        self,
+        structure: Any,
+        method: Any,
+        name: str,
+        arguments: Mapping[str, Any],
+    ) -> None:
+        """Fit a structure by a method, or remember why it cannot be fitted."""
+        try:
+            result = identify(self.trials, structure, method, **arguments)
+            if self.held:
+                metrics = result.metrics["trials"]
+                seen = {trial.name: metrics[trial.name] for trial in self.held}
+            else:
+                seen = _each_in_turn(self.fitted, structure, method, arguments)
+        except InputError as error:
+            self.refused[name] = str(error)
+            return
+        fit = ranked_fit([result], seen, self.trials)
+        self.found.append((fit, result))
+
+    def ranked(
+        self, several: bool
+    ) -> tuple[tuple[RankedFit, ...], dict[str, IdentificationResult]]:
+        """Fits, the best first, and their results by method, or structure and method.
+
+        Raises InputError with the first reason where nothing could be fitted.
+        """
+        if not self.found:
+            first_reason = next(iter(self.refused.values()))
+            raise InputError(first_reason)
+
+        best_first = sorted(self.found, key=lambda entry: entry[0].rank)
+        results = dict[str, IdentificationResult]()
+        for fit, result in best_first:
+            name = fit.method
+            if several:
+                name = fit_name(fit.structure, fit.method)
+            results[name] = result
+        ranked = tuple(fit for fit, _ in best_first)
+        return ranked, results
 
 
 def _with_settings(
@@ -164,29 +210,15 @@ def _with_settings(
     return method
 
 
-def _sorted(
-    found: list[tuple[RankedFit, IdentificationResult]], several: bool
-) -> tuple[tuple[RankedFit, ...], dict[str, IdentificationResult]]:
-    """Fits, the best first, and their results by method, or structure and method."""
-    found.sort(key=lambda entry: entry[0].rank)
-    results = dict[str, IdentificationResult]()
-    for fit, result in found:
-        name = fit.method
-        if several:
-            name = fit_name(fit.structure, fit.method)
-        results[name] = result
-    ranked = tuple(fit for fit, _ in found)
-    return ranked, results
-
-
 def _by_use(trials: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
     """Trials to fit and trials held out; InputError where none can be held out."""
     fitted = [trial for trial in trials if trial.use == "fit"]
     held = [trial for trial in trials if trial.use == "validate"]
-    if not held and len(fitted) < 2:
+    n_fitted = len(fitted)
+    if not held and n_fitted < 2:
         raise InputError(
             "trials: expected a held-out trial to rank the methods on, got"
-            f" {len(fitted)} to fit and none to validate; mark one use ="
+            f" {n_fitted} to fit and none to validate; mark one use ="
             ' "validate", or give two to fit'
         )
     return fitted, held

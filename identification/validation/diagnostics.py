@@ -1,4 +1,4 @@
-"""What the data can determine and what a fit left over: collinearity and residuals."""
+"""Collinearity of the data, and residuals that a fit left over."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -75,16 +75,14 @@ def _of_equation(
 ) -> EquationDiagnostics:
     """Diagnostics of an equation; `apart`: rows whose windows do not overlap."""
     scaled, condition = scaled_features(features)
-    smallest = np.finfo(float).tiny
-    power = max(float(target @ target), smallest)
-    unexplained = float(error @ error) / power
-    rank = getattr(estimator, "rank_", min(features.shape))
+    full_rank = min(features.shape)
+    rank = getattr(estimator, "rank_", full_rank)
     return EquationDiagnostics(
         samples=len(target),
         terms=len(names),
         rank=int(rank),
         condition_number=condition,
-        r_squared=1.0 - unexplained,
+        r_squared=_r_squared(target, error),
         residual_rms=root_mean_square(error),
         residual_autocorrelation=autocorrelation(error[apart], 10),
         variance_inflation=by_name(names, variance_inflation(scaled)),
@@ -93,13 +91,22 @@ def _of_equation(
     )
 
 
+def _r_squared(target: Floats, error: Floats) -> float:
+    """Share of the target's mean square that a fit explains."""
+    smallest = np.finfo(float).tiny
+    power = max(float(target @ target), smallest)
+    unexplained = float(error @ error)
+    return 1.0 - unexplained / power
+
+
 def _dropped(estimator: Estimator, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
     """Terms that make up each direction that an estimator dropped."""
-    groups = []
-    for group in getattr(estimator, "collinear_groups_", ()):
+    groups = getattr(estimator, "collinear_groups_", ())
+    dropped = []
+    for group in groups:
         terms = tuple(names[term] for term in group)
-        groups.append(terms)
-    return tuple(groups)
+        dropped.append(terms)
+    return tuple(dropped)
 
 
 def scaled_features(features: Floats) -> tuple[Floats, float]:
@@ -129,7 +136,9 @@ def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
     most = min(lags, len(values) - 1)
     correlations = []
     for lag in range(1, most + 1):
-        product = float(centred[lag:] @ centred[:-lag])
+        later = centred[lag:]
+        earlier = centred[:-lag]
+        product = float(later @ earlier)
         correlations.append(product / power)
     return tuple(correlations)
 

@@ -1,4 +1,4 @@
-"""What a choice is validated on: each trial in turn, or those of the largest rudder."""
+"""Trials that validate a choice: each in turn, or those of the largest rudder."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -30,7 +30,8 @@ def of_largest_rudder(trials: Sequence[Trial], where: str) -> Flags:
     closest substitute in the data. `where`: the argument that asks for it. Raises
     InputError if all of them have the same rudder, to a tenth.
     """
-    rudders = np.array([np.abs(trial["delta"]).max() for trial in trials], dtype=float)
+    reached = [np.abs(trial["delta"]).max() for trial in trials]
+    rudders = np.array(reached, dtype=float)
     hardest = rudders.max()
     largest: Flags = rudders > 0.9 * hardest
     if largest.all():
@@ -79,18 +80,24 @@ def sample_folds(trials: Sequence[Trial], samples: Samples, folds: str) -> list[
         smaller = samples.select(~largest[samples.trial])
         found = []
         for index in np.flatnonzero(largest):
-            held = samples.select(samples.trial == index)
-            found.append(Fold(fit=smaller, held=held))
+            own = samples.trial == index
+            fold = Fold(
+                fit=smaller,
+                held=samples.select(own),
+            )
+            found.append(fold)
         return found
 
     groups = samples.trial
     if groups.max() == groups.min():
-        groups = np.arange(len(samples)) * 5 // len(samples)
+        n_samples = len(samples)
+        groups = np.arange(n_samples) * 5 // n_samples
     found = []
     for group in np.unique(groups):
+        own = groups == group
         fold = Fold(
-            fit=samples.select(groups != group),
-            held=samples.select(groups == group),
+            fit=samples.select(~own),
+            held=samples.select(own),
         )
         found.append(fold)
     return found
@@ -101,7 +108,9 @@ def pieces(trial: Trial) -> list[Trial]:
     edges = np.linspace(0, len(trial), 4).astype(int)
     found = []
     for number, (begin, end) in enumerate(pairwise(edges.tolist()), start=1):
-        name = f"{trial.name}, part {number}"
-        samples = slice(begin, end)
-        found.append(trial.part(samples, name))
+        piece = trial.part(
+            slice(begin, end),
+            f"{trial.name}, part {number}",
+        )
+        found.append(piece)
     return found

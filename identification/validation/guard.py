@@ -39,7 +39,9 @@ def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
     any other angle would. Stops after the first kind in which it does.
     """
     recorded = _recorded(model, trials)
-    for simulations in (recorded, _turns(model), _reversals(model)):
+    turns = _turns(model)
+    reversals = _reversals(model)
+    for simulations in (recorded, turns, reversals):
         reasons = []
         for simulation in simulations:
             cause = why_unphysical(model, simulation)
@@ -70,11 +72,17 @@ def _turns(model: ShipModel) -> Iterator[Simulation]:
 
 
 def _reversals(model: ShipModel) -> Iterator[Simulation]:
+    intervals = (2.5, 5.0, 10.0, 20.0)  # ship lengths
     for angle in _angles_deg(model):
-        for lengths in (2.5, 5.0, 10.0, 20.0):
+        for lengths in intervals:
             yield Simulation(
                 name=f"rudder {angle:+.0f} deg reversed every {lengths:g} L/U",
-                sail=partial(reversed_rudder, model, angle, lengths),
+                sail=partial(
+                    reversed_rudder,
+                    model,
+                    rudder_deg=angle,
+                    lengths=lengths,
+                ),
             )
 
 
@@ -98,8 +106,9 @@ def reversed_rudder(model: ShipModel, rudder_deg: float, lengths: float) -> Tria
     rudder = np.full(n_steps, np.radians(rudder_deg))
     rudder[to_port] *= -1.0
 
+    ordered = 0
     commands = np.tile(model.service_command, (n_steps, 1))
-    commands[:, 0] = rudder
+    commands[:, ordered] = rudder
     dt = STEP * model.travel_time
     return model.simulate(commands, dt)
 
@@ -113,8 +122,9 @@ def why_unphysical(model: ShipModel, simulation: Simulation) -> str | None:
 
     length = model.particulars["length"]
     speed = model.particulars["speed"]
-    slowest = trial["u"].min()
-    fastest = trial["u"].max()
+    surge = trial["u"]
+    slowest = surge.min()
+    fastest = surge.max()
     least_surge = min(simulation.least_surge, 0.0)
     if slowest < least_surge or fastest > FASTEST * speed:
         return f"surge speed from {slowest:.3g} to {fastest:.3g} m/s"
@@ -152,8 +162,12 @@ def guarded_fit(method: Method, task: FitTask, guarded: bool = True) -> GuardedF
     model = with_coefficients(task.blank, estimators)
     reasons = reasons_unstable(model, task.trials)
     if not reasons:
-        report: dict[str, Any] = {"decision": "stable as fitted"}
-        return GuardedFit(model, estimators, stable=True, report=report)
+        return GuardedFit(
+            model=model,
+            estimators=estimators,
+            stable=True,
+            report={"decision": "stable as fitted"},
+        )
 
     decision = "runs away, not guarded"
     if guarded and method.regularised:
@@ -161,8 +175,12 @@ def guarded_fit(method: Method, task: FitTask, guarded: bool = True) -> GuardedF
         if penalised is not None:
             return penalised
         decision = "runs away under every penalty"
-    report = {"decision": decision, "rejected": reasons}
-    return GuardedFit(model, estimators, stable=False, report=report)
+    return GuardedFit(
+        model=model,
+        estimators=estimators,
+        stable=False,
+        report={"decision": decision, "rejected": reasons},
+    )
 
 
 def penalised_fit(task: FitTask, reasons: list[str]) -> GuardedFit | None:

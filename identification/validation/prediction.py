@@ -1,4 +1,4 @@
-"""How well a model predicts recorded trials, open loop from the measured rudder."""
+"""Predictions of recorded trials, open loop from the measured rudder, and errors."""
 
 from collections.abc import Callable
 from functools import partial

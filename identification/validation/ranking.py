@@ -15,7 +15,7 @@ Metrics = Mapping[str, Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class RankedFit:
-    """How well a method predicts the trials held out."""
+    """Errors of a method on the trials held out."""
 
     structure: str  # of its model
     method: str  # its name
@@ -86,19 +86,26 @@ def in_turn(
     order. Returns what was identified, too.
     """
     names = [trial.name for trial in trials]
-    groups = max(1, min(groups, len(names)))
-    group_of = np.arange(len(names)) * groups // len(names)
     metrics = dict[str, Any]()
     results = list[IdentificationResult]()
-    for group in range(groups):
-        members = np.flatnonzero(group_of == group)
-        held = [names[index] for index in members]
+    for held in _divided(names, groups):
         result = identify(held)
         results.append(result)
         of_trials = result.metrics["trials"]
         for name in held:
             metrics[name] = of_trials[name]
     return metrics, results
+
+
+def _divided(names: list[str], groups: int) -> list[list[str]]:
+    """Names in groups of neighbours of about the same size."""
+    n_names = len(names)
+    groups = max(1, min(groups, n_names))
+    members: list[list[str]] = [[] for _ in range(groups)]
+    for place, name in enumerate(names):
+        group = place * groups // n_names
+        members[group].append(name)
+    return members
 
 
 def fit_name(structure: str, method: str) -> str:
@@ -109,7 +116,7 @@ def fit_name(structure: str, method: str) -> str:
 def ranked_fit(
     results: Sequence[IdentificationResult], seen: Metrics, trials: Sequence[Trial]
 ) -> RankedFit:
-    """How well a method that gave `results` predicts trials.
+    """Rank of a method that gave `results`, by what it predicts of trials.
 
     `seen`: metrics of those held out, by name.
     """
@@ -148,7 +155,8 @@ def _relative_error(metrics: Mapping[str, Any], trial: Trial) -> float | None:
             continue
         deviation = float(np.std(trial[name]))
         if deviation > 0.0:
-            ratios.append(error / deviation)
+            ratio = error / deviation
+            ratios.append(ratio)
     if not ratios:
         return None
     return float(np.mean(ratios))

@@ -62,21 +62,9 @@ def select(
     if len(trials) == 1:
         parts = pieces(trials[0])
         held_out = "each third of the only trial"
-    attempts = _Attempts(identify, [part.with_(kind=None) for part in parts], options)
-    free = options.method_is_default
-    for structure in counted("structures", structures):
-        method = options.method
-        if free:
-            method = methods_of(structure, options.method)[0]
-        attempts.add(structure, method)
-    if not attempts.ranked:
-        first_reason = next(iter(attempts.refused.values()))
-        raise InputError(first_reason)
-
-    first = attempts.by_rank()[0].structure
-    if free and first in TABLES:
-        for method in OTHERS:
-            attempts.add(first, method)
+    parts = [part.with_(kind=None) for part in parts]
+    attempts = _Attempts(identify, parts, options)
+    attempts.add_all(structures)
 
     ranked = attempts.by_rank()
     best = simplest(ranked)
@@ -86,7 +74,7 @@ def select(
         "ranking": [asdict(fit) for fit in (best, *others)],
         "refused": attempts.refused,
     }
-    return _chosen(options, best, free), report
+    return _chosen(options, best), report
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +86,26 @@ class _Attempts:
     options: Options
     ranked: list[RankedFit] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)  # why, by name
+
+    def add_all(self, structures: Sequence[str]) -> None:
+        """Try structures, each by its usual method, the best table by others too.
+
+        Raises InputError where none can be fitted.
+        """
+        free = self.options.method_is_default
+        for structure in counted("structures", structures):
+            method = self.options.method
+            if free:
+                method, *_ = methods_of(structure, method)
+            self.add(structure, method)
+        if not self.ranked:
+            first_reason = next(iter(self.refused.values()))
+            raise InputError(first_reason)
+
+        best, *_ = self.by_rank()
+        if free and best.structure in TABLES:
+            for method in OTHERS:
+                self.add(best.structure, method)
 
     def add(self, structure: str, method: Any) -> None:
         """Try a structure and a method, or remember why it cannot be fitted."""
@@ -133,11 +141,11 @@ class _Attempts:
         return sorted(self.ranked, key=lambda fit: fit.rank)
 
 
-def _chosen(options: Options, best: RankedFit, free: bool) -> Options:
-    """The options of the best fit; the method is another one only where it was free."""
+def _chosen(options: Options, best: RankedFit) -> Options:
+    """The options of the best fit; the method stays where one was named."""
     structure = best.structure
     method = options.method
-    if free and structure != MMG:
+    if options.method_is_default and structure != MMG:
         method = best.method
     return replace(
         options,
@@ -183,13 +191,15 @@ def simplest(ranked: Sequence[RankedFit]) -> RankedFit:
 
 
 def _differs_by_chance(fit: RankedFit, first: RankedFit) -> bool:
-    """Whether errors exceed the first's by one standard error at most, or by 2 %."""
+    """Tell whether errors exceed the first's by one standard error, or 2 %, at most."""
     differences = []
     for name, error in first.errors.items():
         own = fit.errors[name] or 0.0
-        differences.append(own - (error or 0.0))
+        difference = own - (error or 0.0)
+        differences.append(difference)
+    n_trials = len(differences)
     excess = np.mean(differences)
     deviation = float(np.std(differences, ddof=1))
-    standard_error = deviation / np.sqrt(len(differences))
+    standard_error = deviation / np.sqrt(n_trials)
     nothing = 0.02 * (first.error or 0.0)
     return bool(excess <= max(standard_error, nothing))

@@ -26,15 +26,16 @@ def with_start(model: ShipModel, trial: Trial) -> Trial:
     if not names or "psi" not in trial:
         return trial
 
-    length, speed = model.particulars["length"], model.particulars["speed"]
+    length = model.particulars["length"]
+    speed = model.particulars["speed"]
     end = trial.t[0] + WINDOW * length / speed
     window = trial.t <= end
     if np.sum(window) < 3:
         return trial
 
-    opening = _opening(model, trial, window)
+    opening = _opening(model, trial, window, names)
     try:
-        start = _estimated(model, opening, names)
+        start = opening.estimated_start()
     except UnstableModelError:
         return trial
     return _begun(trial, names, start)
@@ -42,15 +43,69 @@ def with_start(model: ShipModel, trial: Trial) -> Trial:
 
 @dataclass(frozen=True, eq=False)
 class _Opening:
-    """The first part of a trial, and what a simulation of it is compared in."""
+    """The first part of a trial, and how a simulation of it is compared with it."""
 
+    model: ShipModel
     trial: Trial
-    channels: tuple[str, ...]
+    names: list[str]  # channels whose first samples are estimated
+    channels: tuple[str, ...]  # those compared
     #: errors that count as one at least, shape (n_channels, 1)
     floors: Floats
 
+    def estimated_start(self) -> Floats:
+        """First samples from which the model comes nearest, shape (n_names,).
 
-def _opening(model: ShipModel, trial: Trial, window: Floats) -> _Opening:
+        Three rounds of Gauss-Newton: what is simulated is nearly linear in its start.
+        The scales are renewed between them, which `scipy.optimize.least_squares` would
+        take for fits of their own, of more simulations each and other last digits.
+        """
+        start = np.array([self.trial[name][0] for name in self.names])
+        scales = self.floors
+        for _ in range(3):
+            start = start + self._correction(start, scales)
+            left = self._errors(start)
+            mean_squares = np.mean(left**2, axis=1, keepdims=True)
+            rms = np.sqrt(mean_squares)
+            scales = np.maximum(rms, self.floors)
+        return start
+
+    def _correction(self, start: Floats, scales: Floats) -> Floats:
+        """Step of Gauss-Newton from a start, by forward differences."""
+        speed = self.model.particulars["speed"]
+        rate = speed / self.model.particulars["length"]
+        units = np.array([rate if name == "r" else speed for name in self.names])
+        step = 1e-4
+
+        errors = self._errors(start)
+        slopes = []
+        for move in np.diag(step * units):
+            moved = self._errors(start + move)
+            change = (moved - errors) / scales
+            slopes.append(change.ravel())
+        jacobian = np.array(slopes).T / step
+        residuals = (errors / scales).ravel()
+
+        excess, *_ = np.linalg.lstsq(jacobian, residuals, rcond=1e-6)
+        return np.asarray(-units * excess)
+
+    def _errors(self, start: Floats) -> Floats:
+        """Simulated less measured channels after the first sample.
+
+        Shape (n_channels, n_samples - 1).
+        """
+        trial = self.trial
+        begun = _begun(trial, self.names, start)
+        run = open_loop(self.model, begun)
+        errors = []
+        for name in self.channels:
+            error = run[name] - trial[name]
+            errors.append(error[1:])
+        return np.array(errors)
+
+
+def _opening(
+    model: ShipModel, trial: Trial, window: Floats, names: list[str]
+) -> _Opening:
     """Heading, and track or velocities, in the first part of a trial."""
     measured = trial.channels.keys() - trial.derived
     if {"x", "y"} <= measured:
@@ -64,70 +119,12 @@ def _opening(model: ShipModel, trial: Trial, window: Floats) -> _Opening:
 
     samples = {name: values[window] for name, values in trial.channels.items()}
     return _Opening(
+        model=model,
         trial=Trial(trial.t[window], samples),
+        names=names,
         channels=channels,
         floors=floors,
     )
-
-
-def _estimated(model: ShipModel, opening: _Opening, names: list[str]) -> Floats:
-    """First samples of some channels from which the model comes nearest to the opening.
-
-    Three rounds of Gauss-Newton: what is simulated is nearly linear in its start. The
-    scales are renewed between them, which `scipy.optimize.least_squares` would take for
-    fits of their own, of more simulations each and other last digits.
-    """
-    start = np.array([opening.trial[name][0] for name in names])
-    scales = opening.floors
-    for _ in range(3):
-        correction = _correction(model, opening, names, start, scales)
-        start = start + correction
-        left = _errors(model, opening, names, start)
-        mean_squares = np.mean(left**2, axis=1, keepdims=True)
-        scales = np.maximum(np.sqrt(mean_squares), opening.floors)
-    return start
-
-
-def _correction(
-    model: ShipModel,
-    opening: _Opening,
-    names: list[str],
-    start: Floats,
-    scales: Floats,
-) -> Floats:
-    """Step of Gauss-Newton from a start, by forward differences, shape (n_names,)."""
-    speed = model.particulars["speed"]
-    rate = speed / model.particulars["length"]
-    units = np.array([rate if name == "r" else speed for name in names])
-    step = 1e-4
-
-    errors = _errors(model, opening, names, start)
-    slopes = []
-    for move in np.diag(step * units):
-        moved = _errors(model, opening, names, start + move)
-        change = (moved - errors) / scales
-        slopes.append(change.ravel())
-    jacobian = np.array(slopes).T / step
-    residuals = (errors / scales).ravel()
-
-    excess, *_ = np.linalg.lstsq(jacobian, residuals, rcond=1e-6)
-    return np.asarray(-units * excess)
-
-
-def _errors(
-    model: ShipModel, opening: _Opening, names: list[str], start: Floats
-) -> Floats:
-    """Simulated less measured channels after the first sample.
-
-    Shape (n_channels, n_samples - 1).
-    """
-    trial = opening.trial
-    run = open_loop(model, _begun(trial, names, start))
-    errors = []
-    for name in opening.channels:
-        error = run[name] - trial[name]
-        errors.append(error[1:])
-    return np.array(errors)
 
 
 def _begun(trial: Trial, names: list[str], start: Floats) -> Trial:

@@ -17,9 +17,10 @@ def why_unstable(fit: Fit) -> str | None:
     """Why an identified model must not be used; None where it is stable."""
     ran_away = [name for name, run in fit.predictions.items() if run is None]
     if ran_away:
+        n_lost = len(ran_away)
         first = PurePath(ran_away[0]).name
         return (
-            f"its simulation runs away on {len(ran_away)} of the recorded trials,"
+            f"its simulation runs away on {n_lost} of the recorded trials,"
             f" {first} first"
         )
     if fit.stable:
@@ -55,12 +56,14 @@ def heading_errors_deg(fit: Fit, use: str | None = None) -> dict[str, float]:
     Of all trials, or of one use.
     """
     errors = {}
-    for name, metrics in fit.metrics["trials"].items():
+    of_trials = fit.metrics["trials"]
+    for name, metrics in of_trials.items():
         if use is not None and metrics["use"] != use:
             continue
         error = metrics["rmse"]["psi"]
         if error is not None:
-            errors[name] = float(np.degrees(error))
+            angle = np.degrees(error)
+            errors[name] = float(angle)
     return errors
 
 
