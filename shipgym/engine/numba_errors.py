@@ -13,11 +13,10 @@ from shipgym.python_files import LIBRARIES
 #: What Numba's reasons mean that do not say it.
 PLAINLY = {
     r"Unknown attribute '(\w+)' of type Module\(<module '((?!numpy|math)[\w.]+)'.*": (
-        r"\2.\1 is looked up in its module, expected it to be imported by name: from \2"
-        r" import \1"
+        r"expected \1 to be imported by name, got \2.\1; write from \2 import \1"
     ),
     r".*: setitem\(readonly array.*": (
-        "a global array is written, expected one that is only read"
+        "expected global arrays to be only read, got one that is written"
     ),
 }
 COLOUR = re.compile(r"\x1b\[[\d;]*m")

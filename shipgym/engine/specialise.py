@@ -109,8 +109,8 @@ class Specialisation:
         """
         if function.__code__.co_kwonlyargcount:
             raise InputError(
-                f"{place_of(function)}: keyword-only arguments found, which cannot be"
-                " compiled"
+                f"{place_of(function)}: expected no keyword-only arguments, which"
+                " cannot be compiled; take out the *"
             )
         namespace: dict[str, Any] = {
             "__name__": function.__module__,
@@ -142,8 +142,8 @@ class Specialisation:
             self._made[key] = self.inner(function, inlined, checked)
         if self._made[key] is None:
             raise InputError(
-                f"{place_of(function)}: calls itself, expected a loop, which can be"
-                " compiled"
+                f"{place_of(function)}: expected a function that can be compiled, got"
+                " one that calls itself; use a loop"
             )
         return self._made[key]
 
@@ -153,6 +153,6 @@ def _refuse_container(function: Any, name: str, value: Any) -> None:
         return
     kind = type(value).__name__
     raise InputError(
-        f"{place_of(function)}: the global {name!r} is a {kind}, expected a tuple or an"
-        " array of numbers"
+        f"{place_of(function)}: global {name!r}: expected a tuple or an array of"
+        f" numbers, got a {kind}"
     )

@@ -290,9 +290,9 @@ class Engine(Lanes):
         reward = self.info(name)[lane]
         step = self.steps[lane]
         raise InputError(
-            f"{self.task.definition.reward_source}: {name} is {reward} in lane {lane}"
-            f" at step {step:g}, expected a finite number; look for a division by zero"
-            " or a root of a negative number (shipgym.check_task helps)"
+            f"{self.task.definition.reward_source}: {name}: expected a finite number,"
+            f" got {reward} in lane {lane} at step {step:g}; look for a division by"
+            " zero or a root of a negative number (shipgym.check_task helps)"
         )
 
     @property
@@ -407,13 +407,15 @@ def refuse_unstable(models: Iterable[ShipModel], allow_unstable: bool = False) -
 
 
 def _refuse_or_warn(name: str, allow_unstable: bool) -> None:
-    found = (
-        f"model {name!r} was found unstable when it was identified: it runs away where"
-        " ships do not"
-    )
+    reason = "one that was found unstable when it was identified"
     if not allow_unstable:
         raise InputError(
-            f"{found}, expected a stable one; identify it from more trials or with the"
-            " guard, or give allow_unstable=True to sail it all the same"
+            f"model {name!r}: expected a stable ship, got {reason}; identify it from"
+            " more trials or with the guard, or give allow_unstable=True to use it all"
+            " the same"
         )
-    warnings.warn(f"{found}, do not trust what is learned or tuned on it", stacklevel=5)
+    warnings.warn(
+        f"model {name!r}: expected a stable ship, got {reason}; do not trust what is"
+        " learned or tuned on it",
+        stacklevel=5,
+    )

@@ -35,7 +35,7 @@ class Episode:
     States and info are those at the beginning and after each of the n steps; commands,
     actions and rewards belong to the steps.
 
-    Raises InputError naming the field, what was found and what is expected.
+    Raises InputError naming the field.
 
     Parameters
     ----------

@@ -75,7 +75,8 @@ def from_file(content: Mapping[str, Any]) -> dict[str, Any]:
     kind = content.get("kind")
     if kind != KIND:
         raise InputError(
-            f"kind: {kind!r} found, expected {KIND!r}: a file that RecordEpisode wrote"
+            f"kind: expected {KIND!r}, got {kind!r}; choose a file that RecordEpisode"
+            " wrote"
         )
     check_format(content, FORMAT, KIND)
     known = ("format", "kind", *TABLES, *PLAIN)

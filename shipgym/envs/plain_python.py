@@ -57,9 +57,9 @@ def _checked(program: EpisodeProgram, name: str, form: Any) -> Callable[..., Any
 def _result_of(function: Any, own: Any, form: Any, *arguments: Any) -> Any:
     """Call a function, and refuse what it returns in another form than asked."""
     given = asked(function, *arguments)
-    fault = _fault(given, form, "what it returns")
+    fault = _fault(given, form, "returned value")
     if fault and own is not function:
-        fault = fault.replace("result 2", "what it returns")  # the reward
+        fault = fault.replace("result 2", "returned value")  # the reward
     if fault:
         raise InputError(f"{place_of(own)}: {fault}")
     return given
@@ -91,7 +91,7 @@ def _fault(given: Any, form: Any, name: str) -> str:
 
 
 def _other(given: Any, form: Any, name: str) -> str:
-    return f"{name} is {_words(given)}, expected {_words(form)}"
+    return f"{name}: expected {_words(form)}, got {_words(given)}"
 
 
 def _fault_within(
@@ -116,7 +116,7 @@ def _words(given: Any) -> str:
         return f"({', '.join(words)})"
     kind = given if isinstance(given, type) else type(given)
     if issubclass(kind, bool | np.bool_):
-        return "true or false"
+        return "a boolean"
     if issubclass(kind, Real):
         return "a number"
     return kind.__name__

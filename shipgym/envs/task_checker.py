@@ -149,8 +149,8 @@ def _not_finite(engine: Engine) -> Iterator[str]:
             found.add(name)
             lane = int(np.argmax(wrong))
             yield (
-                f"{_source_of(name, engine.task)}: {name} is {values[lane]} in lane"
-                f" {lane} at step {step}, expected finite numbers"
+                f"{_source_of(name, engine.task)}: {name}: expected finite numbers, got"
+                f" {values[lane]} in lane {lane} at step {step}"
             )
 
 
@@ -235,8 +235,8 @@ def _often_clipped(task: Task, seen: dict[str, list[float]]) -> Iterator[str]:
             beyond = values[is_beyond]
             furthest = beyond[np.abs(beyond).argmax()]
             yield (
-                f"Observation.{path}: {furthest:.3g} found in units of its scale,"
-                f" beyond its bounds {spec.low:g} to {spec.high:g} in"
-                f" {100.0 * part:.0f} % of the steps, and clipped; give it wider bounds"
-                " or a larger scale if more is to be seen"
+                f"Observation.{path}: expected {spec.low:g} to {spec.high:g} in units"
+                f" of its scale, got up to {furthest:.3g}: it is clipped in"
+                f" {100.0 * part:.0f} % of the steps; give it wider bounds or a larger"
+                " scale if the agent is to see more"
             )

@@ -138,8 +138,8 @@ class Particulars(Mapping[str, Any]):
                 )
         if table.get("length") is None:
             raise InputError(
-                f"{where} length: missing, expected the length between perpendiculars"
-                " in m"
+                f"{where} length: expected the length between perpendiculars in m, got"
+                " none"
             )
         estimated: Any = table.pop("estimated", None) or ()
         with placed(where, " "):

@@ -139,7 +139,7 @@ class TaskDefinition(Configurable):
 
     @cached_property
     def flags(self) -> tuple[str, ...]:
-        """Reported fields that are true or false."""
+        """Reported fields that are booleans."""
         kinds = field_types(self.State, notes=True)
         flags = []
         for name in self.reported:

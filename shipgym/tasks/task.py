@@ -303,7 +303,7 @@ class Task:
 
     @cached_property
     def flags(self) -> frozenset[str]:
-        """Names of those that are true or false."""
+        """Names of those that are booleans."""
         return frozenset({"extrapolating", *self.definition.flags})
 
     @property
