@@ -1,4 +1,5 @@
-"""A fairway due north with a speed limit on part of it. Run it to check the task and to train an agent."""
+"""A fairway due north with a speed limit on part of it. Run it to check the task and to
+train an agent."""
 
 from math import fabs
 from typing import Annotated, NamedTuple

@@ -1,4 +1,5 @@
-"""Tests keep compiled ships in a folder of their own where the user's cache is refused or closed."""
+"""Tests keep compiled ships in a folder of their own where the user's cache is refused
+or closed."""
 
 import os
 import tempfile

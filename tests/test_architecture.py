@@ -1,4 +1,5 @@
-"""The order of the house: what `docs/architecture.md` says and draws is what the code does."""
+"""The order of the house: what `docs/architecture.md` says and draws is what the code
+does."""
 
 import ast
 import re
@@ -21,7 +22,8 @@ PAGES = [
 
 @pytest.fixture(scope="module")
 def imports():
-    """Pairs of modules, the first of which imports the second; lazy and TYPE_CHECKING imports counted."""
+    """Pairs of modules, the first of which imports the second; lazy and TYPE_CHECKING
+    imports counted."""
     return draw_architecture.imports()
 
 
@@ -123,7 +125,8 @@ def test_the_walks_name_what_stands_in_the_files():
 
 
 def test_every_script_is_the_way_to_something_that_is_published():
-    """A page, the Makefile, a ship file or a test names it, or another script imports it."""
+    """A page, the Makefile, a ship file or a test names it, or another script imports
+    it."""
     pages = [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "Makefile", ROOT / "mkdocs.yml"]
     pages += [*(ROOT / "tests").rglob("*.py"), *(ROOT / "examples").rglob("*.toml")]
     text = "".join(path.read_text(encoding="utf-8") for path in pages)

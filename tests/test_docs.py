@@ -1,4 +1,5 @@
-"""Every Python block of the pages runs, page by page, top to bottom, in one namespace and an empty folder.
+"""Every Python block of the pages runs, page by page, top to bottom, in one namespace
+and an empty folder.
 
 Comments of a page, which readers do not see, say what is special:
 

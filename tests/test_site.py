@@ -1,4 +1,5 @@
-"""The built site in a browser. `make docs` builds it and runs this; `make test` leaves it out.
+"""The built site in a browser. `make docs` builds it and runs this; `make test` leaves
+it out.
 
 `SHIPGYM_SITE` names a folder that is built already; otherwise it is built here, in half
 a minute.

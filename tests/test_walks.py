@@ -1,4 +1,5 @@
-"""The walks of `docs/architecture.md`: a journey enters the functions that its walk names, in their order."""
+"""The walks of `docs/architecture.md`: a journey enters the functions that its walk
+names, in their order."""
 
 import asyncio
 import re
@@ -65,7 +66,8 @@ WALKS = {
 
 
 def entered(journey, folder):
-    """Files and functions of the project in the order in which a journey first enters them."""
+    """Files and functions of the project in the order in which a journey first enters
+    them."""
     seen = {}
 
     def note(frame, event, _):

@@ -1,4 +1,5 @@
-"""PPO of RLlib learns to keep a course with a ship of shipgym, and is compared with LQ afterwards."""
+"""PPO of RLlib learns to keep a course with a ship of shipgym, and is compared with LQ
+afterwards."""
 
 import argparse
 import logging

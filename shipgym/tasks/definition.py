@@ -308,7 +308,7 @@ def _check_names(definition: TaskDefinition) -> None:
 
 
 def _check_differ(names: Iterable[str], where: str) -> None:
-    for name, count in Counter(names).items():
+    for name, count in Counter(list(names)).items():
         if count < 2:
             continue
         also = "; the engine has one of that name" if name == "end" else ""

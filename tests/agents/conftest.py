@@ -13,7 +13,8 @@ def demo():
 
 @pytest.fixture(scope="session")
 def chain(tmp_path_factory):
-    """The whole chain on the demo's trials, once: the folder written, the result, the stages told."""
+    """The whole chain on the demo's trials, once: the folder written, the result, the
+    stages told."""
     from agents.verification.chain import build_autopilot
 
     folder = tmp_path_factory.mktemp("chain") / "report"
@@ -26,7 +27,8 @@ def chain(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def unstable_ship(tmp_path_factory):
-    """A ship file whose one fitted trial, a turning circle, cannot tell 40 coefficients apart."""
+    """A ship file whose one fitted trial, a turning circle, cannot tell 40 coefficients
+    apart."""
     head, *trials = DEMO.read_text().replace("tls-svm", "ls").split("[[trials]]")
     uses = [text.replace('"fit"', '"validate"') for text in trials]
     uses = [

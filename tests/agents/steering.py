@@ -1,4 +1,5 @@
-"""What tests of the helm share: sentences, free ports, and a clock that does not wait."""
+"""What tests of the helm share: sentences, free ports, and a clock that
+does not wait."""
 
 import asyncio
 import selectors
@@ -18,7 +19,8 @@ def free_port():
 
 
 class NoWaiting(selectors.DefaultSelector):
-    """Time goes on when there is nothing to do, and only then: tests do not depend on the computer."""
+    """Time goes on when there is nothing to do, and only then: tests do not depend on
+    the computer."""
 
     now = 0.0
 

@@ -525,7 +525,9 @@ def test_an_agent_that_fits_no_task_is_refused_before_anything_is_run(suite, tmp
     guide = WheelOver.from_model(MARINER)
     guide.save(tmp_path / "guide.json")
     file = str(tmp_path / "guide.json")
-    said = "controllers: 'guide' fits none of the tasks: .*'calm': expected 15 observations, got 8"
+    said = (
+        "controllers: 'guide' fits none of the tasks: .*expected 15 observations, got 8"
+    )
     with pytest.raises(InputError, match=said):
         benchmark(file, suite, "calm", tmp_path / "out", episodes=2)
     assert not (tmp_path / "out").exists()

@@ -38,7 +38,8 @@ def lq():
 
 
 class Steers:
-    """Hands back what a function makes of the number of the call and the observations."""
+    """Hands back what a function makes of the number of the call and the
+    observations."""
 
     def __init__(self, answer):
         self.answer, self.calls = answer, 0
@@ -103,7 +104,8 @@ def test_straight_running_needs_the_fuel_of_straight_running():
 
 
 def test_fuel_goes_by_the_cube_of_the_shaft_over_the_way():
-    """With the shaft ordered to half its speed: by the mean of its cube and the speed that is left."""
+    """With the shaft ordered to half its speed: by the mean of its cube and the speed
+    that is left."""
     options = {"course_change_deg": 0.0, "episode_steps": 300, "action": "rudder-shaft"}
     slow = BenchmarkTask("slow", "course-keeping", "tanker", options=options)
     orders = np.array([[0.0, 0.5]], dtype=np.float32)
@@ -118,7 +120,8 @@ def test_fuel_goes_by_the_cube_of_the_shaft_over_the_way():
 
 
 def made_up(task, way=None, **states):
-    """Two episodes of 3 and 1 intervals of 10 s of a ship of 5 m/s and 2 1/s; later nothing counts."""
+    """Two episodes of 3 and 1 intervals of 10 s of a ship of 5 m/s and 2 1/s; later
+    nothing counts."""
     sailing = np.array([[1, 1], [1, 0], [1, 0]], dtype=np.bool_)
     known = {
         "u": np.full((4, 2), 5.0),
@@ -261,7 +264,8 @@ def test_an_episode_without_an_interval_has_no_change_of_course():
 
 
 def test_figures_of_steering_and_of_paths_by_hand():
-    """Two episodes of 4 and 2 intervals of 3 s; what is recorded later or at the beginning does not count."""
+    """Two episodes of 4 and 2 intervals of 3 s; what is recorded later or at the
+    beginning does not count."""
     sailing = np.array([[1, 1], [1, 1], [1, 0], [1, 0]], dtype=np.bool_)
     run = SimpleNamespace(
         sailing=sailing,
@@ -311,7 +315,8 @@ def test_what_is_recorded_after_an_episode_is_not_replayed(lq):
 
 
 def test_overshoot_and_settling_of_a_run_are_those_of_its_recorded_heading(lq):
-    """One change of course of 20 degrees, which LQ makes with little overshoot well before the end."""
+    """One change of course of 20 degrees, which LQ makes with little overshoot well
+    before the end."""
     options = {
         "course_changes_deg": [20.0],
         "change_interval_steps": 400,
@@ -397,7 +402,8 @@ def test_a_controller_that_fails_is_charged_for_the_rest_and_the_others_go_on(ho
 
 
 def test_the_time_of_a_command_is_that_of_a_call_by_the_ships_that_sail(monkeypatch):
-    """A clock that goes on by half a second whenever it is read: each call takes so long."""
+    """A clock that goes on by half a second whenever it is read: each call takes so
+    long."""
     clock = count(0.0, 0.5)
     monkeypatch.setattr(rollout_module.time, "process_time", lambda: next(clock))
     run = evaluate(steady(0.0), KEEPING, SEEDS[:2]).run

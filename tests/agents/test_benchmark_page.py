@@ -339,7 +339,8 @@ def made_up(costs, means, ranking):
 
 
 def test_worst_hardest_and_best_by_hand():
-    """Two training runs of `a` and one of `b`; a cost that is no number is the worst."""
+    """Two training runs of `a` and one of `b`; a cost that is no number is
+    the worst."""
     costs = {
         "a": np.array([[1.0, 3.0, 2.0], [0.0, 9.0, np.nan]]),
         "b": np.array([[1.0, 1.0, 4.0]]),
@@ -379,7 +380,8 @@ def test_differences_add_up():
 
 
 def test_histories_are_as_fine_as_they_are_read():
-    """Heel to 0.01 deg, shaft speed to 0.1 1/min, wind to 0.1 m/s, current to 0.01 m/s."""
+    """Heel to 0.01 deg, shaft speed to 0.1 1/min, wind to 0.1 m/s, current
+    to 0.01 m/s."""
     fine = {"heel": 0.01, "shaft_speed": 0.1, "wind_speed": 0.1, "current_speed": 0.01}
     values = [123.45678, 123.98766]
     found = short(
@@ -418,7 +420,8 @@ def browser():
 
 @pytest.fixture
 def opened(browser, page):
-    """The page at its beginning; after each test it must have kept quiet and stayed offline."""
+    """The page at its beginning; after each test it must have kept quiet and stayed
+    offline."""
     browser.resize(1200, 900)
     browser.open("about:blank")
     browser.open(page.as_uri())

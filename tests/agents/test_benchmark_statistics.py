@@ -64,7 +64,8 @@ def test_training_runs_that_differ_widen_the_interval():
 
 
 def test_intervals_of_every_statistic_are_those_of_theory():
-    """Half-widths of 1.96 standard errors: the middle half of normal costs has 1.19 times that variance."""
+    """Half-widths of 1.96 standard errors: the middle half of normal costs has 1.19
+    times that variance."""
     costs = np.random.default_rng(3).normal(50.0, 10.0, (1, 1000))
     draws = Draws(1, 1000, n_draws=1000)
     sigma = 10.0 / np.sqrt(1000)

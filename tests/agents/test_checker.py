@@ -1,4 +1,5 @@
-"""The conformance suite finds each broken promise and passes controllers that keep them."""
+"""The conformance suite finds each broken promise and passes controllers that keep
+them."""
 
 import numpy as np
 import pytest
@@ -200,7 +201,8 @@ def test_orders_are_the_same_to_a_hundred_thousandth_of_the_rudder_limit(more, p
 
 
 def test_by_default_a_minute_of_intervals_is_steered():
-    """What it remembers is how many it has seen; the first of another episode comes after them."""
+    """What it remembers is how many it has seen; the first of another episode comes
+    after them."""
 
     class Counter(Helmsman):
         most = 0

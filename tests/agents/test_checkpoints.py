@@ -1,4 +1,5 @@
-"""Checkpoints: all is compared with the agent's own before it is restored; no path is opened."""
+"""Checkpoints: all is compared with the agent's own before it is restored; no path is
+opened."""
 
 import copy
 import json
@@ -203,7 +204,8 @@ def test_numbers_that_are_infinite_or_nan_are_refused(
 
 
 def test_numbers_of_ships_without_bound_stay_so(fresh, memory):
-    """The depth of deep water is infinite, and so are the limits of an unknown operating envelope."""
+    """The depth of deep water is infinite, and so are the limits of an unknown
+    operating envelope."""
     assert np.isinf(memory["ships"][1]["ships"]).any()
     restore_agent(fresh, copy.deepcopy(memory))
 
@@ -268,7 +270,8 @@ def test_a_run_of_another_form_is_refused(change, said):
 
 
 def rewritten(path, change):
-    """A file with other metadata and tensors: its header is changed and what follows stays."""
+    """A file with other metadata and tensors: its header is changed and what follows
+    stays."""
     whole = path.read_bytes()
     (length,) = struct.unpack("<Q", whole[:8])
     header = json.loads(whole[8 : 8 + length])

@@ -324,8 +324,9 @@ def test_options_of_a_training_reach_its_plan(tmp_path, monkeypatch):
         raise InputError("stopped")
 
     monkeypatch.setattr("agents.training.training.train", stop)
-    options = """--env path-following --model tanker --sea rough --option max_turn_deg=20
-        --total-steps 5000 --set gamma=0.9 --from-nothing --seed 7 --randomise
+    options = """--env path-following --model tanker --sea rough
+        --option max_turn_deg=20 --total-steps 5000 --set gamma=0.9
+        --from-nothing --seed 7 --randomise
         --threads 2 --max-seconds 9"""
     answer = shipgym("train", "sac", "--out", tmp_path / "run", *options.split())
     assert answer.stderr.splitlines()[-1] == "error: stopped"

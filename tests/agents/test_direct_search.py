@@ -1,4 +1,5 @@
-"""Direct search: it finds a known optimum within its budget, and refuses loops that are not sane."""
+"""Direct search: it finds a known optimum within its budget, and refuses loops that are
+not sane."""
 
 from collections.abc import Mapping
 from dataclasses import replace

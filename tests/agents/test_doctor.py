@@ -1,4 +1,5 @@
-"""`shipgym doctor` and `shipgym warm`: the installation, and the cache of compiled ships."""
+"""`shipgym doctor` and `shipgym warm`: the installation, and the cache of compiled
+ships."""
 
 import errno
 import importlib.metadata

@@ -57,7 +57,7 @@ def test_criteria_are_drawn_in_per_cent_of_their_limits():
     ]
 
 
-def test_tracks_are_drawn_east_to_the_right_in_ship_lengths_and_their_errors_along_the_way():
+def test_tracks_are_drawn_in_ship_lengths_and_their_errors_along_the_path():
     kept = SimpleNamespace(
         waypoints=np.array([[0.0, 0.0], [300.0, 400.0]]),
         positions=np.array([[0.0, 10.0], [30.0, 50.0], [60.0, 90.0]]),

@@ -1,4 +1,5 @@
-"""A grey box from the command line: what the table [identify] of a ship file says of it."""
+"""A grey box from the command line: what the table [identify] of a ship file says of
+it."""
 
 import json
 

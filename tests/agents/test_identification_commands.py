@@ -1,4 +1,5 @@
-"""`shipgym identify`, `advise` and `reduce`, with every option from the ship file or the command line."""
+"""`shipgym identify`, `advise` and `reduce`, with every option from the ship file or
+the command line."""
 
 import json
 import re

@@ -28,7 +28,8 @@ from shipgym.errors import InputError
 
 def spectrum(job):
     x = np.random.default_rng(job["seed"]).normal(size=(60, 40))
-    return {"seed": job["seed"], "values": np.linalg.svd(x, compute_uv=False), "pair": (1, float("inf"))}
+    values = np.linalg.svd(x, compute_uv=False)
+    return {"seed": job["seed"], "values": values, "pair": (1, float("inf"))}
 
 
 def dies(job):
@@ -53,7 +54,8 @@ def threads(job):
     from threadpoolctl import threadpool_info
 
     np.ones((2, 2)) @ np.ones((2, 2))
-    return [[pool["num_threads"] for pool in threadpool_info()], os.environ["OMP_NUM_THREADS"]]
+    pools = [pool["num_threads"] for pool in threadpool_info()]
+    return [pools, os.environ["OMP_NUM_THREADS"]]
 
 
 def loaded(job):
@@ -123,7 +125,8 @@ def test_a_job_has_one_thread_and_the_environment_stays(
 def test_workers_import_nothing_from_the_working_folder(
     engine, functions, tmp_path, monkeypatch
 ):
-    """joblib imports lz4 where it is installed; a file of that name is somebody's results."""
+    """joblib imports lz4 where it is installed; a file of that name is somebody's
+    results."""
     (tmp_path / "lz4.py").touch()
     monkeypatch.chdir(tmp_path)
     ((is_loaded, folder),) = run_jobs(functions.loaded, [{}], JobEngine(engine, 2))

@@ -1,4 +1,5 @@
-"""Agents of stable-baselines3 learn on ShipVecEnv, in seconds, what doing nothing does not do."""
+"""Agents of stable-baselines3 learn on ShipVecEnv, in seconds, what doing nothing does
+not do."""
 
 import numpy as np
 import pytest

@@ -17,18 +17,16 @@ from shipgym.trials.ship_file import ShipFile
 
 @pytest.fixture
 def log(tmp_path, monkeypatch):
-    """Heading and rudder of a first-order ship, the rudder positive to port, in degrees, with clock times."""
+    """Heading and rudder of a first-order ship, the rudder positive to port, in
+    degrees, with clock times."""
     t = np.arange(300.0)
     delta, r = 10.0 * np.sign(np.sin(0.07 * t)), np.zeros(t.size)
     for k in range(1, t.size):
         r[k] = r[k - 1] + (0.08 * delta[k - 1] - r[k - 1]) / 12.0
     lines = ["time;Gyro [deg];Rudder"]
     for k, psi in enumerate(30.0 + np.cumsum(r)):
-        lines.append(
-            f"2024-05-31 09:{30 + k // 60}:{k % 60:02d};{psi:.2f};{-delta[k]:.1f}".replace(
-                ".", ","
-            )
-        )
+        clock = f"2024-05-31 09:{30 + k // 60}:{k % 60:02d}"
+        lines.append(f"{clock};{psi:.2f};{-delta[k]:.1f}".replace(".", ","))
     (tmp_path / "log.csv").write_text("\n".join(lines))
     monkeypatch.chdir(tmp_path)
     return tmp_path

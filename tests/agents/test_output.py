@@ -137,7 +137,7 @@ def holder(tmp_path):
         process.kill()
 
 
-def test_a_second_process_is_told_who_uses_the_folder_and_takes_over_when_that_is_killed(
+def test_a_second_process_takes_the_folder_over_when_the_first_is_killed(
     holder, tmp_path
 ):
     with pytest.raises(
@@ -303,7 +303,8 @@ def test_a_folder_that_is_write_protected_is_refused_and_nothing_is_left(
 
 
 def test_where_no_file_can_be_made_nobody_else_is_blamed():
-    """In /proc a file cannot be made even by root, to whom all folders seem to be open."""
+    """In /proc a file cannot be made even by root, to whom all folders seem
+    to be open."""
     with pytest.raises(InputError, match=r"^/proc/ship: .*cannot be written"):
         write_half(Path("/proc/ship"), RuntimeError())
     with (

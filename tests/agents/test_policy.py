@@ -1,4 +1,5 @@
-"""A learned policy steers as its network and its base say, and refuses what it was not made for."""
+"""A learned policy steers as its network and its base say, and refuses what it was not
+made for."""
 
 from dataclasses import replace
 
@@ -80,7 +81,8 @@ def test_rudder_and_shaft_are_two_commands():
 
 
 def steered_by_hand(policy, rows, starts):
-    """Actions of one ship by the rule in the module's docstring, interval by interval."""
+    """Actions of one ship by the rule in the module's docstring, interval by
+    interval."""
     actions, base_state = [], None
     for step, (seen, begins) in enumerate(zip(rows, starts, strict=True)):
         if begins or step == 0:

@@ -124,7 +124,8 @@ def test_what_it_learned_in_is_recorded():
 
 @pytest.mark.parametrize("history", [1, 3])
 def test_with_base_and_history_it_steers_as_in_training(history):
-    """Step by step what the agent commands through the wrapper, over the ends of episodes."""
+    """Step by step what the agent commands through the wrapper, over the ends of
+    episodes."""
     base = LQ.from_model(MARINER)
     options = {"episode_steps": 15, "action": "rudder"}
     env = ResidualVecEnv(ships(**options), base, authority=0.5, frame_stack=history)

@@ -1,4 +1,5 @@
-"""Policy files: read back bit for bit, without torch, and refused with file and field named."""
+"""Policy files: read back bit for bit, without torch, and refused with file and field
+named."""
 
 import hashlib
 import json

@@ -1,4 +1,5 @@
-"""A controller of one's own is one file and its registration: files, benchmark, workers and bases know it."""
+"""A controller of one's own is one file and its registration: files, benchmark, workers
+and bases know it."""
 
 import re
 import sys
@@ -31,7 +32,10 @@ from shipgym.tasks.scales import control_interval
 @dataclass(frozen=True, eq=False)
 class PD(Controller):
     kind = "my-pd"
-    feedback = {"proportional": ("heading_error", 1.0), "derivative": ("yaw_rate", -1.0)}
+    feedback = {
+        "proportional": ("heading_error", 1.0),
+        "derivative": ("yaw_rate", -1.0),
+    }
 
     @classmethod
     def from_model(cls, model, *, dt=None, proportional=1.0):

@@ -208,8 +208,10 @@ def shown(template, **data):
 def test_texts_are_escaped_wherever_they_stand():
     template = """{% call parts.table([text], caption=text) %}
     {{ parts.row(text, parts.badge(text)) }}{% endcall %}
-    {{ parts.header(text, text, text) }}{{ parts.card(text, text, text) }}{{ parts.note(text) }}
-    {% call parts.verdict(text, "good") %}{% endcall %}{% call parts.section("one", text) %}{% endcall %}"""
+    {{ parts.header(text, text, text) }}{{ parts.card(text, text, text) }}
+    {{ parts.note(text) }}
+    {% call parts.verdict(text, "good") %}{% endcall %}
+    {% call parts.section("one", text) %}{% endcall %}"""
     page = shown(template, text=HOSTILE)
     assert "<script" not in page
     assert page.count("&lt;/script&gt;&lt;script&gt;") == 13
@@ -226,7 +228,8 @@ def test_a_variable_that_is_missing_is_an_error():
 
 
 def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
-    """Escaped in the page's text, and unable to end the scripts that draw the figures."""
+    """Escaped in the page's text, and unable to end the scripts that draw
+    the figures."""
     result = chain[1]
     ship = replace(
         result.ship, particulars=replace(result.ship.particulars, name=HOSTILE)

@@ -1,4 +1,5 @@
-"""What an agent sees and does in training beside a base controller is worked out by hand, ship by ship."""
+"""What an agent sees and does in training beside a base controller is worked out by
+hand, ship by ship."""
 
 import numpy as np
 import pytest
@@ -33,7 +34,8 @@ def ships(env, n=SHIPS, seed=7):
 
 
 def by_hand(env, base, seed, outputs):
-    """What one ship shows an agent with these outputs: observations, terminal ones by step, rewards."""
+    """What one ship shows an agent with these outputs: observations, terminal ones by
+    step, rewards."""
     one, state, start, past = ships(env, 1, seed), None, True, []
     seen = one.reset()
     shown, last, rewards = [], {}, []
@@ -138,7 +140,8 @@ def test_a_held_output_is_that_many_steps_with_it_and_none_after_an_episode_s_en
 
 
 class Counting(VecEnv):
-    """Two rows that show the number of the step and keep what they are commanded; row 1 ends at `end`."""
+    """Two rows that show the number of the step and keep what they are commanded; row 1
+    ends at `end`."""
 
     def __init__(self, end=99, commands=1, bound=1.0):
         super().__init__(2, Box(-100.0, 100.0, (1,)), Box(-bound, bound, (commands,)))

@@ -1,4 +1,5 @@
-"""Agents that stable-baselines3 saved steer in a benchmark as with torch, and nothing in the zip is run."""
+"""Agents that stable-baselines3 saved steer in a benchmark as with torch, and nothing
+in the zip is run."""
 
 import base64
 import io
@@ -118,7 +119,8 @@ def pickled(value):
 
 
 def observations(length=1.0):
-    """Pickle of last observations, whose first two are sine and cosine times a length."""
+    """Pickle of last observations, whose first two are sine and cosine times
+    a length."""
     angle = np.array([0.3, 2.0, -1.0])
     last = np.full((3, 8), 5.0, np.float32)
     last[:, 0] = length * np.sin(angle)

@@ -1,4 +1,5 @@
-"""Settings and plans of learning: what is allowed, where a value comes from, what is refused."""
+"""Settings and plans of learning: what is allowed, where a value comes from, what is
+refused."""
 
 import json
 from dataclasses import fields
@@ -163,7 +164,8 @@ def test_words_stand_for_numbers_where_they_may():
 
 
 def test_a_value_comes_from_the_nearest_table():
-    """Residual tables for the rudder alone, the task's before the suite's, what is given before all."""
+    """Residual tables for the rudder alone, the task's before the suite's, what is
+    given before all."""
     scratch, residual = load_settings("ppo", given=FREE), load_settings("ppo")
     assert (scratch.total_steps, scratch.n_steps, scratch.reward_scale) == (
         1_000_000,
@@ -258,7 +260,8 @@ def test_seas_and_lists_in_the_options_of_a_run_come_back_from_json():
 
 
 def test_what_is_not_asked_for_is_as_it_was():
-    """A run that is resumed: seed, threads, model and options are those of the stored one."""
+    """A run that is resumed: seed, threads, model and options are those of the stored
+    one."""
     own = {"episode_steps": 50}
     first = make_plan(
         TrainingRequest(
@@ -305,7 +308,7 @@ def test_all_agents_were_chosen_on_the_same_hundred_episodes():
     )
 
 
-def test_the_file_of_settings_goes_before_the_tuned_ones_and_the_command_before_the_file(
+def test_the_command_goes_before_the_file_of_settings_and_that_before_tuned_ones(
     tmp_path,
 ):
     (tmp_path / "mine.toml").write_text("gamma = 0.7\nclip_range = 0.3\n")

@@ -93,7 +93,8 @@ def test_bars_are_shown_on_a_terminal_that_is_not_to_be_quiet(quiet, monkeypatch
 
 
 def test_what_would_steer_a_terminal_is_left_out_and_no_letter_is(capsys):
-    """Control characters but tab and newline, and those that turn the direction of writing."""
+    """Control characters but tab and newline, and those that turn the direction of
+    writing."""
     steering = [
         *range(9),
         *range(11, 32),
@@ -134,7 +135,7 @@ def test_what_is_printed_after_a_quiet_command_is_printed():
     assert state() == (False, False, False)
 
 
-def test_an_identification_tells_its_bars_what_is_counted_and_not_what_is_counted_within(
+def test_an_identification_tells_its_bars_what_is_counted(
     monkeypatch,
 ):
     told = []

@@ -1,4 +1,5 @@
-"""Tuning proposes valid settings, goes on after any end as if nothing had happened, stops what is worse."""
+"""Tuning proposes valid settings, goes on after any end as if nothing had happened,
+stops what is worse."""
 
 import json
 import random
@@ -40,13 +41,15 @@ ENDS_AT = []
 
 
 def bowl(job):
-    """A training whose cost depends on two settings only; it stops early as a real one does."""
+    """A training whose cost depends on two settings only; it stops early as a real one
+    does."""
     with LOG.open("a") as log:
         log.write("x")
     if LOG.read_text().count("x") in ENDS_AT:
         raise KeyboardInterrupt
     settings = job["configuration"]["settings"]
-    cost = 5.0 + (math.log10(settings["learning_rate"]) + 3.3) ** 2 + abs(settings["clip_range"] - 0.15)
+    rate_error = math.log10(settings["learning_rate"]) + 3.3
+    cost = 5.0 + rate_error**2 + abs(settings["clip_range"] - 0.15)
     if cost > min((limit for _, limit in job["limits"]), default=math.inf):
         return {"cost": None, "curve": [(10, cost)], "ended": "stopped early"}
     return {"cost": cost, "curve": [(5, 2 * cost), (10, cost)], "ended": "finished"}
@@ -286,7 +289,8 @@ def test_what_a_training_returns_has_to_be_a_result(trainings, tmp_path):
 
 
 def test_what_was_found_decides_what_is_proposed_next():
-    """Of the same trials with the costs the other way round, and of another seed, others follow."""
+    """Of the same trials with the costs the other way round, and of another seed,
+    others follow."""
     first = [
         TuningTrial(k, parameters, settings, 1.0 + k, ((10, 1.0 + k),), "finished")
         for k, (parameters, settings) in enumerate(propose(plan(), [], 4, ()))

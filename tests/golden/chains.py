@@ -71,7 +71,8 @@ def record_demo(_: str) -> dict[str, Floats]:
 
 
 def record_identification(method: str) -> dict[str, Floats]:
-    """Coefficients of the example's ship, each with its standard error, and the errors of predictions."""
+    """Coefficients of the example's ship, each with its standard error, and the errors
+    of predictions."""
     ship = shipgym.ShipFile.load(SHIP_FILE)
     options = METHODS[method]
     kernel = "kernel" in options

@@ -1,4 +1,5 @@
-"""Golden section `environments`: what every environment shows over 2,000 steps, in all its options.
+"""Golden section `environments`: what every environment shows over 2,000 steps, in all
+its options.
 
 Rows are steered by a helmsman of fixed rules: a rudder that swings smoothly, and a
 feedback of heading error and yaw rate, rounded to 1/64. Observations are single
@@ -55,7 +56,8 @@ class Case:
     swing: float = 0.2
 
     def make(self, stretch: float = 0.0) -> Any:
-        """The environment, with ships that are longer by a part `stretch` of their length."""
+        """The environment, with ships that are longer by a part `stretch` of their
+        length."""
         options = dict(self.options)
         if stretch:
             name = options.get(
@@ -174,14 +176,16 @@ def cases() -> dict[str, Case]:
 
 
 def record(name: str, steps: int | None = None) -> dict[str, Floats]:
-    """The values of a case over some steps; by default over as many as can be compared."""
+    """The values of a case over some steps; by default over as many as can
+    be compared."""
     return recorded_case(cases()[name], STEPS, EVERY, steps)
 
 
 def recorded_case(
     case: Case, longest: int, every: int, steps: int | None = None
 ) -> dict[str, Floats]:
-    """The values of a case over some steps, by default over as many of the longest as can be compared."""
+    """The values of a case over some steps, by default over as many of the longest as
+    can be compared."""
     if steps is None:
         history = sailed(case, longest)
         steps = comparable_steps(history, sailed(case, longest, STRETCH))
@@ -192,7 +196,8 @@ def recorded_case(
 
 
 def sailed(case: Case, steps: int, stretch: float = 0.0) -> dict[str, Floats]:
-    """All that an environment shows in each step, by name, each of shape (steps, n_rows)."""
+    """All that an environment shows in each step, by name, each of shape (steps,
+    n_rows)."""
     env = case.make(stretch)
     single = env if not case.single else None
     names = list(env.unwrapped.observation_names)
@@ -233,7 +238,8 @@ def helmsman(
 
 
 def told(shown: Any, names: list[str], env: Any) -> dict[str, Any]:
-    """What a step showed: observations, reward, flags, infos, those of episodes that ended, and the state."""
+    """What a step showed: observations, reward, flags, infos, those of episodes that
+    ended, and the state."""
     seen, reward, terminated, truncated, infos = shown
     found = {
         f"seen {name}": column
@@ -264,7 +270,8 @@ def told(shown: Any, names: list[str], env: Any) -> dict[str, Any]:
 def comparable_steps(
     history: Mapping[str, Floats], perturbed: Mapping[str, Floats]
 ) -> int:
-    """Steps until a difference has grown too large in anything that is double precision."""
+    """Steps until a difference has grown too large in anything that is double
+    precision."""
     steps = len(next(iter(history.values())))
     for name, values in history.items():
         if "seen " in name:
@@ -277,7 +284,8 @@ def comparable_steps(
 
 
 def summary(history: Mapping[str, Floats], every: int) -> dict[str, Floats]:
-    """Mean and root mean square of each row, and samples, each of another row than the one before."""
+    """Mean and root mean square of each row, and samples, each of another row than the
+    one before."""
     found = {}
     for name, values in history.items():
         steps, rows = values.shape

@@ -1,4 +1,5 @@
-"""Golden sections `derivatives` and `manoeuvres`: the physics of every ship, without an environment.
+"""Golden sections `derivatives` and `manoeuvres`: the physics of every ship, without an
+environment.
 
 `models.json` has ships beside the shipped ones: KVLCC2 at both scales in the form of
 the package shipmmg, one of each printed structure with made-up coefficients, and two
@@ -56,7 +57,8 @@ def shipped() -> dict[str, str]:
 
 
 def record_derivatives(name: str) -> dict[str, Floats]:
-    """Derivatives of random states, in deep and, where a ship knows it, shallow water."""
+    """Derivatives of random states, in deep and, where a ship knows it,
+    shallow water."""
     model = ship_named(name)
     states, commands = random_motions(model)
     found = {"deep": model.derivatives(states, commands)}
@@ -103,7 +105,8 @@ def random_motions(model: Any) -> tuple[Floats, Floats]:
 
 
 def record_manoeuvres(name: str) -> dict[str, Floats]:
-    """Indices of the standard manoeuvres and a reverse spiral, criteria, trials in calm water and sea."""
+    """Indices of the standard manoeuvres and a reverse spiral, criteria, trials in calm
+    water and sea."""
     model = ship_named(name)
     found: dict[str, Floats] = {}
     judged: dict[str, Callable[[], Any]] = {
@@ -146,7 +149,8 @@ def told(what: str, judge: Callable[[], Any]) -> dict[str, Floats]:
 
 
 def simulated(model: Any, weather: str | None) -> dict[str, Floats]:
-    """Samples of all channels of a trial with a swinging rudder, by the ship's own time."""
+    """Samples of all channels of a trial with a swinging rudder, by the ship's own
+    time."""
     dt = model.particulars["length"] / model.particulars["speed"] / 50.0
     commands = np.repeat(model.service_command[None], STEPS, axis=0)
     commands[:, 0] = np.radians(15.0) * np.sin(2.0 * np.pi * np.arange(STEPS) / 400.0)

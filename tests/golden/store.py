@@ -1,4 +1,5 @@
-"""Golden values: named vectors of numbers, how small files keep them, and how two sets are compared."""
+"""Golden values: named vectors of numbers, how small files keep them, and how two sets
+are compared."""
 
 from __future__ import annotations
 
@@ -57,7 +58,8 @@ def vector(numbers: ArrayLike) -> Floats:
 def numbers_in(
     content: Any, path: str = "", left_out: Iterable[str] = ()
 ) -> dict[str, Floats]:
-    """All numbers of nested tables and lists, by their path; None is NaN, texts are passed over.
+    """All numbers of nested tables and lists, by their path; None is NaN, texts are
+    passed over.
 
     `left_out` are parts of names of tables' fields that are not looked into.
     """
@@ -86,7 +88,8 @@ def numbers_in(
 
 
 def save(values: Values, path: Path) -> None:
-    """Write values as one compressed file: an index in JSON, and all numbers in a row, byte by byte."""
+    """Write values as one compressed file: an index in JSON, and all numbers in a row,
+    byte by byte."""
     index = {
         case: {name: len(row) for name, row in rows.items()}
         for case, rows in values.items()
@@ -115,7 +118,8 @@ def load(path: Path) -> Values:
 
 
 def _shortened(numbers: Floats) -> Floats:
-    """Numbers rounded to `KEPT_BITS` bits of their mantissa; what is not finite stays."""
+    """Numbers rounded to `KEPT_BITS` bits of their mantissa; what is not
+    finite stays."""
     mantissa, exponent = np.frexp(numbers)
     with np.errstate(invalid="ignore"):
         rounded = np.ldexp(

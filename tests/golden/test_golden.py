@@ -1,4 +1,5 @@
-"""The quick part of the golden results; all of them: `python tests/golden/record.py --compare`."""
+"""The quick part of the golden results; all of them: `python tests/golden/record.py
+--compare`."""
 
 import pytest
 

@@ -1,4 +1,5 @@
-"""Golden section `voyages`: short episodes, with every setting of every task away from its default.
+"""Golden section `voyages`: short episodes, with every setting of every task away from
+its default.
 
 What `environments` shows over thousands of steps, quick enough for each run of the
 tests.
@@ -94,5 +95,6 @@ def cases() -> dict[str, Case]:
 
 
 def record(name: str, steps: int | None = None) -> dict[str, Floats]:
-    """The values of a case over some steps; by default over as many as can be compared."""
+    """The values of a case over some steps; by default over as many as can
+    be compared."""
     return recorded_case(cases()[name], STEPS, EVERY, steps)

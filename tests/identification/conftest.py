@@ -27,7 +27,8 @@ NOISE = {
 def measured(
     trial: Trial, every: int = 1, noise: float = 0.0, seed: int = 0, **changes: str
 ) -> Trial:
-    """What sensors would have recorded of a simulated trial: no orders, every so many samples, noise."""
+    """What sensors would have recorded of a simulated trial: no orders, every so many
+    samples, noise."""
     rng = np.random.default_rng(seed)
     t = trial.t[::every]
     channels = {
@@ -49,7 +50,8 @@ def mariner() -> ShipModel:
 
 @pytest.fixture(scope="session")
 def cao_zigzag(mariner: ShipModel) -> Trial:
-    """The 15/15 zigzag of Cao 2015: 500 s by Runge-Kutta steps of 0.1 s, recorded every 0.5 s."""
+    """The 15/15 zigzag of Cao 2015: 500 s by Runge-Kutta steps of 0.1 s, recorded every
+    0.5 s."""
     return measured(
         zigzag(mariner, 15, 15, duration=500, dt=0.1), every=5, name="zigzag_15_15"
     )

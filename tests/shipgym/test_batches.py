@@ -1,4 +1,5 @@
-"""Batched physics of bare ships, and the mathematics that lets its loops be vectorised."""
+"""Batched physics of bare ships, and the mathematics that lets its loops
+be vectorised."""
 
 import math
 

@@ -1,4 +1,5 @@
-"""The cache of compiled loops: one process compiles, and neither foreign nor broken folders end a program."""
+"""The cache of compiled loops: one process compiles, and neither foreign nor broken
+folders end a program."""
 
 import json
 import os
@@ -180,7 +181,8 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def give(monkeypatch):
-    """Make another user the owner of a file or folder, as far as this process can see."""
+    """Make another user the owner of a file or folder, as far as this
+    process can see."""
 
     def to_another(path):
         if os.geteuid() == 0:

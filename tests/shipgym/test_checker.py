@@ -193,7 +193,8 @@ def test_a_heel_of_sixty_degrees_is_a_capsize(heel_deg, capsized):
 
 @pytest.mark.parametrize(("excess", "problems"), [(9e-7, 0), (1.05e-6, 1)])
 def test_correlations_may_be_off_by_a_millionth(mariner, excess, problems):
-    """The least eigenvalue of [[1, 1 + e], [1 + e, 1]] is -e, whatever the units of the coefficients."""
+    """The least eigenvalue of [[1, 1 + e], [1 + e, 1]] is -e, whatever the units of the
+    coefficients."""
     root = np.diag(np.r_[1e-5, 1.0, np.zeros(38)])
     correlation = np.eye(40)
     correlation[0, 1] = correlation[1, 0] = 1.0 + excess

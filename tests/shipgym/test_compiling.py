@@ -1,4 +1,5 @@
-"""Compiled loops: the same numbers as plain Python, hooks filled, records where their rows are."""
+"""Compiled loops: the same numbers as plain Python, hooks filled, records where their
+rows are."""
 
 import inspect
 import os
@@ -156,7 +157,8 @@ class Sounding(NamedTuple):
 
 
 def moved(given, out):
-    """A loop: what lane 5 of a tile holds is stored elsewhere; what it calls are its hooks."""
+    """A loop: what lane 5 of a tile holds is stored elsewhere; what it calls are its
+    hooks."""
     record = load(given, 5)  # noqa: F821
     one = load_one(given, 5)  # noqa: F821
     store(out, 7, record)  # noqa: F821
@@ -172,7 +174,8 @@ moved.__module__ = "shipgym"  # in a user's function names are the user's
 
 @pytest.mark.parametrize("jit", ["0", "1"])
 def test_records_are_read_and_stored_where_their_rows_are(jit, monkeypatch):
-    """The rows of the tile are 2, 3 and 4, those of the vector 2 and 3: it has no chain, which is 0 then."""
+    """The rows of the tile are 2, 3 and 4, those of the vector 2 and 3: it has no
+    chain, which is 0 then."""
     rows = Layout(before=Fix, found=Anchor)["found"]
     places = (Anchor, ("place.north", "place.east"))
     single = Layout(before=Fix, found=places)["found"]
@@ -464,11 +467,15 @@ from shipgym.engine.specialise import called
 def answer(one, other):
     Settings = NamedTuple("Settings", [(one, float), (other, float)])
     space = {"Settings": Settings, "__name__": "own"}
-    long = "    x = x * 0.5 + x * x * 0.25 - x / (x * x + 3.0)\\n" * 60  # too much to be inlined
+    # too much to be inlined
+    long = "    x = x * 0.5 + x * x * 0.25 - x / (x * x + 3.0)\\n" * 60
     exec(f"def near_of(settings, x):\\n{long}    return settings.near + x\\n"
-         "def loop(x): return begin(Settings(1.0, 2.0), x) + begin(Settings(0.0, 0.0), x)\\n", space)
+         "def loop(x):\\n"
+         "    one = begin(Settings(1.0, 2.0), x)\\n"
+         "    return one + begin(Settings(0.0, 0.0), x)\\n", space)
     space["loop"].__module__ = "shipgym.tests"
-    return compiled(space["loop"], "float64(float64)", {"begin": called(space["near_of"])}, "a loop")
+    hooks = {"begin": called(space["near_of"])}
+    return compiled(space["loop"], "float64(float64)", hooks, "a loop")
 
 print(*(answer(*names.split("-"))(0.0) for names in sys.argv[1:]))
 """
@@ -477,7 +484,8 @@ print(*(answer(*names.split("-"))(0.0) for names in sys.argv[1:]))
 def test_loops_from_files_call_their_own_functions_whose_names_and_types_are_alike(
     tmp_path,
 ):
-    """Records of one name that differ in the order of fields only, compiled in processes of their own."""
+    """Records of one name that differ in the order of fields only, compiled in
+    processes of their own."""
 
     def answers(*orders):
         return run(SAME_NAMES, *orders, SHIPGYM_CACHE=str(tmp_path)).split()

@@ -113,7 +113,8 @@ def test_the_ship_is_the_one_that_the_model_simulates(mariner):
 
 
 def test_one_step_a_control_interval_is_accurate_enough(mariner):
-    """Against 20 steps an interval the heading stays within 0.1 deg over 100 s of wild steering."""
+    """Against 20 steps an interval the heading stays within 0.1 deg over 100 s of wild
+    steering."""
     commands = np.repeat(np.random.default_rng(0).uniform(-0.5, 0.5, 100), 1)[:, None]
     dt = control_interval(mariner)
     coarse, fine = (
@@ -372,7 +373,8 @@ def interval(**given):
 
 @given(small, small, small, st.booleans())
 def test_costs_of_steering_are_squares_by_their_scales(delta, before, heel, outside):
-    """In 30 degrees of rudder, 30 degrees of it a ship length sailed (20 s), 15 degrees of heel."""
+    """In 30 degrees of rudder, 30 degrees of it a ship length sailed (20 s), 15 degrees
+    of heel."""
     weights = Weights(
         rudder_weight=0.2, rudder_rate_weight=0.03, roll_weight=0.4, roll_scale_deg=15.0
     )
@@ -419,7 +421,8 @@ def test_the_helmsman_sees_the_ship_against_her_course():
 
 @given(st.floats(-30.0, 30.0), st.floats(-1.0, 1.0))
 def test_the_integral_gathers_small_errors_up_to_its_bound(integral, error):
-    """Up to 10 degrees; its bound is 10 degrees for the time to sail 10 ship lengths, 200 s."""
+    """Up to 10 degrees; its bound is 10 degrees for the time to sail 10 ship lengths,
+    200 s."""
     bound = np.radians(10.0) * 200.0
     gathered = integral + (0.5 * error if abs(error) <= np.radians(10.0) else 0.0)
     found = integrated(integral, error, interval(), SHIP, Weights())
@@ -427,7 +430,8 @@ def test_the_integral_gathers_small_errors_up_to_its_bound(integral, error):
 
 
 def test_set_points_are_drawn_within_their_bounds_and_change_in_time():
-    """Changes evenly up to 30 degrees to both sides, after 100 to 300 steps; listed ones on the step."""
+    """Changes evenly up to 30 degrees to both sides, after 100 to 300 steps; listed
+    ones on the step."""
     settings = course_keeping.Settings(change_interval_steps=200)
     state = course_keeping.State(1.0, 0.0, 3.0, 0.25, 0.1)
     with np.errstate(over="ignore"):

@@ -1,4 +1,5 @@
-"""What Gymnasium, stable-baselines3 and workers ask of an environment; wrong arguments and actions."""
+"""What Gymnasium, stable-baselines3 and workers ask of an environment; wrong arguments
+and actions."""
 
 import math
 import warnings
@@ -119,7 +120,8 @@ def build():
 
 @pytest.mark.parametrize("start_method", ["forkserver", "fork"])
 def test_workers_of_stable_baselines3(start_method):
-    """Its `spawn` differs from `forkserver` in nothing of ours, and takes seconds to import."""
+    """Its `spawn` differs from `forkserver` in nothing of ours, and takes seconds to
+    import."""
     env = SubprocVecEnv([build], start_method=start_method)
     env.seed(4)
     ours = build()

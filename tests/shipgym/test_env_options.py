@@ -1,4 +1,5 @@
-"""Options of the environments: instruments, observations, commands, seas, depth, and ships that differ."""
+"""Options of the environments: instruments, observations, commands, seas, depth, and
+ships that differ."""
 
 import re
 from dataclasses import replace
@@ -109,7 +110,8 @@ def test_noise_of_the_position_shows_in_the_cross_track_error():
 
 @pytest.mark.compiled
 def test_the_course_to_steer_is_that_of_the_position_shown():
-    """So satellite noise reaches it: what remains of the heading error's noise is the compass's alone."""
+    """So satellite noise reaches it: what remains of the heading error's noise is the
+    compass's alone."""
     count, lookahead, length = 4000, 0.2, 160.93
     env = many(
         count,
@@ -154,7 +156,8 @@ def test_noise_is_only_shown_and_none_is_none():
 
 
 def waves_shown(measurement, **options):
-    """Part of the variance of first-order yaw rate and heading that is shown, half of 64 ships show less."""
+    """Part of the variance of first-order yaw rate and heading that is shown, half of
+    64 ships show less."""
     env = many(
         64,
         sea=Weather(waves=Waves(3.0, 9.0)),
@@ -183,7 +186,8 @@ def test_a_filter_takes_most_of_the_waves_out_of_what_is_shown():
 
 @pytest.mark.compiled
 def test_a_filter_keeps_slow_motion():
-    """Rudder to and fro in 120 s, in waves too low to matter: the yaw rate comes through, a little late."""
+    """Rudder to and fro in 120 s, in waves too low to matter: the yaw rate comes
+    through, a little late."""
     env = many(
         64,
         sea=Weather(waves=Waves(0.01, 9.0)),
@@ -271,7 +275,8 @@ def test_rudder_and_shaft_are_commanded(name, model, shown):
 
 
 def test_a_tanker_goes_astern():
-    """Her propeller is known there: ordered full astern she has hardly any way left after five minutes."""
+    """Her propeller is known there: ordered full astern she has hardly any way left
+    after five minutes."""
     env = make(model="tanker", action="rudder-shaft", **UNBOUND)
     env.reset(seed=0)
     for _ in range(int(300 / env.dt)):
@@ -471,7 +476,7 @@ def test_ranges_that_are_none_are_refused(options, message):
         make(**options)
 
 
-def test_an_approach_speed_turns_the_shaft_in_proportion_and_load_divides_what_forces_do():
+def test_an_approach_speed_turns_the_shaft_and_load_divides_what_forces_do():
     tanker, mariner = shipgym.load_model("tanker"), shipgym.load_model("mariner")
     slower = Randomisation(speed_range=(0.5, 0.9)).ships(tanker, [Weather()])
     parts = (

@@ -1,4 +1,5 @@
-"""Libraries of extras: given where they are installed, named with their extra where they are not."""
+"""Libraries of extras: given where they are installed, named with their extra where
+they are not."""
 
 import sys
 

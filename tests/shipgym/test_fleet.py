@@ -1,4 +1,5 @@
-"""Container ship, tanker and KVLCC2 against the MSS toolbox and shipmmg (../shared/reference)."""
+"""Container ship, tanker and KVLCC2 against the MSS toolbox and shipmmg
+(../shared/reference)."""
 
 from dataclasses import replace
 
@@ -390,7 +391,8 @@ def test_port_is_the_mirror_of_starboard_where_the_ship_is_symmetric(name):
 
 
 def test_kvlcc2_and_its_model_scale_by_froude():
-    """The hull alone scales: with the same wake fraction and the model's shaft the prime turn is the same."""
+    """The hull alone scales: with the same wake fraction and the model's shaft the
+    prime turn is the same."""
     scale = 2.0
     small, numbers = kvlcc2_l7(), kvlcc2_l7().coefficients
     larger = {

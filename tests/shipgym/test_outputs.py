@@ -1,4 +1,5 @@
-"""What a vector environment gives away never changes, and arrays nobody holds are used again."""
+"""What a vector environment gives away never changes, and arrays nobody holds are used
+again."""
 
 import gymnasium
 import numpy as np

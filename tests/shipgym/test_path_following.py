@@ -1,4 +1,5 @@
-"""The path-following environment: its planned path, its reward and attempts at gaming it."""
+"""The path-following environment: its planned path, its reward and attempts at gaming
+it."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -105,7 +106,8 @@ def on_path(radius, plan):
 
 
 def followed(path, radius, places):
-    """States of a ship that goes along a path, at some ways along it, and these ways."""
+    """States of a ship that goes along a path, at some ways along it, and
+    these ways."""
     line, plan = rounded(path, radius), path.waypoints.ravel()
     way = np.append(0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T)))
     ways, asked = places * way[-1], Settings(turn_radius=radius / LENGTH)
@@ -267,7 +269,8 @@ def test_running_aground_ends_the_episode_and_says_so():
 
 
 def test_a_propeller_that_holds_ahead_only_is_stopped_by_an_order_astern():
-    """The thrust polynomial of KVLCC2 would push a ship ahead that reverses her shaft."""
+    """The thrust polynomial of KVLCC2 would push a ship ahead that reverses
+    her shaft."""
     runs = []
     for order in (-1.0, 0.0):
         env = gymnasium.make(ID, model="kvlcc2", action="rudder-shaft").unwrapped
@@ -312,7 +315,8 @@ angles, speeds = st.floats(-3.1, 3.1), st.floats(-3.0, 3.0)
 def test_course_over_ground_is_the_way_that_the_ship_moves_on_every_leg(
     leg, psi, u, v, north, east
 ):
-    """Worked with vectors north and east: way through the water, turned by the heading, and the current."""
+    """Worked with vectors north and east: way through the water, turned by the heading,
+    and the current."""
     motion = Motion(30.0, -40.0, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     ahead, aside = ground_velocity(motion, north, east)
     over_ground = (u + 1j * v) * np.exp(1j * psi) + north + 1j * east
@@ -376,7 +380,8 @@ def test_each_episode_has_one_of_a_list_of_paths():
 
 
 def test_the_mirrored_voyage_earns_the_same():
-    """A ship without a preferred side, on the path that is reflected in the north axis."""
+    """A ship without a preferred side, on the path that is reflected in the
+    north axis."""
     mariner = shipgym.load_model("mariner")
     even = {
         name: value for name, value in mariner.coefficients.items() if name[1:3] == "_0"
@@ -435,7 +440,8 @@ def test_the_mirrored_voyage_earns_the_same():
 
 
 def cutter(seen, step, env):
-    """Steer straight for the waypoint behind the next, across the inside of the turn."""
+    """Steer straight for the waypoint behind the next, across the inside of
+    the turn."""
     state = env.physical_state()
     goal = (
         HOOK[2]
@@ -601,7 +607,8 @@ def test_the_next_leg_is_one_of_the_plan_whatever_a_checkpoint_holds(leg):
 def test_near_the_centre_of_a_turn_places_on_it_are_those_of_a_tenth_of_its_radius(
     angle, near, side
 ):
-    """Seen from the centre the arc passes below the ship as slowly as a tenth of the radius off."""
+    """Seen from the centre the arc passes below the ship as slowly as a tenth of the
+    radius off."""
     plan, radius = np.array([0.0, 0.0, 3000.0, 0.0, 3000.0, side * 3000.0]), 1000.0
     leg, asked = leg_from(0, 0.0, radius, plan), Settings(turn_radius=radius / LENGTH)
     towards = np.array([1.0, -side]) / np.sqrt(
@@ -625,7 +632,8 @@ def test_near_the_centre_of_a_turn_places_on_it_are_those_of_a_tenth_of_its_radi
 
 
 def test_a_course_leads_to_the_path_a_lookahead_distance_ahead():
-    """On the arc it is the direction of the chord to the point that far ahead on the path."""
+    """On the arc it is the direction of the chord to the point that far ahead on the
+    path."""
     plan, radius, lookahead = (
         np.array([0.0, 0.0, 3000.0, 0.0, 3000.0, 3000.0]),
         1000.0,
@@ -648,7 +656,8 @@ def test_a_course_leads_to_the_path_a_lookahead_distance_ahead():
 
 @pytest.mark.parametrize(("legs", "least"), [(1, 0.0), (2, 4.0), (3, 8.0), (9, 8.0)])
 def test_legs_of_a_drawn_path_leave_room_for_the_turns_at_their_ends(legs, least):
-    """Right angles with a radius of 4 lengths: none for a single leg, one for two, two for others."""
+    """Right angles with a radius of 4 lengths: none for a single leg, one for two, two
+    for others."""
     asked = Settings(
         n_legs=legs,
         max_turn_deg=90.0,
@@ -695,9 +704,8 @@ def test_a_corridor_is_wider_than_the_ship_whose_beam_is_known():
     path_following.check(Settings(corridor=1.01 * least), mariner)
     with pytest.raises(InputError) as caught:
         path_following.check(Settings(corridor=0.07), mariner)
-    assert (
-        str(caught.value)
-        == "corridor: expected more than the beam of 'mariner', 23.2 m, got 22.5 m, 0.07"
+    assert str(caught.value) == (
+        "corridor: expected more than the beam of 'mariner', 23.2 m, got 22.5 m, 0.07"
         " ship lengths to each side"
     )
     path_following.check(Settings(corridor=0.07), None)

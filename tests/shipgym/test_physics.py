@@ -1,4 +1,5 @@
-"""What holds for every ship: symmetry, energy, invariance, scaling by Froude, order of the integrator."""
+"""What holds for every ship: symmetry, energy, invariance, scaling by Froude, order of
+the integrator."""
 
 from dataclasses import replace
 
@@ -23,7 +24,8 @@ def ship_time(model):
 
 
 def symmetric(name):
-    """The ship without what makes her sides differ: propeller walk, and KVLCC2's flow straightening."""
+    """The ship without what makes her sides differ: propeller walk, and KVLCC2's flow
+    straightening."""
     model = shipgym.load_model(name)
     changes = {
         "mariner": {
@@ -86,7 +88,8 @@ def test_place_and_heading_do_not_matter(name):
 
 @pytest.mark.parametrize("name", SHIPS)
 def test_halving_the_step_divides_the_error_by_sixteen(name):
-    """With a rudder that starts off amidships and stays there, so that the motion is smooth."""
+    """With a rudder that starts off amidships and stays there, so that the motion is
+    smooth."""
     model = shipgym.load_model(name)
     start = model.service_state.copy()
     start[model.state_names.index("delta")] = 0.05
@@ -131,7 +134,8 @@ def kinetic_energy(model, trial):
 @pytest.mark.parametrize("drift_deg", [-15.0, 0.0, 10.0])
 @pytest.mark.parametrize("turn", [-0.3, 0.0, 0.3])
 def test_a_ship_without_thrust_loses_energy(name, drift_deg, turn):
-    """From straight, drifting and turning states with the shaft at rest; heeling counts as stored energy."""
+    """From straight, drifting and turning states with the shaft at rest; heeling counts
+    as stored energy."""
     model = shipgym.load_model(name)
     speed, angle = model.particulars["speed"], np.radians(drift_deg)
     values = {
@@ -184,7 +188,8 @@ def linear(state, coefficients, ship):
 
 
 def test_a_step_sails_by_the_equations_of_motion_in_wind_and_current(monkeypatch):
-    """Position, heading, heel, memory of yaw, rudder with lag and shaft against SciPy's integrator."""
+    """Position, heading, heel, memory of yaw, rudder with lag and shaft against SciPy's
+    integrator."""
     monkeypatch.setattr(motion, "accelerations", linear)
     monkeypatch.setattr(
         motion, "shaft_acceleration", lambda n, command, *_: 0.3 * (command - n)
@@ -256,7 +261,8 @@ def test_a_rudder_follows_its_order_by_lag_and_rate(monkeypatch):
     ],
 )
 def test_a_ship_is_lost_beyond_what_any_ship_does(velocities, heel, lost, monkeypatch):
-    """Three times service speed, six times U / L, a right angle of heel, or no number."""
+    """Three times service speed, six times U / L, a right angle of heel, or
+    no number."""
     state = motion.Motion(0.0, 0.0, 0.0, *velocities, 0.0, heel, 0.0, 0.0, 0.0)
     assert motion.lost(state, SHIP) == lost
     monkeypatch.setattr(motion, "HAS_ROLL", False)
@@ -264,7 +270,8 @@ def test_a_ship_is_lost_beyond_what_any_ship_does(velocities, heel, lost, monkey
 
 
 def test_inertia_of_each_ship_is_that_of_her_source():
-    """KVLCC2 of Yasukawa & Yoshimura 2015, S175 of Son & Nomoto 1981, the Esso tanker in 37 m; by hand."""
+    """KVLCC2 of Yasukawa & Yoshimura 2015, S175 of Son & Nomoto 1981, the Esso tanker
+    in 37 m; by hand."""
     mass, added = 312.6e6, 0.5 * 1000.0 * 320.0**2 * 20.8
     yaw = mass * (80.0**2 + 11.2**2)
     expected = np.array(
@@ -302,7 +309,8 @@ def test_inertia_of_each_ship_is_that_of_her_source():
 
 
 def test_inertia_of_a_table_is_that_of_the_particulars():
-    """With the centre of gravity off midship: mass, static moment, Steiner's part and added mass."""
+    """With the centre of gravity off midship: mass, static moment, Steiner's part and
+    added mass."""
     mariner = shipgym.load_model("mariner")
     ship = replace(mariner.particulars, mass=2e7, xg=-3.0, yaw_gyradius=40.0)
     ship = replace(

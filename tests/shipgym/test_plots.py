@@ -32,15 +32,8 @@ from shipgym.plots.style import (
     translucent,
 )
 from shipgym.plots.trials import CHANNEL_AXES, thinned
-from tests.golden.texts import flat, same_text
 
 DERIVED = ("speed", "drift")  # channels that u and v give
-
-
-def same_figure(name, figure):
-    return same_text(
-        f"plots/{name}", "\n".join(flat(json.loads(figure.to_json()), "figure"))
-    )
 
 
 def values(figure, axis, trace=0):
@@ -65,7 +58,6 @@ def test_measured_lines_are_dark_and_lines_share_one_entry_of_the_legend(circle)
     figure = history_figure(
         {"measured": circle, "predicted": circle}, ["psi", "r", "u"]
     )
-    assert same_figure("histories", figure)
     assert [trace.showlegend for trace in figure.data] == [
         True,
         True,
@@ -87,7 +79,6 @@ def test_every_channel_is_drawn_in_its_unit():
         if name not in DERIVED
     }
     figure = history_figure({"run": Trial(t, channels)}, [*CHANNEL_AXES])
-    assert same_figure("every channel", figure)
     factors = [values(figure, "y", k)[0] / (0.01 * (k + 1.0)) for k in (0, 2)]
     assert factors == pytest.approx([1.0, np.degrees(1.0)], rel=1e-6)
 
@@ -95,7 +86,6 @@ def test_every_channel_is_drawn_in_its_unit():
 def test_titles_of_axes_stand_below_the_last_row_and_beside_the_first_column():
     shown = [Panel([], f"x {k}", f"y {k}", f"panel {k}") for k in range(5)]
     figure = panels(shown, 400, 2, outer=True)
-    assert same_figure("panels", figure)
     below = [figure.layout[f"xaxis{k or ''}"].title.text for k in ("", 2, 3, 4, 5)]
     beside = [figure.layout[f"yaxis{k or ''}"].title.text for k in ("", 2, 3, 4, 5)]
     assert below == ["", "", "", "", "x 4"]
@@ -114,7 +104,6 @@ def test_without_any_of_the_channels_there_is_no_figure(circle):
 
 def test_a_path_has_north_up_and_one_scale(circle):
     figure = path_figure({"turn": circle, "measured": circle})
-    assert same_figure("paths", figure)
     assert values(figure, "x") == pytest.approx(circle["y"], abs=1e-3)
     assert values(figure, "y") == pytest.approx(circle["x"], abs=1e-3)
     assert figure.layout.yaxis.scaleanchor == "x"
@@ -129,7 +118,6 @@ def test_a_trial_without_position_has_no_path():
 def test_a_zigzag_is_drawn_as_the_change_of_heading_with_its_rudder():
     run = zigzag(load_model("mariner"), 20.0, 20.0, duration=200.0, dt=1.0)
     figure = zigzag_figure(run)
-    assert same_figure("zigzag", figure)
     assert values(figure, "y", 0)[0] == 0.0
     assert values(figure, "y", 1).max() == pytest.approx(20.0, abs=0.1)
 
@@ -148,7 +136,6 @@ def test_without_plotly_the_message_says_what_to_install(monkeypatch, circle):
 def test_a_turning_circle_is_drawn_with_its_indices():
     trial = turning_circle(load_model("mariner"), -35.0, dt=1.0)
     indices, figure = turning_indices(trial), turning_figure(trial)
-    assert same_figure("turning circle", figure)
     marks = {trace.name.rsplit(" ", 2)[0]: trace for trace in figure.data}
     assert np.ptp(np.asarray(marks["advance"].y, dtype=float)) == pytest.approx(
         indices.advance_lengths
@@ -176,7 +163,6 @@ def test_the_loop_of_a_spiral_is_marked_where_it_is():
         "direct",
     )
     assert [trace.name for trace in spiral_figure(spiral).data] == ["there", "and back"]
-    assert same_figure("spiral", spiral_figure(wide))
     loop = spiral_figure(wide).data[-1]
     assert loop.name == "loop, 3.00 deg wide"
     assert values(spiral_figure(wide), "x", 2) == pytest.approx([0.0, 3.0])
@@ -196,9 +182,7 @@ def test_every_manoeuvre_has_its_figure():
     for name, title in axes.items():
         figure = manoeuvre_figure(known[name].sail(ship))
         assert figure.layout.yaxis.title.text == title
-        assert same_figure(f"tanker, {name}".replace("/", "-"), figure)
     excited = excitation_figure(prbs_rudder(ship, duration=200))
-    assert same_figure("excitation", excited)
     assert excited.layout.yaxis.title.text == "rudder order, deg"
 
 

@@ -44,7 +44,8 @@ def renderer():
 
 
 def where(picture, colour):
-    """Rows and columns of a colour on the chart, from the middle: metres north and east."""
+    """Rows and columns of a colour on the chart, from the middle: metres north and
+    east."""
     rows, columns = np.nonzero(np.all(picture[CHART] == colour, axis=-1))
     return METRES * (SIZE / 2 - (rows + CHART.start)), METRES * (columns - SIZE / 2)
 

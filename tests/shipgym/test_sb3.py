@@ -1,4 +1,5 @@
-"""ShipVecEnv: stable-baselines3's promises, and its DummyVecEnv of single environments step by step."""
+"""ShipVecEnv: stable-baselines3's promises, and its DummyVecEnv of single environments
+step by step."""
 
 import gymnasium
 import numpy as np

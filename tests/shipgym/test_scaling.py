@@ -72,7 +72,8 @@ def test_a_steering_model_in_si_units_keeps_its_overshoot():
 
 
 def test_a_surge_model_stops_in_as_many_ship_lengths_at_another_speed():
-    """Another service speed at the same length: not Froude's, and similar all the same."""
+    """Another service speed at the same length: not Froude's, and similar
+    all the same."""
     ship = small_ship("surge")
     quick = scale_model(ship, length=160.93, speed=2.0 * 7.7175)
     assert quick.service_shaft_speed == pytest.approx(2.4)
@@ -138,7 +139,8 @@ def test_what_cannot_be_scaled_is_refused(name, arguments, message):
 
 
 def test_each_particular_grows_with_its_power_of_the_length():
-    """Four times as long: lengths 4, areas 16, the roll period 2, mass 64 (in denser water more)."""
+    """Four times as long: lengths 4, areas 16, the roll period 2, mass 64 (in denser
+    water more)."""
     small = replace(
         shipgym.load_model("mariner").particulars,
         rudder_area=30.0,

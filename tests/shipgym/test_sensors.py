@@ -28,7 +28,8 @@ def test_white_noise_has_its_standard_deviation_and_no_memory(still):
 
 
 def test_drift_is_a_gauss_markov_process(still):
-    """Variance as given, correlation exp(-lag / T); position errors of GNSS are white plus drift."""
+    """Variance as given, correlation exp(-lag / T); position errors of GNSS are white
+    plus drift."""
     sensor = Sensor(drift=2.0, drift_time_s=10.0)
     reading = np.concatenate(
         [Sensors({"x": sensor}).measure(still, seed)["x"] for seed in range(3)]
@@ -62,7 +63,8 @@ def test_a_late_sensor_shows_the_past(zigzag):
 
 
 def test_gaps_leave_samples_out(still):
-    """A gap begins at a sample with 1 %, is 4 samples long in the mean, so about 3.9 % are lost."""
+    """A gap begins at a sample with 1 %, is 4 samples long in the mean, so about 3.9 %
+    are lost."""
     measured = Sensors({}, dropout_probability=0.01, dropout_samples=4.0).measure(still)
     assert 1.0 - len(measured) / N == pytest.approx(0.039, abs=0.004)
     gaps = np.diff(measured.t) - 1.0
@@ -106,7 +108,8 @@ def test_instruments_feel_the_motion_in_waves_and_the_weather_is_not_logged():
 
 
 def test_a_sea_trial_has_instruments_for_roll_as_for_yaw():
-    """Gyros of 0.02 deg/s, angles to 0.1 deg; the shaft is counted to a tenth of a turn a minute."""
+    """Gyros of 0.02 deg/s, angles to 0.1 deg; the shaft is counted to a tenth of a turn
+    a minute."""
     degree = np.radians(1.0)
     noise = {name: sensor.noise for name, sensor in SEA_TRIAL.items() if sensor.noise}
     assert noise == pytest.approx(
@@ -149,7 +152,8 @@ def test_sensors_do_not_change_with_the_mapping_that_they_were_given(zigzag):
 
 
 def test_a_sea_trial_still_tells_the_overshoot(zigzag):
-    """6 degrees of overshoot, read through the sensors of a sea trial at 2 Hz, are right to a few tenths."""
+    """6 degrees of overshoot, read through the sensors of a sea trial at 2 Hz, are
+    right to a few tenths."""
     measured = Sensors(sampling_s=0.5, dropout_probability=0.01).measure(zigzag, 1)
     seen = manoeuvres.zigzag_indices(measured).overshoot_1_deg
     assert seen == pytest.approx(

@@ -1,4 +1,5 @@
-"""A task, a reward and a sensor set from files outside the package: those of their documentation page."""
+"""A task, a reward and a sensor set from files outside the package: those of their
+documentation page."""
 
 import re
 import sys
@@ -95,7 +96,8 @@ def test_a_task_works_everywhere(fairway):
 
 
 def test_the_limit_is_what_it_says(fairway):
-    """At service speed the zone costs the square of the excess; a ship that fails pays for the rest."""
+    """At service speed the zone costs the square of the excess; a ship that fails pays
+    for the rest."""
     env = gymnasium.make(fairway, zone_begins=0.0, speed_limit=0.5).unwrapped
     env.reset(seed=0)
     *_, info = env.step(np.array([0.0, 1.0], dtype=np.float32))
@@ -215,7 +217,8 @@ def test_a_file_that_was_changed_is_read_and_compiled_anew(tmp_path):
 
 
 def wrong_fairway(folder, text, old, new, message):
-    """Write a task with a change, and name its line, the next, and that of its function."""
+    """Write a task with a change, and name its line, the next, and that of its
+    function."""
     assert old in text
     here = text[: text.index(old)].count("\n") + 1
     head = text.splitlines()[:here]

@@ -121,7 +121,8 @@ def test_a_single_ship_is_enough_of_a_batch():
 
 
 class Walker(gymnasium.Env):
-    """Draws where it begins and when it ends, and goes where it is told; what it costs is its distance."""
+    """Draws where it begins and when it ends, and goes where it is told; what it costs
+    is its distance."""
 
     observation_space = Box(-99.0, 99.0, (2,), np.float32)
     action_space = Box(-1.0, 1.0, (1,), np.float32)

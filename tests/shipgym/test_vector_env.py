@@ -1,4 +1,5 @@
-"""The native vector environments: Gymnasium's promises, and the single environments row by row."""
+"""The native vector environments: Gymnasium's promises, and the single environments row
+by row."""
 
 import warnings
 from dataclasses import replace

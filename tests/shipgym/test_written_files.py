@@ -1,4 +1,5 @@
-"""Files appear whole or not at all, wherever they are, and nothing is left of those that did not."""
+"""Files appear whole or not at all, wherever they are, and nothing is left of those
+that did not."""
 
 import errno
 import os
