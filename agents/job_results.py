@@ -107,7 +107,7 @@ class KeptResults:
         write_json({"key": key, "result": result}, path)
 
     def _key(self, job: str) -> tuple[dict[str, Any], Path]:
-        """What a result belongs to, and its file."""
+        """Key of a result, and its file."""
         key = {
             "shipgym": shipgym.__version__,
             "function": self.function,

@@ -1,4 +1,4 @@
-"""Where controllers come from: what a text names, and how it is made for a task."""
+"""Sources of controllers: what a text names, and how it is made for a task."""
 
 import glob
 import hashlib

@@ -1,4 +1,4 @@
-"""From captive tests to the coefficients of a table for forces, in one regression.
+"""Regression of the coefficients of a table for forces on captive tests.
 
 A coefficient that stands in several equations (`shipgym.ships.shared_structure`) has
 one column; the rows of X, Y and N are stacked. Source: Xu, Hassani & Guedes Soares

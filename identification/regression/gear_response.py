@@ -1,4 +1,4 @@
-"""How a rudder answers to its orders: the ramp of its gear, then the lag.
+"""Response of a rudder to its orders: the ramp of its gear, then the lag.
 
 A rudder far from its order moves at the gear's rate; where its gear has a lag, the last
 of the way, rate times lag, decays exponentially.
@@ -85,9 +85,9 @@ class GearResponse(NamedTuple):
 
 
 def goes_on(orders: Floats, delta: Floats) -> Flags:
-    """Whether each interval but the first can be under the order of the one before it.
+    """Flags of intervals that can be under the order of the one before them.
 
-    Shape (n_samples - 2,), of orders of shape (n_samples - 1,).
+    The first is left out. Shape (n_samples - 2,), of orders of shape (n_samples - 1,).
     """
     before = orders[:-1]
     now = orders[1:]

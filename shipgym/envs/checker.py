@@ -1,4 +1,4 @@
-"""Conformance suite for vector environments, which Gymnasium's own checker refuses."""
+"""Conformance suite for vector environments; Gymnasium's checker takes single ones."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -27,9 +27,9 @@ def check_vector_env(
 ) -> None:
     """Check that a vector environment meets the requirements of Gymnasium's interface.
 
-    Spaces and shapes, seeds that hold, arrays that are not changed later, the autoreset
-    that its metadata name, wrong actions, and, given single environments, that each row
-    is one of them, bit for bit.
+    Spaces and shapes, reproducible seeds, arrays that are not changed later, the
+    autoreset named in its metadata, wrong actions, and, given single environments, that
+    each row equals one of them, bit for bit.
 
     Raises InputError for the first requirement that is not met.
 

@@ -47,7 +47,7 @@ TABLES = {
     "outcome": {name: name for name in ("terminated", "truncated", "success")},
 }
 SERIES = ("states", "commands", "reward_parts", "info")
-#: Fields that stand in the file as in an episode.
+#: Fields that are the same in the file as in an episode.
 PLAIN = ("model", "seed", "number", "dt", *SERIES, "actions", "rewards")
 
 

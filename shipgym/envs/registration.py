@@ -64,9 +64,9 @@ def register_environments() -> None:
 def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     """Register a task of your own, so that `gym.make` and `gym.make_vec` know it.
 
-    It is tried in plain Python and compiled, which takes some seconds, once. Raises
-    InputError if the task is not what the contract asks, cannot be compiled or does not
-    fit the ship, or the id belongs to another; nothing is registered then.
+    It is run in plain Python and compiled, which takes some seconds, once. Raises
+    InputError if the task does not meet the contract, cannot be compiled or does not
+    fit the ship, or the id is in use; nothing is registered then.
 
     Parameters
     ----------

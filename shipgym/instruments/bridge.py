@@ -53,7 +53,7 @@ class Noise(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What the instruments add to the ship's slow motion, and the filters' memory."""
+    """Additions of the instruments to the slow motion, and states of the filters."""
 
     x: float
     y: float

@@ -1,4 +1,4 @@
-"""When a manoeuvre was executed, by the ordered or measured rudder; shared helpers."""
+"""Time of execution of a manoeuvre, by the ordered or measured rudder."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -17,7 +17,7 @@ ORDERED, MEASURED = 0.9, 0.75
 
 
 class Reversals(NamedTuple):
-    """When the rudder of a zigzag was ordered, s."""
+    """Times at which the rudder of a zigzag was ordered, s."""
 
     start: float  # the first order
     turns: list[float]  # each reversal
@@ -35,7 +35,7 @@ def rudder(trial: Trial) -> Floats:
 
 
 def is_ordered(trial: Trial) -> bool:
-    """Whether a trial has the ordered rudder."""
+    """Return whether a trial has the ordered rudder."""
     return "delta_command" in trial.channels
 
 

@@ -1,4 +1,4 @@
-"""How certain the indices of an identified ship are, by models of its covariance."""
+"""Uncertainty of an identified ship's indices, by models drawn from its covariance."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass

@@ -20,7 +20,7 @@ LONGEST_DELAY_S = 10.0  # that is looked for
 
 
 class ClockOffset(NamedTuple):
-    """How late a channel is, and what it explains of another."""
+    """Delay of a channel, and the gain and certainty of the estimate."""
 
     late: float  # s
     error: float  # standard error, s

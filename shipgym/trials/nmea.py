@@ -41,7 +41,7 @@ class Sentence(NamedTuple):
 
 @dataclass(frozen=True)
 class NumberField:
-    """Where a number stands in a sentence; `nmea.toml` explains the names."""
+    """Position of a number in a sentence; `nmea.toml` explains the names."""
 
     at: int
     unit: str = ""
@@ -53,7 +53,7 @@ class NumberField:
 
 @dataclass(frozen=True)
 class SentenceKind:
-    """What a kind of sentence says; `nmea.toml` explains the names."""
+    """Contents of a kind of sentence; `nmea.toml` explains the names."""
 
     fields: Mapping[str, NumberField]  # by quantity
     valid: Letters = field(default_factory=dict)
@@ -65,7 +65,7 @@ class SentenceKind:
 
 @dataclass(frozen=True)
 class NmeaQuantity:
-    """What a number in a sentence measures, in SI units and radians."""
+    """Quantity that a number in a sentence measures, in SI units and radians."""
 
     largest: float
     tolerance: float | None  # between two instruments; None: not compared

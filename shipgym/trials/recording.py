@@ -1,4 +1,4 @@
-"""From a table's columns to channels in SI units, each on its clock."""
+"""Conversion of a table's columns to channels in SI units, each on its clock."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -58,7 +58,7 @@ class Log:
     start: float | None = None
 
     def has(self, *channels: str) -> bool:
-        """Whether the log has all of these channels."""
+        """Return whether the log has all of these channels."""
         return all(channel in self.channels for channel in channels)
 
     def derive(self, channel: str, values: Floats) -> None:

@@ -1,4 +1,4 @@
-"""From the tables of a log to channels in SI units, at midship."""
+"""Conversion of the tables of a log to channels in SI units, at midship."""
 
 from collections.abc import Mapping, Sequence
 

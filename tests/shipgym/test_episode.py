@@ -293,6 +293,6 @@ def test_a_file_of_another_kind_is_told_so(tmp_path):
     (tmp_path / "model.json").write_text('{"kind": "model", "format": 7}')
     with pytest.raises(
         InputError,
-        match=r"kind: expected 'episode', got 'model'; choose a file that RecordEpisode",
+        match=r"kind: expected 'episode', got 'model'; choose a file that",
     ):
         Episode.load(tmp_path / "model.json")

@@ -71,9 +71,9 @@ def _ends_that_jump(
     middle: Floats,
     least: float,
 ) -> tuple[bool, bool]:
-    """Whether the first and the last sample jump to the next one.
+    """Return whether the first and the last sample jump to the next one.
 
-    That is further than the signal moves anywhere inside.
+    A jump is further than the signal moves anywhere inside.
     """
     half = WIDTH // 2
     inside = middle[half:-half]

@@ -9,7 +9,7 @@ from shipgym.trials.resampling import Signal
 
 
 class _Span(NamedTuple):
-    """From when to when channels were logged, s."""
+    """First and last time at which channels were logged, s."""
 
     begin: float
     end: float
