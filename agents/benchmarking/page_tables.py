@@ -89,7 +89,7 @@ class TableCell:
 
 @dataclass(frozen=True)
 class TableRow:
-    """Row of a table: its name, a link or a badge beside it, and its cells."""
+    """Row of a table: its name, a link or a badge next to it, and its cells."""
 
     name: str
     cells: Sequence[TableCell]

@@ -74,7 +74,7 @@ class TuningResult:
 
 
 class TuningProposal(NamedTuple):
-    """Parameters of a trial to come, and all its settings."""
+    """Parameters of the next trial, and all its settings."""
 
     parameters: dict[str, Any]
     settings: dict[str, Any]

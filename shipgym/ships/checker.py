@@ -43,7 +43,7 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
     """Check a model for errors.
 
     The file and its coefficients; the inertia; accelerations over the states that a
-    manoeuvre passes (finite, as the table of terms says, alike to both sides); straight
+    manoeuvre passes (finite, as in the table of terms, equal to both sides); straight
     running; the side to which the rudder turns the ship; hard turns to both sides; the
     covariance.
 

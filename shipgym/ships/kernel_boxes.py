@@ -53,7 +53,7 @@ class KernelTerm(Term):
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """Radial basis functions exp(-|x - centre|^2 / 2), and the features made of them.
+    """Radial basis functions exp(-|x - centre|^2 / 2), and features built from them.
 
     x is v / U, r L / U, the rudder angle in rad and U / U0, less an offset, by a scale.
 

@@ -192,7 +192,7 @@ def _velocity(log: Log, installation: Installation) -> tuple[Floats, Floats] | N
 
 
 def _sway_through_water(log: Log, water: Floats, u: Floats, v: Floats) -> Floats:
-    """Sway over ground less the current that a speed log shows, which a note tells."""
+    """Sway over ground less the current that a speed log shows; adds a note of it."""
     psi = log.channels["psi"]
     current = set_and_drift(psi, water, u, v)
     log.notes.append(current.note)

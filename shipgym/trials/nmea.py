@@ -172,7 +172,7 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
     """Numbers of a sentence in a log, in SI units and radians, by quantity.
 
     More lenient than :func:`steering_numbers`: estimated and simulated values count,
-    letters that the standard puts beside a number may be missing, and no number is too
+    letters that the standard puts next to a number may be missing, and no number is too
     large. Raises ValueError where one is broken.
     """
     kind = NMEA_SENTENCES[sentence.kind]
