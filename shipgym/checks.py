@@ -235,7 +235,7 @@ def _no_such_number(
 
 
 def _as_float(value: Any) -> float:
-    """Convert to float: infinite where too large, nan for what is no number."""
+    """Convert to float: infinite where too large, nan for anything but a number."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return math.nan
     try:

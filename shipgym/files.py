@@ -234,7 +234,7 @@ def check_content(
     infinite: bool = False,
     depth: int = 1,
 ) -> None:
-    """Refuse what no file of this project holds, before its fields are looked at.
+    """Refuse content that no file of this project has, before its fields are read.
 
     In a list or table from JSON or TOML these are: lists and tables more than `DEEPEST`
     deep, integers of more than 64 bits (a `seed` may have 128), numbers that are nan or

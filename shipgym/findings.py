@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Findings:
-    """Problems and remarks that a battery of checks found."""
+    """Problems and remarks from a battery of checks."""
 
     name: str  # of what was checked
     # what makes it unfit to be used, each with a remedy or its place

@@ -39,7 +39,7 @@ COLOURS = (
 )
 DASHES = ("solid", "dash", "dot")
 SCORE = "wheel-over from the model 0, best known 1"
-#: Range of the axis of scores, and of relative costs; others stand at its ends.
+#: Range of the axis of scores, and of relative costs; others are drawn at its ends.
 SCORE_RANGE, RELATIVE_RANGE = (-1.5, 1.5), (0.0, 4.0)
 
 

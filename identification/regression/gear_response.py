@@ -54,7 +54,7 @@ class GearResponse(NamedTuple):
         distances = self._distances(steps, sizes)
         orders = delta[:-1] + np.sign(moves) * distances
 
-        # a ramp does not tell how far it goes on
+        # the end of a ramp is not known
         ramps_throughout = sizes >= (1.0 - RAMP) * self.rate * steps
         orders[ramps_throughout] = np.copysign(np.inf, moves[ramps_throughout])
         return orders
@@ -78,7 +78,7 @@ class GearResponse(NamedTuple):
         return distances
 
     def explained_share(self, t: Floats, delta: Floats) -> float:
-        """Share of the intervals that go on under the order before them."""
+        """Share of the intervals that continue under the order before them."""
         if self.rate == 0.0 or len(t) < 4:
             return 0.0
         return float(np.mean(goes_on(self.orders(t, delta), delta)))

@@ -40,7 +40,7 @@ def is_ordered(trial: Trial) -> bool:
 
 
 def usual_rudder(trial: Trial) -> float:
-    """Rudder angle that shows in a manoeuvre, whatever it is on the approach, rad."""
+    """Rudder angle that is held in a manoeuvre, regardless of the approach, rad."""
     return float(np.percentile(np.abs(rudder(trial)), 75))
 
 
@@ -58,7 +58,7 @@ def execute_time(trial: Trial) -> float:
     t = trial.t
     delta = rudder(trial)
     if is_ordered(trial):
-        # a little helm on the approach is no order yet
+        # small rudder angles on the approach are not an order
         least = 0.5 * usual_rudder(trial)
         first = np.argmax(np.abs(delta) > least)
         return float(t[first])

@@ -27,7 +27,7 @@ from shipgym.trials.trial import Trial
 class Criterion:
     """One criterion; the worse of the two sides counts."""
 
-    value: float | None  # of the model, in `unit`; None where it never got so far
+    value: float | None  # of the model, in `unit`; None where it did not finish
     limit: float  # largest value allowed
     # None where it is not decided, or the ship's equations do not allow the test: see
     # `note`

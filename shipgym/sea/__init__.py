@@ -1,7 +1,7 @@
 """Weather: what current, wind and waves do to a ship.
 
 What a user gives is in `conditions`; what becomes of it for one ship in `wind`,
-`gusts`, `waves`, `motions`, `drift` and `weather_column`. The public names stand in
+`gusts`, `waves`, `motions`, `drift` and `weather_column`. The public names are in
 `__init__.pyi`.
 """
 

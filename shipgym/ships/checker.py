@@ -1,4 +1,4 @@
-"""Checks that any ship model, a user's own included, can be put through."""
+"""Checks for any ship model, including a user's own."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ STRAIGHT_LENGTHS = 30.0  # ship lengths of a run
 
 @dataclass(frozen=True)
 class ModelCheck(Findings):
-    """Problems and remarks that a check of a model found."""
+    """Problems and remarks from a check of a model."""
 
     # root mean square of the accelerations' port/starboard difference over twice their
     # own, over states that a manoeuvre passes: 0 for a symmetric ship; nan where it

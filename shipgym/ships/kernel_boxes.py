@@ -222,7 +222,7 @@ class KernelBox(GreyBox):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Reference ship and kernel, as they stand in a model file."""
+        """Reference ship and kernel, as written in a model file."""
         table = super().to_dict()
         del table["equations"]
         return {**table, "kernel": self.kernel.to_dict()}

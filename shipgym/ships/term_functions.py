@@ -135,7 +135,7 @@ def _written(rates: Mapping[str, str], variables: set[str], memory: bool) -> str
 
 
 def _has_negative_power(equations: Equations) -> bool:
-    """True where a term has more velocities than the sum it stands in."""
+    """True where a term has more velocities than the sum that contains it."""
     for equation, terms in equations.items():
         if any(speed_power(equation, term) < 0 for term in terms):
             return True
@@ -235,5 +235,5 @@ def _with_their_makings(names: set[str]) -> set[str]:
 
 
 def _variables_in(expression: str) -> set[str]:
-    """Variables that stand in an expression."""
+    """Variables that occur in an expression."""
     return MADE_OF.keys() & re.findall(r"\w+", expression)

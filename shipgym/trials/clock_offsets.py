@@ -226,7 +226,7 @@ def _remembered(t: Floats, values: Floats, memory: float) -> Floats:
 
 
 def reverses(values: Floats, least: float = 0.0) -> bool:
-    """Tell whether a channel goes there and back three times or more, as in zigzags.
+    """Return whether a channel reverses three times or more, as in zigzags.
 
     A single step shows no delay.
     """

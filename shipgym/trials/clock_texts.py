@@ -68,7 +68,7 @@ def _series(texts: Sequence[str]) -> Any:
 
 
 def _times_of_day(series: Any) -> Floats:
-    """Seconds since midnight, nan for what is no time."""
+    """Seconds since midnight, nan for an invalid time."""
     import pandas as pd
 
     colons = series.str.count(":")

@@ -28,7 +28,7 @@ _SPEED_UNITS = {"N": "knots", "K": "km/h", "M": "m/s"}
 #: Sign of a number by the letter of its side; L and R are the sides to steer to.
 _SIGNS = {"N": 1.0, "S": -1.0, "E": 1.0, "W": -1.0, "L": 1.0, "R": -1.0}
 
-Letters = Mapping[int, frozenset[str]]  # those that may stand in a field, by its place
+Letters = Mapping[int, frozenset[str]]  # letters allowed in a field, by its place
 
 
 class Sentence(NamedTuple):

@@ -41,7 +41,7 @@ class Recording:
     signals : dict of str to Signal
         By channel, headings without jumps.
     locator : Locator
-        Where the values stand in the file.
+        Places of the values in the file.
     filled : dict of str to int
         How many values of a channel were filled in.
     start : float or None
