@@ -8,9 +8,9 @@ class Findings:
     """Problems and remarks from a battery of checks."""
 
     name: str  # of what was checked
-    # what makes it unfit to be used, each with a remedy or its place
+    # faults that make it unusable, each with a remedy or its place
     problems: tuple[str, ...]
-    remarks: tuple[str, ...] = ()  # what is unusual, and may be right
+    remarks: tuple[str, ...] = ()  # unusual facts, which may be right
 
     @property
     def ok(self) -> bool:

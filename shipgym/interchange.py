@@ -148,7 +148,7 @@ def _series(recorded: Trial | Episode) -> dict[str, Floats]:
 
 
 def _facts(recorded: Trial | Episode) -> str:
-    """All of a trial or an episode that is no time series, as JSON."""
+    """All of a trial or an episode except its time series, as JSON."""
     trial_fields = ("name", "kind", "use", "length", "over_ground", "notes")
     if isinstance(recorded, Trial):
         fields: dict[str, Any] = {

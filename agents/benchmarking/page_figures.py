@@ -187,7 +187,7 @@ def costs_figure(result: BenchmarkResult, task: str) -> Figure:
 
 
 def _is_wide(costs: Floats) -> bool:
-    """Tell whether an axis of costs is logarithmic."""
+    """Return whether an axis of costs is logarithmic."""
     if not len(costs) or costs.min() <= 0.0:
         return False
     # Ratio of the largest to the smallest cost above which their axis is logarithmic.

@@ -38,7 +38,7 @@ def known_names() -> tuple[str, ...]:
 
 
 def names_code(text: str) -> bool:
-    """Tell whether a text names a function, `module:function`."""
+    """Return whether a text names a function, `module:function`."""
     module, colon, function = text.rpartition(":")
     parts = [*module.split("."), function]
     return bool(colon) and all(part.isidentifier() for part in parts)

@@ -56,7 +56,7 @@ class Finding:
 
 
 def examine_installation() -> list[Finding]:
-    """Everything that `shipgym doctor` reports, in order."""
+    """All findings of `shipgym doctor`, in order."""
     system = (
         f"{shipgym.__version__}, Python {platform.python_version()},"
         f" {platform.platform()}"

@@ -84,7 +84,7 @@ class IndexInterval:
         if self.n_ran_away:
             lost.append(f"{self.n_ran_away} of {draws} draws ran away")
         if self.n_never_reached:
-            lost.append(f"{self.n_never_reached} of {draws} draws never got so far")
+            lost.append(f"{self.n_never_reached} of {draws} draws did not finish")
         return ", ".join(lost)
 
 

@@ -36,7 +36,7 @@ class Manoeuvre:
 
     @property
     def no_indices(self) -> dict[str, float | None]:
-        """Its indices where it could not be completed: all None."""
+        """Indices of a manoeuvre that did not finish: all None."""
         return dict.fromkeys(field.name for field in fields(self.outcome))
 
     def evaluate(self, model: ShipModel) -> Any:

@@ -149,7 +149,7 @@ def _rate_on_heading_clock(log: Log, rate: ClockOffset | None) -> Floats:
 
 
 def _is_against(offset: ClockOffset | None) -> bool:
-    """Tell whether a channel surely acts with the opposite sign."""
+    """Return whether a channel surely acts with the opposite sign."""
     return offset is not None and offset.gain < 0.0 and offset.certainty > CERTAIN
 
 

@@ -15,7 +15,7 @@ class _Span(NamedTuple):
     end: float
 
     def overlaps(self, other: "_Span", shift: float = 0.0) -> bool:
-        """Tell whether this span, moved back by `shift`, overlaps another."""
+        """Return whether this span, moved back by `shift`, overlaps another."""
         return self.begin - shift < other.end and self.end - shift > other.begin
 
 
