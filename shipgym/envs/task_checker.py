@@ -149,8 +149,8 @@ def _not_finite(engine: Engine) -> Iterator[str]:
             found.add(name)
             lane = int(np.argmax(wrong))
             yield (
-                f"{_source_of(name, engine.task)}: {name}: expected finite numbers, got"
-                f" {values[lane]} in lane {lane} at step {step}"
+                f"{_source_of(name, engine.task)}: {name}: expected a finite number,"
+                f" got {values[lane]} in lane {lane} at step {step}"
             )
 
 

@@ -506,7 +506,7 @@ def test_an_observation_that_is_no_number_before_the_first_step_is_a_problem(tmp
     )
     found = check_task(written(tmp_path, "fairway.py", text), **SHIP)
     assert any(
-        "Observation.to_zone: expected finite numbers, got nan in lane 0 at step 0"
+        "Observation.to_zone: expected a finite number, got nan in lane 0 at step 0"
         in problem
         for problem in found.problems
     )
