@@ -30,7 +30,7 @@ def job_to_json(job: Any, where: str) -> str:
 
 
 def result_to_json(result: Any) -> str:
-    """A result as JSON text; TypeError for what is neither JSON nor an array of it."""
+    """A result as JSON text; TypeError if it is neither JSON nor an array of it."""
 
     def encode(item: Any) -> Any:
         if isinstance(item, np.generic):
@@ -107,7 +107,7 @@ class KeptResults:
         write_json({"key": key, "result": result}, path)
 
     def _key(self, job: str) -> tuple[dict[str, Any], Path]:
-        """What a result belongs to, and its file."""
+        """Key of a result, and its file."""
         key = {
             "shipgym": shipgym.__version__,
             "function": self.function,

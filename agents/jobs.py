@@ -56,10 +56,10 @@ class EngineError(InputError):
 
 @dataclass(frozen=True)
 class JobEngine:
-    """Where jobs run, and where results are kept.
+    """Settings of where jobs run and where results are kept.
 
-    Raises InputError, naming the field, for a wrong one. Whether a cluster answers is
-    found out when it is needed.
+    Raises InputError, naming the field, for a wrong one. A cluster is contacted only
+    when it is needed.
 
     Attributes
     ----------

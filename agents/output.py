@@ -101,7 +101,7 @@ def check_file(path: Path) -> None:
 def in_use(folder: Path) -> Iterator[Path]:
     """Keep other processes out of a folder of results while the block lasts.
 
-    Yields where drafts and lock are: beside the folder, or in it if it is a mount point
+    Yields the place of drafts and lock: next to the folder, or in it if it is a mount
     or its parent cannot be written. Folders above it are made, and removed again if
     they stay empty. The lock of a process that was killed is free; a disk that has no
     locks is used without. Raises InputError if another process uses the folder, saying
@@ -119,7 +119,7 @@ def in_use(folder: Path) -> Iterator[Path]:
         yield lock_path.parent
     finally:
         if lock.is_locked:
-            # before it is free, so that whoever waits for it notices
+            # before it is free, so that a waiting process notices
             lock_path.unlink(missing_ok=True)
             lock.release()
         for path in missing:  # the innermost first
@@ -155,7 +155,7 @@ def _acquired(lock_path: Path, folder: Path) -> FileLock:
 
 
 def _stands_alone(target: Path) -> bool:
-    """True if nothing can stand beside a folder: a mount, or a read-only parent."""
+    """True if nothing can be put next to a folder: a mount, or a read-only parent."""
     if not target.is_dir():
         return False
     return os.path.ismount(target) or not os.access(target.parent, os.W_OK | os.X_OK)

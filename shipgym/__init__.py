@@ -1,6 +1,6 @@
 """Ships to be steered by software: trials, models, manoeuvres and environments.
 
-Importing shipgym registers its environments with Gymnasium. The public names stand in
+Importing shipgym registers its environments with Gymnasium. The public names are in
 `__init__.pyi`; each is imported when it is first used.
 """
 

@@ -94,7 +94,7 @@ def check_keys(
     for key in required:
         if key not in mapping:
             raise InputError(
-                f"{where}: field '{key}' is missing, expected {quoted(required)}"
+                f"{where}: field '{key}' is missing; give {quoted(required)}"
             )
 
 
@@ -235,7 +235,7 @@ def _no_such_number(
 
 
 def _as_float(value: Any) -> float:
-    """Convert to float: infinite where too large, nan for what is no number."""
+    """Convert to float: infinite where too large, nan for anything but a number."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return math.nan
     try:
@@ -345,7 +345,7 @@ def _check_table_shape(value: Any, shape: dict[str, Shape], where: str) -> None:
     keys = table if ANY_KEY in shape else shape
     for key in keys:
         if key not in table:
-            raise InputError(f"{where}: '{key}' is missing, expected {quoted(shape)}")
+            raise InputError(f"{where}: '{key}' is missing; give {quoted(shape)}")
         expected = shape[key] if key in shape else shape[ANY_KEY]
         check_shape(table[key], expected, f"{where}.{key}")
 

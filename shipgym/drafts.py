@@ -20,7 +20,7 @@ DRAFT = re.compile(r"\..+\.([0-9a-f]{8})-(\d+)\.draft", re.DOTALL)
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """Temporary name beside a file, renamed to it if the block ends without error.
+    """Temporary name next to a file, renamed to it if the block ends without error.
 
     InputError if the folder does not exist or cannot be written, or what is there is no
     file, as a device.
@@ -50,7 +50,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def draft_folder(path: Path) -> Iterator[Path]:
-    """Temporary folder beside a path, removed when the block ends unless renamed."""
+    """Temporary folder next to a path, removed when the block ends unless renamed."""
     remove_drafts(path.parent)
     draft = draft_name(path)
     shutil.rmtree(draft, ignore_errors=True)  # of a killed process of the same number
@@ -62,7 +62,7 @@ def draft_folder(path: Path) -> Iterator[Path]:
 
 
 def draft_name(path: Path) -> Path:
-    """Hidden name beside a file or folder under which this process writes it."""
+    """Hidden name next to a file or folder under which this process writes it."""
     return path.parent / f".{path.name}.{_host()}-{os.getpid()}.draft"
 
 

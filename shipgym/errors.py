@@ -1,4 +1,4 @@
-"""The errors a user of shipgym meets, each with one message that says what to do."""
+"""Errors that a user of shipgym sees, each with one message that says what to do."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,11 +9,11 @@ LONGEST_MESSAGE = 2000  # characters
 class InputError(ValueError):
     """Invalid input by the user: a file, a row, a field or an argument.
 
-    The message names the file, the row or field, the value found, what is expected, and
-    the remedy. The command line prints it and exits with code 2. Of a message longer
-    than `LONGEST_MESSAGE` the middle is left out: it repeats what was found, which may
-    be a whole file. `instead`: what a log may be read with instead, the likely one
-    first, each a channel with its unit or a convention with its value.
+    The message names the file, the row or field, what was expected, what was given, and
+    the remedy. The command line prints it and exits with code 2. The middle of a
+    message longer than `LONGEST_MESSAGE` is left out: it repeats the input, which may
+    be a whole file. `instead`: alternatives with which a log may be read, the likely
+    one first, each a channel with its unit or a convention with its value.
     """
 
     def __init__(self, message: str, instead: Sequence[tuple[str, str]] = ()) -> None:

@@ -1,4 +1,4 @@
-"""Libraries of the package's extras, imported when first used."""
+"""Libraries of the package's extras, imported on first use."""
 
 from importlib import import_module
 from typing import Any

@@ -34,7 +34,7 @@ DEEPEST = 20  # levels of lists and tables within each other
 LONGEST_KEY = 4096  # characters
 LARGEST_NUMBER = 1e100  # magnitude: products of three such numbers are still finite
 
-#: What cannot be written in UTF-8, or ends a text for the operating system.
+#: Characters that UTF-8 cannot encode, or that end a text for the operating system.
 _UNWRITABLE = re.compile("[\0\ud800-\udfff]")
 
 
@@ -139,7 +139,7 @@ def read_text(path: Path, what: str, largest: int, latin: bool = False) -> str:
 
 
 def _not_utf_8(path: Path, what: str, data: bytes, start: int) -> InputError:
-    """The error for a file whose bytes are none of UTF-8 from `start` on."""
+    """Error for a file whose bytes are not UTF-8 from `start` on."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         place, found = str(path), "UTF-16"
     else:
@@ -154,7 +154,7 @@ def _not_utf_8(path: Path, what: str, data: bytes, start: int) -> InputError:
 
 
 def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
-    """Read a JSON object; `what` is expected, `remedy` says how to mend a broken file.
+    """Read a JSON object; `what` is expected, `remedy` says how to repair one.
 
     Raises InputError as `read_text` does, and if the file is cut short, holds no
     object, or something that `check_content` refuses.
@@ -234,7 +234,7 @@ def check_content(
     infinite: bool = False,
     depth: int = 1,
 ) -> None:
-    """Refuse what no file of this project holds, before its fields are looked at.
+    """Refuse content that no file of this project has, before its fields are read.
 
     In a list or table from JSON or TOML these are: lists and tables more than `DEEPEST`
     deep, integers of more than 64 bits (a `seed` may have 128), numbers that are nan or

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Findings:
-    """Problems and remarks that a battery of checks found."""
+    """Problems and remarks from a battery of checks."""
 
     name: str  # of what was checked
-    # what makes it unfit to be used, each with a remedy or its place
+    # faults that make it unusable, each with a remedy or its place
     problems: tuple[str, ...]
-    remarks: tuple[str, ...] = ()  # what is unusual, and may be right
+    remarks: tuple[str, ...] = ()  # unusual facts, which may be right
 
     @property
     def ok(self) -> bool:

@@ -148,7 +148,7 @@ def _series(recorded: Trial | Episode) -> dict[str, Floats]:
 
 
 def _facts(recorded: Trial | Episode) -> str:
-    """All of a trial or an episode that is no time series, as JSON."""
+    """All of a trial or an episode except its time series, as JSON."""
     trial_fields = ("name", "kind", "use", "length", "over_ground", "notes")
     if isinstance(recorded, Trial):
         fields: dict[str, Any] = {
@@ -185,8 +185,7 @@ def _rebuild(
         facts = check_table(json.loads(attributes[ATTRIBUTE]), ATTRIBUTE)
     except (KeyError, TypeError, ValueError):
         raise InputError(
-            f"attribute '{ATTRIBUTE}': expected what shipgym wrote, found none;"
-            f" {remedy}"
+            f"attribute '{ATTRIBUTE}': expected what shipgym wrote, got none; {remedy}"
         ) from None
     if "trial" in facts:
         return Trial(t, series, **check_table(facts["trial"], "trial"))
@@ -214,7 +213,7 @@ def _observations(env: gymnasium.Env[Any, Any], episode: Episode, where: str) ->
     """Observations of an episode run again, shape (n_steps + 1, n_observations)."""
     if episode.seed is None:
         raise InputError(
-            f"{where}: expected a seed, found none; without it an episode cannot be run"
+            f"{where}: expected a seed, got none; without it an episode cannot be run"
             " again"
         )
     observation, _ = env.reset(seed=episode.seed)

@@ -97,7 +97,7 @@ class Cell:
 
 
 def _has_figures(run: ScoredRun, n_episodes: int) -> bool:
-    """Tell whether a run has costs, and only numbers of so many episodes."""
+    """Return whether a run has costs, and only numbers of so many episodes."""
     if "cost" not in run.figures:
         return False
     for figure in run.figures.values():

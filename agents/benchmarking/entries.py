@@ -59,7 +59,7 @@ class Entry:
 
     @property
     def is_text(self) -> bool:
-        """Tell whether another process can make it too."""
+        """Return whether another process can make it too."""
         return isinstance(self.source, str)
 
     def policies(self, task: BenchmarkTask) -> tuple[Policy, ...]:

@@ -19,7 +19,7 @@ Columns = dict[str, NDArray[Any]]
 
 KEYS = ("controller", "task", "run", "seed")
 TEXT_KEYS = ("controller", "task")
-#: Figures that are true or false in the file; missing ones are null.
+#: Figures that are booleans in the file; missing ones are null.
 FLAGS = ("left_corridor", "grounded", "success", "terminated", "failed")
 MOST_NUMBERS = 5_000_000  # in a table; characters in a column of texts
 

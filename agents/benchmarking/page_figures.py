@@ -39,7 +39,7 @@ COLOURS = (
 )
 DASHES = ("solid", "dash", "dot")
 SCORE = "wheel-over from the model 0, best known 1"
-#: Range of the axis of scores, and of relative costs; others stand at its ends.
+#: Range of the axis of scores, and of relative costs; others are drawn at its ends.
 SCORE_RANGE, RELATIVE_RANGE = (-1.5, 1.5), (0.0, 4.0)
 
 
@@ -187,7 +187,7 @@ def costs_figure(result: BenchmarkResult, task: str) -> Figure:
 
 
 def _is_wide(costs: Floats) -> bool:
-    """Tell whether an axis of costs is logarithmic."""
+    """Return whether an axis of costs is logarithmic."""
     if not len(costs) or costs.min() <= 0.0:
         return False
     # Ratio of the largest to the smallest cost above which their axis is logarithmic.

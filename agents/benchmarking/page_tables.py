@@ -89,7 +89,7 @@ class TableCell:
 
 @dataclass(frozen=True)
 class TableRow:
-    """Row of a table: its name, a link or a badge beside it, and its cells."""
+    """Row of a table: its name, a link or a badge next to it, and its cells."""
 
     name: str
     cells: Sequence[TableCell]
@@ -263,7 +263,7 @@ def metrics_table(result: BenchmarkResult, task: str, name: str) -> SortableTabl
 
 
 def _is_shown(metric: str, cells: Mapping[str, Any]) -> bool:
-    """Tell whether a controller has a metric, not 0 if it is a rare one."""
+    """Return whether a controller has a metric, not 0 if it is a rare one."""
     rare_metrics = ("extrapolating",)  # shown only if not 0 throughout
     for cell in cells.values():
         figures = cell["metrics"].get(metric)

@@ -167,7 +167,7 @@ def _collect(result: BenchmarkResult, records: Mapping[CellName, Record]) -> Rer
 
 
 def _is_same(cost: float, before: float) -> bool:
-    """Tell whether two costs are equal to rounding; one that is not known is."""
+    """Return whether two costs are equal to rounding; one that is not known is."""
     return not np.isfinite(cost) or bool(np.isclose(cost, before, rtol=SAME_COST))
 
 

@@ -1,4 +1,4 @@
-"""Where controllers come from: what a text names, and how it is made for a task."""
+"""Sources of controllers: what a text names, and how it is made for a task."""
 
 import glob
 import hashlib
@@ -38,7 +38,7 @@ def known_names() -> tuple[str, ...]:
 
 
 def names_code(text: str) -> bool:
-    """Tell whether a text names a function, `module:function`."""
+    """Return whether a text names a function, `module:function`."""
     module, colon, function = text.rpartition(":")
     parts = [*module.split("."), function]
     return bool(colon) and all(part.isidentifier() for part in parts)

@@ -197,7 +197,7 @@ class _Costs:
         )
 
     def _has_room(self, task: int) -> bool:
-        """Tell whether the best known cost of a task is below that of wheel-over."""
+        """Return whether the best known cost of a task is below that of wheel-over."""
         if task not in self.reference:
             return False
         zero, best = self.reference[task]

@@ -112,7 +112,7 @@ def report_os_error(error: OSError) -> int:
 
     # standard output failed: what is still in its buffer must not fail again
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    if error.errno != EPIPE:  # whoever reads the output has not just gone away
+    if error.errno != EPIPE:  # the reader of the output has not just gone away
         print_error(f"the output cannot be written ({reason})")
     return FAILED
 

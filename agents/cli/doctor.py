@@ -56,7 +56,7 @@ class Finding:
 
 
 def examine_installation() -> list[Finding]:
-    """Everything that `shipgym doctor` reports, in order."""
+    """All findings of `shipgym doctor`, in order."""
     system = (
         f"{shipgym.__version__}, Python {platform.python_version()},"
         f" {platform.platform()}"
@@ -198,6 +198,6 @@ def name_finding(name: str) -> Finding:
         folder = Path(spec.origin).resolve().parent
     home = Path(shipgym.__file__).resolve().parents[1]
     if folder is None or folder.parent != home:
-        detail = f"leads to {folder}, expected {home / name}: install shipgym again"
+        detail = f"expected {home / name}, got {folder}: install shipgym again"
         return Finding(what, "wrong", detail)
     return Finding(what, "fine", os.fspath(folder))

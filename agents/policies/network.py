@@ -94,7 +94,7 @@ def _check_layer(layer: Layer, where: str) -> None:
 
 
 def _check_array(array: Any, ndim: int, where: str) -> None:
-    """Refuse what is no array of finite float32 numbers with so many axes."""
+    """Refuse anything but an array of finite float32 numbers with so many axes."""
     expected = f"float32 with {ndim} axes, none of them empty"
     if not isinstance(array, np.ndarray):
         raise unexpected(where, expected, array)

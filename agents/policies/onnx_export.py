@@ -116,7 +116,7 @@ def _add_layer(graph: _Graph, layer: Layer, number: int, inputs: str) -> str:
 
 
 def _add_action(graph: _Graph, policy: LearnedPolicy, output: str) -> None:
-    """What `LearnedPolicy.commands` does with the network's output."""
+    """Add the nodes of `LearnedPolicy.commands` that follow the network's output."""
     if policy.action == "rudder-discrete":
         orders = graph.constant("orders", ORDERS)
         number = graph.add("ArgMax", [output], "number", axis=1, keepdims=1)

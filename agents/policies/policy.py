@@ -171,7 +171,7 @@ class LearnedPolicy:
 
     @property
     def remembers(self) -> bool:
-        """Whether a command depends on earlier observations."""
+        """True if a command depends on earlier observations."""
         return (
             self.frame_stack > 1
             or self.base is not None

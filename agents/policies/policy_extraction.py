@@ -23,7 +23,7 @@ from shipgym.tasks.definition import TASKS
 
 
 class Actor(NamedTuple):
-    """What acts in a policy of stable-baselines3."""
+    """Names of the layers that act in a policy of stable-baselines3."""
 
     body: str  # hidden layers
     head: str  # last layer; empty where it is the last of the body
@@ -142,7 +142,7 @@ def _residual(stack: Sequence[Any]) -> dict[str, Any]:
 
 
 def _environment(ships: Any) -> dict[str, Any]:
-    """What is observed and commanded, and where."""
+    """Observations, action and environment of a policy, by keyword."""
     if not hasattr(ships, "observation_names"):
         raise InputError(
             "env: expected an environment of shipgym, such as ShipVecEnv, got"

@@ -51,7 +51,7 @@ FIELDS = (
 
 
 def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy:
-    """Learned policy from the JSON at `path`, and the weights beside it.
+    """Learned policy from the JSON at `path`, and the weights next to it.
 
     Raises InputError naming the file and the field at fault.
     """

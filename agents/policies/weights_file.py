@@ -34,7 +34,7 @@ def write_policy(content: Mapping[str, Any], tensors: Tensors, path: Path) -> No
     if path.suffix != ".json":
         raise InputError(
             f"{path}: expected a name that ends in .json; the weights are written"
-            " beside it, in .safetensors"
+            " next to it, in .safetensors"
         )
     try:
         json.dumps(content, allow_nan=False)

@@ -1,4 +1,4 @@
-"""State of a training at a rollout's boundary: all that the steps to come depend on.
+"""State of a training at a rollout's boundary: all that later steps depend on.
 
 Networks and optimisers, the replay buffer, counters, random numbers, scales of the
 rewards, and the ships where they are. A run that is restored goes on as if it had never

@@ -60,7 +60,7 @@ def _has_axes(value: Any) -> bool:
 
 
 def _kind(value: Any) -> str:
-    """Say what a value is; of a table or a list also how long."""
+    """Name the kind of a value; of a table or a list also its length."""
     if isinstance(value, dict):
         return f"a table of {len(value)}"
     if isinstance(value, list | tuple):

@@ -25,7 +25,7 @@ N_EVALUATIONS = 100
 
 @dataclass(frozen=True)
 class TrainingPlan:
-    """All that decides what is learned.
+    """Settings of a training that determine its result.
 
     Raises InputError for settings of another algorithm, commands that are not
     continuous, or a value out of its range.

@@ -1,4 +1,4 @@
-"""Training that a user asks for, and the plan that is made of it."""
+"""Training that a user asks for, and the plan built from it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -117,7 +117,7 @@ def check_resumable(folder: Path, plan: TrainingPlan) -> None:
 
 
 def other_versions(folder: Path) -> list[str]:
-    """Say what was installed in another version when the run began, a line each."""
+    """Return a line for each package whose version differs from that of the run."""
     content = _content(folder)
     before = check_table(content["versions"], f"{folder / RUN}: versions")
     others = []

@@ -39,7 +39,7 @@ except ModuleNotFoundError as error:
 
 
 class TrainingProgress(NamedTuple):
-    """How far a training is."""
+    """Progress of a training."""
 
     #: decisions learned from, and to learn from
     steps: int

@@ -74,7 +74,7 @@ class TuningResult:
 
 
 class TuningProposal(NamedTuple):
-    """Parameters of a trial to come, and all its settings."""
+    """Parameters of the next trial, and all its settings."""
 
     parameters: dict[str, Any]
     settings: dict[str, Any]
@@ -143,7 +143,7 @@ def tune(
 def _check_progress(
     done: Sequence[TuningTrial], results: Sequence[Mapping[str, Any]]
 ) -> None:
-    """Refuse to go on if every trial so far has diverged."""
+    """Refuse to continue if every trial so far has diverged."""
     if all(trial.ended == "diverged" for trial in done):
         why = results[0]["why"]
         raise InputError(f"every trial diverged, the first: {why}")

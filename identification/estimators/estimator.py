@@ -43,7 +43,7 @@ def weights(estimator: Estimator, features: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class FitTask:
-    """Everything that a method may use."""
+    """Data and settings that a method may use."""
 
     samples: Samples  # the regression of each equation
     blank: ShipModel  # the model but for its coefficients

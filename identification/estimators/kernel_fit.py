@@ -175,7 +175,7 @@ def _kernels(
 
 
 def _remarks(errors: dict[str, float]) -> list[str]:
-    """What a user has to know of the errors on held-out trials."""
+    """Remarks for the user on the errors on held-out trials."""
     if "kernel" not in errors or errors["kernel"] < errors["reference"]:
         return []
     kernel = np.degrees(errors["kernel"])

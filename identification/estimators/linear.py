@@ -1,4 +1,4 @@
-"""What the linear estimators share: prediction and the checks of their arguments."""
+"""Common parts of the linear estimators: prediction and checks of arguments."""
 
 from numbers import Real
 from typing import Any, ClassVar, TypeGuard

@@ -222,7 +222,7 @@ class TruncatedLSSVM(LinearRegressor):
         Right singular vectors, of the scaled features, in the order of
         `singular_values_`.
     collinear_groups_ : tuple of tuple of int
-        For each dropped direction the features it is made of.
+        For each dropped direction its features.
     """
 
     name: ClassVar[str] = "tls-svm"

@@ -1,1 +1,1 @@
-"""From recorded trials to regressions: samples, forces, preprocessing."""
+"""Regressions of recorded trials: samples, forces, preprocessing."""

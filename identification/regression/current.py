@@ -300,7 +300,7 @@ class _Fit(NamedTuple):
 
 
 class _Problem:
-    """What ships of given coefficients do in the trials, and their fit.
+    """Least-squares problem of the motions of ships of given coefficients in trials.
 
     Unknowns are the coefficients, in deviations of the prior, then u and v at the start
     of each trial, then the current of each trial or of all.

@@ -1,4 +1,4 @@
-"""From captive tests to the coefficients of a table for forces, in one regression.
+"""Regression of the coefficients of a table for forces on captive tests.
 
 A coefficient that stands in several equations (`shipgym.ships.shared_structure`) has
 one column; the rows of X, Y and N are stacked. Source: Xu, Hassani & Guedes Soares
@@ -231,8 +231,8 @@ def fit_forces(
 ) -> tuple[Floats, Floats]:
     """Coefficients and their covariance.
 
-    X, Y and N count alike, each by its root mean square. `estimator` has no intercept.
-    The covariance is for white errors of the size of each force's residuals.
+    X, Y and N weigh the same, each by its root mean square. `estimator` has no
+    intercept. The covariance is for white errors of the size of each force's residuals.
     """
     scales = regression.scales()
     features = regression.features / scales[:, None]

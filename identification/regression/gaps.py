@@ -40,7 +40,7 @@ def between_gaps(
 
 
 def _gaps(t: Floats, particulars: Particulars) -> Flags:
-    """Whether each step between samples is a gap, shape (n_samples - 1,)."""
+    """Flags of steps between samples that are gaps, shape (n_samples - 1,)."""
     steps = np.diff(t)
     neighbours = 11  # steps whose median is the usual one
     around = median_filter(steps, neighbours, mode="mirror")

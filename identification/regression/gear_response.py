@@ -1,4 +1,4 @@
-"""How a rudder answers to its orders: the ramp of its gear, then the lag.
+"""Response of a rudder to its orders: the ramp of its gear, then the lag.
 
 A rudder far from its order moves at the gear's rate; where its gear has a lag, the last
 of the way, rate times lag, decays exponentially.
@@ -54,7 +54,7 @@ class GearResponse(NamedTuple):
         distances = self._distances(steps, sizes)
         orders = delta[:-1] + np.sign(moves) * distances
 
-        # a ramp does not tell how far it goes on
+        # the end of a ramp is not known
         ramps_throughout = sizes >= (1.0 - RAMP) * self.rate * steps
         orders[ramps_throughout] = np.copysign(np.inf, moves[ramps_throughout])
         return orders
@@ -78,16 +78,16 @@ class GearResponse(NamedTuple):
         return distances
 
     def explained_share(self, t: Floats, delta: Floats) -> float:
-        """Share of the intervals that go on under the order before them."""
+        """Share of the intervals that continue under the order before them."""
         if self.rate == 0.0 or len(t) < 4:
             return 0.0
         return float(np.mean(goes_on(self.orders(t, delta), delta)))
 
 
 def goes_on(orders: Floats, delta: Floats) -> Flags:
-    """Whether each interval but the first can be under the order of the one before it.
+    """Flags of intervals that can be under the order of the one before them.
 
-    Shape (n_samples - 2,), of orders of shape (n_samples - 1,).
+    The first is left out. Shape (n_samples - 2,), of orders of shape (n_samples - 1,).
     """
     before = orders[:-1]
     now = orders[1:]

@@ -111,7 +111,7 @@ def explained_samples(
 
 
 def bare_metrics(model: ShipModel, trials: Sequence[Trial]) -> dict[str, Any]:
-    """How well the reference ship of a grey box alone predicts trials.
+    """Score the predictions of trials by the reference ship of a grey box alone.
 
     Returns her name and the `trial_metrics` by trial.
     """

@@ -130,7 +130,7 @@ def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
 
 
 def _is_far(t: Floats, knots: Floats, corner: float) -> bool:
-    """Whether a knot is more than two samples away from a corner."""
+    """Return whether a knot is more than two samples away from a corner."""
     at_corner = np.searchsorted(t, corner)
     samples_away = np.abs(np.searchsorted(t, knots) - at_corner)
     return bool(np.any(samples_away > 2))
@@ -149,7 +149,7 @@ def _with_ends(t: Floats, knots: Floats, corners: list[float]) -> Floats:
 
 
 def _is_solvable(t: Floats, knots: Floats) -> bool:
-    """Whether every basis function has a sample of its own.
+    """Return whether every basis function has a sample of its own.
 
     Source: Schoenberg & Whitney 1953.
     """

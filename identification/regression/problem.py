@@ -31,7 +31,7 @@ MMG_CHANNELS = Structure(
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What a method is given to fit."""
+    """Data, structure and settings that a method fits."""
 
     trials: tuple[Trial, ...]  # all, those held out marked `validate`
     used: tuple[Trial, ...]  # those to fit, repaired where asked

@@ -1,4 +1,4 @@
-"""From sampled trials to a regression: Euler, integral and spline sample structures.
+"""Regressions of sampled trials: Euler, integral and spline sample structures.
 
 For accelerations that are linear in unknown parameters, xdot = P(x, rudder) theta, each
 row says x(t_k+w) - x(t_k) = (integral of P over the window) theta. Euler takes P at the

@@ -113,7 +113,7 @@ def _refuse(name: str, doubt: str, current: TrialCurrent) -> None:
 
 
 def _doubt(current: TrialCurrent, speed: float, one_heading: bool) -> str:
-    """Why a current cannot be removed; empty where it can."""
+    """Reason why a current cannot be removed; empty where it can."""
     if current.covariance is not None:
         # drift by the current and drift by the ship's own neutral helm look the same
         if one_heading:
@@ -129,7 +129,7 @@ def _doubt(current: TrialCurrent, speed: float, one_heading: bool) -> str:
 
 
 def _keep_to_one_heading(trials: Iterable[Trial]) -> bool:
-    """Whether trials keep so near to one heading that speed hides the current.
+    """Return whether trials are so near to one heading that speed hides the current.
 
     Only trials to fit whose velocities are over ground count.
     """
@@ -231,7 +231,7 @@ def _estimated_currents(
 
 
 def _contradict(currents: Floats, covariance: Floats, chance: float = 1e-6) -> bool:
-    """Whether the currents of trials differ by more than chance.
+    """Return whether the currents of trials differ by more than chance.
 
     The chance is small because their covariance is an average over few blocks.
     """

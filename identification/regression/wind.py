@@ -144,7 +144,7 @@ def _constants(samples: Samples, equation: str, n_trials: int) -> Floats:
 
 
 def _explains(features: Floats, target: Floats, rounding: float = 1e-6) -> bool:
-    """Tell whether features explain a target but for rounding."""
+    """Return whether features explain a target but for rounding."""
     solution = np.linalg.lstsq(features, target)[0]
     left = target - features @ solution
     return bool(np.linalg.norm(left) < rounding * np.linalg.norm(target))

@@ -57,8 +57,8 @@ def sail_segment(
     A measured rudder is a steering gear without limit or lag that moves at the measured
     rate. `state` is where each ship starts, and is changed; `offsets`, shape (64,), are
     added to the measured rudder, rad; `inputs`, (n_points, 6), are time, s, rudder,
-    rad, shaft speed, 1/s, and the accelerations by wind in surge, sway and yaw, of
-    which a loop for calm water knows nothing; between the points they are straight.
+    rad, shaft speed, 1/s, and the accelerations by wind in surge, sway and yaw, which
+    a loop for calm water ignores; between the points they are linear.
     `samples`, (n_points,), has the row of `out`, (n_samples, n_state * 64), that takes
     the state at a point, -1 for none. A ship that runs away leaves numbers that are not
     finite, or not any ship's.

@@ -1,9 +1,9 @@
-"""The folder in which compiled loops are kept, and whether what lies there may be run.
+"""Folder of compiled loops, and the checks that its files may be run.
 
-A loop's file is code. It is run only if nobody but root and this user could have
-written it: files, the folder and all above it are theirs, and others may not write
-them. A folder above may be sticky, as ``/tmp`` is, where others cannot rename what is
-not theirs.
+A loop's file is code. It is run only if root and this user alone could have written it:
+they own the files, the folder and all folders above it, and others may not write to
+them. A folder above may be sticky, as ``/tmp`` is, where others cannot rename files
+that they do not own.
 """
 
 import os
@@ -47,10 +47,10 @@ def usable_folder() -> Path | None:
 
 
 def open_folder() -> Path:
-    """Return the folder of the cache, without links in its path; make it if need be.
+    """Return the folder of the cache, without links in its path; make it if needed.
 
-    Raises OSError if it cannot be made or read, ValueError if code in it might be
-    another user's, with what to do.
+    Raises OSError if it cannot be made or read, ValueError, with the remedy, if code in
+    it might be another user's.
     """
     home = cache_folder()
     if home.parts[:1] == ("~",):
@@ -71,9 +71,9 @@ def open_folder() -> Path:
 
 
 def _others_of(found: os.stat_result, above: bool = False) -> str:
-    """Say who beside root and this user could change a file or folder.
+    """Say who, other than root and this user, could change a file or folder.
 
-    Empty if nobody could. `above`: it is a folder above the cache.
+    Empty if no one else could. `above`: it is a folder above the cache.
     """
     if not hasattr(os, "geteuid"):  # Windows, where a user's folders are the user's
         return ""
@@ -87,7 +87,7 @@ def _others_of(found: os.stat_result, above: bool = False) -> str:
 
 
 def read_loop(path: Path) -> bytes:
-    """Read what a loop's file holds behind its hash.
+    """Read the content of a loop's file that follows its hash.
 
     Raises OSError if it cannot be read, ValueError, with what is wrong, if it is
     damaged or might be another user's.
@@ -108,7 +108,7 @@ def read_loop(path: Path) -> bytes:
 
 
 def loop_fault(path: Path) -> str:
-    """Say what is wrong with a loop's file; empty for a sound one, and other files."""
+    """Say what is wrong with a loop's file; empty for a valid or another file."""
     try:
         if path.suffix == LOOP:
             read_loop(path)
@@ -131,9 +131,9 @@ def write_loop(content: bytes, path: Path) -> None:
 def locked(path: Path, waiting: Callable[[], None]) -> Iterator[None]:
     """Let one process compile a loop's file while others wait.
 
-    `waiting` is called where another process holds the lock; that of a process that was
-    killed is free. Where no lock can be had, in a folder that may only be read or on a
-    disk without locks, each compiles.
+    `waiting` is called if another process holds the lock; the lock of a killed process
+    is free. Where there are no locks, in a read-only folder or on a disk without them,
+    each process compiles.
     """
     from filelock import FileLock, Timeout
 
@@ -152,7 +152,7 @@ def locked(path: Path, waiting: Callable[[], None]) -> Iterator[None]:
 
 
 def warn_of(folder: Path, error: BaseException) -> None:
-    """Say that nothing can be kept, because of an OSError, and what to do."""
+    """Warn that nothing can be stored, because of an OSError, and name the remedy."""
     reason = getattr(error, "strerror", error)
     tell(
         f"{folder}: cannot be written ({reason}), so ships are compiled again in each"
@@ -161,7 +161,7 @@ def warn_of(folder: Path, error: BaseException) -> None:
 
 
 class CacheWarning(UserWarning):
-    """What is compiled cannot be kept, or read."""
+    """Compiled code cannot be stored or read."""
 
 
 @cache

@@ -1,4 +1,4 @@
-"""A ship as loops take her: her functions, what she has, and where her numbers lie."""
+"""Ship as loops take her: her functions, equipment, and the layout of her numbers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from shipgym.engine.records import LANES, Layout, Record, Rows
 
 @dataclass(frozen=True, eq=False)
 class CompiledShip:
-    """What is compiled of a ship; ships that share it differ in numbers only.
+    """Compiled functions of a ship; ships that share them differ in numbers only.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class CompiledShip:
         Whether her steering gear has a time constant.
     staged : mapping
         Hooks of `shipgym.engine.stages`, of a ship part of whose accelerations is a sum
-        over a table: they take the place of her functions where many ships are sailed.
+        over a table: they replace her functions where many ships are simulated.
     """
 
     name: str
@@ -81,7 +81,7 @@ def compiled_ship(
 ) -> CompiledShip:
     """Return the one `CompiledShip` of these fields.
 
-    So what is compiled for one ship serves all that are like her.
+    Code compiled for one ship thus serves all ships like her.
     """
     return CompiledShip(
         name, state_names, coefficients, dict(functions), lag, dict(staged)

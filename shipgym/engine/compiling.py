@@ -1,10 +1,10 @@
-"""How loops are compiled for a ship, a sea and a task, and kept on disk, never stale.
+"""Compilation of loops for a ship, a sea and a task, cached on disk and never stale.
 
 A loop and the functions that it names are copied with their hooks filled
-(`shipgym.engine.specialise`) and handed to `numba.njit`. The machine code is kept under
-a name that hashes all that it depends on (`shipgym.engine.fingerprint`): a file that is
-there is right, whoever made it and when. So a cache that was filled beforehand and may
-only be read is used as it is.
+(`shipgym.engine.specialise`) and compiled by `numba.njit`. The machine code is stored
+under a name that hashes all that it depends on (`shipgym.engine.fingerprint`), so an
+existing file is always valid. A read-only cache that was filled beforehand is used as
+it is.
 """
 
 import sys
@@ -45,9 +45,9 @@ def compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
     signature : str
         Types of its arguments, as Numba writes them.
     hooks : mapping
-        What takes the place of globals that the loop and its functions name.
+        Replacements for globals that the loop and its functions name.
     what : str
-        What is compiled for whom, for messages.
+        Name of the compiled code, for messages.
 
     Returns
     -------
@@ -84,9 +84,9 @@ def compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
 
 
 def entry_of(loop: Any) -> Any:
-    """Return a compiled loop that does not look at the types of its arguments.
+    """Return a compiled loop that does not check the types of its arguments.
 
-    To look takes as long as to sail a ship. Who calls it has to give the right ones.
+    The check takes as long as a step of a ship. The caller has to pass the right types.
     """
     if plain_python():
         return loop
@@ -155,11 +155,11 @@ def _named(copy: Any) -> Any:
 
 
 def announce(what: str, folder: Path | None) -> None:
-    """Tell a person who waits that something is compiled, and where it is kept."""
+    """Announce to a waiting user what is compiled, and where it is stored."""
     kept = "kept in memory only"
     if folder:
         kept = f"kept in {folder} (beforehand: shipgym warm)"
-    # about what a loop takes to compile on a laptop; what who waits is told
+    # typical compilation time of a loop on a laptop, for the announcement
     seconds = 7
     tell_who_waits(f"shipgym: compiling {what}, once, about {seconds} s; {kept}")
 

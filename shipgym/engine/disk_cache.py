@@ -42,7 +42,7 @@ class CachedLoop:
             result = CompileResult._rebuild(
                 dispatcher.targetctx, *pickle.loads(content)
             )
-        except Exception as error:  # whatever the inside of another Numba may raise
+        except Exception as error:  # of the internals of another Numba
             tell(
                 f"{self.path}: cannot be loaded ({type(error).__name__}: {error}); it"
                 " is compiled again"
@@ -53,7 +53,7 @@ class CachedLoop:
         return dispatcher
 
     def save(self, dispatcher: Any) -> None:
-        """Keep a compiled loop, where the folder may be written."""
+        """Store a compiled loop if the folder is writable."""
         (result,) = dispatcher.overloads.values()
         if result.library.has_dynamic_globals:  # addresses of this process
             return

@@ -1,4 +1,4 @@
-"""How far a state lies outside the data its model was identified from."""
+"""Distance of a state from the data its model was identified from."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -57,7 +57,7 @@ def envelope_distance(motion: Motion, data: Envelope) -> float:
 
 
 def outside_range(motion: Motion, data: Envelope) -> bool:
-    """Whether one of u, v, r, delta is outside its range in the data."""
+    """Return whether u, v, r or delta is outside its range in the data."""
     low, high = data.low, data.high
     below = (
         (motion.u < low.u)

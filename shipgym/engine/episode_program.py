@@ -115,7 +115,7 @@ class EpisodeProgram:
 
     @cached_property
     def hooks(self) -> dict[str, Any]:
-        """What takes the place of hooks and constants of loops, by name."""
+        """Functions and values for the hooks and constants of loops, by name."""
         of_ships = 1 if self.shared else LANES
         return {
             "GROUP": 1 if plain_python() else tiles.GROUP,

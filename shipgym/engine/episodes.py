@@ -1,7 +1,7 @@
 """Episodes of many ships at once: take a control interval, and begin them.
 
 Ships lie in tiles of 64 lanes. What every step needs is a loop over lanes, which is
-vectorised (`shipgym.engine.sailing`, `shipgym.engine.judging`); what is rare is done
+vectorised (`shipgym.engine.sailing`, `shipgym.engine.judging`); rare work is done
 afterwards, lane by lane. The ship, the sea, the sensor set and the task are hooks
 (`shipgym.engine.hooks`): these files know none of them.
 """
@@ -128,7 +128,7 @@ def choose_ended(tile: Tile, chosen: Any) -> None:
 
 @called
 def begin_lanes(tile: Tile, outputs: OutputTables, chosen: Any, next_one: bool) -> None:
-    """Begin an episode in the chosen lanes of a tile, and show it.
+    """Begin an episode in the chosen lanes of a tile, and write its outputs.
 
     It is the one of the lane's key and number, or, with `next_one`, the next one under
     the key.

@@ -1,8 +1,8 @@
 """A hash of all that the machine code of a loop depends on.
 
 The loop and all functions that it names are followed to their bytecode, defaults and
-globals. An object counts by what Numba compiles of it, not by its text, which may leave
-out the middle of a long array, or everything but a name.
+globals. An object is hashed by what Numba compiles of it, not by its text, which may
+omit the middle of a long array, or everything but a name.
 """
 
 import hashlib
@@ -43,7 +43,7 @@ def traced(function: Any, hooks: Hooks) -> tuple[str, tuple[Any, ...]]:
 
 
 class _Trace:
-    """The hash on the way from a function to all that it names."""
+    """Hash of a function and of all that it names, as they are visited."""
 
     def __init__(self, hooks: Hooks) -> None:
         self.hooks = hooks
@@ -52,11 +52,11 @@ class _Trace:
         self._numbers: dict[Any, int] = {}  # of functions and modules seen so far
 
     def add(self, value: object) -> None:
-        """Take a value by its text."""
+        """Add a value by its text."""
         self.digest.update(repr(value).encode() + b"\0")
 
     def visit(self, value: Any, attributes: tuple[str, ...] = ()) -> None:
-        """Take a value, and of modules what is called by one of the `attributes`."""
+        """Add a value; of a module, those of its members named by `attributes`."""
         if isinstance(value, FunctionType):
             self._visit_function(value)
         elif isinstance(value, ModuleType):
@@ -102,7 +102,7 @@ class _Trace:
         self._visit_python(function)
 
     def _visit_compiled(self, value: Any) -> None:
-        """Take what Numba compiles, or knows by its name."""
+        """Add a function that Numba compiles, or knows by its name."""
         value = getattr(value, "_dispatcher", value)  # of `numba.vectorize`
         python = getattr(value, "py_func", None) or getattr(value, "_defn", None)
         jitclass = getattr(value, "class_type", None)
@@ -118,7 +118,7 @@ class _Trace:
             self.add(getattr(value, "__qualname__", str(type(value))))
 
     def _visit_python(self, function: Any) -> None:
-        """Take bytecode, defaults and globals of a function."""
+        """Add bytecode, defaults and globals of a function."""
         if not self._is_new(function):
             return
         self._visit_code(function.__code__, function.__doc__)
@@ -145,7 +145,7 @@ class _Trace:
                 self.add(constant)
 
     def _is_new(self, value: Any) -> bool:
-        """Return whether a value was not seen before; take which one it is."""
+        """Return whether a value is new, and add its number."""
         new = value not in self._numbers
         self.add(self._numbers.setdefault(value, len(self._numbers)))
         return new
@@ -153,12 +153,12 @@ class _Trace:
 
 @cache
 def _compiler() -> str:
-    """Versions and settings of what writes machine code, and the processor."""
+    """Versions and settings of the compiler, and the processor."""
     import numba
     from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
 
     sources = hashlib.sha256()
-    # Modules that decide how machine code is written.
+    # Modules that determine the machine code.
     compiler = ("compiling", "specialise")
     for name in compiler:
         sources.update(Path(__file__).with_name(f"{name}.py").read_bytes())

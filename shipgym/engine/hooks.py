@@ -1,9 +1,9 @@
-"""Hooks: functions that loops call, and that others replace when a loop is compiled.
+"""Hooks: functions that loops call, and that are replaced when a loop is compiled.
 
 A loop over ships is written against these functions. When it is compiled for a ship, a
 sea, a sensor set and a task, each is replaced by the function of that name that one of
-them gives (`shipgym.engine.specialise`); the functions here only say what is asked of
-it. `CompiledShip.hooks`, `sea_hooks` and `EpisodeProgram.hooks` give them.
+them provides (`shipgym.engine.specialise`); the functions here only document the
+interface. `CompiledShip.hooks`, `sea_hooks` and `EpisodeProgram.hooks` give them.
 
 Functions that load and store records are written from the rows of each record
 (`shipgym.engine.record_code`). They take an array and a lane; where it is a vector and
@@ -154,7 +154,7 @@ def total_reward(reward: Any) -> float:
 
 
 def load_ship(ships: Floats, lane: int = 0) -> Ship:
-    """Read what every ship has beside her coefficients."""
+    """Read the particulars that every ship has in addition to her coefficients."""
     raise NotImplementedError(RECORDS)
 
 
@@ -164,7 +164,7 @@ def load_coefficients(ships: Floats, lane: int = 0) -> Any:
 
 
 def load_sea_parameters(ships: Floats, lane: int = 0) -> SeaParameters:
-    """Read the parameters of the sea that the ship meets; zeros in calm water."""
+    """Read the parameters of the sea around the ship; zeros in calm water."""
     raise NotImplementedError(RECORDS)
 
 
@@ -214,12 +214,12 @@ def load_task_settings(settings: Floats) -> Any:
 
 
 def load_arguments(memory: Words) -> Arguments:
-    """Read where the arrays of an engine lie."""
+    """Read the locations of the arrays of an engine."""
     raise NotImplementedError(RECORDS)
 
 
 def store_sea_channels(row: Floats, lane: int, channels: SeaChannels) -> None:
-    """Write what is recorded of the sea behind the state of a row."""
+    """Write the recorded channels of the sea behind the state of a row."""
     raise NotImplementedError(RECORDS)
 
 
@@ -237,12 +237,12 @@ def load_inputs(row: Floats) -> Inputs:
 
 
 def load_point(result: Floats, lane: int) -> Point:
-    """Read where the ship is in the coordinates of her table."""
+    """Read the position of the ship in the coordinates of her table."""
     raise NotImplementedError(RECORDS)
 
 
 def store_point(result: Floats, lane: int, point: Point) -> None:
-    """Write where the ship is in the coordinates of her table."""
+    """Write the position of the ship in the coordinates of her table."""
     raise NotImplementedError(RECORDS)
 
 
@@ -286,7 +286,7 @@ def sail_lanes(tile: Tile, h: float, groups: int) -> None:
 
 
 def point_of(motion: Motion, terms: Any, ship: Ship) -> Point:
-    """Return where a ship is in the coordinates of her table, of such coefficients."""
+    """Return the position of a ship in the coordinates of her table."""
     raise NotImplementedError(SHIP)
 
 
@@ -313,7 +313,7 @@ def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
 
 
 def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> Sea:
-    """Return the sea h seconds later, around a ship whose motion is that of then."""
+    """Return the sea h seconds later, around a ship with her motion at that time."""
     raise NotImplementedError(SEA)
 
 
@@ -324,11 +324,11 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
 
 
 def encounter_frequency(motion: Motion, sea: Sea, p: SeaParameters) -> float:
-    """Frequency at which the ship meets the waves, rad/s; 0 in calm water."""
+    """Frequency of encounter with the waves, rad/s; 0 in calm water."""
     raise NotImplementedError(SEA)
 
 
-# The sensor set (`shipgym.instruments.perfect` says what is asked of it)
+# The sensor set (interface: `shipgym.instruments.perfect`)
 
 
 def measure(
@@ -345,11 +345,11 @@ def measure(
 
 
 def readings(motion: Motion, sea: Sea, memory: Any) -> Readings:
-    """Return what the instruments show."""
+    """Return the readings of the instruments."""
     raise NotImplementedError(SENSORS)
 
 
-# The task (`shipgym.tasks.contract` says what is asked of it)
+# The task (interface: `shipgym.tasks.contract`)
 
 
 @called
@@ -359,7 +359,7 @@ def task_begin(
     random: Random,
     plan: Floats,
 ) -> tuple[Motion, Any]:
-    """Return how an episode begins: motion of the ship, and state of the task."""
+    """Return the initial motion of the ship and state of the task in an episode."""
     raise NotImplementedError(TASK)
 
 
@@ -381,7 +381,7 @@ def observe(
     ship: Ship,
     settings: Any,
 ) -> Any:
-    """Return what the autopilot sees, an `Observation` in SI units."""
+    """Return the observations of the autopilot, an `Observation` in SI units."""
     raise NotImplementedError(TASK)
 
 
@@ -425,7 +425,7 @@ def step_of_task(
     ship: Ship,
     settings: Any,
 ) -> tuple[Any, Any, bool, bool]:
-    """Return what `task_step` does, with a reward that is not used."""
+    """Return the same as `task_step`, with a reward that is not used."""
     raise NotImplementedError(TASK)
 
 

@@ -1,7 +1,7 @@
-"""Many ships after an interval: what the task makes of it, and what is seen then.
+"""Many ships after an interval: its reward, its end, and the observations.
 
 What every interval needs is one loop over lanes, which is vectorised (see
-`shipgym.engine.sailing`). What is rare, such as a new set-point, is done afterwards,
+`shipgym.engine.sailing`). Rare work, such as a new set-point, is done afterwards,
 lane by lane.
 """
 
@@ -51,7 +51,7 @@ from shipgym.tasks.contract import Interval
 
 
 class LaneView(NamedTuple):
-    """A ship, the data of her model, and the scales of what is seen of her."""
+    """A ship, the data of her model, and the scales of her observations."""
 
     ship: Ship
     data: Envelope
@@ -185,9 +185,9 @@ def outcome_of(
     earned: float,
     settings: AllSettings,
 ) -> Outcome:
-    """Return what comes of an interval, from what the task says of it.
+    """Return the outcome of an interval, from the verdict of the task.
 
-    An episode that fails pays the largest cost for each of the intervals that are left.
+    A failed episode costs the largest cost for each of the remaining intervals.
     """
     rules = settings.rules
     going = 1.0 - counters.ended

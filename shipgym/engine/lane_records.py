@@ -1,4 +1,4 @@
-"""Records that loops keep of a lane beside those of ship, sea, sensors and task."""
+"""Records that loops keep of a lane, besides those of ship, sea, sensors and task."""
 
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ class Rules(NamedTuple):
 
 
 class Commands(NamedTuple):
-    """What is ordered in a lane."""
+    """Commands of a lane."""
 
     rudder_command: float  # part of the limit
     shaft_command: float  # part of the shaft speed at service speed
@@ -22,7 +22,7 @@ class Commands(NamedTuple):
 
 
 class EpisodeCounters(NamedTuple):
-    """How far the episode of a lane has come."""
+    """Progress of the episode of a lane."""
 
     steps: float  # control intervals so far
     ended: float  # 1 once the episode is over
@@ -30,7 +30,7 @@ class EpisodeCounters(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What comes of an interval beside the task's own."""
+    """Result of an interval, in addition to the task's own quantities."""
 
     reward: float
     terminated: float  # 1 or 0
@@ -47,7 +47,7 @@ class SeaRandom(NamedTuple):
 
 
 class Point(NamedTuple):
-    """Where a ship is in the coordinates of her table."""
+    """Position of a ship in the coordinates of her table."""
 
     a: float
     b: float
@@ -73,7 +73,7 @@ class WindAccelerations(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """A point of a measured trial, of which the inputs are straight between points."""
+    """Point of a measured trial, whose inputs are linear between points."""
 
     time: float  # s
     rudder: float  # rad
@@ -82,7 +82,7 @@ class Inputs(NamedTuple):
 
 
 class SeaChannels(NamedTuple):
-    """What is recorded of the sea beside the state."""
+    """Channels of the sea that are recorded in addition to the state."""
 
     psi_wave: float  # rad, first-order motion in heading
     r_wave: float  # rad/s, in yaw rate

@@ -29,7 +29,7 @@ class Loop:
     lanes: int = 1  # of a tile of states: 64, or 1 where states are vectors
     # whether there is one ship only, so that her numbers are a vector
     shared: bool = True
-    # hooks and constants beside those of the ship and the sea
+    # hooks and constants besides those of the ship and the sea
     hooks: Mapping[str, Any] = field(default_factory=dict)
 
 

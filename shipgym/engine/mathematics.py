@@ -16,7 +16,7 @@ import numpy as np
 Choice = TypeVar("Choice")
 
 TWO_OVER_PI = 2.0 / pi
-# 1.5 * 2^52: a number added to it loses what is behind the point
+# 1.5 * 2^52: a number added to it loses its fraction
 SHIFT = 6755399441055744.0
 
 
@@ -31,9 +31,9 @@ def clip(value: float, low: float, high: float) -> float:
 
 
 def nearest(x: float) -> float:
-    """Return the whole number nearest to x, |x| < 2^51, as a float.
+    """Return the integer nearest to x, |x| < 2^51, as a float.
 
-    A floor would be an integer, which is worked out lane by lane.
+    A floor would be of integer type, which is computed lane by lane.
     """
     return (x + SHIFT) - SHIFT
 
@@ -112,13 +112,13 @@ def wrap(angle: float) -> float:
 
 
 def power_of_bits(biased: float) -> float:
-    """2 to the power whose biased exponent stands in the lowest bits of a number."""
+    """2 to the power whose biased exponent is in the lowest bits of a number."""
     return np.int64(np.float64(biased).view(np.int64) << 52).view(np.float64)
 
 
 def power_of_two(k: float) -> float:
-    """2 to the power of a whole number in [-1022, 1023]."""
-    # added to a whole number: its biased exponent in the lowest bits
+    """2 to the power of an integer in [-1022, 1023]."""
+    # added to an integer: its biased exponent in the lowest bits
     exponent = 4503599627370496.0 + 1023.0
     return power_of_bits(k + exponent)
 

@@ -1,8 +1,8 @@
 """Memory of an engine: all its arrays in one, which a loop takes as one argument.
 
-To look at a dozen arrays takes the interpreter longer than to sail a ship. So tables of
-an engine lie one after another in one array of float64, and begin with the record of
-where each lies, `Arguments`. Tables of other types share it as views.
+Passing a dozen arrays takes the interpreter longer than a step of a ship. So tables of
+an engine lie one after another in one array of float64, which begins with the record of
+their locations, `Arguments`. Tables of other types share it as views.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ LINE = 8
 
 
 class Block(NamedTuple):
-    """Where a table lies."""
+    """Location of a table."""
 
     first: int  # entry of the float64 array at which it begins
     rows: int

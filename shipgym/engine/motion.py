@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import clip, sin_cos, small_cosine, turn_sin_cos
 
-# What ship, gear and sea have. Set when a loop is compiled, like hooks, so that what
-# they lack costs nothing.
+# Features of ship, gear and sea. Set when a loop is compiled, like hooks, so that
+# absent ones cost nothing.
 HAS_ROLL = True
 HAS_SHAFT = True  # a shaft speed among the states
 HAS_MEMORY = True  # of yaw
@@ -19,7 +19,7 @@ HAS_SEA = True
 
 
 class Motion(NamedTuple):
-    """State of a ship; what she does not have stays 0."""
+    """State of a ship; quantities that she does not have stay 0."""
 
     x: float  # m, north
     y: float  # m, east
@@ -35,7 +35,7 @@ class Motion(NamedTuple):
 
 
 class Ship(NamedTuple):
-    """What every ship has beside her coefficients."""
+    """Particulars that every ship has in addition to her coefficients."""
 
     length: float  # m
     speed: float  # m/s, service speed
@@ -50,7 +50,7 @@ class Ship(NamedTuple):
 
 
 class Push(NamedTuple):
-    """What the sea does to a ship, held over a step."""
+    """Accelerations and current that act on a ship, held over a step."""
 
     u: float  # m/s^2
     v: float  # m/s^2
@@ -64,7 +64,7 @@ CALM = Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Held(NamedTuple):
-    """What is held over a step."""
+    """Inputs held over a step."""
 
     order: float  # rad, to the rudder, within its limit
     shaft: float  # 1/s, command to the shaft
@@ -97,7 +97,7 @@ def accelerations(
 ) -> tuple[float, float, float, float, float]:
     """Accelerations in surge, sway, yaw, roll and of the memory of yaw.
 
-    A hook: the ship's own function takes its place.
+    A hook, replaced by the ship's own function.
     """
     return 0.0, 0.0, 0.0, 0.0, 0.0
 
@@ -110,7 +110,7 @@ def shaft_acceleration(
 ) -> float:
     """Acceleration of a shaft whose speed is a state, 1/s^2.
 
-    A hook: the function of a ship with such a shaft takes its place.
+    A hook, replaced by the function of a ship with such a shaft.
     """
     return 0.0
 
@@ -301,9 +301,9 @@ def sail(
 ) -> Motion:
     """State after one classical Runge-Kutta step of h seconds.
 
-    The commands, rad and 1/s, are held. The stages are worked out in the ship's frame
+    The commands, rad and 1/s, are held. The stages are computed in the ship's frame
     at the start of the step, from which she turns by a small angle only, whose sine and
-    cosine cost little; the way made is turned to north and east at the end.
+    cosine are cheap; the displacement is rotated to north and east at the end.
     """
     order = clip(rudder, -ship.rudder_limit, ship.rudder_limit)
     held = Held(order=order, shaft=shaft, push=push)
@@ -321,7 +321,7 @@ def sail(
 def lost(motion: Motion, ship: Ship) -> bool:
     """Return whether the ship has run away or capsized.
 
-    Her velocities are then beyond any ship's, or not numbers.
+    Her velocities then exceed those of any ship, or are not numbers.
     """
     u = motion.u
     v = motion.v

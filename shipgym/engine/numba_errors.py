@@ -1,4 +1,4 @@
-"""Why a function does not compile: what Numba says on a page, in one sentence."""
+"""One-sentence summary of Numba's explanation why a function does not compile."""
 
 import dis
 import re
@@ -10,14 +10,13 @@ from typing import Any
 
 from shipgym.python_files import LIBRARIES
 
-#: What Numba's reasons mean that do not say it.
+#: Plain words for reasons of Numba that are hard to understand.
 PLAINLY = {
     r"Unknown attribute '(\w+)' of type Module\(<module '((?!numpy|math)[\w.]+)'.*": (
-        r"\2.\1 is looked up in its module, expected it to be imported by name: from \2"
-        r" import \1"
+        r"expected \1 to be imported by name, got \2.\1; write from \2 import \1"
     ),
     r".*: setitem\(readonly array.*": (
-        "a global array is written, expected one that is only read"
+        "expected global arrays to be only read, got one that is written"
     ),
 }
 COLOUR = re.compile(r"\x1b\[[\d;]*m")
@@ -38,7 +37,7 @@ def explanation(error: Exception, what: str, functions: Iterable[Any] = ()) -> s
     code = None
     callee = CALLEE.search(text)
     if callee:
-        own = text[: callee.start()]  # what stands behind it is about who calls it
+        own = text[: callee.start()]  # the text behind it is about the caller
         code = _code_of(callee[0], functions)
 
     file, line = _place(own)
@@ -96,7 +95,7 @@ def _reason(text: str) -> str:
 
 
 def _place(text: str) -> tuple[str, int]:
-    """First file and line of a user's that a text names, or of anybody's."""
+    """First user's file and line that a text names, or the first of all."""
     places = []
     for at, at_line, within, within_line in PLACE.findall(text):
         file = at or within

@@ -81,7 +81,7 @@ def storer(rows: Rows, lanes: int = LANES) -> Function:
 def clipped_storer(rows: Rows, bounds: Mapping[str, tuple[float, float]]) -> Function:
     """Write `store(array, lane, record, scale)` for numbers clipped to their bounds.
 
-    What is stored is each number times that of the record `scale`.
+    Each number is multiplied by that of the record `scale`.
     """
     names: dict[str, Any] = {}
     lines = []
@@ -149,7 +149,7 @@ def _function(
     body: list[str],
     names: Mapping[str, Any],
 ) -> Function:
-    """Make a function of its source, which is kept for tracebacks."""
+    """Make a function from its source, which is stored for tracebacks."""
     lines = [f"def {name}({arguments}):"]
     if any(other.startswith("row_") for other in names):
         lines.append("    entry = uintp(lane)")

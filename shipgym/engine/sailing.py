@@ -101,16 +101,16 @@ def ship_of(tile: Tile, lane: int) -> tuple[Ship, Any]:
 
 
 def push_of(tile: Tile, lane: int) -> Push:
-    """Return what the sea does to the ship of a lane now."""
+    """Return the accelerations and current of the sea on the ship of a lane now."""
     motion = load_motion(tile.state, lane)
     sea = load_sea(tile.state, lane)
     return push(motion, sea, load_sea_parameters(tile.ships, lane))
 
 
 def end_substep(tile: Tile, lane: int, after: Motion, h: float, ship: Ship) -> None:
-    """Store where a ship is after h seconds, and let the sea go on.
+    """Store the state of a ship after h seconds, and advance the sea.
 
-    A ship that would run away, or whose episode is over, stays where she was.
+    A ship that would run away, or whose episode is over, keeps her state.
     """
     state = tile.state
     before = load_motion(state, lane)
@@ -131,7 +131,7 @@ def end_substep(tile: Tile, lane: int, after: Motion, h: float, ship: Ship) -> N
 
 
 def evolve_sea(tile: Tile, lane: int, motion: Motion, h: float, over: bool) -> None:
-    """Let the sea around a ship go on for h seconds, unless her episode is over."""
+    """Advance the sea around a ship by h seconds, unless her episode is over."""
     sea = load_sea(tile.state, lane)
     parameters = load_sea_parameters(tile.ships, lane)
     word = load_sea_random(tile.random, lane).rng_state

@@ -4,8 +4,8 @@ A ship, a sea, a task is written as plain functions on named tuples, without dec
 `specialise` takes a loop over many ships that is written against hooks
 (`shipgym.engine.hooks`). It copies the loop, and each function that it names, with
 other globals: hooks are replaced by the functions that fill them, constants such as
-`HAS_SEA` by their values. The copies are handed to `numba.njit`. The originals stay
-what they are, to be called from Python.
+`HAS_SEA` by their values. The copies are compiled by `numba.njit`. The originals are
+unchanged and can be called from Python.
 """
 
 import dis
@@ -25,7 +25,7 @@ AnyFunction = TypeVar("AnyFunction", bound=Callable[..., Any])
 def called(function: AnyFunction) -> AnyFunction:
     """Mark a function, or what fills a hook, as one that is called and not inlined.
 
-    Others become part of the loops that name them, which is what vectorises these.
+    Others become part of the loops that name them, so that these are vectorised.
     """
     vars(function)["inlined"] = False
     return function
@@ -109,8 +109,8 @@ class Specialisation:
         """
         if function.__code__.co_kwonlyargcount:
             raise InputError(
-                f"{place_of(function)}: keyword-only arguments found, which cannot be"
-                " compiled"
+                f"{place_of(function)}: expected no keyword-only arguments, which"
+                " cannot be compiled; take out the *"
             )
         namespace: dict[str, Any] = {
             "__name__": function.__module__,
@@ -128,12 +128,12 @@ class Specialisation:
         )
 
     def inner(self, function: Any, inlined: bool, checked: bool) -> Any:
-        """Make what stands for a function in those that name it."""
+        """Make the replacement of a function in those that name it."""
         return self.copy(function, checked)
 
     def _inner(self, function: Any, inlined: bool, checked: bool) -> Any:
         """`inner`, once for each function; InputError for one that calls itself."""
-        # a user's function that is called may write into its plan, and beside that is
+        # a user's function that is called may write into its plan, next to which is
         # the state of other ships
         checked = checked or not (inlined or is_shipped(function))
         key = (function, inlined, checked)
@@ -142,8 +142,8 @@ class Specialisation:
             self._made[key] = self.inner(function, inlined, checked)
         if self._made[key] is None:
             raise InputError(
-                f"{place_of(function)}: calls itself, expected a loop, which can be"
-                " compiled"
+                f"{place_of(function)}: expected a function that can be compiled, got"
+                " one that calls itself; use a loop"
             )
         return self._made[key]
 
@@ -153,6 +153,6 @@ def _refuse_container(function: Any, name: str, value: Any) -> None:
         return
     kind = type(value).__name__
     raise InputError(
-        f"{place_of(function)}: the global {name!r} is a {kind}, expected a tuple or an"
-        " array of numbers"
+        f"{place_of(function)}: global {name!r}: expected a tuple or an array of"
+        f" numbers, got a {kind}"
     )

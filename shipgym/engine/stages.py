@@ -2,8 +2,8 @@
 
 A loop over the rows of a table inside the loop over lanes would keep that one from
 being vectorised. So each stage of the Runge-Kutta step is finished in all lanes of a
-tile before the next one, and the loop over rows has that over lanes inside. What stands
-between the loops lies with the results of the tile.
+tile before the next one, and the loop over rows has that over lanes inside. Records
+between the loops lie with the results of the tile.
 """
 
 from shipgym.engine.hooks import (
@@ -71,7 +71,7 @@ def sail_in_stages(tile: Tile, h: float, groups: int) -> None:
 
 
 def start_of(tile: Tile, lane: int, ship: Ship) -> tuple[Motion, Held]:
-    """State at the start of the step, and what is held over it."""
+    """State at the start of the step, and the inputs held over it."""
     motion = load_motion(tile.state, lane)
     commands = load_commands(tile.state, lane)
     limit = ship.rudder_limit
@@ -92,7 +92,7 @@ def state_at_stage(tile: Tile, lane: int, reach: float, ship: Ship) -> Motion:
 
 
 def begin_stage(tile: Tile, reach: float, groups: int) -> None:
-    """Find where ships are at a stage, in the coordinates of their tables."""
+    """Find the positions of ships at a stage, in the coordinates of their tables."""
     shared = ship_of(tile, FIRST_LANE)
     for lane in range(groups * GROUP):
         ship, coefficients = shared if SHARED_SHIP else ship_of(tile, lane)
@@ -120,7 +120,7 @@ def sum_rows(tile: Tile, groups: int) -> None:
 
 
 def end_stage(tile: Tile, reach: float, weight: float, groups: int) -> None:
-    """Work out the rates at a stage, and add them to those of the step."""
+    """Compute the rates at a stage, and add them to those of the step."""
     shared = ship_of(tile, FIRST_LANE)
     for lane in range(groups * GROUP):
         ship, coefficients = shared if SHARED_SHIP else ship_of(tile, lane)

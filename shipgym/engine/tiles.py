@@ -1,4 +1,4 @@
-"""Ships tile by tile: the arrays of 64 of them, and what is shown of all."""
+"""Ships tile by tile: the arrays of 64 of them, and the outputs of all."""
 
 from typing import Any, NamedTuple
 
@@ -15,8 +15,8 @@ from shipgym.engine.memory import (
 from shipgym.engine.records import LANES
 from shipgym.engine.specialise import called
 
-# Lanes are sailed in whole vectors, whose arithmetic may be contracted otherwise than
-# that of a single lane, so that results do not depend on the number of ships.
+# Lanes are computed in whole vectors, so that results do not depend on the number of
+# ships: the arithmetic of a single lane may be contracted differently.
 GROUP = 16
 # typed, since Numba compiles a function once more for a literal that it is called with
 FIRST_LANE: Any = np.int64(0)
@@ -42,7 +42,7 @@ class Tile(NamedTuple):
 
 
 class OutputTables(NamedTuple):
-    """Tables that users are given, row after row, and where their rows come from."""
+    """Tables returned to users, row after row, and the sources of their rows."""
 
     observations: Any  # float32 (n_ships * n_observations,)
     outcomes: Any  # float64 (n_outcomes * n_ships,)

@@ -3,7 +3,7 @@
 Each loop but `derivatives` begins with the state in row 0 of `out` and writes one a
 sample into the others; it returns the last row at which the ship had not yet run away.
 States are vectors in the order of the ship's `state_names`; behind them, in the open
-sea, stands what is recorded of it (`SeaChannels`). `sea` is the vector of the sea's
+sea, are its recorded channels (`SeaChannels`). `sea` is the vector of the sea's
 state and `rng_state` that of its random numbers, one word long; both are changed.
 `parameters` are numbers of the sea, `numbers` those of the ship.
 """
@@ -95,7 +95,7 @@ def replaced(motion: Motion, psi: float, delta: float, n: float) -> Motion:
 
 
 def push_now(motion: Motion, sea: Any, parameters: Any) -> Push:
-    """Return what the sea does to the ship now."""
+    """Return the accelerations and current of the sea on the ship now."""
     return push(motion, load_sea(sea), load_sea_parameters(parameters))
 
 
@@ -119,7 +119,7 @@ def follow(
     rng_state: Any,
     parameters: Any,
 ) -> None:
-    """Record where a step led, and let the sea go on meanwhile."""
+    """Record the state after a step, and advance the sea over it."""
     store_motion(out[row], 0, motion)
     if HAS_SEA:
         p = load_sea_parameters(parameters)

@@ -25,12 +25,12 @@ class Artist:
         self.note(engine)
 
     def note(self, engine: Engine) -> None:
-        """Note where the ship is."""
+        """Add the position of the ship to the wake."""
         state = engine.physical_state()
         north = float(state["x"][self._lane])
         east = float(state["y"][self._lane])
         self._wake.append((north, east))
-        wake_points = 400  # kept of the wake
+        wake_points = 400  # points of the wake that are kept
         del self._wake[:-wake_points]
 
     def picture(self, engine: Engine) -> NDArray[np.uint8]:
@@ -103,6 +103,6 @@ def _readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, s
 
 
 def _bearing(angle: float) -> str:
-    """Angle as a compass shows it."""
+    """Text of an angle as on a compass."""
     tenths = round(degrees(angle) * 10.0) % 3600
     return f"{tenths / 10.0:05.1f} deg"

@@ -1,4 +1,4 @@
-"""Conformance suite for vector environments, which Gymnasium's own checker refuses."""
+"""Conformance suite for vector environments; Gymnasium's checker takes single ones."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -27,12 +27,11 @@ def check_vector_env(
 ) -> None:
     """Check that a vector environment meets the requirements of Gymnasium's interface.
 
-    Spaces and shapes, seeds that hold, arrays that are not changed later, the autoreset
-    that its metadata name, wrong actions, and, given single environments, that each row
-    is one of them, bit for bit.
+    Spaces and shapes, reproducible seeds, arrays that are not changed later, the
+    autoreset named in its metadata, wrong actions, and, given single environments, that
+    each row equals one of them, bit for bit.
 
-    Raises InputError naming the first requirement that is not met, what was found and
-    what is expected.
+    Raises InputError for the first requirement that is not met.
 
     Parameters
     ----------
@@ -43,7 +42,7 @@ def check_vector_env(
         Makes the single environment that row i equals when it is reset with the seed
         plus i.
     n_steps : int
-        Steps taken in each check; let them be enough for some episodes to end.
+        Steps taken in each check, enough for some episodes to end.
     """
     checks = (
         _check_spaces,
@@ -70,8 +69,8 @@ def autoreset_mode(env: Vectors) -> AutoresetMode:
     mode = env.metadata.get("autoreset_mode")
     if not isinstance(mode, AutoresetMode):
         raise InputError(
-            f"vector environment: metadata['autoreset_mode'] is {mode!r}, expected a"
-            " member of gymnasium.vector.AutoresetMode"
+            "vector environment: metadata['autoreset_mode']: expected a member of"
+            f" gymnasium.vector.AutoresetMode, got {mode!r}"
         )
     return mode
 
@@ -79,7 +78,7 @@ def autoreset_mode(env: Vectors) -> AutoresetMode:
 def _check_spaces(env: Vectors, n_steps: int) -> None:
     autoreset_mode(env)
     n = env.num_envs
-    _expect(isinstance(n, int) and n >= 1, f"num_envs is {n!r}, expected >= 1")
+    _expect(isinstance(n, int) and n >= 1, f"num_envs: expected >= 1, got {n!r}")
     _check_batched(
         "observation",
         single=env.single_observation_space,
@@ -98,7 +97,8 @@ def _check_batched(which: str, single: Space, batch: Space, n: int) -> None:
     expected = gymnasium.vector.utils.batch_space(single, n)
     _expect(
         batch == expected,
-        f"{which}_space is {batch}, expected {expected}: single_{which}_space batched",
+        f"{which}_space: expected {expected}, that is single_{which}_space batched, got"
+        f" {batch}",
     )
 
 
@@ -106,7 +106,7 @@ def _check_reset(env: Vectors, n_steps: int) -> None:
     answer = env.reset(seed=SEED)
     _expect(
         isinstance(answer, tuple) and len(answer) == 2,
-        f"reset returned {type(answer)}, expected (observations, infos)",
+        f"reset: expected (observations, infos), got {type(answer)}",
     )
     observations, infos = answer
     _check_observations(env, observations, "reset")
@@ -119,7 +119,7 @@ def _check_steps(env: Vectors, n_steps: int) -> None:
     kept: list[tuple[Any, Any]] = []
     for _ in range(min(n_steps, 20)):
         answer = env.step(env.action_space.sample())
-        _expect(len(answer) == 5, f"step returned {len(answer)} values, expected 5")
+        _expect(len(answer) == 5, f"step: expected 5 values, got {len(answer)}")
         observations, rewards, terminated, truncated, infos = answer
         _check_observations(env, observations, "step")
         _check_array("rewards", rewards, np.floating, env.num_envs)
@@ -127,7 +127,7 @@ def _check_steps(env: Vectors, n_steps: int) -> None:
         _check_array("truncated", truncated, np.bool_, env.num_envs)
         _expect(
             bool(np.all(np.isfinite(rewards))),
-            f"step: rewards {rewards} are not all finite",
+            f"step: rewards: expected finite numbers, got {rewards}",
         )
         _check_infos(env, infos, "step")
 
@@ -145,7 +145,7 @@ def _check_array(name: str, array: Any, kind: Any, n: int) -> None:
     dtype = getattr(array, "dtype", None)
     _expect(
         shape == (n,) and np.issubdtype(dtype, kind),
-        f"step: {name} of shape and type {(shape, dtype)}, expected ({n},) {kind}",
+        f"step: {name}: expected shape and type ({n},) {kind}, got {(shape, dtype)}",
     )
 
 
@@ -157,14 +157,14 @@ def _check_observations(
     space = env.observation_space
     _expect(
         observations in space,
-        f"{where}: observations {observations} are not in {space}",
+        f"{where}: observations: expected a member of {space}, got {observations}",
     )
 
 
 def _check_infos(env: Vectors, infos: Any, where: str) -> None:
     _expect(
         isinstance(infos, dict),
-        f"{where}: infos are {type(infos)}, expected a dict of arrays",
+        f"{where}: infos: expected a dict of arrays, got {type(infos)}",
     )
     for key, value in infos.items():
         if key.startswith("_"):
@@ -173,15 +173,16 @@ def _check_infos(env: Vectors, infos: Any, where: str) -> None:
         is_flags = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
         _expect(
             is_flags and mask.shape == (env.num_envs,),
-            f"{where}: infos['_{key}'] is {mask!r}, expected a mask of {env.num_envs}"
-            " booleans",
+            f"{where}: infos['_{key}']: expected a mask of {env.num_envs} booleans, got"
+            f" {mask!r}",
         )
         if isinstance(value, dict):
             _check_infos(env, value, f"{where}, {key}")
         else:
             _expect(
                 isinstance(value, np.ndarray) and len(value) == env.num_envs,
-                f"{where}: infos['{key}'] is {value!r}, expected an entry for each row",
+                f"{where}: infos['{key}']: expected an entry for each row, got"
+                f" {value!r}",
             )
 
 
@@ -238,7 +239,7 @@ def _check_actions(env: Vectors, n_steps: int) -> None:
         except (ValueError, AssertionError, IndexError):
             continue
         raise InputError(
-            f"vector environment: step took actions {bad!r}, expected an error"
+            f"vector environment: step: expected an error for actions {bad!r}, got none"
         )
 
 
@@ -247,7 +248,7 @@ def _check_autoreset(env: Vectors, n_steps: int) -> None:
     env.action_space.seed(SEED)
     env.reset(seed=SEED)
     ended = np.zeros(env.num_envs, dtype=np.bool_)
-    stagger = 5  # step at which a row is begun anew by hand
+    stagger = 5  # step at which a row is reset by hand
     for step in range(n_steps):
         action = env.action_space.sample()
         observations, rewards, terminated, truncated, infos = env.step(action)
@@ -259,7 +260,7 @@ def _check_autoreset(env: Vectors, n_steps: int) -> None:
             )
             _expect(
                 not np.any(rewards[ended]),
-                "the step that begins an episode earned something, expected 0",
+                "rewards: expected 0 in the step that begins an episode, got another",
             )
         elif mode is AutoresetMode.SAME_STEP:
             if np.any(done):
@@ -283,13 +284,13 @@ def _check_final(
         mask = infos.get(f"_{key}", np.zeros(0))
         _expect(
             np.array_equal(mask, done),
-            f"infos['_{key}'] is {mask}, expected {done}: the ended rows",
+            f"infos['_{key}']: expected the ended rows {done}, got {mask}",
         )
     for row in np.flatnonzero(done):
         final = infos["final_obs"][row]
         _expect(
             final in env.single_observation_space,
-            f"infos['final_obs'][{row}] is {final}, not an observation",
+            f"infos['final_obs'][{row}]: expected an observation, got {final}",
         )
 
 
@@ -325,6 +326,6 @@ def _check_rows(make: Make, make_single: MakeSingle, n_steps: int) -> None:
                 found = array[row]
                 _expect(
                     bool(np.array_equal(found, expected)),
-                    f"row {row} shows {found}, expected {expected} of the single"
-                    f" environment with seed {SEED + row}",
+                    f"row {row}: expected {expected} of the single environment with"
+                    f" seed {SEED + row}, got {found}",
                 )

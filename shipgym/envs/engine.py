@@ -42,15 +42,15 @@ class Engine(Lanes):
     num_envs : int
         Number of lanes.
     task : Task, optional
-        What is asked; by default course keeping.
+        Task of the ships; by default course keeping.
     randomisation : Randomisation, optional
-        What differs from episode to episode; only with one ship for all.
+        Variation from episode to episode; only with one ship for all.
     allow_unstable : bool
         Whether a model that was found unstable when it was identified may be used.
     threads : int
         Number of threads that share the lanes; the results do not depend on it.
     model_index : int, optional
-        The one of the ships that are drawn from that all episodes have.
+        Number of the ship, of those that are drawn from, that all episodes have.
     loop : callable, optional
         Makes the loop that steps the ships; by default it is compiled.
     """
@@ -111,10 +111,10 @@ class Engine(Lanes):
         self._orders = self._actions.T
         self.all_lanes = np.ones(self.num_envs, dtype=np.bool_)
         self.all_lanes.flags.writeable = False
-        # threads begin when there is a share for them
+        # threads start when there is a share for them
         self._threads = ThreadPoolExecutor(max(self.n_shares - 1, 1), "shipgym")
         self.renew_outputs()
-        # last, when nothing is left that may be refused
+        # last, when no input is left that may be refused
         self._run = loop(self.program)
         self.reset(np.arange(self.num_envs))
 
@@ -123,7 +123,7 @@ class Engine(Lanes):
         try:
             run = entry_of(program.run)
         except InputError as error:
-            # plain Python often says better what is wrong
+            # plain Python often has the better message
             fault = fault_in_python(self.model, self.task)
             raise InputError(fault or str(error)) from None
         task = program.task
@@ -133,11 +133,11 @@ class Engine(Lanes):
         return run
 
     def renew_outputs(self) -> None:
-        """Write the next outputs into new arrays; given ones do not change."""
+        """Write the next outputs into new arrays; earlier ones do not change."""
         self.outputs = self._output_pool.take()
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go on from the `get_state` of this engine, or one of the same arguments.
+        """Continue from the `get_state` of this engine, or one with the same arguments.
 
         InputError for another state.
         """
@@ -151,10 +151,10 @@ class Engine(Lanes):
     def advance(self, begin_ended: bool = False, anew: bool = False) -> int:
         """Take one control interval with the commands as they stand.
 
-        With `begin_ended` lanes whose episode was over begin the next one, and do not
-        stay. With `anew` it is written into new arrays, so that those that were given
-        may be kept. Returns how many episodes ended. Raises InputError if a command is
-        not finite; nothing is changed then.
+        With `begin_ended`, lanes whose episode was over begin the next one instead of
+        staying as they are. With `anew`, results are written into new arrays, so that
+        earlier ones may be kept. Returns the number of episodes that ended. Raises
+        InputError if a command is not finite; nothing is changed then.
         """
         before = self.outputs
         if anew:
@@ -193,7 +193,7 @@ class Engine(Lanes):
     def step_of_one(self) -> Callable[[], int]:
         """Return the step of an engine of one lane, whose arrays stay the same.
 
-        What it returns is the number of episodes that ended, or
+        The step returns the number of episodes that ended, or
         `shipgym.engine.episodes.REFUSED`.
         """
         return partial(self._run, self._memory, self.outputs.memory, 0, STEP)
@@ -243,13 +243,13 @@ class Engine(Lanes):
         self._chosen[:] = chosen
         try:
             self._run(self._memory, self.outputs.memory, 0, asked)
-        except IndexError as error:  # of a user's function
+        except IndexError as error:  # raised by a user's function
             fault = fault_in_python(self.model, self.task)
             source = self.task.definition.source
             raise InputError(fault or f"{source}: begin: {error}") from None
 
     def order(self, actions: ArrayLike) -> None:
-        """Set the commands for the next step, which refuses those that are not finite.
+        """Set the commands for the next step, which refuses non-finite ones.
 
         `actions`, shape (num_envs, n_commands), are commanded rudder, and shaft speed,
         parts of their limits, clipped to [-1, 1]. Raises InputError for another shape,
@@ -290,9 +290,9 @@ class Engine(Lanes):
         reward = self.info(name)[lane]
         step = self.steps[lane]
         raise InputError(
-            f"{self.task.definition.reward_source}: {name} is {reward} in lane {lane}"
-            f" at step {step:g}, expected a finite number; look for a division by zero"
-            " or a root of a negative number (shipgym.check_task helps)"
+            f"{self.task.definition.reward_source}: {name}: expected a finite number,"
+            f" got {reward} in lane {lane} at step {step:g}; look for a division by"
+            " zero or a root of a negative number (shipgym.check_task helps)"
         )
 
     @property
@@ -343,7 +343,7 @@ def _check_ships(
 def fault_in_python(model: ShipModel, task: Task) -> str:
     """Fault that plain Python finds in the first step of a task; empty if none.
 
-    Errors of arithmetic are passed over: compiled code goes on with infinities and NaN.
+    Arithmetic errors are ignored: compiled code continues with infinities and NaN.
     """
     try:
         with warnings.catch_warnings(action="ignore"):
@@ -370,7 +370,7 @@ def as_array(actions: Any) -> NDArray[Any]:
 
 
 def as_numbers(actions: Any, where: str) -> NDArray[Any]:
-    """Return actions as an array; InputError for what is no array of real numbers."""
+    """Return actions as an array; InputError if it is not one of real numbers."""
     array = as_array(actions)
     if array.dtype.kind not in "fiub":
         raise InputError(
@@ -390,7 +390,7 @@ def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:
 
 
 def episode_key(random: np.random.Generator) -> int:
-    """Draw the key of an episode: all that an environment's generator is asked for."""
+    """Draw the key of an episode, the only draw from an environment's generator."""
     return int(random.integers(2**63))
 
 
@@ -407,13 +407,15 @@ def refuse_unstable(models: Iterable[ShipModel], allow_unstable: bool = False) -
 
 
 def _refuse_or_warn(name: str, allow_unstable: bool) -> None:
-    found = (
-        f"model {name!r} was found unstable when it was identified: it runs away where"
-        " ships do not"
-    )
+    reason = "one that was found unstable when it was identified"
     if not allow_unstable:
         raise InputError(
-            f"{found}, expected a stable one; identify it from more trials or with the"
-            " guard, or give allow_unstable=True to sail it all the same"
+            f"model {name!r}: expected a stable ship, got {reason}; identify it from"
+            " more trials or with the guard, or give allow_unstable=True to use it all"
+            " the same"
         )
-    warnings.warn(f"{found}, do not trust what is learned or tuned on it", stacklevel=5)
+    warnings.warn(
+        f"model {name!r}: expected a stable ship, got {reason}; do not trust what is"
+        " learned or tuned on it",
+        stacklevel=5,
+    )

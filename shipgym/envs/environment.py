@@ -40,9 +40,9 @@ ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
 
 
 class UnknownKeywordError(InputError, TypeError):
-    """Keyword that an environment does not take.
+    """Error for a keyword that an environment does not take.
 
-    It is a TypeError, because libraries probe for keywords by that.
+    It is a TypeError, because libraries probe for keywords by catching one.
     """
 
     def __init__(self, message: str, known: Sequence[str] = ()) -> None:
@@ -61,7 +61,7 @@ def read_options(
     options: Mapping[str, Any],
     taken: Sequence[str] = (),
 ) -> tuple[ShipModel, Task, Randomisation]:
-    """Read the ship, the task and what is randomised from an environment's keywords.
+    """Read ship, task and randomisation from an environment's keywords.
 
     `taken`: further keywords of its caller, for messages. Raises InputError for an
     unknown model or keyword, or a value out of its range.
@@ -124,8 +124,8 @@ def rudder_orders(
 class ShipsEnv:
     """An environment on an engine.
 
-    `copy.deepcopy` and `pickle` make an environment again by its arguments, and give it
-    state and attributes: what is compiled stays where it is.
+    `copy.deepcopy` and `pickle` rebuild an environment from its arguments, state and
+    attributes: compiled code is not copied.
 
     Attributes
     ----------
@@ -147,7 +147,7 @@ class ShipsEnv:
         taken: Sequence[str],
         render_modes: Sequence[str],
     ) -> tuple[gymnasium.spaces.Box, Space]:
-        """Take the arguments of its making; returns the spaces of one ship."""
+        """Read the arguments of the environment; return the spaces of one ship."""
         options = arguments.pop("options")
         given = dict(arguments)
         for name in ("self", "__class__"):
@@ -188,7 +188,7 @@ class ShipsEnv:
         return spaces(self.task, self.model)
 
     def _made(self) -> None:
-        """End making an environment: attributes that are added later are the user's."""
+        """End the construction: attributes that are added later are the user's."""
         self._by_arguments = frozenset([*vars(self), "_by_arguments"])
 
     def _use(self, engine: Engine) -> None:
@@ -196,7 +196,7 @@ class ShipsEnv:
 
     @property
     def spec(self) -> EnvSpec | None:
-        """How it was registered, with the steps of an episode."""
+        """Registration of the environment, with the number of steps of an episode."""
         return self._spec
 
     @spec.setter
@@ -227,7 +227,7 @@ class ShipsEnv:
         return {"row_keys": np.array(self._keys)}
 
     def get_state(self) -> dict[str, Any]:
-        """All that `set_state` needs to go on from here.
+        """Return all that `set_state` needs to continue from here.
 
         These are the episodes, their random numbers, and the outputs of the last step.
         Raises InputError before the first `reset`.
@@ -241,7 +241,7 @@ class ShipsEnv:
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go on from what `get_state` gave, of an environment by the same arguments.
+        """Continue from the `get_state` of an environment with the same arguments.
 
         Raises InputError for a state of another task, version, ship or number of ships,
         or one with a number that is not finite; nothing is changed then.
@@ -267,11 +267,11 @@ class ShipsEnv:
             artist.begin(engine)
 
     def _recall(self, counters: Mapping[str, Any]) -> None:
-        """Take what `_counters` gave."""
+        """Restore the integers of `_counters`."""
         self._keys = counters["row_keys"].copy()
 
     def _engine_for(self, asked: Mapping[str, Any]) -> Engine:
-        """Return its own engine, or one with other waypoints or a certain ship."""
+        """Return the engine, or one with other waypoints or a certain ship."""
         own = self._own_engine
         if not asked:
             return own
@@ -284,7 +284,7 @@ class ShipsEnv:
         )
 
     def _take(self, options: Mapping[str, Any] | None, *more: str) -> Any:
-        """Do what the options of a reset ask for, until the next; return a given state.
+        """Apply the options of a reset until the next one; return a state among them.
 
         Raises InputError for other options, or a value that does not fit.
         """
@@ -326,7 +326,7 @@ class ShipsEnv:
         return np.array(keys, dtype=np.uint64)
 
     def _draw(self, mask: Flags | None = None) -> None:
-        """Let the wakes grow, or begin where an episode did; in the rows of a mask."""
+        """Extend the wakes, or begin them with an episode, in the rows of a mask."""
         engine = self._engine
         for row, artist in enumerate(self._artists):
             if mask is not None and not mask[row]:
@@ -338,7 +338,7 @@ class ShipsEnv:
 
 
 def _artists(mode: str, num_envs: int) -> list[Artist]:
-    from shipgym.envs.artist import Artist  # needed for pictures alone
+    from shipgym.envs.artist import Artist  # needed only for pictures
 
     return [Artist(mode, row) for row in range(num_envs)]
 
@@ -349,7 +349,7 @@ def rebuild(
     state: Any,
     attributes: dict[str, Any],
 ) -> Any:
-    """Make an environment again."""
+    """Rebuild an environment from its arguments, state and attributes."""
     env = kind(**arguments)
     vars(env).update(attributes)
     if state is not None:

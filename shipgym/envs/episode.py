@@ -1,4 +1,4 @@
-"""Episode of an environment: what ship and agent did, to be kept and replayed."""
+"""Episode of an environment: record of ship and agent, to be stored and replayed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -35,7 +35,7 @@ class Episode:
     States and info are those at the beginning and after each of the n steps; commands,
     actions and rewards belong to the steps.
 
-    Raises InputError naming the field, what was found and what is expected.
+    Raises InputError naming the field.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Episode:
     length, rudder_limit : float
         Of the ship: length between perpendiculars, m, and largest rudder angle, rad.
     states : mapping of str to array-like of shape (n_steps + 1,)
-        All that the environment's `physical_state` names; at least x, y, psi and delta.
+        Entries of the environment's `physical_state`; at least x, y, psi and delta.
     actions : array-like of shape (n_steps, n_actions)
         As the agent gave them.
     rewards : array-like of shape (n_steps,)
@@ -151,7 +151,7 @@ class Episode:
         self._set_table("info", n_steps + 1)
         self._set_table("commands", n_steps)
         self._set_table("reward_parts", n_steps)
-        # What has to be recorded of any ship.
+        # Channels that are required of any ship.
         required_states = ("x", "y", "psi", "delta")
         missing = [name for name in required_states if name not in self.states]
         if missing:

@@ -47,7 +47,7 @@ TABLES = {
     "outcome": {name: name for name in ("terminated", "truncated", "success")},
 }
 SERIES = ("states", "commands", "reward_parts", "info")
-#: Fields that stand in the file as in an episode.
+#: Fields that are the same in the file as in an episode.
 PLAIN = ("model", "seed", "number", "dt", *SERIES, "actions", "rewards")
 
 
@@ -75,7 +75,8 @@ def from_file(content: Mapping[str, Any]) -> dict[str, Any]:
     kind = content.get("kind")
     if kind != KIND:
         raise InputError(
-            f"kind: {kind!r} found, expected {KIND!r}: a file that RecordEpisode wrote"
+            f"kind: expected {KIND!r}, got {kind!r}; choose a file that RecordEpisode"
+            " wrote"
         )
     check_format(content, FORMAT, KIND)
     known = ("format", "kind", *TABLES, *PLAIN)

@@ -1,4 +1,4 @@
-"""State of many ships by lane: laid out, read, written, copied between two steps."""
+"""State of many ships by lane: layout, reading, writing and copies between steps."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -30,7 +30,7 @@ class Lanes:
     Parameters
     ----------
     program : EpisodeProgram
-        Says where each number lies.
+        Layout of the numbers.
     model : ShipModel
         The ship, or the first of them.
     task : Task
@@ -190,7 +190,7 @@ class Lanes:
         """State, set-point, commands and, unless it is calm, weather, in SI units.
 
         Each is of shape (num_envs,). Heading and yaw rate are without the first-order
-        motion in waves, which has names of its own, as has the weather
+        motion in waves, which is named separately, as is the weather
         (`shipgym.engine.trajectories.SeaChannels`). `set_point` is the heading to
         steer, rad.
         """
@@ -259,7 +259,7 @@ class Lanes:
         return float(lengths * self.model.particulars["length"])
 
     def get_state(self) -> dict[str, Any]:
-        """All that `set_state` needs to go on from here, copies by name."""
+        """Return all that `set_state` needs to continue from here, copies by name."""
         rows = []
         for name, record in self.program.state_rows.rows.items():
             rows += [f"{name}.{path}" for path in record.present]
@@ -278,9 +278,9 @@ class Lanes:
         }
 
     def check_state(self, state: Mapping[str, Any]) -> None:
-        """Refuse a state that an engine made by other arguments gave.
+        """Refuse a state of an engine with other arguments.
 
-        InputError says what differs.
+        InputError names the difference.
         """
         own = self.get_state()
         check_table(state, "state", own, required=own)
@@ -316,7 +316,7 @@ class Lanes:
             raise InputError("state: observations: expected finite numbers")
 
     def memory(self) -> dict[str, NDArray[Any]]:
-        """All that later steps depend on except their commands, copies by name."""
+        """Return all on which later steps depend, except commands; copies by name."""
         return {
             "states": self._states.copy(),
             "keys": self._random.copy(),
@@ -324,7 +324,7 @@ class Lanes:
         }
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from the `memory` of this engine, or one of the same arguments."""
+        """Continue from the `memory` of this engine, or one with the same arguments."""
         self._states[:] = memory["states"]
         self._random[:] = memory["keys"]
         self._ships[:] = memory["ships"]
@@ -356,7 +356,7 @@ def lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:
 
 def bridge_noise(multiple: float) -> dict[str, float]:
     """Settings of a bridge's noise, in multiples of that of a sea trial's sensors."""
-    # imports all that reads trials, which is needed for noise alone
+    # imports the readers of trials, which are needed only for noise
     from shipgym.trials.sensors import SEA_TRIAL
 
     channels = {"heading": "psi", "yaw_rate": "r", "speed": "u", "position": "x"}
@@ -380,9 +380,9 @@ def ship_columns(
     base: ShipModel,
     drawn: bool,
 ) -> Floats:
-    """Numbers of ships and of the seas they meet, a row each.
+    """Numbers of ships and of the seas around them, a row each.
 
-    The sea is worked out once for each kind of ship. Ships that are drawn for an
+    The sea is computed once for each kind of ship. Ships that are drawn for an
     episode are seen in the scales of the environment's model.
     """
     step = task.substep(base)
@@ -407,7 +407,7 @@ def ship_columns(
 
 
 def _scale_factors(task: Task, ship: Ship) -> list[float]:
-    """Observations of quantities of 1; 0 for those that are not made of such a ship."""
+    """Observations of quantities of 1; 0 for those that such a ship does not have."""
     factors = []
     for path in task.definition.observations:
         scale = task.scale(path, ship)

@@ -1,4 +1,4 @@
-"""Output buffers: the arrays that a step writes and users are given."""
+"""Output buffers: the arrays that a step writes and returns to users."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,15 +32,15 @@ class Outputs:
 
 
 class OutputPool:
-    """Output buffers of one engine; memory that nobody holds any more is used again.
+    """Output buffers of one engine; memory that is no longer referenced is reused.
 
-    To ask the system for memory in each step would take longer than to sail hundreds of
-    ships. What a user keeps, an array or a view of one, stays as it is.
+    Allocating memory in each step would take longer than the step of hundreds of ships.
+    Arrays and views that a user keeps do not change.
 
     Attributes
     ----------
     blocks : dict
-        Where each table lies in the memory, by name.
+        Location of each table in the memory, by name.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class OutputPool:
         self._free: list[bytearray] = []
 
     def take(self) -> Outputs:
-        """Return buffers that nobody else holds."""
+        """Return buffers that are not in use."""
         memory = self._free.pop() if self._free else bytearray(WORD * self._size)
         lease = _Lease(self._size, np.float64, memory)
         lease.memory = memory
@@ -86,7 +86,7 @@ class OutputPool:
 
 
 class _Lease(np.ndarray[Any, Any]):
-    """A buffer that returns to the pool when the last array or view of it is gone."""
+    """Buffer returned to the pool when its last array or view is garbage-collected."""
 
     memory: bytearray
     free: list[bytearray]
@@ -103,7 +103,7 @@ def named_rows(
 ) -> dict[str, Any]:
     """Rows of outcomes and flags by name, but for the answer of a step.
 
-    The row of a flag takes the place of that of its number.
+    The row of a flag replaces that of its number.
     """
     numbers = outcomes[ANSWER_OUTCOMES:]
     rows = dict(zip(names, numbers, strict=True))

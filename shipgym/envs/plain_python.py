@@ -1,4 +1,4 @@
-"""Episodes in plain Python, which look at what functions of task and sensors return."""
+"""Episodes in plain Python that check results of functions of task and sensors."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -22,10 +22,10 @@ def plain_loop(
     program: EpisodeProgram,
     hooks: Mapping[str, Callable[..., Any]] | None = None,
 ) -> Any:
-    """Return the loop of a program in plain Python, `hooks` in place of its own.
+    """Return the loop of a program in plain Python, with `hooks` in place of its own.
 
-    What a function of the task or of the sensor set raises, or returns in another form
-    than the contract asks, is an InputError that names file, line and function.
+    An error in a function of the task or the sensor set, or a result in another form
+    than the contract's, is an InputError that names file, line and function.
     """
     task = program.task
     forms = {
@@ -45,21 +45,21 @@ def plain_loop(
 
 
 def _checked(program: EpisodeProgram, name: str, form: Any) -> Callable[..., Any]:
-    """Return a function of the task or the sensor set whose results are looked at."""
+    """Return a function of the task or the sensor set whose results are checked."""
     specialisation = Specialisation(program.hooks)
     function = specialisation.copy(program.hooks[name])
-    # of a task with another's reward, what differs from its own step
+    # of a task with another's reward, the function that differs from its own step
     namespace = function.__globals__
     own = namespace.get("reward_of_another", function)
     return partial(_result_of, function, own, form)
 
 
 def _result_of(function: Any, own: Any, form: Any, *arguments: Any) -> Any:
-    """Call a function, and refuse what it returns in another form than asked."""
+    """Call a function, and refuse a result in another form."""
     given = asked(function, *arguments)
-    fault = _fault(given, form, "what it returns")
+    fault = _fault(given, form, "returned value")
     if fault and own is not function:
-        fault = fault.replace("result 2", "what it returns")  # the reward
+        fault = fault.replace("result 2", "returned value")  # the reward
     if fault:
         raise InputError(f"{place_of(own)}: {fault}")
     return given
@@ -91,7 +91,7 @@ def _fault(given: Any, form: Any, name: str) -> str:
 
 
 def _other(given: Any, form: Any, name: str) -> str:
-    return f"{name} is {_words(given)}, expected {_words(form)}"
+    return f"{name}: expected {_words(form)}, got {_words(given)}"
 
 
 def _fault_within(
@@ -116,7 +116,7 @@ def _words(given: Any) -> str:
         return f"({', '.join(words)})"
     kind = given if isinstance(given, type) else type(given)
     if issubclass(kind, bool | np.bool_):
-        return "true or false"
+        return "a boolean"
     if issubclass(kind, Real):
         return "a number"
     return kind.__name__

@@ -1,4 +1,4 @@
-"""Domain randomisation: the ships of which an environment gives each episode one."""
+"""Domain randomisation: the ships from which each episode of an environment has one."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -15,7 +15,7 @@ from shipgym.ships import ShipModel, load_model
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.term_table import Structure
 
-POOL_SIZE = 256  # ships drawn from what is continuous
+POOL_SIZE = 256  # ships drawn from continuous distributions
 N_SPEEDS = 9  # approach speeds, evenly over their range
 Range = tuple[float, float]
 Pool = list[tuple[ShipModel, Weather]]
@@ -23,7 +23,7 @@ Pool = list[tuple[ShipModel, Weather]]
 
 @dataclass(frozen=True)
 class Randomisation:
-    """What differs from episode to episode beside task and sea."""
+    """Variation from episode to episode, in addition to task and sea."""
 
     # {None, "covariance"}; whether each episode's ship is drawn from the identified
     # covariance ("posterior" is taken too)
@@ -55,7 +55,7 @@ class Randomisation:
 
     @classmethod
     def take_from(cls, options: Mapping[str, Any]) -> tuple[Self, dict[str, Any]]:
-        """Make it of an environment's options; return the other options too."""
+        """Make it from an environment's options; return the other options too."""
         others = dict(options)
         own = {}
         for name in cls.names():
@@ -116,7 +116,7 @@ class Randomisation:
     def _paces(self, models: Sequence[ShipModel]) -> dict[int, list[Particulars]]:
         """Particulars of each model at each approach speed.
 
-        Each is one object, because the weather is worked out once for an object.
+        Each is one object, because the weather is computed once for an object.
         """
         least, largest = self.speed_range or (1.0, 1.0)
         parts = np.linspace(least, largest, N_SPEEDS).tolist()
@@ -157,7 +157,7 @@ def _check_range(given: Any, name: str) -> None:
 
 
 def _loaded(ship: ShipModel, displacement: float) -> ShipModel:
-    """Ship that forces accelerate less, the heavier it is."""
+    """Ship of another loading: the heavier, the less forces accelerate it."""
     if not isinstance(ship.dynamics, Structure):
         raise InputError(
             "loading_range: expected a ship whose equations are a table of"

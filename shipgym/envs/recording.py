@@ -1,4 +1,4 @@
-"""Episodes of an environment written to files, to be replayed and identified again."""
+"""Episodes of an environment written to files, for replay and identification."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -19,7 +19,7 @@ from shipgym.ships import ShipModel
 Observation = TypeVar("Observation")
 Action = TypeVar("Action")
 
-REWARD = "reward_"  # how the names of the parts of the reward begin in info
+REWARD = "reward_"  # prefix of the names of the parts of the reward in info
 SUCCESS = ("success", "is_success")
 
 
@@ -27,7 +27,7 @@ class RecordEpisode(
     gymnasium.Wrapper[Observation, Action, Observation, Action],
     gymnasium.utils.RecordConstructorArgs,
 ):
-    """Writes each episode to a file of its own, `episode-00000.json` and so on.
+    """Wrapper that writes each episode to a file, `episode-00000.json` and so on.
 
     A file is written, complete, when its episode ends. One cut off by `reset` or
     `close` is written as well, neither terminated nor truncated, if it has a step.
@@ -42,13 +42,12 @@ class RecordEpisode(
     folder : str or Path
         Where the files go; made if it does not exist.
     episode_trigger : callable of int, optional
-        Given the number of an episode, counted from 0, whether to record it. All by
-        default.
+        Whether to record an episode, given its number, counted from 0. All by default.
     trials : bool
         Whether each episode is written as a trial too, `episode-00000.csv`, if it has
         two steps.
     name_prefix : str
-        How the names of the files begin.
+        Prefix of the names of the files.
     overwrite : bool
         Whether files of an earlier recording may be replaced.
     """
@@ -87,7 +86,7 @@ class RecordEpisode(
         seed: int | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin an episode, after writing one that is cut off so."""
+        """Begin an episode, after writing one that is cut off by it."""
         self._write()
         observation, info = super().reset(seed=seed, options=options)
         self.episode_number += 1
@@ -111,7 +110,7 @@ class RecordEpisode(
         return observation, reward, terminated, truncated, info
 
     def close(self) -> None:
-        """Close the environment, after writing an episode that is cut off so."""
+        """Close the environment, after writing an episode that is cut off by it."""
         self._write()
         super().close()
 
@@ -130,7 +129,7 @@ class RecordEpisode(
 
 
 class _Recorded:
-    """An episode as far as it has come.
+    """Record of the episode so far.
 
     Path and ship are taken at its beginning, because the next reset may change them.
     """
@@ -153,7 +152,7 @@ class _Recorded:
         model: ShipModel = ship.model
         self._command_names = model.command_names
         seed = ship.np_random_seed
-        if seed is not None and seed < 0:  # of a generator put in by hand
+        if seed is not None and seed < 0:  # of a generator set by hand
             seed = None
         waypoints = getattr(ship, "waypoints", None)
         if waypoints is not None:
@@ -181,7 +180,7 @@ class _Recorded:
         truncated: bool,
         info: Mapping[str, Any],
     ) -> None:
-        """Add one more step and what came of it."""
+        """Add one more step and its results."""
         self._actions.append(np.array(action, dtype=float).reshape(-1))
         self.rewards.append(reward)
         self._states.append(self._ship.physical_state())
@@ -274,7 +273,7 @@ def _folder(folder: Path, prefix: str, overwrite: bool) -> Path:
 
 
 def plain(value: Any) -> Any:
-    """Argument of an environment as JSON can hold it.
+    """Argument of an environment, ready for JSON.
 
     A model is its name, a weather its fields.
     """

@@ -64,9 +64,9 @@ def register_environments() -> None:
 def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     """Register a task of your own, so that `gym.make` and `gym.make_vec` know it.
 
-    It is tried in plain Python and compiled, which takes some seconds, once. Raises
-    InputError if the task is not what the contract asks, cannot be compiled or does not
-    fit the ship, or the id belongs to another; nothing is registered then.
+    It is run in plain Python and compiled, which takes some seconds, once. Raises
+    InputError if the task does not meet the contract, cannot be compiled or does not
+    fit the ship, or the id is in use; nothing is registered then.
 
     Parameters
     ----------
@@ -98,8 +98,8 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     known = gymnasium.registry.get(check_text(env_id, "env_id"))
     if known is not None and known.kwargs != given:
         raise InputError(
-            f"{env_id}: registered already, for {known.kwargs.get('task')!r}, expected"
-            " an id of its own; give another name or version"
+            f"{env_id}: expected an unused id, got one registered for"
+            f" {known.kwargs.get('task')!r}; give another name or version"
         )
     if fault := fault_in_python(ship, asked):
         raise InputError(fault)
@@ -108,7 +108,7 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
         _register(env_id, given)
     except gymnasium.error.Error as error:
         raise InputError(
-            f"{env_id!r} found, expected an id such as 'harbour/{asked.name}-v0':"
+            f"env_id: expected an id such as 'harbour/{asked.name}-v0', got {env_id!r}:"
             f" {error}"
         ) from None
 

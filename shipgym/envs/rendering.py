@@ -237,7 +237,7 @@ class Renderer:
             place = _on_circle(centre, radius - 15.0, radians(angle))
             brush.text(name, place, INK, "centre", small=True)
 
-        needle = radius - 22.0  # leaves the letters free
+        needle = radius - 22.0  # keeps clear of the letters
         tail = _on_circle(centre, 0.6 * needle, scene.heading + pi)
         tip = _on_circle(centre, needle, scene.heading)
         brush.arrow(HULL, tail, tip)
@@ -315,7 +315,7 @@ class _Brush:
         self._small_font = pygame.font.Font(None, FINER * 16)
 
     def show(self, surface: Any) -> None:
-        """Bring the picture to its size."""
+        """Scale the picture to its size."""
         self._smoothscale(self._surface, (SIZE, SIZE), surface)
 
     def fill(self, colour: Colour) -> None:

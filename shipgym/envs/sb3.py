@@ -29,7 +29,7 @@ Observations = NDArray[np.float32]
 Indices = None | int | Sequence[int]
 Vectors = VectorEnv[Any, Any, Any]
 
-#: What all rows have in common, by the names of the single environment.
+#: Attributes that all rows share, by the names of the single environment.
 SHARED = (
     "dt",
     "metadata",
@@ -84,14 +84,14 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
 
     It equals stable-baselines3's DummyVecEnv of the single environments.
 
-    The list of infos is the same in every step, and its dictionaries are empty but for
+    The list of infos is the same in every step; its dictionaries are empty except for
     episodes that ended: those hold what the single environment's `info` does,
     `terminal_observation`, `TimeLimit.truncated`, `episode` as stable-baselines3's
     Monitor writes it (return `r`, length `l`, time `t`) and, where paths are followed,
     `is_success`. Copy the list to keep infos beyond the next step.
 
     Raises InputError for an environment that is not native, an unknown keyword or a
-    value out of its range, or options beside an environment that is made already.
+    value out of its range, or options together with an existing environment.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         return observations, rewards.astype(np.float32), dones, self._infos
 
     def _show(self, infos: Infos) -> None:
-        """Put what is asked for in every step into new dictionaries."""
+        """Put the infos of every step into new dictionaries."""
         columns = [infos[name].tolist() for name in self.info_names]
         for row, values in enumerate(zip(*columns, strict=True)):
             self._infos[row] = dict(zip(self.info_names, values, strict=True))
@@ -229,7 +229,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         return info
 
     def memory(self) -> dict[str, NDArray[Any]]:
-        """All that later steps depend on except their actions, copies by name.
+        """Return all on which later steps depend, except actions; copies by name.
 
         Only after a `reset`.
         """
@@ -237,9 +237,9 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         return own | self._ships.memory()
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from the `memory` of an environment by the same arguments.
+        """Continue from the `memory` of an environment with the same arguments.
 
-        It takes the place of a `reset`.
+        It replaces a `reset`.
         """
         self._returns[:] = memory["returns"]
         self._lengths[:] = memory["lengths"]
@@ -256,16 +256,16 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         return self.vector_env.render() or [None] * self.num_envs
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
-        """Attribute of the single environments of some rows, or what `set_attr` set.
+        """Attribute of the single environments of some rows, or one of `set_attr`.
 
         See `Row`.
         """
         return [getattr(row, attr_name) for row in self._chosen(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
-        """Keep a value for some rows by a name of the user's own.
+        """Store a value for some rows under a user-defined name.
 
-        Raises InputError for what is fixed when the environments are made.
+        Raises InputError for an attribute that is fixed when the environments are made.
         """
         if attr_name in FIXED:
             raise InputError(
@@ -295,9 +295,9 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
         wrapper_class: type[gymnasium.Wrapper],
         indices: Indices = None,
     ) -> list[bool]:
-        """Return for some rows whether they do what a wrapper does.
+        """Return for some rows whether they act as a wrapper.
 
-        They keep the episode statistics of Monitor, and do nothing else.
+        They record the episode statistics of Monitor, and act as no other.
         """
         return [wrapper_class is Monitor for _ in self._chosen(indices)]
 
@@ -310,7 +310,7 @@ def _info_of(infos: Infos, row: int) -> dict[str, Any]:
     info = {}
     for name, values in infos.items():
         if name.startswith(("_", "final_")) or isinstance(values, dict):
-            continue  # masks, and what ended episodes showed last
+            continue  # masks, and the last values of ended episodes
         info[name] = values[row].item()
     return info
 

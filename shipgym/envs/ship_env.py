@@ -33,7 +33,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     The action is the commanded rudder, -1 to 1 of its limit, positive to starboard. The
     observation holds the quantities of `observation_names`, each divided by its entry
     of `observation_scales`. The reward is the sum of its parts, which `info` has by
-    name. What is asked, observed and paid is told by the task's file
+    name. Settings, observations and reward are defined in the task's file
     (`shipgym/tasks/course_keeping.py`, `shipgym/tasks/path_following.py`, or one of
     your own).
 
@@ -46,7 +46,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     task : str, Path or module
         The name of a registered task, or the file of one (`shipgym.tasks.contract`).
     render_mode : {None, "human", "rgb_array"}
-        As Gymnasium has it.
+        Render mode of Gymnasium.
     allow_unstable : bool
         Whether a model that was found unstable when it was identified may be used.
     **options
@@ -194,7 +194,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
 
     def _order(self, action: Any) -> None:
         """Set the command; InputError for an invalid action."""
-        # as the action space has it: to be taken without a look at its numbers
+        # as in the action space: its numbers need no check
         is_array = isinstance(action, np.ndarray) and action.dtype is FLOAT32
         if self._discrete:
             action = rudder_orders(action, (), "action")[0]
@@ -224,7 +224,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         return pictures[0] if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
-        """Close the window, if there is one; to step again takes a `reset`."""
+        """Close the window, if there is one; a further step needs a `reset`."""
         self._begun = False
         for artist in self._artists:
             artist.close()

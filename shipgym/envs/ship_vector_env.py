@@ -190,7 +190,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
                 "options: reset_mask: expected True in one row at least, got none"
             )
         if not mask.all():
-            # other options hold for the engine, which is that of all rows
+            # other options apply to the engine, which all rows share
             where = "options with a reset_mask of some rows"
             check_keys(options, ["reset_mask"], where)
         return np.asarray(mask)
@@ -279,16 +279,16 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self._engine.write(name, values)
 
     def memory(self) -> dict[str, NDArray[Any]]:
-        """All that later steps depend on except their commands, copies by name.
+        """Return all on which later steps depend, except commands; copies by name.
 
         Only after a `reset`.
         """
         return self._counters() | self._engine.memory()
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from the `memory` of an environment by the same arguments.
+        """Continue from the `memory` of an environment with the same arguments.
 
-        It takes the place of a `reset`.
+        It replaces a `reset`.
         """
         self._begun = True
         self._recall(memory)
@@ -315,7 +315,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         return tuple(artist.picture(self._engine) for artist in self._artists)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Leave nothing open; to step again takes a `reset`."""
+        """Close all windows; a further step needs a `reset`."""
         self._begun = False
 
 

@@ -25,20 +25,20 @@ LANES = 70  # more than a tile
 PLAIN_STEPS = 40  # in plain Python
 PLAIN_LANES = 3
 AGREEMENT = 1e-5  # of compiled and plain results, whose last digits differ
-BEYOND = 1e-6  # of a bound, what rounding makes
+BEYOND = 1e-6  # beyond a bound, by rounding
 
 
 class TaskCheck(Findings):
-    """What a check of a task found; its name is that of the task, or its file."""
+    """Result of checking a task; its name is that of the task, or its file."""
 
 
 def check_task(task: Any, **options: Any) -> TaskCheck:
     """Check a task for errors.
 
     Its records and functions; compilation; some steps in plain Python, whose errors
-    name the line; some hundred steps of many ships by orders of a beginner: rewards,
-    state and observations finite and within their bounds; the same results compiled and
-    in plain Python, for one ship and for many.
+    name the line; some hundred steps of many ships under crude orders: rewards, state
+    and observations finite and within their bounds; the same results compiled and in
+    plain Python, for one ship and for many.
 
     The task is a file or module (`shipgym.tasks.contract`), or the name of one of the
     package's; options are keywords of the environment, `model`, `reward` and `sensors`
@@ -104,10 +104,10 @@ def _plain_engine(
 
 
 def _orders(engine: Engine, step: int) -> Floats:
-    """Orders of a beginner: to and fro, hard over, nothing; the same for a lane."""
+    """Crude orders: to and fro, hard over, none; the same for a lane."""
     n_lanes = engine.num_envs
     lanes = np.arange(n_lanes)
-    # each lane swings in a way of its own
+    # each lane swings differently
     frequency = 0.11 * (1.0 + 0.3 * (lanes % 7))
     swing = np.sin(frequency * step + lanes)
     kinds = np.stack(
@@ -130,7 +130,7 @@ def _sail_in_python(plain: Engine) -> None:
         try:
             asked(plain.step, orders)
         except InputError as error:
-            # the step tells an error of the beginning from one of a rare event
+            # the step distinguishes an error of the beginning from one of a rare event
             where = f"at step {step + 1} in plain Python"
             raise InputError(f"{error}, {where}") from error
 
@@ -149,8 +149,8 @@ def _not_finite(engine: Engine) -> Iterator[str]:
             found.add(name)
             lane = int(np.argmax(wrong))
             yield (
-                f"{_source_of(name, engine.task)}: {name} is {values[lane]} in lane"
-                f" {lane} at step {step}, expected finite numbers"
+                f"{_source_of(name, engine.task)}: {name}: expected a finite number,"
+                f" got {values[lane]} in lane {lane} at step {step}"
             )
 
 
@@ -225,7 +225,7 @@ def _differ(
 
 def _often_clipped(task: Task, seen: dict[str, list[float]]) -> Iterator[str]:
     """Observations that are often beyond their bounds."""
-    often = 0.05  # part of the observations beyond their bounds that is worth a remark
+    often = 0.05  # share of the observations beyond their bounds that is worth a remark
     for path, observed in seen.items():
         spec = task.definition.observations[path]
         values = np.array(observed)
@@ -235,8 +235,8 @@ def _often_clipped(task: Task, seen: dict[str, list[float]]) -> Iterator[str]:
             beyond = values[is_beyond]
             furthest = beyond[np.abs(beyond).argmax()]
             yield (
-                f"Observation.{path}: {furthest:.3g} found in units of its scale,"
-                f" beyond its bounds {spec.low:g} to {spec.high:g} in"
-                f" {100.0 * part:.0f} % of the steps, and clipped; give it wider bounds"
-                " or a larger scale if more is to be seen"
+                f"Observation.{path}: expected {spec.low:g} to {spec.high:g} in units"
+                f" of its scale, got up to {furthest:.3g}: it is clipped in"
+                f" {100.0 * part:.0f} % of the steps; give it wider bounds or a larger"
+                " scale if the agent is to see more"
             )

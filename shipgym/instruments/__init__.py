@@ -1,1 +1,1 @@
-"""Sensor sets: what instruments show, as files of plain functions on named records."""
+"""Sensor sets: models of instruments, as files of plain functions on named records."""

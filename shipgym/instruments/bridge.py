@@ -33,7 +33,7 @@ class Settings(NamedTuple):
 
 
 class Notch(NamedTuple):
-    """Memory of the notch filter: the last two signals and what was taken from them."""
+    """Memory of the notch filter: the last two signals, and the parts subtracted."""
 
     signal_1: float
     signal_2: float
@@ -53,7 +53,7 @@ class Noise(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What the instruments add to the ship's slow motion, and the filters' memory."""
+    """Additions of the instruments to the slow motion, and states of the filters."""
 
     x: float
     y: float
@@ -74,7 +74,7 @@ def measure(
     settings: Settings,
     random: Random,
 ) -> Memory:
-    """Add first-order motion and noise; take away what the filter finds of the waves.
+    """Add first-order motion and noise; subtract the filter's estimate of the waves.
 
     See `shipgym.instruments.perfect` for the arguments.
     """
@@ -146,7 +146,7 @@ def notched(signal: float, turn: float, first: bool, memory: Notch) -> Notch:
 
 
 def readings(motion: Motion, sea: Sea, memory: Memory) -> Readings:
-    """Readings: the ship's motion, and what the instruments add."""
+    """Readings: the ship's motion plus the additions of the instruments."""
     ahead, aside = ground_velocity(motion, sea.current_north, sea.current_east)
     return Readings(
         motion.x + memory.x,

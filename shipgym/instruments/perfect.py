@@ -51,7 +51,7 @@ def measure(
 
 
 def readings(motion: Motion, sea: Sea, memory: Memory) -> Readings:
-    """Readings that the task is given: the motion itself."""
+    """Readings for the task: the motion itself."""
     ahead, aside = ground_velocity(motion, sea.current_north, sea.current_east)
     return Readings(
         motion.x,

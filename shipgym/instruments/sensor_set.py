@@ -40,7 +40,7 @@ class SensorSet(Configurable):
 
 
 def read_sensors(source: Any) -> SensorSet:
-    """Read the sensor set of a file or module; InputError for what does not fit."""
+    """Read the sensor set of a file or module; InputError if it does not fit."""
     if isinstance(source, SensorSet):
         return source
     namespace, where = read_source(source)

@@ -1,4 +1,4 @@
-"""When a manoeuvre was executed, by the ordered or measured rudder; shared helpers."""
+"""Time of execution of a manoeuvre, by the ordered or measured rudder."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -17,7 +17,7 @@ ORDERED, MEASURED = 0.9, 0.75
 
 
 class Reversals(NamedTuple):
-    """When the rudder of a zigzag was ordered, s."""
+    """Times at which the rudder of a zigzag was ordered, s."""
 
     start: float  # the first order
     turns: list[float]  # each reversal
@@ -35,12 +35,12 @@ def rudder(trial: Trial) -> Floats:
 
 
 def is_ordered(trial: Trial) -> bool:
-    """Whether a trial has the ordered rudder."""
+    """Return whether a trial has the ordered rudder."""
     return "delta_command" in trial.channels
 
 
 def usual_rudder(trial: Trial) -> float:
-    """Rudder angle that shows in a manoeuvre, whatever it is on the approach, rad."""
+    """Rudder angle that is held in a manoeuvre, regardless of the approach, rad."""
     return float(np.percentile(np.abs(rudder(trial)), 75))
 
 
@@ -58,7 +58,7 @@ def execute_time(trial: Trial) -> float:
     t = trial.t
     delta = rudder(trial)
     if is_ordered(trial):
-        # a little helm on the approach is no order yet
+        # small rudder angles on the approach are not an order
         least = 0.5 * usual_rudder(trial)
         first = np.argmax(np.abs(delta) > least)
         return float(t[first])

@@ -64,7 +64,7 @@ def imo_criteria(
 ) -> dict[str, Criterion]:
     """Criteria of a ship by name, from the indices of her standard manoeuvres.
 
-    A manoeuvre that never got so far fails its criteria. Of an identified ship a
+    A manoeuvre that was not completed fails its criteria. Of an identified ship a
     criterion is decided only where the manoeuvre is within the envelope of her trials
     and the draws are on one side of the limit.
     """

@@ -22,7 +22,7 @@ class Rule:
 
     @property
     def source(self) -> str:
-        """Where it stands."""
+        """Source of the rule."""
         return f"MSC.137(76), annex, {self.paragraph}"
 
     @property

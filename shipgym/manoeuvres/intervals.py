@@ -1,4 +1,4 @@
-"""How certain the indices of an identified ship are, by models of its covariance."""
+"""Uncertainty of an identified ship's indices, by models drawn from its covariance."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -17,7 +17,7 @@ from shipgym.ships.ship_model import ShipModel
 #: From a ship to the indices of one of her manoeuvres, a dataclass such as
 #: `ZigzagIndices`.
 Evaluation = Callable[[ShipModel], Any]
-#: Indices of manoeuvres by manoeuvre and name; None where one never got so far.
+#: Indices of manoeuvres by manoeuvre and name; None where one was not completed.
 Indices = Mapping[str, Mapping[str, float | None]]
 
 
@@ -25,8 +25,8 @@ Indices = Mapping[str, Mapping[str, float | None]]
 class IndexInterval:
     """One index of a model and of models drawn from its covariance."""
 
-    value: float | None  # of the model itself; None where it never got so far
-    #: of the draws, NaN where one ran away or its manoeuvre never got so far, shape
+    value: float | None  # of the model itself; None where it was not completed
+    #: of the draws, NaN where one ran away or did not complete it, shape
     #: (n_draws,)
     values: Floats
     ran_away: Flags  # draws that ran away in the manoeuvre, shape (n_draws,)
@@ -35,7 +35,7 @@ class IndexInterval:
     def interval(self) -> tuple[float, float] | None:
         """The 95 % interval: quantiles of 2.5 and 97.5 per cent of the draws.
 
-        It says nothing of those that ran away or never got so far: see their counts.
+        Draws that ran away or were not completed are left out: see their counts.
         None without any.
         """
         low, high = self.quantiles(*LEVELS_95)
@@ -48,7 +48,7 @@ class IndexInterval:
 
     @property
     def n_never_reached(self) -> int:
-        """Draws that did not run away, but whose manoeuvre never got so far."""
+        """Draws that did not run away, but did not complete their manoeuvre."""
         without = np.isnan(self.values) & ~self.ran_away
         return int(without.sum())
 
@@ -78,13 +78,13 @@ class IndexInterval:
 
     @property
     def lost_in_words(self) -> str:
-        """Say how many draws have no value, and so no part in the interval."""
+        """Say how many draws have no value, and are not part of the interval."""
         draws = len(self.values)
         lost = []
         if self.n_ran_away:
             lost.append(f"{self.n_ran_away} of {draws} draws ran away")
         if self.n_never_reached:
-            lost.append(f"{self.n_never_reached} of {draws} draws never got so far")
+            lost.append(f"{self.n_never_reached} of {draws} draws did not finish")
         return ", ".join(lost)
 
 
@@ -97,7 +97,7 @@ def index_intervals(
     """Indices of a manoeuvre with their 95 % intervals over a model's covariance.
 
     Returns an IndexInterval by the name of each index, with its unit in the name. Draws
-    that run away or never get so far are counted. Raises InputError for a model without
+    that run away or do not finish are counted. Raises InputError for a model without
     covariance, or a manoeuvre that is not known or that the ship cannot sail. Raises
     UnstableModelError if the model itself runs away. Raises ManoeuvreError if the model
     itself never reaches its switch heading or its speed.

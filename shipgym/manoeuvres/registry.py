@@ -27,20 +27,20 @@ class Manoeuvre:
 
     # from a ship to the trial (to the spiral, for spirals)
     sail: Callable[[ShipModel], Any]
-    indices: Callable[[Any], Any]  # from what was sailed to its indices
+    indices: Callable[[Any], Any]  # from the run to its indices
     outcome: type  # the dataclass of its indices, units in the names of its fields
-    caption: str = ""  # what its figure shows
-    # from what was sailed to its figure; by default what suits its kind
+    caption: str = ""  # caption of its figure
+    # from the run to its figure; by default one for its kind
     # (`shipgym.plots.manoeuvre_figure`)
     figure: Callable[[Any], Figure] | None = None
 
     @property
     def no_indices(self) -> dict[str, float | None]:
-        """Its indices where it could not be completed: all None."""
+        """Indices of a manoeuvre that did not finish: all None."""
         return dict.fromkeys(field.name for field in fields(self.outcome))
 
     def evaluate(self, model: ShipModel) -> Any:
-        """Indices of a ship; UnstableModelError where she does what no ship can."""
+        """Indices of a ship; UnstableModelError for motions that no ship can have."""
         sailed = self.sail(model)
         if isinstance(sailed, Trial):
             check_physical(model, sailed)
@@ -86,7 +86,7 @@ class Family:
     variants: Variants
 
 
-#: All families by name, in the order in which they are sailed and reported.
+#: All families by name, in the order in which they are run and reported.
 FAMILIES: dict[str, Family] = {}
 
 

@@ -25,7 +25,7 @@ class SteadyMotion(NamedTuple):
 
 
 class Voyage:
-    """Manoeuvre in the making: leg by leg, from service speed or a given state.
+    """Builder of a manoeuvre, leg by leg, from service speed or a given state.
 
     Samples are dt apart, s; by default a fortieth of the time to travel one ship
     length. In weather the motion is never steady: legs that wait for it last their

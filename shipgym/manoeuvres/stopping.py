@@ -125,7 +125,7 @@ def stopping_order(model: ShipModel, shaft_speed: float, speed_ratio: float) -> 
 
 
 def goes_astern(model: ShipModel) -> bool:
-    """Whether the equations of a ship hold for a shaft that turns astern."""
+    """Return whether the equations of a ship hold for a shaft that turns astern."""
     return isinstance(model.dynamics, ShipEquations) and model.dynamics.astern
 
 

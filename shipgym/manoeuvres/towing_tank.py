@@ -33,7 +33,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Tank:
-    """How a captive test is run and measured; InputError for a number out of range."""
+    """Settings of a captive test; InputError for a number out of range."""
 
     speed: float | None = None  # of the carriage, m/s; None: the ship's service speed
     rudder_deg: float = 0.0  # held, degrees

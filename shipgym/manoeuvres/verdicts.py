@@ -27,7 +27,7 @@ from shipgym.trials.trial import Trial
 class Criterion:
     """One criterion; the worse of the two sides counts."""
 
-    value: float | None  # of the model, in `unit`; None where it never got so far
+    value: float | None  # of the model, in `unit`; None where it did not finish
     limit: float  # largest value allowed
     # None where it is not decided, or the ship's equations do not allow the test: see
     # `note`
@@ -67,7 +67,7 @@ class Criterion:
         return self.share_passed
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON knows it."""
+        """Dictionary ready for JSON."""
         fields: dict[str, Any] = {
             "manoeuvre": self.manoeuvre,
             "value": self.value,
@@ -131,7 +131,7 @@ def decided_by_model(criterion: Criterion, manoeuvre: str, outside: bool) -> Cri
 
 
 def _on_both_sides(criterion: Criterion) -> bool:
-    """Whether too few draws lie on one side of the limit; runaways lie on none."""
+    """Return whether the draws lie on both sides of the limit; runaways on none."""
     drawn = criterion.drawn
     if drawn is None or not len(drawn.values):
         return False
@@ -144,9 +144,9 @@ def _on_both_sides(criterion: Criterion) -> bool:
 
 
 def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:
-    """Whether a manoeuvre leaves the trials' envelope, in a turn up to 180 degrees.
+    """Return whether a manoeuvre leaves the envelope of the trials.
 
-    By more than 0.15 of its size.
+    By more than 0.15 of its size, in a turn up to 180 degrees.
     """
     if model.envelope is None or test.outcome is StoppingIndices:
         return False
@@ -217,7 +217,7 @@ def measured_indices(model: ShipModel, trial: Trial) -> dict[str, float]:
 
 
 def _at_speed(model: ShipModel, trial: Trial) -> bool:
-    """Whether a trial begins at service speed, to a tenth."""
+    """Return whether a trial begins at service speed, to a tenth."""
     if "u" not in trial or "v" not in trial:
         return False
     service = model.particulars["speed"]

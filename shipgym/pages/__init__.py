@@ -1,6 +1,6 @@
 """Pages of results: one self-contained HTML file each, made from a template.
 
-A page extends `shipgym.pages/page.html` and is made of the macros in
+A page extends `shipgym.pages/page.html` and consists of the macros in
 `shipgym.pages/parts.html`.
 """
 

@@ -12,7 +12,7 @@ _CHANNELS = ("psi", "r", "delta", "u", "v", "n", "phi", "wind_speed")
 
 
 class _Record(NamedTuple):
-    """What the page shows of a trial."""
+    """Content of the page's section on a trial."""
 
     name: str
     facts: dict[str, str]

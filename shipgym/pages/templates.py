@@ -24,7 +24,7 @@ def render(template: str, **data: Any) -> str:
 
 @cache
 def environment() -> Environment:
-    """What all templates share: escaping, the ways to write a number, and plotly.js."""
+    """Environment of all templates: escaping, number formats, and plotly.js."""
     made = Environment(
         autoescape=True,
         undefined=StrictUndefined,

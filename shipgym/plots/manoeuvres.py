@@ -217,7 +217,7 @@ def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
 
 
 def _release(trial: Trial) -> float:
-    """When the rudder was below half of its largest angle for good, s."""
+    """Time after which the rudder stays below half of its largest angle, s."""
     angle = np.abs(rudder(trial))
     laid = np.flatnonzero(angle > 0.5 * angle.max())
     return float(trial.t[laid[-1] + 1])

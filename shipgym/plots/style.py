@@ -66,7 +66,7 @@ def panels(
     """A figure of panels in the shared style, row by row.
 
     Its height is in pixels; with `outer`, titles of axes stand below the last row and
-    beside the first column only. `grid` has settings of plotly's `make_subplots`, and
+    next to the first column only. `grid` has settings of plotly's `make_subplots`, and
     `changes` those of `layout`.
     """
     columns = max(min(columns, len(shown)), 1)
@@ -103,7 +103,7 @@ def _axes(shown: Sequence[Panel]) -> dict[str, dict[str, Any]]:
 def _outer_axes(
     shown: Sequence[Panel], rows: int, columns: int
 ) -> dict[str, dict[str, Any]]:
-    """Axes of panels, titles below the last row and beside the first column only."""
+    """Axes of panels, titles below the last row and next to the first column only."""
     axes = _axes(shown)
     in_last_row = columns * (rows - 1)
     for k in range(len(shown)):

@@ -1,4 +1,4 @@
-"""Figures of any trial: time histories and paths, measured beside predicted."""
+"""Figures of any trial: time histories and paths, measured and predicted."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,7 @@
-"""Weather: what current, wind and waves do to a ship.
+"""Weather: the effects of current, wind and waves on a ship.
 
-What a user gives is in `conditions`; what becomes of it for one ship in `wind`,
-`gusts`, `waves`, `motions`, `drift` and `weather_column`. The public names stand in
+User input is in `conditions`; its effects on one ship are in `wind`,
+`gusts`, `waves`, `motions`, `drift` and `weather_column`. The public names are in
 `__init__.pyi`.
 """
 

@@ -55,7 +55,7 @@ def weather_particulars(particulars: Particulars) -> Particulars:
         listed = ", ".join(missing)
         raise InputError(
             f"weather without the particulars it needs: {listed} of {particulars.name}"
-            " is not known, expected in [ship] of the ship file or in the model's"
+            " is not known; give it in [ship] of the ship file or in the model's"
             " particulars"
         )
     return with_estimates(particulars.completed(), _ESTIMATES)

@@ -1,4 +1,4 @@
-"""Checks that any ship model, a user's own included, can be put through."""
+"""Checks for any ship model, including a user's own."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ STRAIGHT_LENGTHS = 30.0  # ship lengths of a run
 
 @dataclass(frozen=True)
 class ModelCheck(Findings):
-    """Problems and remarks that a check of a model found."""
+    """Problems and remarks from a check of a model."""
 
     # root mean square of the accelerations' port/starboard difference over twice their
     # own, over states that a manoeuvre passes: 0 for a symmetric ship; nan where it
@@ -43,7 +43,7 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
     """Check a model for errors.
 
     The file and its coefficients; the inertia; accelerations over the states that a
-    manoeuvre passes (finite, as the table of terms says, alike to both sides); straight
+    manoeuvre passes (finite, as in the table of terms, equal to both sides); straight
     running; the side to which the rudder turns the ship; hard turns to both sides; the
     covariance.
 

@@ -8,7 +8,7 @@
 
 Of a ship with surge or roll the linear forms keep sway and yaw; from a linear form
 comes back a ship that keeps her speed. From Nomoto's form sway cannot come back: two
-ships that drift otherwise may turn alike.
+ships that drift differently may turn the same way.
 """
 
 from collections.abc import Mapping
@@ -221,7 +221,7 @@ def linear_steering_ship(
 
 
 def _ship(particulars: Known) -> Particulars:
-    """Particulars, made of a mapping where they are one, as `identify` takes them."""
+    """Particulars, read from a mapping if they are one, as `identify` accepts them."""
     if isinstance(particulars, Particulars):
         return particulars
     return Particulars.from_mapping(particulars)

@@ -61,7 +61,7 @@ class Envelope:
         return distance
 
     def to_dict(self) -> dict[str, Any]:
-        """Envelope as it stands in a model file."""
+        """Envelope as written in a model file."""
         return {
             "channels": list(ENVELOPE_CHANNELS),
             "low": self.low.tolist(),

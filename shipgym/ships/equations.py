@@ -265,7 +265,7 @@ class ShipEquations:
         return np.array([coefficients[name] for name in self.coefficient_names])
 
     def to_dict(self) -> dict[str, Any]:
-        """As they stand in a model file."""
+        """Equations as written in a model file."""
         return {"name": self.name, "source": self.source}
 
 

@@ -258,7 +258,7 @@ class GreyBox(Structure):
         return found
 
     def to_dict(self) -> dict[str, Any]:
-        """The table and the whole reference ship, as they stand in a model file."""
+        """The table and the whole reference ship, as written in a model file."""
         return {
             **super().to_dict(),
             "shaft": self.shaft,

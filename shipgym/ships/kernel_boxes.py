@@ -53,7 +53,7 @@ class KernelTerm(Term):
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """Radial basis functions exp(-|x - centre|^2 / 2), and the features made of them.
+    """Radial basis functions exp(-|x - centre|^2 / 2), and features built from them.
 
     x is v / U, r L / U, the rudder angle in rad and U / U0, less an offset, by a scale.
 
@@ -222,7 +222,7 @@ class KernelBox(GreyBox):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Reference ship and kernel, as they stand in a model file."""
+        """Reference ship and kernel, as written in a model file."""
         table = super().to_dict()
         del table["equations"]
         return {**table, "kernel": self.kernel.to_dict()}

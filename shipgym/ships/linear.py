@@ -349,7 +349,7 @@ class StraightLineStability:
     """Straight-line stability with the rudder held."""
 
     # of sway and yaw for the smallest turns to `starboard` and to `port`, 1/s, the
-    # largest real part first. They are the same for a ship alike to both sides
+    # largest real part first. They are the same for a ship symmetric to both sides
     eigenvalues: dict[str, tuple[complex, ...]]
     # C = Y_v (N_r - m xG) - N_v (Y_r - m) of either side, prime system: positive for a
     # stable ship. None where the particulars do not tell the mass

@@ -107,7 +107,7 @@ class ManoeuvringModel:
         values = np.linalg.solve(self.acceleration_matrix, stacked)
         return self.with_coefficients(values)
 
-    # ---- what simulations are made of ------------------------------------------------
+    # ---- parts of simulations --------------------------------------------------------
 
     @property
     def compiled(self) -> CompiledShip:
@@ -138,7 +138,7 @@ class ManoeuvringModel:
 
     @cached_property
     def _numbers(self) -> dict[tuple[float, ...], Floats]:
-        """Last numbers of the dynamics, by the coefficients that they were made of."""
+        """Last numbers of the dynamics, by the coefficients they were computed from."""
         return {}
 
     @property

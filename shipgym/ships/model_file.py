@@ -126,7 +126,7 @@ def read_model(
 
 
 def _check_hash(model: ManoeuvringModel, given: Any, where: str) -> None:
-    """Refuse a file whose numbers are not those that its hash was made of."""
+    """Refuse a file whose numbers do not match its hash."""
     expected = numbers_hash(model)
     if given != expected:
         raise unexpected(

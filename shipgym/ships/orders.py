@@ -72,7 +72,7 @@ def check_units(model: Commanded, orders: Floats, where: str = "commands") -> No
             "a rudder in rad (not degrees) between -pi/2 and pi/2",
             where,
         )
-    fastest_shaft = 5.0  # times the speed in service; beyond it stands in other units
+    fastest_shaft = 5.0  # times the speed in service; beyond it the units are wrong
     if "n" in names:
         service = model.service_shaft_speed
         most = fastest_shaft * service

@@ -1,4 +1,4 @@
-"""Particulars of a ship, and what can be estimated from them."""
+"""Particulars of a ship, and estimates from them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from shipgym.ships.particulars_limits import LIMITS, check_together, check_value
 class Particulars(Mapping[str, Any]):
     """Main dimensions, mass and added masses of a ship; a mapping from name to value.
 
-    What is not known is None. :meth:`completed` estimates what the models need.
+    Unknown values are None. :meth:`completed` estimates those that the models need.
 
     Raises InputError for values that no ship has.
 
@@ -122,7 +122,7 @@ class Particulars(Mapping[str, Any]):
     ) -> Self:
         """Make particulars from the keys of the ship file's ``[ship]``.
 
-        Added masses stand there or in a table ``added_mass``; ``estimated`` is as
+        Added masses are there or in a table ``added_mass``; ``estimated`` is as
         :meth:`to_dict` writes it; None stands for a value that is not known. Raises
         InputError, beginning with `where`, for an unknown key, a missing length, a
         wrong type or a value that no ship has.
@@ -138,8 +138,8 @@ class Particulars(Mapping[str, Any]):
                 )
         if table.get("length") is None:
             raise InputError(
-                f"{where} length: missing, expected the length between perpendiculars"
-                " in m"
+                f"{where} length: expected the length between perpendiculars in m, got"
+                " none"
             )
         estimated: Any = table.pop("estimated", None) or ()
         with placed(where, " "):

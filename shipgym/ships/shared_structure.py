@@ -54,7 +54,7 @@ class Share:
         return symbol if symbol in ACCELERATIONS else None
 
     def to_dict(self) -> dict[str, Any]:
-        """Share as it stands in a model file."""
+        """Share as written in a model file."""
         term = self.term.to_dict()
         return {"coefficient": self.coefficient, **term, "sign": self.sign}
 
@@ -192,7 +192,7 @@ class SharedStructure(Structure):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Table as it stands in a model file."""
+        """Table as written in a model file."""
         shares = {}
         for axis, listed in self.shares.items():
             shares[axis] = [share.to_dict() for share in listed]

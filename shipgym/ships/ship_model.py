@@ -164,7 +164,7 @@ class ShipModel(ManoeuvringModel):
 
 
 def _square_root(covariance: Floats) -> Floats:
-    """Square root of a covariance by its correlations, which are alike in size."""
+    """Square root of a covariance by its correlations, which are of similar size."""
     deviation = np.sqrt(np.diag(covariance))
     scale = np.where(deviation > 0.0, deviation, 1.0)
     column = scale[:, None]

@@ -29,7 +29,7 @@ VARIABLE = {
     symbol: f"abs_{CHANNEL[symbol]}" if symbol[0] == "|" else symbol
     for symbol in SYMBOLS
 }
-#: Variables, and what each is made of, those that others need first; velocities over U
+#: Variables and their factors, those that others need first; velocities over U
 #: end in an underscore.
 MADE_OF = {
     "u": "motion.u",
@@ -135,7 +135,7 @@ def _written(rates: Mapping[str, str], variables: set[str], memory: bool) -> str
 
 
 def _has_negative_power(equations: Equations) -> bool:
-    """True where a term has more velocities than the sum it stands in."""
+    """True where a term has more velocities than the sum that contains it."""
     for equation, terms in equations.items():
         if any(speed_power(equation, term) < 0 for term in terms):
             return True
@@ -225,7 +225,7 @@ def _factors(term: Term, speed_power: int, divided: bool) -> Powers:
 
 
 def _with_their_makings(names: set[str]) -> set[str]:
-    """Names of variables, and of those that they are made of in turn."""
+    """Names of variables, and of those of which they are products in turn."""
     makings = set(names)
     for name in names:
         makings |= _variables_in(MADE_OF[name])
@@ -235,5 +235,5 @@ def _with_their_makings(names: set[str]) -> set[str]:
 
 
 def _variables_in(expression: str) -> set[str]:
-    """Variables that stand in an expression."""
+    """Variables that occur in an expression."""
     return MADE_OF.keys() & re.findall(r"\w+", expression)

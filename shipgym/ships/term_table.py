@@ -82,7 +82,7 @@ class Structure:
             self.name, self.source, self.equations, self.normalisation, self.quantity
         )
 
-    # ---- what stands in the table ----------------------------------------------------
+    # ---- contents of the table -------------------------------------------------------
 
     def names(self, equation: str) -> tuple[str, ...]:
         """Names of an equation's coefficients, such as X_u (force) or a_u."""
@@ -106,13 +106,13 @@ class Structure:
 
     @cached_property
     def symbols(self) -> tuple[str, ...]:
-        """Symbols that stand in its terms."""
+        """Symbols that occur in its terms."""
         used = symbols_in(self.equations.values())
         return tuple(symbol for symbol in SYMBOLS if symbol in used)
 
     @cached_property
     def channels(self) -> frozenset[str]:
-        """Channels that stand in its terms, the speed `U` included."""
+        """Channels that occur in its terms, the speed `U` included."""
         return frozenset(CHANNEL[symbol] for symbol in self.symbols)
 
     @cached_property
@@ -123,7 +123,7 @@ class Structure:
 
     @property
     def has_rudder(self) -> bool:
-        """True where the rudder stands in a term."""
+        """True where the rudder occurs in a term."""
         return "delta" in self.channels
 
     @property
@@ -138,7 +138,7 @@ class Structure:
 
     @property
     def command_names(self) -> tuple[str, ...]:
-        """Rudder, and shaft speed where it stands in a term."""
+        """Rudder, and shaft speed where it occurs in a term."""
         return ("delta", "n") if "n" in self.required_channels else ("delta",)
 
     @property
@@ -412,7 +412,7 @@ class Structure:
     # ---- model file ------------------------------------------------------------------
 
     def to_dict(self) -> dict[str, Any]:
-        """Table as it stands in a model file."""
+        """Table as written in a model file."""
         table: dict[str, Any] = {
             "name": self.name,
             "source": self.source,

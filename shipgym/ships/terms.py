@@ -68,7 +68,7 @@ class Term:
 
     @property
     def symbols(self) -> frozenset[str]:
-        """Symbols that stand in the term."""
+        """Symbols that occur in the term."""
         return frozenset(dict(self.powers))
 
     def power(self, *symbols: str) -> int:
@@ -105,7 +105,7 @@ class Term:
             )
 
     def to_dict(self) -> dict[str, Any]:
-        """Name and powers, as they stand in a model file."""
+        """Name and powers, as written in a model file."""
         return {"name": self.name, "powers": dict(self.powers)}
 
     @classmethod
@@ -126,7 +126,7 @@ class Term:
 
 
 def symbols_in(tables: Iterable[tuple[Term, ...]]) -> set[str]:
-    """Symbols that stand in any term of some equations."""
+    """Symbols that occur in any term of some equations."""
     symbols: set[str] = set()
     for terms in tables:
         for term in terms:

@@ -1,4 +1,4 @@
-"""Tasks: what is asked of an autopilot, each in one file."""
+"""Tasks of an autopilot, each in one file."""
 
 from lazy_loader import attach_stub
 

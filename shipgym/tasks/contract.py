@@ -7,22 +7,22 @@ A task file defines (`shipgym/tasks/course_keeping.py` is one)
   is a list. The reward is the sum of the fields of `Reward`, which `info` has as
   `reward_NAME`. Each field of `Observation` is annotated with an
   `ObservationSpec`.
-* `begin(ship, settings, random, plan) -> (Motion, State)`: how an episode begins.
+* `begin(ship, settings, random, plan) -> (Motion, State)`: the beginning of an episode.
 * `step(motion, state, interval, ship, settings) -> (State, Reward, failed, arrived)`:
   after an interval.
-* `observe(readings, state, interval, ship, settings) -> Observation`: what the
-  autopilot sees, in SI units.
+* `observe(readings, state, interval, ship, settings) -> Observation`: the
+  observations of the autopilot, in SI units.
 
 and may define
 
 * `due(motion, state, interval, ship, settings) -> bool` and `on_event(motion, state,
   interval, ship, settings, random, plan) -> State`: rare events, such as the next
   set-point.
-* `worst_cost(settings) -> float`: the largest cost of a step. A ship that is lost pays
-  it for the rest of the episode, so that ending early never pays.
+* `worst_cost(settings) -> float`: the largest cost of a step. A lost ship costs
+  as much for the rest of the episode, so that ending early is never an advantage.
 * `NAME`, by default that of the file, and `EPISODE_STEPS`, by default 600.
-* `REPORTED`: names of fields of `State` that `info` has; those annotated `Flag` as true
-  or false.
+* `REPORTED`: names of fields of `State` that `info` has; those annotated `Flag` as
+  booleans.
 * `plan_length(settings) -> int`: how many numbers `plan` holds, an array that lasts
   over an episode.
 * `check(settings, model)`: raises `InputError` for settings that do not fit, first
@@ -57,7 +57,7 @@ from shipgym.engine.random import uniform
 #: A last field of `Settings` that holds any number of numbers, and its default, none.
 Numbers = NDArray[np.float64]
 NO_NUMBERS: Numbers = np.zeros(0)
-#: A field of `State` that is true, 1, or false, 0.
+#: A field of `State` that is a boolean, 1 or 0.
 Flag = Annotated[float, bool]
 #: Physical value of an observation of 1, or how it follows from ship and settings.
 Scale = float | Callable[[Ship, Any], float]
@@ -86,7 +86,7 @@ class Interval(NamedTuple):
     rudder_before: float  # rad, rudder at its beginning
     rudder_command: float  # part of the limit
     shaft_command: float  # part of the shaft speed at service speed
-    # how many times further out than the training data (`Envelope.distance`)
+    # distance from the training data (`Envelope.distance`)
     envelope_distance: float
     extrapolating: float  # 1 where the ship was outside that data
 
@@ -104,7 +104,7 @@ class Readings(NamedTuple):
     phi: float  # rad
     delta: float  # rad
     n: float  # 1/s
-    track_psi: float  # rad, heading to which the velocity over ground is seen
+    track_psi: float  # rad, heading to which the velocity over ground is referred
     ahead: float  # m/s, over ground, ahead
     aside: float  # m/s, over ground, to starboard
 

@@ -3,7 +3,7 @@
 The reward is minus the squares of heading error, rudder angle (weight 0.1) and rudder
 rate (weight 0.01), all in units of 30 degrees, the rate per ship length sailed (Norrbin
 1972; van Amerongen 1982). Losing control costs as much as the rest of the episode at
-the largest heading error, so that it never pays to end early.
+the largest heading error, so that ending early is never an advantage.
 """
 
 from math import fabs, floor, pi, radians
@@ -37,7 +37,7 @@ REPORTED = ("heading_error",)
 
 
 class Settings(NamedTuple):
-    """What is asked of the autopilot."""
+    """Settings of the task."""
 
     course_change_deg: Annotated[
         float,
@@ -77,7 +77,7 @@ class Settings(NamedTuple):
 
 
 class State(NamedTuple):
-    """How far an episode has come."""
+    """State of an episode."""
 
     heading_setpoint: float  # rad
     next_change: float  # step of the next new set-point
@@ -94,7 +94,7 @@ class Reward(NamedTuple):
 
 
 class Observation(NamedTuple):
-    """What the autopilot sees."""
+    """Observations of the autopilot."""
 
     helm: SteeringSignals
     extras: Extras
@@ -211,7 +211,7 @@ def observe(
     ship: Ship,
     settings: Settings,
 ) -> Observation:
-    """Observe what every autopilot does."""
+    """Return the observations of every autopilot."""
     return Observation(
         helm=helm(state.heading_setpoint, state.integral, readings, interval, ship),
         extras=extras(readings, interval, ship),

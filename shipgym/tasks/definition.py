@@ -139,7 +139,7 @@ class TaskDefinition(Configurable):
 
     @cached_property
     def flags(self) -> tuple[str, ...]:
-        """Reported fields that are true or false."""
+        """Reported fields that are booleans."""
         kinds = field_types(self.State, notes=True)
         flags = []
         for name in self.reported:
@@ -190,8 +190,8 @@ def last_names(paths: Iterable[str]) -> tuple[str, ...]:
     return tuple(path.rpartition(".")[2] for path in paths)
 
 
-#: Definitions by themselves: one that is read again is the same object, so that it is
-#: compiled once.
+#: Definitions, each its own key: one that is read again is the same object, so that it
+#: is compiled once.
 _KNOWN: dict[TaskDefinition, TaskDefinition] = {}
 
 
@@ -206,7 +206,7 @@ def read_definition(source: Any, reward: Any = None) -> TaskDefinition:
         A name, the path of a Python file, or a module or object with the names of the
         contract.
     reward : str, Path or module, optional
-        The path of a file, or a module, whose reward takes the place of the task's.
+        The path of a file, or a module, whose reward replaces the task's.
     """
     known = isinstance(source, TaskDefinition)
     definition = source if known else _definition(source)
@@ -235,7 +235,7 @@ def _definition(source: Any) -> TaskDefinition:
 
 
 def _definition_of(namespace: Any, where: str) -> TaskDefinition:
-    """Take what is defined in a namespace, defaults in place of what is not."""
+    """Return the definition in a namespace, with defaults for absent names."""
     found = {}
     for name in (*RECORDS, *FUNCTIONS):
         if hasattr(namespace, name):

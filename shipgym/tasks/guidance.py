@@ -129,7 +129,7 @@ def _arc(course: float, turn: float) -> Floats:
 
 
 def _checked_waypoints(given: Any) -> Floats:
-    """Waypoints as an array, shape (n, 2); InputError for what is no path."""
+    """Waypoints as an array, shape (n, 2); InputError for an invalid path."""
     furthest = 1e8  # m from the origin: more than the way round the earth
     try:
         points = np.array(given, dtype=float)

@@ -1,7 +1,7 @@
 """Path following: sail along a planned path of straight legs, joined by turns.
 
 The reward is minus the square of the distance from the path in units of the corridor,
-minus what is missing in way made along the path at service speed, and the costs of
+minus the shortfall in progress along the path at service speed, and the costs of
 rudder angle, rudder travel and its reversals. The place along the path is a continuous
 function of the ship's position: circling and going back earn nothing; a step cannot
 earn more than at service speed, so that cutting a corner earns nothing; waypoints
@@ -70,14 +70,14 @@ WORST_PROGRESS = 2.0  # cost of a step against the path
 
 
 class Range(NamedTuple):
-    """From the least to the largest."""
+    """Range from the least to the largest."""
 
     least: float
     largest: float
 
 
 class Settings(NamedTuple):
-    """What is asked of the autopilot; lengths in ship lengths."""
+    """Settings of the task; lengths in ship lengths."""
 
     n_legs: Annotated[
         int,
@@ -138,7 +138,7 @@ class Settings(NamedTuple):
 
 
 class State(NamedTuple):
-    """Where the ship is on her path, and what her rudder has done."""
+    """Position of the ship on her path, and the activity of her rudder."""
 
     leg: Leg
     heading_setpoint: float  # rad
@@ -175,7 +175,7 @@ def preview(ship: Ship, settings: Settings) -> float:
 
 
 class Observation(NamedTuple):
-    """What the autopilot sees."""
+    """Observations of the autopilot."""
 
     helm: SteeringSignals
     cross_track: Annotated[float, ObservationSpec(-5.0, 5.0, "m", half_corridor)]
@@ -302,7 +302,7 @@ def draw_path(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> 
 
 
 def start(leg: Leg, ship: Ship, settings: Settings, random: Random) -> Motion:
-    """Near the first waypoint and about along the first leg."""
+    """Starting position, near the first waypoint and about along the first leg."""
     furthest = 0.5 * settings.corridor * ship.length
     largest = pi / 12.0
     # numbers of random numbers, apart from those of a drawn path
@@ -441,13 +441,13 @@ def activity_after(
     state: State,
     settings: Settings,
 ) -> tuple[RudderActivity, float]:
-    """How the rudder has been turned so far, and 1 if it has just been reversed."""
+    """Rudder activity so far, and 1 if the rudder has just been reversed."""
     smallest = (pi / 180.0) * settings.reversal_deg
     return rudder_activity(state.rudder_activity, motion.delta, smallest)
 
 
 def at_the_end(at: Fix, leg: Leg) -> bool:
-    """Return whether a ship has come to the end of the path, or passed it."""
+    """Return whether a ship has reached the end of the path, or passed it."""
     is_last = leg.turn == 0.0
     return is_last & (at.along_track >= leg.turn_at)
 
@@ -470,7 +470,7 @@ def cross_track_reward(off: float, settings: Settings) -> float:
 
 
 def progress_reward(made_now: float, interval: Interval, ship: Ship) -> float:
-    """Cost of way made along the path in an interval, m, that is missing."""
+    """Cost of the shortfall in progress along the path in an interval, m."""
     progress = made_now * (1.0 / interval.dt)
     return clip(progress / ship.scale_speed, 1.0 - WORST_PROGRESS, 1.0) - 1.0
 
@@ -488,7 +488,7 @@ def worst_cost(settings: Settings) -> float:
 
 
 def over_ground(course: float, readings: Readings, ship: Ship) -> tuple[float, float]:
-    """Sine and cosine of a course less the course over ground; both 0 without way."""
+    """Sine and cosine of a course less the course over ground; both 0 at rest."""
     ahead = readings.ahead
     aside = readings.aside
     standstill = 1e-6 * ship.scale_speed
@@ -509,7 +509,7 @@ def observe(
     ship: Ship,
     settings: Settings,
 ) -> Observation:
-    """Observe the path from where the instruments show the ship."""
+    """Return the observations of the path from the position of the instruments."""
     leg = state.leg
     at = fix(readings.x, readings.y, leg, ship, settings)
     course_error_sin, course_error_cos = over_ground(at.course, readings, ship)

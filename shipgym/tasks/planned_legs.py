@@ -1,4 +1,4 @@
-"""Legs and turns of a planned path, as a ship passes them, and where she is on them.
+"""Legs and turns of a planned path, as a ship passes them, and her position on them.
 
 A plan holds north and east of the waypoints by turns, m. Legs, arcs and a planned turn
 radius are as in IEC 62065:2014, Track control systems; guidance by line of sight:
@@ -33,7 +33,7 @@ class Leg(NamedTuple):
 
 
 class Fix(NamedTuple):
-    """Where a position lies on the path."""
+    """Location of a position on the path."""
 
     along_track: float  # m
     cross_track: float  # m, to starboard
@@ -152,11 +152,11 @@ def leg_from(number: int, along_track: float, radius: float, plan: Numbers) -> L
 
 
 def fix(x: float, y: float, leg: Leg, ship: Ship, settings: Any) -> Fix:
-    """Where a position lies on the leg or the turn behind it, and the course to steer.
+    """Location on the leg or the turn behind it, and the course to steer.
 
-    That is the course to the point of the path a lookahead distance ahead: of the path
-    half as far ahead, which is the direction of a chord of the arc, less the angle by
-    which the ship is to come back.
+    The course to steer leads to the point of the path a lookahead distance ahead: it is
+    that of the path half as far ahead, the direction of a chord of the arc, less the
+    angle by which the ship has to return to the path.
     """
     radius = settings.turn_radius * ship.length
     lookahead = settings.lookahead * ship.length

@@ -21,7 +21,7 @@ OBSERVATION_NAMES: tuple[str, ...] = SteeringSignals._fields
 
 
 class _Settings(NamedTuple):
-    """Default settings that the scales depend on beside the ship."""
+    """Default settings on which the scales depend, besides the ship."""
 
     weights: Weights = Weights()
 

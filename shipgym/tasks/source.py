@@ -31,7 +31,7 @@ def read_source(source: Any) -> tuple[Any, str]:
 
 
 def kept_source(source: Any) -> Any:
-    """Make the path of a file absolute, for whoever reads it from another folder."""
+    """Make the path of a file absolute, so that it can be read from another folder."""
     if isinstance(source, str | Path) and Path(source).suffix == ".py":
         return str(Path(source).resolve())
     return source

@@ -1,6 +1,6 @@
 """Parts that tasks of steering share: observations of the helm, and costs of steering.
 
-The reward is the classical steering cost with the sign turned (Norrbin 1972, On the
+The reward is the classical steering cost with the sign reversed (Norrbin 1972, On the
 added resistance due to steering on a straight course; van Amerongen 1982, Adaptive
 steering of ships).
 """
@@ -63,7 +63,7 @@ RATE_WEIGHT = DEFAULTS.rudder_rate_weight
 
 
 class SteeringReward(NamedTuple):
-    """Costs of the rudder and of what it does, with the sign turned."""
+    """Costs of the rudder and of its effects, with the sign reversed."""
 
     rudder: float
     rudder_rate: float
@@ -72,7 +72,7 @@ class SteeringReward(NamedTuple):
 
 
 class RudderActivity(NamedTuple):
-    """How the rudder has been turned to and fro."""
+    """Direction and extent of the last rudder turn, and the number of reversals."""
 
     direction: float  # of the last turn: 1 to starboard, -1 to port, 0 none so far
     furthest: float  # rad, in that direction
@@ -129,7 +129,7 @@ class SteeringSignals(NamedTuple):
 
 
 class Extras(NamedTuple):
-    """Observations that are made where an option asks for them."""
+    """Observations that options ask for."""
 
     roll: Annotated[float, ObservationSpec(-3.0, 3.0, "rad", radians(30.0), "roll")]
     roll_rate: Annotated[float, ObservationSpec(-5.0, 5.0, "rad/s", 0.1, "roll")]

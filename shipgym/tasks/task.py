@@ -47,7 +47,7 @@ class Observed(NamedTuple):
 
 @dataclass(frozen=True)
 class Task:
-    """Task of an autopilot: what it has to do, for which it is paid.
+    """Task of an autopilot, with its settings, sea, commands and sensors.
 
     Attributes
     ----------
@@ -276,7 +276,7 @@ class Task:
         return tuple(observed)
 
     def instruments(self, windy: bool) -> SensorSet:
-        """Sensor set that the ship is seen by, in weather or in calm water."""
+        """Sensor set of the ship, in weather or in calm water."""
         if self.sensors is not None:
             return self.sensors
         return shipped_sensors(windy, self.noise > 0.0, self.measurement == "filtered")
@@ -303,7 +303,7 @@ class Task:
 
     @cached_property
     def flags(self) -> frozenset[str]:
-        """Names of those that are true or false."""
+        """Names of those that are booleans."""
         return frozenset({"extrapolating", *self.definition.flags})
 
     @property

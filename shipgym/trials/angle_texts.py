@@ -1,4 +1,4 @@
-"""Latitudes and longitudes as texts: degrees, with or without minutes and seconds."""
+"""Latitudes and longitudes as strings: degrees, with or without minutes and seconds."""
 
 import re
 from collections.abc import Sequence

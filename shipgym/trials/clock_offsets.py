@@ -20,7 +20,7 @@ LONGEST_DELAY_S = 10.0  # that is looked for
 
 
 class ClockOffset(NamedTuple):
-    """How late a channel is, and what it explains of another."""
+    """Delay of a channel, and the gain and certainty of the estimate."""
 
     late: float  # s
     error: float  # standard error, s
@@ -226,7 +226,7 @@ def _remembered(t: Floats, values: Floats, memory: float) -> Floats:
 
 
 def reverses(values: Floats, least: float = 0.0) -> bool:
-    """Tell whether a channel goes there and back three times or more, as in zigzags.
+    """Return whether a channel reverses three times or more, as in zigzags.
 
     A single step shows no delay.
     """

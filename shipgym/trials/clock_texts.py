@@ -68,7 +68,7 @@ def _series(texts: Sequence[str]) -> Any:
 
 
 def _times_of_day(series: Any) -> Floats:
-    """Seconds since midnight, nan for what is no time."""
+    """Seconds since midnight, nan for an invalid time."""
     import pandas as pd
 
     colons = series.str.count(":")
@@ -103,7 +103,7 @@ def _dated_times(series: Any, first: str) -> Floats:
 
 
 def _implausibility(seconds: Any) -> tuple[int, float]:
-    """How many texts are no dates, then how long a time the others span."""
+    """Number of texts that are no dates, then the time that the others span, s."""
     missing = seconds.isna()
     span = seconds.max() - seconds.min()
     return int(missing.sum()), float(span)

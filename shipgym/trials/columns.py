@@ -16,7 +16,7 @@ from shipgym.trials.units import QUANTITIES, check_channel, si_factor, si_unit
 
 @dataclass(frozen=True)
 class Column:
-    """Where a channel stands in a file."""
+    """Column of a channel in a file."""
 
     name: str  # of the column
     unit: str = ""  # none: as the reader knows it, else the SI unit
@@ -50,7 +50,7 @@ class Locator:
         return f"{number:.{digits}g} {unit}"
 
     def declaration(self, channel: str, unit: str) -> str:
-        """How to declare another unit: ``r = { column = "yaw", unit = "deg/s" }``."""
+        """Declaration of another unit: ``r = { column = "yaw", unit = "deg/s" }``."""
         name = self.columns[channel].name
         return f'{channel} = {{ column = "{name}", unit = "{unit}" }}'
 

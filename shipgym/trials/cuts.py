@@ -72,7 +72,7 @@ def _samples(stretch: Stretch, log: Log, where: str) -> slice:
 
 
 def _span(log: Log) -> str:
-    """From when to when a log goes, in seconds and by its clock."""
+    """First and last time of a log, in seconds and by its clock."""
     first = log.t[0]
     last = log.t[-1]
     seconds = f"{first:g} to {last:g} s"
@@ -105,7 +105,7 @@ def _seconds(moment: float | str, log: Log, where: str) -> float:
 
 
 def _active_stretches(log: Log, where: str) -> list[Stretch]:
-    """From before the rudder leaves its usual place until it is quiet again."""
+    """Stretch from before the rudder leaves its usual place until it is quiet again."""
     largest_swing = 3.0 * DEGREE  # of a rudder that is at its usual place
     longest_pause = 60.0  # s, within a manoeuvre
     shortest = 30.0  # s

@@ -1,4 +1,4 @@
-"""How the instruments are installed: the table ``[sensors]`` of a ship file."""
+"""Installation of the instruments: the table ``[sensors]`` of a ship file."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Installation:
 
     @property
     def is_at_midship(self) -> bool:
-        """Whether the antenna stands at midship, or is not known to stand elsewhere."""
+        """True if the antenna is at midship, or not known to be elsewhere."""
         return self.forward == 0.0 and self.starboard == 0.0
 
 

@@ -22,14 +22,14 @@ DISTINCT_COURSES = 60.0 * DEGREE
 
 
 class HeadingOffset(NamedTuple):
-    """What a heading shows too much, rad."""
+    """Offset of a heading, positive if it shows too much, rad."""
 
     offset: float
     error: float  # standard error
 
     @property
     def is_certain(self) -> bool:
-        """Whether it is more than 2 deg, and more than four standard errors."""
+        """True if the offset exceeds 2 deg and four standard errors."""
         return abs(self.offset) > max(2.0 * DEGREE, 4.0 * self.error)
 
 
@@ -52,7 +52,7 @@ def straight_parts(t: Floats, channels: Mapping[str, Floats]) -> Flags:
 def heading_offset(
     channels: Mapping[str, Floats], straight: Flags
 ) -> HeadingOffset | None:
-    """What the heading shows too much by the velocity over ground.
+    """Estimate the offset of the heading from the velocity over ground.
 
     An offset turns with the ship, a current does not: with the speed U and the offset
     o, the velocity to the north is U cos(psi - o) and that of the current. None without

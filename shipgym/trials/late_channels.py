@@ -45,7 +45,7 @@ class LateChannel(NamedTuple):
 
     @property
     def evidence(self) -> str:
-        """What was found, in words."""
+        """Delay found, in words."""
         comparison = _COMPARISONS[self.channel]
         size = abs(self.delay)
         side = "late" if self.delay > 0.0 else "early"
@@ -56,7 +56,7 @@ class LateChannel(NamedTuple):
 
     @property
     def is_small(self) -> bool:
-        """Whether it is left on one clock where nobody decided."""
+        """True if the delay is left uncorrected on one clock by default."""
         comparison = _COMPARISONS[self.channel]
         return abs(self.delay) <= comparison.refused_s
 
@@ -102,7 +102,7 @@ def is_corrected(
 
 
 def _rate_offset(log: Log) -> ClockOffset | None:
-    """How late the yaw rate is against the heading, where a log tells it."""
+    """Delay of the yaw rate against the heading; None where a log does not show it."""
     if not log.has("psi", "r"):
         return None
     psi = log.channels["psi"]
@@ -149,7 +149,7 @@ def _rate_on_heading_clock(log: Log, rate: ClockOffset | None) -> Floats:
 
 
 def _is_against(offset: ClockOffset | None) -> bool:
-    """Tell whether a channel surely acts with the opposite sign."""
+    """Return whether a channel surely acts with the opposite sign."""
     return offset is not None and offset.gain < 0.0 and offset.certainty > CERTAIN
 
 

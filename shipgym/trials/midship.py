@@ -1,4 +1,4 @@
-"""From a log's frame and origin to velocities in the body frame, at midship."""
+"""Conversion of a log's frame and origin to body-frame velocities at midship."""
 
 import math
 from typing import NamedTuple
@@ -43,7 +43,7 @@ def to_project_conventions(log: Log, conventions: Conventions) -> None:
 
 
 def _needs_moving(log: Log, installation: Installation) -> bool:
-    """Whether velocities are made of what GNSS and a speed log show."""
+    """Return whether velocities have to be derived from GNSS and a speed log."""
     is_elsewhere = not installation.is_at_midship
     return is_elsewhere or log.has("ground_north") or log.has("stw")
 
@@ -192,7 +192,7 @@ def _velocity(log: Log, installation: Installation) -> tuple[Floats, Floats] | N
 
 
 def _sway_through_water(log: Log, water: Floats, u: Floats, v: Floats) -> Floats:
-    """Sway over ground less the current that a speed log shows, which a note tells."""
+    """Sway over ground less the current that a speed log shows; adds a note of it."""
     psi = log.channels["psi"]
     current = set_and_drift(psi, water, u, v)
     log.notes.append(current.note)

@@ -1,4 +1,4 @@
-"""From latitude and longitude to metres, and between earth and body frame."""
+"""Conversion of latitude and longitude to metres, and of earth and body frame."""
 
 import math
 from typing import Any

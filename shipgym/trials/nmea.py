@@ -28,7 +28,7 @@ _SPEED_UNITS = {"N": "knots", "K": "km/h", "M": "m/s"}
 #: Sign of a number by the letter of its side; L and R are the sides to steer to.
 _SIGNS = {"N": 1.0, "S": -1.0, "E": 1.0, "W": -1.0, "L": 1.0, "R": -1.0}
 
-Letters = Mapping[int, frozenset[str]]  # those that may stand in a field, by its place
+Letters = Mapping[int, frozenset[str]]  # letters allowed in a field, by its place
 
 
 class Sentence(NamedTuple):
@@ -41,7 +41,7 @@ class Sentence(NamedTuple):
 
 @dataclass(frozen=True)
 class NumberField:
-    """Where a number stands in a sentence; `nmea.toml` explains the names."""
+    """Position of a number in a sentence; `nmea.toml` explains the names."""
 
     at: int
     unit: str = ""
@@ -53,7 +53,7 @@ class NumberField:
 
 @dataclass(frozen=True)
 class SentenceKind:
-    """What a kind of sentence says; `nmea.toml` explains the names."""
+    """Contents of a kind of sentence; `nmea.toml` explains the names."""
 
     fields: Mapping[str, NumberField]  # by quantity
     valid: Letters = field(default_factory=dict)
@@ -65,7 +65,7 @@ class SentenceKind:
 
 @dataclass(frozen=True)
 class NmeaQuantity:
-    """What a number in a sentence measures, in SI units and radians."""
+    """Quantity that a number in a sentence measures, in SI units and radians."""
 
     largest: float
     tolerance: float | None  # between two instruments; None: not compared
@@ -172,7 +172,7 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
     """Numbers of a sentence in a log, in SI units and radians, by quantity.
 
     More lenient than :func:`steering_numbers`: estimated and simulated values count,
-    letters that the standard puts beside a number may be missing, and no number is too
+    letters that the standard puts next to a number may be missing, and no number is too
     large. Raises ValueError where one is broken.
     """
     kind = NMEA_SENTENCES[sentence.kind]

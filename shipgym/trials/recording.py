@@ -1,4 +1,4 @@
-"""From a table's columns to channels in SI units, each on its clock."""
+"""Conversion of a table's columns to channels in SI units, each on its clock."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -41,7 +41,7 @@ class Recording:
     signals : dict of str to Signal
         By channel, headings without jumps.
     locator : Locator
-        Where the values stand in the file.
+        Places of the values in the file.
     filled : dict of str to int
         How many values of a channel were filled in.
     start : float or None

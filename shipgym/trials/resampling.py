@@ -58,7 +58,7 @@ class Log:
     start: float | None = None
 
     def has(self, *channels: str) -> bool:
-        """Whether the log has all of these channels."""
+        """Return whether the log has all of these channels."""
         return all(channel in self.channels for channel in channels)
 
     def derive(self, channel: str, values: Floats) -> None:
@@ -73,7 +73,7 @@ def usual_step(t: npt.NDArray[Any]) -> float:
 
 
 def have_own_clocks(t: Floats, channels: Mapping[str, Floats]) -> bool:
-    """Tell whether missing values are those of channels at different rates.
+    """Return whether missing values are those of channels at different rates.
 
     Then every row has a time and some value, and the values of some channel stand two
     rows or more apart as a rule.
@@ -92,7 +92,7 @@ def have_own_clocks(t: Floats, channels: Mapping[str, Floats]) -> bool:
 
 
 def share_clock(signals: Mapping[str, Signal]) -> bool:
-    """Tell whether all channels were logged by one and the same clock."""
+    """Return whether all channels were logged by one and the same clock."""
     clocks = {id(signal.t) for signal in signals.values()}
     return len(clocks) == 1
 
@@ -173,7 +173,7 @@ def _motion_clocks(signals: Mapping[str, Signal]) -> dict[str, Floats]:
 
 
 def _inside(t: Floats, clock: Floats, is_hole: Flags) -> Flags:
-    """Which times lie within a clock's span and in none of its holes."""
+    """Flags of times within a clock's span and in none of its holes."""
     after = np.searchsorted(clock, t)
     after = np.clip(after, 1, clock.size - 1)
     before = after - 1

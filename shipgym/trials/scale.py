@@ -1,4 +1,4 @@
-"""Whether a trial can be that of a ship of this size and speed."""
+"""Checks that a trial can be that of a ship of this size and speed."""
 
 import math
 

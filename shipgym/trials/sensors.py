@@ -216,7 +216,7 @@ class Sensors:
         return times
 
     def _outside_gaps(self, count: int, seed: int) -> Flags:
-        """Which samples are not in a gap."""
+        """Flags of samples that are not in a gap."""
         rng = _random(seed, SEA_CHANNELS[0])
         is_start = rng.random(count) < self.dropout_probability
         starts = np.flatnonzero(is_start)

@@ -358,7 +358,7 @@ class Trial:
     ) -> Trial:
         """Read a trial from a pandas frame.
 
-        An index that is no plain count of rows is a column. `columns` and the other
+        An index other than a count of rows is a column. `columns` and the other
         keywords are those of :meth:`from_csv`. Raises InputError as that does.
         """
         return cls.from_csv(read_frame(frame), columns, **settings)

@@ -56,7 +56,7 @@ class TrialEntry:
 
 @dataclass(frozen=True)
 class _Shared:
-    """What a ship file has for all of its trials."""
+    """Contents of a ship file that hold for all of its trials."""
 
     ship: Particulars
     columns: Mapping[str, Column]

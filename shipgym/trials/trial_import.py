@@ -1,4 +1,4 @@
-"""From the tables of a log to channels in SI units, at midship."""
+"""Conversion of the tables of a log to channels in SI units, at midship."""
 
 from collections.abc import Mapping, Sequence
 
@@ -150,7 +150,7 @@ def _corrected(
     late: Sequence[LateChannel],
     conventions: Conventions,
 ) -> tuple[Log, list[str]]:
-    """The log with those late channels put right that are to be, and remarks on all."""
+    """The log with late channels corrected where asked, and remarks on all."""
     choice = conventions.installation.clock_offsets
     is_one_clock = share_clock(signals)
     corrected = dict(signals)

@@ -294,7 +294,7 @@ def test_the_command_writes_the_page(recorded):
         (None, "there is no such recorded episode"),
         ("x,y\n1,2\n", "broken JSON"),
         ("[1, 2]", "expected a table"),
-        ('{"name": "mariner", "format": 1}', "kind: None found, expected 'episode'"),
+        ('{"name": "mariner", "format": 1}', "kind: expected 'episode', got None"),
         (
             '{"kind": "episode", "format": 9}',
             "expected format 1, which this version of shipgym reads, got 9",

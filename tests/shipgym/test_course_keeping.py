@@ -255,7 +255,7 @@ def test_each_lane_of_a_batch_is_the_single_environment(mariner):
 def test_a_model_found_unstable_is_refused_unless_asked_for(mariner):
     marked = replace(mariner, provenance={"stable": False})
     with pytest.raises(
-        InputError, match=r"'mariner' was found unstable.*allow_unstable=True"
+        InputError, match=r"'mariner': expected a stable ship.*allow_unstable=True"
     ):
         make(model=marked)
     with pytest.raises(InputError, match="was found unstable"):

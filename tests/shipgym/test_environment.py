@@ -273,13 +273,13 @@ def test_the_first_reward_that_is_no_number_is_named():
         engine.refuse_rewards()
     value = engine.info("reward_heading")[1]
     assert str(caught.value).startswith(
-        f"{own}: reward_heading is {value} in lane 1 at step 1, expected a finite"
-        " number; look for"
+        f"{own}: reward_heading: expected a finite number, got {value} in lane 1"
+        " at step 1; look for"
     )
     engine.info("reward_rudder_rate")[2] = np.nan
     with pytest.raises(
         InputError,
-        match=r"reward_rudder_rate is nan in lane 2 at step 1, expected a finite",
+        match=r"reward_rudder_rate: expected a finite number, got nan in lane 2",
     ):
         engine.refuse_rewards()
 

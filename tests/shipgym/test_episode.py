@@ -93,7 +93,7 @@ def test_an_episode_cannot_be_changed():
             2,
             "expected format 1, which this version of shipgym reads, got 2",
         ),
-        (("kind",), None, "kind: None found, expected 'episode'"),
+        (("kind",), None, "kind: expected 'episode', got None"),
         (("dt",), 0, "dt: expected a number > 0"),
         (("dt",), "1", "dt: expected a number > 0, got '1'"),
         (
@@ -293,6 +293,6 @@ def test_a_file_of_another_kind_is_told_so(tmp_path):
     (tmp_path / "model.json").write_text('{"kind": "model", "format": 7}')
     with pytest.raises(
         InputError,
-        match=r"kind: 'model' found, expected 'episode': a file that RecordEpisode",
+        match=r"kind: expected 'episode', got 'model'; choose a file that",
     ):
         Episode.load(tmp_path / "model.json")

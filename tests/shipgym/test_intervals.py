@@ -89,7 +89,7 @@ def test_draws_that_run_away_or_never_reach_are_counted():
     )
     index = found[name]["advance_lengths"]
     assert (index.n_ran_away, index.n_never_reached) == (1, 1)
-    assert "1 of 4 draws ran away, 1 of 4 draws never got so far" in str(index)
+    assert "1 of 4 draws ran away, 1 of 4 draws did not finish" in str(index)
     criterion = assess_draws(ship, [ship, wild, numb, ship])["advance"]
     assert criterion.share_passed == 0.5
     assert criterion.to_dict()["without_value"] == 2
@@ -173,7 +173,7 @@ def index(value, values, ran_away=()):
 
 
 def test_an_interval_is_told_in_numbers_and_words():
-    """41 draws from 7 to 9, one that ran away and one that never got so far."""
+    """41 draws from 7 to 9, one that ran away and one that did not finish."""
     values = [*np.linspace(7.0, 9.0, 41), np.nan, np.nan]
     found = index(7.77777, values, ran_away=[41])
     assert found.interval == pytest.approx((7.05, 8.95))
@@ -181,7 +181,7 @@ def test_an_interval_is_told_in_numbers_and_words():
     assert (found.n_ran_away, found.n_never_reached) == (1, 1)
     assert (
         str(found)
-        == "7.778 [7.05, 8.95] (1 of 43 draws ran away, 1 of 43 draws never got so far)"
+        == "7.778 [7.05, 8.95] (1 of 43 draws ran away, 1 of 43 draws did not finish)"
     )
     assert found.to_dict() == {
         "value": 7.77777,
@@ -197,7 +197,7 @@ def test_an_interval_is_told_in_numbers_and_words():
 
 
 def test_the_worst_of_two_runs_is_the_larger_draw_by_draw():
-    """One that never got so far is the worst of all."""
+    """One that did not finish is the worst of all."""
     one, other = index(2.0, [1.0, 5.0, np.nan], [2]), index(3.0, [2.0, 4.0, 1.0])
     found = worst([one, other])
     assert found.value == 3.0

@@ -178,7 +178,7 @@ def test_particulars_are_a_mapping_and_go_through_json():
         ),
         ({"length": math.nan}, "[ship] length: expected"),
         ({"length": True}, "[ship] length: expected"),
-        ({"length": None}, "[ship] length: missing"),
+        ({"length": None}, "[ship] length: expected"),
         ({"lenght": 7.0}, "[ship]: unknown key 'lenght'. Did you mean 'length'?"),
         ({"name": 3}, "[ship] name: expected a non-empty string"),
         (

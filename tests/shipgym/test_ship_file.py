@@ -220,7 +220,7 @@ def test_repair_may_be_asked_for_the_whole_file_or_one_trial(folder):
         ("length = 7.0", 'length = "7.0"', ": [ship] length: "),
         ("length = 7.0", "length = nan", ": ship.length: "),
         ("length = 7.0", "length = true", ": [ship] length: "),
-        ("length = 7.0", "", ": [ship] length: missing"),
+        ("length = 7.0", "", ": [ship] length: expected"),
         (
             "length = 7.0",
             f"length = 1{'0' * 400}",

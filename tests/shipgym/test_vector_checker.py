@@ -89,7 +89,7 @@ def test_what_is_right_passes(kind):
     [
         (WithoutMode, "autoreset_mode"),
         (ShowsItsBuffer, "changed an array"),
-        (PaysForTheReset, "begins an episode earned"),
+        (PaysForTheReset, "expected 0 in the step that begins an episode"),
         (ForgetsTheSeed, "same seed"),
         (TakesAnything, "expected an error"),
         (MasksNothing, "expected a mask"),
@@ -108,7 +108,7 @@ def test_rows_that_are_other_ships_are_named():
             "shipgym/CourseKeeping-v0", model="tanker", disable_env_checker=True
         )
 
-    with pytest.raises(InputError, match="row 0 shows"):
+    with pytest.raises(InputError, match="row 0: expected"):
         check_vector_env(Right, tanker, n_steps=5)
 
 
@@ -278,94 +278,98 @@ NO_INFO = changed_step(
     infos=lambda one: {k: v for k, v in one.items() if "final_info" not in k}
 )
 WRONG = [
-    (Walkers, {"num_envs": 0}, "num_envs is 0, expected >= 1"),
-    (Walkers, {"num_envs": 2.0}, "num_envs is 2.0, expected >= 1"),
-    (Walkers, WIDE, "observation_space is Box.*: single_observation_space batched"),
+    (Walkers, {"num_envs": 0}, "num_envs: expected >= 1, got 0"),
+    (Walkers, {"num_envs": 2.0}, "num_envs: expected >= 1, got 2.0"),
+    (
+        Walkers,
+        WIDE,
+        "observation_space: expected Box.* single_observation_space batched",
+    ),
     (
         Walkers,
         {"single_action_space": Discrete(3)},
-        "action_space is Box.* expected MultiDiscrete",
+        "action_space: expected MultiDiscrete.* got Box",
     ),
     (
         Walkers,
         changed_reset(lambda given: given[0]),
-        r"reset returned <class 'numpy.ndarray'>, expected",
+        r"reset: expected .* got <class 'numpy.ndarray'>",
     ),
     (
         Walkers,
         changed_reset(lambda given: given * 2),
-        "reset returned <class 'tuple'>, expected",
+        "reset: expected .* got <class 'tuple'>",
     ),
     (
         Walkers,
         changed_reset(lambda given: (given[0] + 999, {})),
-        "reset: observations .* are not in Box",
+        "reset: observations: expected a member of Box",
     ),
     (
         Walkers,
         changed_reset(lambda given: (given[0], [])),
-        "reset: infos are <class 'list'>, expected a di",
+        "reset: infos: expected a dict of arrays, got <class 'list'>",
     ),
-    (Walkers, FOUR, "step returned 4 values, expected 5"),
+    (Walkers, FOUR, "step: expected 5 values, got 4"),
     (
         Walkers,
         changed_step(seen=lambda one: one + 999),
-        "step: observations .* are not in Box",
+        "step: observations: expected a member of Box",
     ),
     (
         Walkers,
         changed_step(rewards=lambda one: one[:1]),
-        r"step: rewards of shape and type \(\(1,\), dty",
+        r"step: rewards: expected shape and type .*got \(\(1,\), dty",
     ),
     (
         Walkers,
         changed_step(rewards=lambda one: one.astype(int)),
-        "step: rewards of shape .*int64",
+        "step: rewards: expected shape and type .*int64",
     ),
     (
         Walkers,
         changed_step(terminated=lambda one: one * 1.0),
-        "step: terminated of shape and type .*float64",
+        "step: terminated: expected shape and type .*float64",
     ),
     (
         Walkers,
         changed_step(truncated=lambda one: one.tolist()),
-        r"truncated of shape .* \(None, None\)",
+        r"truncated: expected shape .* \(None, None\)",
     ),
     (
         Walkers,
         changed_step(rewards=lambda one: one / 0.0),
-        "step: rewards .* are not all finite",
+        "step: rewards: expected finite numbers",
     ),
     (
         Walkers,
         changed_step(infos=lambda one: one | {"k": [1]}),
-        r"\['k'\] is \[1\], expected an entry",
+        r"\['k'\]: expected an entry for each row, got \[1\]",
     ),
     (
         Walkers,
         changed_step(infos=lambda one: one | {"k": np.zeros(3)}),
-        r"\['k'\] is .* expected an entry",
+        r"\['k'\]: expected an entry for each row",
     ),
     (
         Walkers,
         changed_step(infos=lambda one: one | {"_k": [True] * 2}),
-        r"infos\['_k'\] is \[True, True\]",
+        r"infos\['_k'\]: expected a mask .* got \[True, True\]",
     ),
     (
         Walkers,
         changed_step(infos=lambda one: one | {"_k": one["k"]}),
-        r"step: infos\['_k'\] is array",
+        r"step: infos\['_k'\]: expected a mask .* got array",
     ),
     (
         Walkers,
         changed_step(infos=lambda one: one | {"_k": one["_k"][:1]}),
-        r"step: infos\['_k'\] is array",
+        r"step: infos\['_k'\]: expected a mask .* got array",
     ),
     (
         Walkers,
         UNMASKED,
-        r"step, more: infos\['_l'\] is None, expected a mask of 2 booleans",
+        r"step, more: infos\['_l'\]: expected a mask of 2 booleans, got None",
     ),
     (
         Walkers,
@@ -378,12 +382,12 @@ WRONG = [
     (
         WalkersInTurn,
         ended(_final_obs=np.zeros_like),
-        r"\['_final_obs'\] is \[False False\], expected .*end",
+        r"\['_final_obs'\]: expected the ended rows .* got \[False False\]",
     ),
     (
         WalkersInTurn,
         ended(final_obs=lambda one: one + 999),
-        r"infos\['final_obs'\]\[\d\] is .*not an obser",
+        r"infos\['final_obs'\]\[\d\]: expected an observation",
     ),
     (
         WalkersByHand,
@@ -415,7 +419,7 @@ def test_each_promise_that_is_broken_is_named(kind, changes, message):
 def test_a_row_that_is_not_the_single_environment_is_named(changes):
     with pytest.raises(
         InputError,
-        match=r"row [01] shows .*, expected .* of the single environment with seed",
+        match=r"row [01]: expected .* of the single environment with seed .*, got",
     ):
         check_vector_env(type("Broken", (Walkers,), changes), Walker, 60)
 
@@ -435,6 +439,6 @@ def test_rows_of_different_ends_are_compared_until_all_steps_are_taken():
             return seen, rewards - wrong, terminated, *rest
 
     with pytest.raises(
-        InputError, match=r"row 1 shows .* of the single environment with seed 1235"
+        InputError, match=r"row 1: expected .* of the single environment with seed 1235"
     ):
         check_vector_env(Late, Walker, 30)

@@ -1,4 +1,4 @@
-"""From a noisy record to channels that can be differentiated."""
+"""Preparation of a noisy record: channels that can be differentiated."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

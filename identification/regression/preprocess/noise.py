@@ -1,4 +1,4 @@
-"""How noisy a record is."""
+"""Noise of a record."""
 
 from collections.abc import Iterable
 
@@ -60,5 +60,5 @@ def noise_ratio(t: ArrayLike, values: ArrayLike, window: int = 1) -> float:
 
 
 def is_noisy(t: ArrayLike, channels: Iterable[ArrayLike]) -> bool:
-    """Whether any of some channels, each (n_samples,), has noise beyond `NOISY`."""
+    """Return whether a channel, each (n_samples,), has noise beyond `NOISY`."""
     return any(noise_ratio(t, values) > NOISY for values in channels)

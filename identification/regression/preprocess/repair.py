@@ -52,7 +52,7 @@ def outliers(
 
     if not may_step and len(values) >= 3 * WIDTH:
         first, last = _ends_that_jump(t, values, middle, least)
-        # beside an outlier it is not the end that jumps
+        # next to an outlier it is not the end that jumps
         found[0] = first and not found[1]
         found[-1] = last and not found[-2]
     return found
@@ -71,9 +71,9 @@ def _ends_that_jump(
     middle: Floats,
     least: float,
 ) -> tuple[bool, bool]:
-    """Whether the first and the last sample jump to the next one.
+    """Return whether the first and the last sample jump to the next one.
 
-    That is further than the signal moves anywhere inside.
+    A jump is further than the signal moves anywhere inside.
     """
     half = WIDTH // 2
     inside = middle[half:-half]
@@ -82,7 +82,7 @@ def _ends_that_jump(
     jumps = np.abs(np.diff(values))
 
     def is_jump(end: int) -> bool:
-        # beside a gap the signal moves further
+        # next to a gap the signal moves further
         longer = max(steps[end] / np.median(steps), 1.0)
         return bool(jumps[end] > (least + WIDTH * largest_move) * longer)
 

@@ -1,4 +1,4 @@
-"""Which column of a log holds which channel, by its name."""
+"""Guesses of the column of a log that holds a channel, by its name."""
 
 import json
 import re

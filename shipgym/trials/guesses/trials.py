@@ -38,7 +38,7 @@ class TrialGuess:
 def guess_trial(path: str | Path) -> TrialGuess:
     """Read a log with guesses; where a check proposes another setting, try that.
 
-    A unit that a column's name tells is kept. Raises InputError, as the readers do, for
+    A unit given in a column's name is kept. Raises InputError, as the readers do, for
     a log that cannot be read so.
     """
     table = read_log(path)

@@ -78,7 +78,7 @@ def named_unit(units: list[str], channel: str) -> UnitGuess | None:
 
 
 def names_another_quantity(units: list[str], channel: str) -> bool:
-    """Tell whether a name ends with a unit of another quantity.
+    """Return whether a name ends with a unit of another quantity.
 
     A single letter may be no unit, as in "Heading M".
     """

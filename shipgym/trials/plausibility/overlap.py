@@ -9,13 +9,13 @@ from shipgym.trials.resampling import Signal
 
 
 class _Span(NamedTuple):
-    """From when to when channels were logged, s."""
+    """First and last time at which channels were logged, s."""
 
     begin: float
     end: float
 
     def overlaps(self, other: "_Span", shift: float = 0.0) -> bool:
-        """Tell whether this span, moved back by `shift`, overlaps another."""
+        """Return whether this span, moved back by `shift`, overlaps another."""
         return self.begin - shift < other.end and self.end - shift > other.begin
 
 

@@ -51,7 +51,7 @@ def check_track(t: Floats, x: Floats, y: Floats, locator: Locator) -> None:
 def check_outliers(
     lat: Floats, lon: Floats, is_outlier: Flags, locator: Locator
 ) -> None:
-    """Refuse outliers of positions, in degrees, that nobody asked to fill."""
+    """Refuse outliers of positions, in degrees, that are not to be filled."""
     if not is_outlier.any():
         return
     k = np.argmax(is_outlier)

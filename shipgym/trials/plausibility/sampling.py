@@ -26,7 +26,7 @@ def likelier_time_units(t: Floats, locator: Locator) -> dict[str, float]:
 
 
 def is_usual(step: float) -> bool:
-    """Tell whether rows are usual in a manoeuvre that are so far apart, s."""
+    """Return whether rows are usual in a manoeuvre that are so far apart, s."""
     return 0.01 <= step <= 10.0
 
 

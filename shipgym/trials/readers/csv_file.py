@@ -1,4 +1,4 @@
-"""Tables in CSV files, exact about the place of what is no table."""
+"""Tables in CSV files, with the exact place of errors."""
 
 import csv
 import re

@@ -11,7 +11,7 @@ MOST_CELLS = 5_000_000
 
 
 def read_frame(frame: Any, name: str | Path = "frame", first: int = 0) -> LogTable:
-    """Table in a pandas frame; an index that is no plain count of rows is a column.
+    """Table in a pandas frame; an index other than a count of rows is a column.
 
     Messages call it `name`, and its rows by numbers from `first` on. Raises InputError
     for what is no frame, and for one without values or with too many.

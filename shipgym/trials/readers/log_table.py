@@ -131,7 +131,7 @@ def plain_numbers(cells: Sequence[Any]) -> Floats:
 
 
 def is_number(text: str) -> bool:
-    """Tell whether a text is a number as Python reads it, without underscores."""
+    """Return whether a text is a number as Python reads it, without underscores."""
     try:
         float(text)
     except ValueError:

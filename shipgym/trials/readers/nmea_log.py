@@ -65,7 +65,7 @@ def _by_source() -> _BySource:
 
 @dataclass
 class _Heard:
-    """What the sentences of a log say."""
+    """Contents of the sentences of a log."""
 
     times: _BySource = field(default_factory=_by_source)
     channels: dict[str, _BySource] = field(
@@ -197,7 +197,7 @@ def _check_content(path: Path, heard: _Heard) -> None:
 
 
 class _Rank(NamedTuple):
-    """What makes a source better than another, the first first."""
+    """Rank of a source, by the most important criterion first."""
 
     preference: int  # by its kind
     is_dated: bool
