@@ -17,7 +17,7 @@ SLOWEST, FASTEST = 1e-4, 0.999  # of them, over the Nyquist frequency
 
 @dataclass(frozen=True)
 class Margins:
-    """How much the rudder's effect on the ship may change before the loop is unstable.
+    """Largest changes of the rudder's effect on the ship that leave the loop stable.
 
     The loop is broken where the ship's motions are fed back; the rudder's own feedback,
     if there is one, belongs to the steering gear and stays closed.
@@ -108,25 +108,12 @@ class Compensator:
         """
         import control
 
-        matrix = self.closed_loop(ship)
-        pole = largest_pole(matrix)
-        if pole >= 1.0:
-            raise InputError(
-                f"{name}: expected sampled poles below 1, got {pole:.4f}: the closed"
-                " loop is unstable with these gains; choose a shorter control interval"
-                " dt, and a lower frequency (PID) or a larger rate_weight_s2 (LQ) in"
-                " from_model"
-            )
-
-        nyquist = np.pi / ship.dt
-        frequencies = 500  # of the frequency response; splines lie between them
-        omega = np.geomspace(SLOWEST * nyquist, FASTEST * nyquist, frequencies)
+        self._check_closed_loop(ship, name)
+        omega = frequencies_of(ship)
         response = self.responses(ship, omega)
         loop: Any = control.frd(response.broken, omega)
-        found = control.stability_margins(loop, returnall=True)
-        gains = np.asarray(found[0], dtype=float)
-        phases = np.asarray(found[1], dtype=float)
-        crossings = np.asarray(found[4], dtype=float)
+        figures = control.stability_margins(loop, returnall=True)
+        gains, phases, _, _, crossings, _ = map(np.asarray, figures)
 
         delays = np.radians(phases % 360.0) / crossings
         return Margins(
@@ -137,23 +124,46 @@ class Compensator:
             lowest_gain=np.max(gains[gains < 1.0], initial=0.0).item(),
         )
 
+    def _check_closed_loop(self, ship: SampledShip, name: str) -> None:
+        """Refuse gains with which a ship is unstable, with a remedy."""
+        matrix = self.closed_loop(ship)
+        pole = largest_pole(matrix)
+        if pole >= 1.0:
+            raise InputError(
+                f"{name}: expected sampled poles below 1, got {pole:.4f}: the closed"
+                " loop is unstable with these gains; choose a shorter control interval"
+                " dt, and a lower frequency (PID) or a larger rate_weight_s2 (LQ) in"
+                " from_model"
+            )
+
     def responses(self, ship: SampledShip, omega: Floats) -> Responses:
         """Frequency responses at frequencies in rad/s, shape (n_frequencies,)."""
         z = np.exp(1j * omega * ship.dt)
-        motions = _transfer(ship.A, ship.B, z)[:, :, 0].T
+        by_order = _transfer(ship.A, ship.B, z)
+        motions = by_order[:, :, 0].T
         of_memory = self.C @ _transfer(self.A, self.B, z)
         orders = (of_memory + self.D)[:, 0].T
 
-        by_rudder = orders[RUDDER] * motions[RUDDER]
-        by_motions = (orders * motions).sum(axis=0) - by_rudder
+        fed_back = orders * motions
+        by_rudder = fed_back[RUDDER]
+        by_motions = fed_back.sum(axis=0) - by_rudder
         open_gear = 1.0 - by_rudder
 
         integral = ship.dt / (z - 1.0)  # of the set-point
         set_point = orders[ERROR] + orders[INTEGRAL] * integral
+        to_heading = -motions[ERROR] * set_point
+        closed = open_gear - by_motions
         return Responses(
             broken=-by_motions / open_gear,
-            following=-motions[ERROR] * set_point / (open_gear - by_motions),
+            following=to_heading / closed,
         )
+
+
+def frequencies_of(ship: SampledShip) -> Floats:
+    """Frequencies of the responses with a ship, rad/s; splines lie between them."""
+    n_frequencies = 500
+    nyquist = np.pi / ship.dt
+    return np.geomspace(SLOWEST * nyquist, FASTEST * nyquist, n_frequencies)
 
 
 def largest_pole(matrix: Floats) -> float:
@@ -182,11 +192,15 @@ def bandwidth(omega: Floats, size: Floats) -> float:
     if first == 0:
         return float(omega[0])
 
-    low, high = size[first], size[first - 1]
+    low = size[first]
+    high = size[first - 1]
     share = (high - half_power) / (high - low)
+
+    first_below = omega[first]
     last_above = omega[first - 1]
-    step = np.log(omega[first] / last_above)
-    return float(np.exp(np.log(last_above) + share * step))
+    step = np.log(first_below / last_above)
+    logarithm = np.log(last_above) + share * step
+    return float(np.exp(logarithm))
 
 
 def _transfer(A: Floats, B: Floats, z: Complexes) -> Complexes:

@@ -215,7 +215,7 @@ class ExpressionWriter:
         return call
 
     def _callee(self, node: ast.expr) -> Any:
-        """What is called, found where Python would find it."""
+        """Object that is called, found where Python would find it."""
         callee = None
         match node:
             case ast.Name(id=name) if isinstance(self.kinds.get(name), FunctionType):

@@ -54,7 +54,7 @@ KEYWORDS = frozenset(
 
 
 class Level(IntEnum):
-    """How tightly an expression of C holds together."""
+    """Precedence of an expression of C."""
 
     CHOICE = 0
     LOGIC = 1

@@ -16,7 +16,7 @@ from shipgym.trials.readers.csv_file import read_csv
 
 
 class _Scale(NamedTuple):
-    """What the environment's functions read of ship and settings, m."""
+    """Numbers of ship and settings that the environment's functions read, m."""
 
     length: float
     turn_radius: float

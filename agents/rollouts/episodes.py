@@ -33,12 +33,17 @@ def recorded(
     several control intervals, in which rewards are summed. The last one is filled up:
     the ship stays where her episode ended.
     """
-    n = len(seeds)
-    engine = task.engine(n)
-    run = rollout(policy, engine, np.asarray(seeds), record=True, tolerant=True)
+    engine = task.engine(len(seeds))
+    run = rollout(
+        policy,
+        engine,
+        np.asarray(seeds),
+        record=True,
+        tolerant=True,
+    )
     stride = math.ceil(task.task.episode_steps / samples)
     episodes = []
-    for lane in range(n):
+    for lane in range(len(seeds)):
         episode = episode_of(run, task, lane, engine, stride)
         episodes.append(episode)
 
@@ -75,6 +80,15 @@ class _Lane:
         running = np.append(0.0, np.cumsum(own))
         return np.diff(running[self.samples])
 
+    def commands(self, states: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Orders of the ship over the steps, from the states at the samples."""
+        commands = {}
+        for name in self.run.model.command_names:
+            order = f"{name}_command"
+            if order in states:
+                commands[name] = states[order][1:]
+        return commands
+
     def success(self) -> bool | None:
         """Return True if the episode was a success; None if its task knows none."""
         infos = self.run.infos
@@ -106,11 +120,6 @@ def episode_of(
             infos[name] = values
 
     states = history.at_samples(run.states)
-    commands = {}
-    for name in ship.command_names:
-        order = f"{name}_command"
-        if order in states:
-            commands[name] = states[order][1:]
     return Episode(
         environment=task.env_id,
         model=ship.name,
@@ -121,7 +130,7 @@ def episode_of(
         states=states,
         actions=run.actions[history.samples[:-1], lane],
         rewards=history.summed(run.rewards),
-        commands=commands,
+        commands=history.commands(states),
         reward_parts=parts,
         info=history.at_samples(infos),
         waypoints=engine.waypoints(lane),

@@ -73,7 +73,8 @@ class Suite:
         if names is None:
             return self.tasks
         if isinstance(names, str):
-            names = [name.strip() for name in names.split(",")]
+            parts = names.split(",")
+            names = [name.strip() for name in parts]
         if not names:
             raise InputError("tasks: expected at least one, got none")
 
@@ -189,13 +190,15 @@ def _read_suite(text: str, where: str, reader: "_Reader", source: str) -> Suite:
     content = parse_toml(text, f"{where}:")
     check_keys(content, ("name", "tasks"), where)
     name = check_text(content.get("name"), f"{where}: name")
-    tables = check_table(content.get("tasks"), f"{where}: tasks")
+    tasks_field = f"{where}: tasks"
+    tables = check_table(content.get("tasks"), tasks_field)
 
     tasks: list[BenchmarkTask] = []
     for task_name, table in tables.items():
-        field = f"{where}: tasks.{task_name}"
+        field = f"{tasks_field}.{task_name}"
         task = reader.read(task_name, table, field)
-        tasks += _sets_of(replace(task, suite=source))
+        own_task = replace(task, suite=source)
+        tasks += _sets_of(own_task)
 
     digest = hashlib.sha256(text.encode())
     return Suite(
@@ -270,7 +273,10 @@ class _Reader:
     def without_allowed(self, value: Any) -> Any:
         """Copy a value of TOML without the code that is allowed."""
         if isinstance(value, Mapping):
-            return {key: self.without_allowed(part) for key, part in value.items()}
+            kept = {}
+            for key, part in value.items():
+                kept[key] = self.without_allowed(part)
+            return kept
         if isinstance(value, list):
             return [self.without_allowed(part) for part in value]
         if isinstance(value, str) and self.allows(value):

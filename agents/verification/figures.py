@@ -74,8 +74,7 @@ def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
         traces += _marks_of(criterion, row)
         names.append(criterion_name(name, criterion))
     ends = [-0.5, len(criteria) - 0.5]
-    limit = line([100.0, 100.0], ends, "IMO limit", LIMIT, 1.8, line_dash="dash")
-    traces.append(limit)
+    traces.append(_limit_line(ends))
 
     names_axis = axis(
         tickvals=list(range(len(names))),
@@ -87,6 +86,12 @@ def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
     panel = Panel(traces, shares_axis, names_axis)
     height = 46 * len(criteria) + 100
     return panels([panel], height, left=190, hovermode="closest")
+
+
+def _limit_line(heights: list[float]) -> Any:
+    """The limit of all criteria, which is 100 per cent."""
+    limit = [100.0, 100.0]
+    return line(limit, heights, "IMO limit", LIMIT, 1.8, line_dash="dash")
 
 
 def _draws_of(criterion: Criterion, row: int, jitter: np.random.Generator) -> Any:
@@ -137,7 +142,8 @@ def _zigzag_lines(run: Trial, headings: Floats) -> list[Any]:
     """Heading and rudder of the model over the band of the draws' headings."""
     lines = []
     if len(headings):
-        lines.append(band(run.t, np.degrees(headings), "95 % of draws", MODEL))
+        headings_deg = np.degrees(headings)
+        lines.append(band(run.t, headings_deg, "95 % of draws", MODEL))
     rudder = np.degrees(run["delta"])
     heading = np.degrees(run["psi"])
     lines.append(line(run.t, rudder, "rudder", RUDDER, 1.2))
@@ -158,8 +164,8 @@ def _circle_lines(run: Trial, paths: Sequence[Floats], length: float) -> list[An
         lines.append(line(east, north, "single draws", pale, 1.0))
     north = run["x"] / length
     east = run["y"] / length
-    lines.append(line(east, north, "identified model", MODEL, 2.0))
-    return lines
+    circle = line(east, north, "identified model", MODEL, 2.0)
+    return [*lines, circle]
 
 
 def _side_by_side(left: Panel, right: Panel) -> Figure:
@@ -183,11 +189,7 @@ def steps_figure(
         headings += _step_lines(t, np.degrees(heading), name, colour)
         rudders += _step_lines(t, np.degrees(rudder), name, colour)
 
-    ends = [t[0], t[-1]]
-    course = [step_deg, step_deg]
-    set_course = line(ends, course, "set course", MUTED, 1.2, line_dash="dot")
-    headings.append(set_course)
-
+    headings.append(_set_course(t, step_deg))
     rudder_axis = axis("rudder, deg", zero=True)
     shown = [
         Panel(headings, "", "heading change, deg"),
@@ -195,6 +197,13 @@ def steps_figure(
     ]
     grid = {"shared_xaxes": True, "vertical_spacing": 0.06, "row_heights": [0.58, 0.42]}
     return panels(shown, 500, grid=grid)
+
+
+def _set_course(t: Floats, step_deg: float) -> Any:
+    """Line of the course that is steered."""
+    ends = [t[0], t[-1]]
+    course = [step_deg, step_deg]
+    return line(ends, course, "set course", MUTED, 1.2, line_dash="dot")
 
 
 def _step_lines(t: Floats, angles: Floats, name: str, colour: str) -> list[Any]:
@@ -217,8 +226,7 @@ def tracks_figure(tracks: Mapping[str, Track], length: float) -> Figure:
         north, east = track.positions.T / length
         paths.append(line(east, north, name, colour, 2.0))
 
-        steps = np.hypot(np.diff(north), np.diff(east))
-        sailed = np.append(0.0, np.cumsum(steps))
+        sailed = _way_sailed(north, east)
         errors.append(line(sailed, track.cross_track, name, colour, 1.6))
 
     north_axis = axis("north, ship lengths", scaleanchor="x", scaleratio=1)
@@ -226,6 +234,12 @@ def tracks_figure(tracks: Mapping[str, Track], length: float) -> Figure:
     aside = axis("m, positive to starboard", zero=True)
     right = Panel(errors, "way, ship lengths", aside, "Cross-track error")
     return _side_by_side(left, right)
+
+
+def _way_sailed(north: Floats, east: Floats) -> Floats:
+    """Length of a track up to each of its points, shape (n_points,)."""
+    steps = np.hypot(np.diff(north), np.diff(east))
+    return np.append(0.0, np.cumsum(steps))
 
 
 def costs_figure(costs: Mapping[str, Floats]) -> Figure:
@@ -247,5 +261,7 @@ def costs_figure(costs: Mapping[str, Floats]) -> Figure:
             showlegend=False,
         )
         boxes.append(box)
-    panel = Panel(boxes, "steering cost of an episode", axis(autorange="reversed"))
-    return panels([panel], 90 * len(costs) + 90, hovermode="closest")
+    from_top = axis(autorange="reversed")
+    panel = Panel(boxes, "steering cost of an episode", from_top)
+    height = 90 * len(costs) + 90
+    return panels([panel], height, hovermode="closest")

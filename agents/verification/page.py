@@ -60,8 +60,9 @@ def _origin(result: AutopilotResult) -> dict[str, str]:
     for key in ("structure", "method", "samples"):
         how.append(str(provenance.get(key, NONE)))
     own_version = f"shipgym {shipgym.__version__}"
+    software = provenance.get("software", own_version)
     return {
-        "software": provenance.get("software", own_version),
+        "software": software,
         "ship file": result.ship.path.name,
         "structure, method, samples": ", ".join(how),
     }

@@ -80,7 +80,7 @@ class CriterionRow:
 
 @dataclass(frozen=True, eq=False)
 class VerificationView:
-    """What the template shows of a verification but for its figures."""
+    """Contents of the report about a verification, but for its figures."""
 
     draws: int
     seed: int
@@ -108,7 +108,7 @@ class VerificationView:
 
 
 def verification_view(found: Verification, length: float) -> VerificationView:
-    """What the template shows of a verification of a ship of some length, m."""
+    """Contents of the report about a verification; `length`: of the ship, m."""
     criteria = found.manoeuvres.criteria
     designed = {
         pilot.name: pilot.design for pilot in found.by_name if pilot.design is not None
@@ -157,9 +157,26 @@ def is_certain(found: Verification) -> bool:
 
 def headline(found: Verification) -> str:
     """The verdict in two or three sentences."""
+    sentences = _criteria_sentences(found.manoeuvres.criteria)
+    unstable = int(found.manoeuvres.unstable.sum())
+    if unstable:
+        sentences.append(
+            f"{unstable} of {found.draws} models drawn run away in a manoeuvre."
+        )
+    best = found.pilots[0]
+    lost = int(np.sum(best.episodes.terminated))
+    control = f"loses control of {lost} of" if lost else "keeps control of all"
+    sentences.append(
+        f"{best.name} steers best and {control} {found.draws} models drawn."
+    )
+    return " ".join(sentences)
+
+
+def _criteria_sentences(criteria: Mapping[str, Criterion]) -> list[str]:
+    """The verdict on the IMO criteria, and those that are not decided."""
     missed: list[str] = []
     undecided: list[str] = []
-    for name, criterion in found.manoeuvres.criteria.items():
+    for name, criterion in criteria.items():
         words = criterion_name(name, criterion).lower()
         if criterion.passed is False:
             missed.append(words)
@@ -175,18 +192,7 @@ def headline(found: Verification) -> str:
     sentences = [f"The model is stable {verdict}."]
     if undecided:
         sentences.append(f"Not decided by these trials: {', '.join(undecided)}.")
-    unstable = int(found.manoeuvres.unstable.sum())
-    if unstable:
-        sentences.append(
-            f"{unstable} of {found.draws} models drawn run away in a manoeuvre."
-        )
-    best = found.pilots[0]
-    lost = int(np.sum(best.episodes.terminated))
-    control = f"loses control of {lost} of" if lost else "keeps control of all"
-    sentences.append(
-        f"{best.name} steers best and {control} {found.draws} models drawn."
-    )
-    return " ".join(sentences)
+    return sentences
 
 
 def _unstable_note(found: Verification) -> str:
@@ -249,7 +255,7 @@ def _criterion_row(name: str, criterion: Criterion) -> CriterionRow:
 
 
 def _introduction(found: Verification, designed: Mapping[str, Controller]) -> str:
-    """How the autopilots were made, and the model in its first-order form."""
+    """Sentences on how the autopilots were made, and on the first-order model."""
     names = ", ".join(designed)
     sentences = [
         f"{names} are designed on the identified model, linearised about straight"
@@ -307,8 +313,10 @@ def _margin_rows(designs: Sequence[Controller]) -> list[MarginRow]:
         shown = []
         for design in designs:
             value = getattr(design.margins, field)
-            shown.append("∞" if value == np.inf else number(value))
-        rows.append(MarginRow(name, unit, shown))
+            text = "∞" if value == np.inf else number(value)
+            shown.append(text)
+        row = MarginRow(name, unit, shown)
+        rows.append(row)
     return rows
 
 
