@@ -155,12 +155,15 @@ class PathAhead:
             to_come += [at_arc.distance, at_arc.angle]
 
             leg = arc.next_leg(leg)
-            behind = PathPoint(
-                along_track=leg.begins + leg.x,
-                cross_track=leg.y,
-                course=leg.course,
+            point = chosen(
+                arc.passed,
+                yes=PathPoint(
+                    along_track=leg.begins + leg.x,
+                    cross_track=leg.y,
+                    course=leg.course,
+                ),
+                no=at_arc.point,
             )
-            point = chosen(arc.passed, behind, at_arc.point)
         return Place(*point, turns=Turns(*to_come))
 
 

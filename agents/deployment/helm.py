@@ -111,8 +111,8 @@ class Helm:
         if self.follows_path:
             turns = {*TURNS} & {*self.pilot.inputs}
         has_route = self.route is not None
+        preposition = "with" if has_route else "without"
         if has_route != bool(turns) or not turns <= {*Route.GIVES}:
-            preposition = "with" if has_route else "without"
             raise InputError(
                 "route: expected 'wheel-over' or 'mpc' of shipgym autopilot with a"
                 f" route, or another without, got '{name}' {preposition} a route"
@@ -143,12 +143,11 @@ class Helm:
             self.state = STEERING
         elif self.state == STEERING and not fault:
             fault = self._fault(step, now)
+        self.warnings = []
         if fault and self.state == STEERING:
             self.state = MANUAL
             self.alarm = fault
-
-        self.warnings = []
-        if self.state == STEERING:
+        elif self.state == STEERING:
             self.warnings = self.warnings_of(inputs, now)
 
     def _fault(self, step: float, now: float) -> str:

@@ -52,7 +52,8 @@ class Route:
         self.origin = float(latitudes[0]), float(longitudes[0])
         north, east = local_metres(latitudes, longitudes, self.origin)
         path = Path(np.column_stack([north, east]))
-        farthest_km = float(np.abs(path.waypoints).max()) / 1e3
+        distances = np.abs(path.waypoints)
+        farthest_km = float(distances.max()) / 1e3
         if farthest_km > 100.0:  # too far for a plane
             raise InputError(
                 "waypoints: expected at most 100 km from the first, got"
@@ -97,14 +98,18 @@ class Route:
         """
         here = self._fix(latitude, longitude)
         leg = self.leg
-        self.ended = leg.turn == 0.0 and here.along_track >= leg.turn_at
-        turn_to_go = max(fabs(leg.turn) - here.turned, 0.0)
+        to_turn = leg.turn_at - here.along_track
+        to_second = leg.second_at - here.along_track
+        self.ended = leg.turn == 0.0 and to_turn <= 0.0
+
+        turned = copysign(here.turned, leg.turn)
+        left = max(fabs(leg.turn) - here.turned, 0.0)
         return {
-            "set_point": leg.course + copysign(here.turned, leg.turn),
+            "set_point": leg.course + turned,
             "cross_track": here.cross_track,
-            "next_turn_distance": leg.turn_at - here.along_track,
-            "next_turn_angle": copysign(turn_to_go, leg.turn),
-            "second_turn_distance": leg.second_at - here.along_track,
+            "next_turn_distance": to_turn,
+            "next_turn_angle": copysign(left, leg.turn),
+            "second_turn_distance": to_second,
             "second_turn_angle": leg.second_turn,
         }
 

@@ -100,16 +100,14 @@ class SimulatedShip:
         surge = state["u"]
         sway = state["v"] * cos(state.get("phi", 0.0))  # in the horizontal plane
 
-        sea = np.zeros(len(SEA_CHANNELS))
-        if self.passage.windy:
-            sea = self.states[0, -len(SEA_CHANNELS) :]
         # the first-order motion that compass and gyro feel, and the current
-        psi_wave, r_wave, _, _, current_north, current_east = sea[:6].tolist()
-
+        psi_wave, r_wave, _, _, current_north, current_east = self._sea()
         north = current_north + surge * cos(psi) - sway * sin(psi)
         east = current_east + surge * sin(psi) + sway * cos(psi)
+
         latitude = START[0] + state["x"] / MINUTE / 60.0
-        longitude = START[1] + state["y"] / MINUTE / 60.0 / cos(radians(latitude))
+        per_degree = cos(radians(latitude))
+        longitude = START[1] + state["y"] / MINUTE / 60.0 / per_degree
         return {
             "heading": psi + psi_wave,
             "yaw_rate": state["r"] + r_wave,
@@ -121,6 +119,14 @@ class SimulatedShip:
             "latitude": radians(latitude),
             "longitude": radians(longitude),
         }
+
+    def _sea(self) -> list[float]:
+        """The first six of `SEA_CHANNELS`; zeros in calm water."""
+        sea = np.zeros(len(SEA_CHANNELS))
+        if self.passage.windy:
+            sea = self.states[0, -len(SEA_CHANNELS) :]
+        channels: list[float] = sea[:6].tolist()
+        return channels
 
     def _of_plotter(self) -> dict[str, float]:
         """Readings of the chart plotter: the leg, and a waypoint ten miles along it."""

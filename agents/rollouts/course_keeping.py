@@ -266,7 +266,8 @@ class _NewCourse:
     def __init__(self, engine: Engine, step: float) -> None:
         self.engine = engine
         self.step = step
-        self.largest_integral = observation_scales(engine.model)[-1]
+        scales = observation_scales(engine.model)
+        self.largest_integral = scales[-1]
         self.integral = np.zeros(engine.num_envs)
         self.started = 0.0
 

@@ -37,7 +37,7 @@ def recorded(
     run = rollout(
         policy,
         engine,
-        np.asarray(seeds),
+        seeds,
         record=True,
         tolerant=True,
     )
@@ -120,6 +120,7 @@ def episode_of(
             infos[name] = values
 
     states = history.at_samples(run.states)
+    arguments = plain({"model": task.model, **task.arguments})
     return Episode(
         environment=task.env_id,
         model=ship.name,
@@ -136,7 +137,7 @@ def episode_of(
         waypoints=engine.waypoints(lane),
         corridor=engine.path_metres("corridor"),
         turn_radius=engine.path_metres("turn_radius"),
-        arguments=plain({"model": task.model, **task.arguments}),
+        arguments=arguments,
         seed=int(run.seeds[lane]),
         terminated=bool(run.terminated[lane]) and not history.failed,
         truncated=bool(run.truncated[lane]) and not history.failed,

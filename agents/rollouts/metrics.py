@@ -201,10 +201,10 @@ def course_changes(run: Rollout) -> dict[str, Floats]:
     for course, heading, steps in zip(courses, headings, run.steps, strict=True):
         sailed = slice(int(steps) + 1)
         changes = changes_of_course(course[sailed], heading[sailed], run.dt)
-        mean_change = undefined
         if changes:
-            mean_change = np.mean(changes, axis=0)
-        means.append(mean_change)
+            means.append(np.mean(changes, axis=0))
+        else:
+            means.append(undefined)
 
     columns = np.transpose(means)
     return dict(zip(CourseChange._fields, columns, strict=True))

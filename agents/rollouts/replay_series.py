@@ -57,19 +57,9 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
     parts = {}
     for part, values in episode.reward_parts.items():
         parts[part] = np.append(0.0, values)
-    seed = None if episode.seed is None else str(episode.seed)
-    beam = 1.0 / 6.5  # of the length, drawn where the beam is not known
     return {
         "name": name,
-        "environment": episode.environment,
-        "model": episode.model,
-        "number": episode.number,
-        "seed": seed,  # a string: too long for a number in a browser
-        "dt": episode.dt,
-        "steps": episode.n_steps,
-        "length": episode.length,
-        "beam": episode.beam or beam * episode.length,
-        "rudderLimit": float(np.degrees(episode.rudder_limit)),
+        **_facts(episode),
         "outcome": outcome(episode),
         "total": float(np.sum(episode.rewards)),
         "corridor": episode.corridor,
@@ -79,6 +69,27 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
         "parts": _rounded_all(parts),
         "rewards": rounded(np.append(0.0, episode.rewards)),
         "other": _rounded_all(_other(episode)),
+    }
+
+
+def _facts(episode: Episode) -> dict[str, Any]:
+    """Numbers that say which episode it is, and of which ship."""
+    beam = episode.beam
+    if not beam:  # it is not known
+        beam_share = 1.0 / 6.5  # of the length
+        beam = beam_share * episode.length
+    rudder_limit_deg = np.degrees(episode.rudder_limit)
+    seed = None if episode.seed is None else str(episode.seed)
+    return {
+        "environment": episode.environment,
+        "model": episode.model,
+        "number": episode.number,
+        "seed": seed,  # a string: too long for a number in a browser
+        "dt": episode.dt,
+        "steps": episode.n_steps,
+        "length": episode.length,
+        "beam": beam,
+        "rudderLimit": float(rudder_limit_deg),
     }
 
 

@@ -106,14 +106,16 @@ def rollout(
 
     starts = log.sailing
     while log.sailing.any():
-        seen = observations if show is None else show(observations)
+        seen = observations
+        if show is not None:
+            seen = show(observations)
         command = helmsman.steer(seen, starts, log.sailing, engine)
         log.give_up(command.missing)
         if not log.sailing.any():  # the policy has failed in all episodes
             break
         observations, rewards, terminated, truncated = engine.step(command.values)
         log.note(command.values, rewards, terminated, truncated)
-        starts = np.zeros(engine.num_envs, dtype=np.bool_)
+        starts = np.zeros_like(starts)
     return log.rollout(np.asarray(seeds), helmsman)
 
 
@@ -218,8 +220,7 @@ def _checked_command(actions: Any, shape: tuple[int, int], sailing: Flags) -> _C
             f" finite number for {n_missing} of {n_sailing} ships; look for a"
             " division by zero in the controller"
         )
-    is_idle = missing | ~sailing
-    values[is_idle] = 0.0
+    values[missing | ~sailing] = 0.0
     return _Command(values, missing, fault)
 
 

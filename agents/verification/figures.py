@@ -219,15 +219,18 @@ def _step_lines(t: Floats, angles: Floats, name: str, colour: str) -> list[Any]:
 def tracks_figure(tracks: Mapping[str, Track], length: float) -> Figure:
     """Tracks of the identified model under each path autopilot, and their errors."""
     first = next(iter(tracks.values()))
-    north, east = first.waypoints.T / length
-    paths = [line(east, north, "waypoints", MUTED, 1.2, line_dash="dot")]
+    waypoints = _path_line(
+        first.waypoints / length,
+        name="waypoints",
+        colour=MUTED,
+        width=1.2,
+        line_dash="dot",
+    )
+    paths = [waypoints]
     errors = []
     for (name, track), colour in zip(tracks.items(), PILOT_COLOURS, strict=False):
-        north, east = track.positions.T / length
-        paths.append(line(east, north, name, colour, 2.0))
-
-        sailed = _way_sailed(north, east)
-        errors.append(line(sailed, track.cross_track, name, colour, 1.6))
+        paths.append(_path_line(track.positions / length, name, colour, 2.0))
+        errors.append(_error_line(track, length, name, colour))
 
     north_axis = axis("north, ship lengths", scaleanchor="x", scaleratio=1)
     left = Panel(paths, "east, ship lengths", north_axis, "Track")
@@ -236,10 +239,20 @@ def tracks_figure(tracks: Mapping[str, Track], length: float) -> Figure:
     return _side_by_side(left, right)
 
 
-def _way_sailed(north: Floats, east: Floats) -> Floats:
-    """Length of a track up to each of its points, shape (n_points,)."""
-    steps = np.hypot(np.diff(north), np.diff(east))
-    return np.append(0.0, np.cumsum(steps))
+def _path_line(
+    places: Floats, name: str, colour: str, width: float, **more: Any
+) -> Any:
+    """A line through places, shape (n, 2), north and east."""
+    north, east = places.T
+    return line(east, north, name, colour, width, **more)
+
+
+def _error_line(track: Track, length: float, name: str, colour: str) -> Any:
+    """Cross-track error of a track over the way sailed, in ship lengths."""
+    steps = np.diff(track.positions / length, axis=0)
+    distances = np.hypot(*steps.T)
+    sailed = np.append(0.0, np.cumsum(distances))
+    return line(sailed, track.cross_track, name, colour, 1.6)
 
 
 def costs_figure(costs: Mapping[str, Floats]) -> Figure:

@@ -193,7 +193,8 @@ def refused_designs(
     designed = [pilot for pilot in found.pilots if pilot.design is not None]
     lost = {}
     for pilot in designed:
-        why = lost_control(pilot.episodes.terminated, most_lost)
+        terminated = pilot.episodes.terminated
+        why = lost_control(terminated, most_lost)
         if why is not None:
             lost[pilot.key] = why
     if not lost:

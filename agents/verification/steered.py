@@ -95,9 +95,10 @@ def show(
 ) -> None:
     """Show an autopilot what is measured, but for quantities that are silent."""
     for quantity, value in measured.items():
-        if quantity not in silent:
-            reading = NmeaReading(quantity, value, talker="II")
-            helm.sensors.take(reading, now)
+        if quantity in silent:
+            continue
+        reading = NmeaReading(quantity, value, talker="II")
+        helm.sensors.take(reading, now)
 
 
 def steer_to_heading(

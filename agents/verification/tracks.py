@@ -75,10 +75,9 @@ def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:
     run = rollout(guide, engine, seeds, record=RECORDED)
     figures = path_following(run)
 
-    own_samples = slice(int(run.steps[0]) + 1)
-    x = run.states["x"][own_samples, 0]
-    y = run.states["y"][own_samples, 0]
-    cross_track = run.infos["cross_track"][own_samples, 0]
+    x = _of_first(run, run.states["x"])
+    y = _of_first(run, run.states["y"])
+    cross_track = _of_first(run, run.infos["cross_track"])
     return Track(
         key=guide.kind,
         controller=guide,
@@ -89,6 +88,12 @@ def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:
         rms=figures["cross_track_rmse_m"],
         arrived=figures["success"] > 0.0,
     )
+
+
+def _of_first(run: Rollout, history: Floats) -> Floats:
+    """History of the first ship up to the end of her episode."""
+    n_samples = int(run.steps[0]) + 1
+    return history[:n_samples, 0]
 
 
 def _largest_error(run: Rollout) -> Floats:

@@ -164,7 +164,8 @@ def headline(found: Verification) -> str:
             f"{unstable} of {found.draws} models drawn run away in a manoeuvre."
         )
     best = found.pilots[0]
-    lost = int(np.sum(best.episodes.terminated))
+    terminated = best.episodes.terminated
+    lost = int(np.sum(terminated))
     control = f"loses control of {lost} of" if lost else "keeps control of all"
     sentences.append(
         f"{best.name} steers best and {control} {found.draws} models drawn."
@@ -228,7 +229,11 @@ def _best_card(found: Verification, metrics: Mapping[str, dict[str, Any]]) -> Ca
     if best.design is not None:
         margin_deg = number(best.design.margins.phase_margin_deg, 2)
         detail = f"phase margin {margin_deg}°, {detail}"
-    return Card("Best autopilot", best.name, f"mean cost {cost}; {detail}")
+    return Card(
+        label="Best autopilot",
+        value=best.name,
+        detail=f"mean cost {cost}; {detail}",
+    )
 
 
 def _criterion_row(name: str, criterion: Criterion) -> CriterionRow:
@@ -285,8 +290,9 @@ def _gain_rows(designs: Sequence[Controller]) -> list[GainRow]:
     rows = []
     for signal, (name, unit) in SIGNALS.items():
         gains = [own.get(signal) for own in by_signal]
+        row = GainRow(name, unit, gains)
         if any(gains):
-            rows.append(GainRow(name, unit, gains))
+            rows.append(row)
     return rows
 
 
