@@ -113,7 +113,7 @@ def _names(value: Any, where: str) -> tuple[str, ...]:
 
 def _gains(value: Any, design: type[Controller]) -> dict[str, float]:
     bounds = {}
-    for name in design.gain_names or design.feedback:
+    for name in _gain_names(design):
         bounds[name] = design.bounds.get(name, ANY_NUMBER)
     table = check_table(value, "gains", bounds)
     return _numbers(table, bounds, "gains")
@@ -122,10 +122,16 @@ def _gains(value: Any, design: type[Controller]) -> dict[str, float]:
 def _design(value: Any, design: type[Controller]) -> dict[str, float]:
     """Design settings: any numbers, those that the law needs within their bounds."""
     table = check_table(value, "design")
-    needed = dict(design.bounds)
-    for gain in design.gain_names or design.feedback:
-        needed.pop(gain, None)
+    gains = _gain_names(design)
+    needed = {}
+    for name, bounds in design.bounds.items():
+        if name not in gains:
+            needed[name] = bounds
     return _numbers(table, needed, "design")
+
+
+def _gain_names(design: type[Controller]) -> tuple[str, ...]:
+    return design.gain_names or tuple(design.feedback)
 
 
 def _parts(content: Mapping[str, Any], design: type[Controller]) -> dict[str, Any]:

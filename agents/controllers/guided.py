@@ -261,7 +261,9 @@ class Guided(Controller):
 
 def _scales_of(task: Task, model: ShipModel, names: Sequence[str]) -> tuple[float, ...]:
     """Scales of observations of a task; InputError for one that it does not show."""
-    scales = {quantity.name: quantity.scale for quantity in task.observed(model)}
+    scales = {}
+    for quantity in task.observed(model):
+        scales[quantity.name] = quantity.scale
     for name in names:
         if name not in scales:
             raise InputError(

@@ -94,7 +94,8 @@ class Compensator:
         )
         feeds_order = self.D[:, INTEGRAL].any()
         feeds_memory = self.B[:, INTEGRAL].any()
-        if feeds_order or feeds_memory:
+        is_fed_back = feeds_order or feeds_memory
+        if is_fed_back:
             return whole
         without = np.delete(whole, INTEGRAL, axis=0)
         return np.delete(without, INTEGRAL, axis=1)
@@ -115,13 +116,16 @@ class Compensator:
         figures = control.stability_margins(loop, returnall=True)
         gains, phases, _, _, crossings, _ = map(np.asarray, figures)
 
+        raised = gains[gains > 1.0]
+        lowered = gains[gains < 1.0]
         delays = np.radians(phases % 360.0) / crossings
+        size = np.abs(response.following)
         return Margins(
-            gain_margin=np.min(gains[gains > 1.0], initial=np.inf).item(),
-            phase_margin_deg=np.min(np.abs(phases), initial=np.inf).item(),
-            delay_margin_s=np.min(delays, initial=np.inf).item(),
-            bandwidth_rad_s=bandwidth(omega, np.abs(response.following)),
-            lowest_gain=np.max(gains[gains < 1.0], initial=0.0).item(),
+            gain_margin=least(raised),
+            phase_margin_deg=least(np.abs(phases)),
+            delay_margin_s=least(delays),
+            bandwidth_rad_s=bandwidth(omega, size),
+            lowest_gain=float(np.max(lowered, initial=0.0)),
         )
 
     def _check_closed_loop(self, ship: SampledShip, name: str) -> None:
@@ -164,6 +168,11 @@ def frequencies_of(ship: SampledShip) -> Floats:
     n_frequencies = 500
     nyquist = np.pi / ship.dt
     return np.geomspace(SLOWEST * nyquist, FASTEST * nyquist, n_frequencies)
+
+
+def least(values: Floats) -> float:
+    """Smallest of some values; infinite without any."""
+    return float(np.min(values, initial=np.inf))
 
 
 def largest_pole(matrix: Floats) -> float:

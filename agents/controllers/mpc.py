@@ -350,11 +350,12 @@ class DesignModels:
         n = len(to_path)
         self.engine = _engine(
             guide.ship,
-            n,
+            n=n,
             dt=self.dt,
             depth=guide.design["water_depth"],
         )
-        self.engine.reset(np.zeros(n, dtype=np.int64))
+        seeds = np.zeros(n, dtype=np.int64)
+        self.engine.reset(seeds)
         self._begin(seen)
         self._observe()
 

@@ -249,10 +249,12 @@ def _turns_to_one_side(
     model: ShipModel, side: float, slowed: bool
 ) -> list[tuple[float, float]]:
     """Rates, rad/s, and rudders, rad, of steady turns from the slowest on."""
+    rates = side * GRID / model.travel_time
+    largest = LARGEST_RUDDER * model.steering.limit
     turns = []
-    for rate in (side * GRID / model.travel_time).tolist():
+    for rate in rates.tolist():
         rudder = steady_turn_rudder(model, rate, slowed)
-        if rudder is None or abs(rudder) > LARGEST_RUDDER * model.steering.limit:
+        if rudder is None or abs(rudder) > largest:
             break
         turns.append((rate, rudder))
     return turns
@@ -267,7 +269,8 @@ def course_rate(model: ShipModel, turns: SteadyTurns, neutral: float) -> float:
         rates=turns.rates[reached],
         rudders=turns.rudders[reached],
     )
-    least_rate = float(GRID[0]) / model.travel_time
+    slowest = float(GRID[0])
+    least_rate = slowest / model.travel_time
     return max(gentle.largest_rate, least_rate)
 
 

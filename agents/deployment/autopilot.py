@@ -283,12 +283,16 @@ class Autopilot:
         self.dt = self.parameters.dt
         self.limit = self.parameters.limit
         self.largest = self.limit
+        guidance: Any = Nothing()
+        if isinstance(agent, Guided):
+            guidance = _no_memory(agent)
+        zero = np.zeros(1)
         self.state = BridgeState(
-            integral=np.zeros(1),
-            last_command=np.zeros(1),
-            started=np.zeros(1),
+            integral=zero,
+            last_command=zero,
+            started=zero,
             memory=_no_memory(self.pilot),
-            guidance=_no_memory(agent) if isinstance(agent, Guided) else Nothing(),
+            guidance=guidance,
         )
         self._given: Any = None
 

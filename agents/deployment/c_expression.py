@@ -238,8 +238,9 @@ class ExpressionWriter:
     def _arguments(self, node: ast.Call, function: Any) -> list[Expression]:
         """Arguments of a call in the order of the parameters, defaults among them."""
         named = {str(one.arg): one.value for one in node.keywords}
+        signature = inspect.signature(function)
         try:
-            bound = inspect.signature(function).bind(*node.args, **named)
+            bound = signature.bind(*node.args, **named)
         except TypeError:
             raise self.refusal(node) from None
         bound.apply_defaults()

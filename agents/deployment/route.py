@@ -76,17 +76,19 @@ class Route:
         for name, largest in {"latitude": 89.0, "longitude": 180.0}.items():
             values = table.numbers(name)
             for row, value in enumerate(values.tolist()):
+                place = table.place(row)
                 check_number(
                     value,
-                    f"{path}: {table.place(row)}, column '{name}'",
+                    f"{path}: {place}, column '{name}'",
                     at_least=-largest,
                     at_most=largest,
                     hint="degrees",
                 )
             columns.append(values)
-        if len(table.rows) < 2:
+        n_waypoints = len(table.rows)
+        if n_waypoints < 2:
             raise InputError(
-                f"{path}: expected at least 2 waypoints, got {len(table.rows)}"
+                f"{path}: expected at least 2 waypoints, got {n_waypoints}"
             )
         with placed(str(path)):
             return cls(np.column_stack(columns), radius)

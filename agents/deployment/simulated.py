@@ -136,10 +136,12 @@ class SimulatedShip:
         waypoint_m = 10.0 * MINUTE
         north_to_go = waypoint_m * cos(leg) - x
         east_to_go = waypoint_m * sin(leg) - y
+        cross_track = y * cos(leg) - x * sin(leg)
+        bearing = atan2(east_to_go, north_to_go)
         return {
-            "cross_track": y * cos(leg) - x * sin(leg),
+            "cross_track": cross_track,
             "leg": leg,
-            "waypoint_bearing": atan2(east_to_go, north_to_go),
+            "waypoint_bearing": bearing,
             "waypoint_distance": hypot(north_to_go, east_to_go),
         }
 
@@ -203,7 +205,8 @@ async def simulate_ship(
     """
     check_number(speed_up, "speed_up", above=0.0)
     dropped = dict(drop or {})
-    types = {_type(line) for line in ship.sentences().splitlines()}
+    lines = ship.sentences().splitlines()
+    types = {_type(line) for line in lines}
     check_keys(dropped, sorted(types), "drop")
 
     loop = asyncio.get_running_loop()
@@ -214,8 +217,10 @@ async def simulate_ship(
         now = ship.steps * ship.step
         while now < duration:
             due = begin + now / speed_up
-            await asyncio.sleep(max(0.0, due - loop.time()))
-            link.send(_still_sent(ship.sentences(), dropped, now))
+            pause = due - loop.time()
+            await asyncio.sleep(max(0.0, pause))
+            text = _still_sent(ship.sentences(), dropped, now)
+            link.send(text)
             ship.advance()
             now = ship.steps * ship.step
 

@@ -1,7 +1,7 @@
 """Histories of single episodes of a task, as they are replayed."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -89,6 +89,14 @@ class _Lane:
                 commands[name] = states[order][1:]
         return commands
 
+    def reward_parts(self, names: Iterable[str]) -> dict[str, Floats]:
+        """Parts of the reward, summed between the samples."""
+        parts = {}
+        for name in names:
+            per_step = self.run.infos[name][1:]
+            parts[name] = self.summed(per_step)
+        return parts
+
     def success(self) -> bool | None:
         """Return True if the episode was a success; None if its task knows none."""
         infos = self.run.infos
@@ -111,9 +119,7 @@ def episode_of(
     if len(history.samples) < 2:
         return None
 
-    parts = {}
-    for name in task.task.reward_parts:
-        parts[name] = history.summed(run.infos[name][1:])
+    parts = history.reward_parts(task.task.reward_parts)
     infos = {}
     for name, values in run.infos.items():
         if name not in parts and name not in SUCCESS:

@@ -304,10 +304,11 @@ def path_following(run: Rollout) -> dict[str, Floats]:
     """Figures of path following of each episode, see `metrics`."""
     is_outside = during(run, "in_corridor") == 0.0
     outside = run.sailing & is_outside
+    left = outside.any(axis=0)
     return {
         "cross_track_rmse_m": root_mean_square(run, "cross_track"),
         "outside_corridor": ratio(total(outside), run.steps),
-        "left_corridor": outside.any(axis=0).astype(np.float64),
+        "left_corridor": left.astype(np.float64),
         "grounded": _ever(run, "grounded"),
         "success": _ever(run, "success"),
     }

@@ -180,12 +180,13 @@ class BenchmarkTask:
         """Files of the user's own that it names: tasks, models, rewards, sensors."""
         options = {**self.options, **self.far}
         named = [self.environment, self.model, self.true_ship, *options.values()]
+        suffixes = (".py", ".json")
         files = []
         for name in named:
             if not isinstance(name, str):
                 continue
             path = Path(name)
-            if path.suffix in (".py", ".json") and path.is_file():
+            if path.suffix in suffixes and path.is_file():
                 files.append(path)
         return files
 

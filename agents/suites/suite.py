@@ -148,7 +148,8 @@ def find_task(
     Raises InputError for an unknown name, with the nearest, or as `load_suite`.
     """
     known = {}
-    for task in load_suite(suite, allow_code).tasks:
+    found = load_suite(suite, allow_code)
+    for task in found.tasks:
         if task.on == "ship":
             known[task.name] = task
     check_choice(name, known, "task")
@@ -197,8 +198,7 @@ def _read_suite(text: str, where: str, reader: "_Reader", source: str) -> Suite:
     for task_name, table in tables.items():
         field = f"{tasks_field}.{task_name}"
         task = reader.read(task_name, table, field)
-        own_task = replace(task, suite=source)
-        tasks += _sets_of(own_task)
+        tasks += _sets_of(replace(task, suite=source))
 
     digest = hashlib.sha256(text.encode())
     return Suite(
@@ -223,20 +223,17 @@ class _Reader:
             raise InputError(
                 f"{where}.far: expected `ship` too, the one behind the model, got none"
             )
-        environment_text = check_text(table.get("environment"), f"{where}.environment")
-        self.check_code(environment_text, table, where)
+        field = f"{where}.environment"
+        text = check_text(table.get("environment"), field)
+        self.check_code(text, table, where)
 
-        environment = read_environment(
-            environment_text, self.folder, f"{where}.environment"
-        )
-        options = dict(environment.options)
-        options |= self.options(table.get("options", {}), f"{where}.options")
-        if "sea" in table:
-            options |= self.options({"sea": table["sea"]}, where)
+        environment = read_environment(text, self.folder, field)
+        options = {**environment.options, **self.own_options(table, where)}
         far = self.options(table.get("far", {}), f"{where}.far")
 
         default_model = options.pop("model", None)
-        model = check_text(table.get("model", default_model), f"{where}.model")
+        named_model = table.get("model", default_model)
+        model = check_text(named_model, f"{where}.model")
         ship = ""
         if "ship" in table:
             ship = check_text(table["ship"], f"{where}.ship")
@@ -251,6 +248,14 @@ class _Reader:
                 far=far,
                 design_name=name,
             )
+
+    def own_options(self, table: Mapping[str, Any], where: str) -> dict[str, Any]:
+        """Keywords of an environment that a task's table gives, its sea among them."""
+        options = self.options(table.get("options", {}), f"{where}.options")
+        if "sea" in table:
+            sea = {"sea": table["sea"]}
+            options |= self.options(sea, where)
+        return options
 
     def check_code(
         self, environment: str, table: Mapping[str, Any], where: str

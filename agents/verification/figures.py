@@ -123,7 +123,8 @@ def _marks_of(criterion: Criterion, row: int) -> list[Any]:
         if value is not None:
             share = 100.0 * value / criterion.limit
             heights = [row - 0.32, row + 0.32]
-            marks.append(line([share, share], heights, name, colour, 2.2))
+            mark = line([share, share], heights, name, colour, 2.2)
+            marks.append(mark)
     return marks
 
 

@@ -59,12 +59,13 @@ def _origin(result: AutopilotResult) -> dict[str, str]:
     how = []
     for key in ("structure", "method", "samples"):
         how.append(str(provenance.get(key, NONE)))
+    origin = ", ".join(how)
     own_version = f"shipgym {shipgym.__version__}"
     software = provenance.get("software", own_version)
     return {
         "software": software,
         "ship file": result.ship.path.name,
-        "structure, method, samples": ", ".join(how),
+        "structure, method, samples": origin,
     }
 
 

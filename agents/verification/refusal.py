@@ -42,7 +42,8 @@ def why_refused(fit: Fit) -> str | None:
         drawn = []
         for ship in (model, *model.sample(60, 0)):
             A, B = steering_state_space(ship)
-            drawn.append(Steering(A, B))
+            steering = Steering(A, B)
+            drawn.append(steering)
     except InputError:  # no straight course: the designs say so
         return None
 
@@ -69,7 +70,8 @@ def _steers_to_other_side(fit: Fit, steering: Steering) -> str | None:
 
 def why_driven(drawn: Sequence[Steering]) -> str | None:
     """Damping of the wrong sign in 97.5 % of models; None without one."""
-    for row, name in enumerate(("sway damping (Y_v)", "yaw damping (N_r)")):
+    dampings = ("sway damping (Y_v)", "yaw damping (N_r)")
+    for row, name in enumerate(dampings):
         driven = [steering.A[row, row] > 0.0 for steering in drawn]
         share = float(np.mean(driven))
         per_cent = 100.0 * share

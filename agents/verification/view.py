@@ -109,10 +109,12 @@ class VerificationView:
 
 def verification_view(found: Verification, length: float) -> VerificationView:
     """Contents of the report about a verification; `length`: of the ship, m."""
-    criteria = found.manoeuvres.criteria
-    designed = {
-        pilot.name: pilot.design for pilot in found.by_name if pilot.design is not None
-    }
+    manoeuvres = found.manoeuvres
+    criteria = manoeuvres.criteria
+    designed = {}
+    for pilot in found.by_name:
+        if pilot.design is not None:
+            designed[pilot.name] = pilot.design
     linear = {name: design for name, design in designed.items() if design.feedback}
     pilots = {pilot.name: pilot_metrics(pilot) for pilot in found.pilots}
     return VerificationView(
@@ -122,7 +124,7 @@ def verification_view(found: Verification, length: float) -> VerificationView:
         headline=headline(found),
         certain=is_certain(found),
         cards=[_criteria_card(criteria), _best_card(found, pilots)],
-        unstable=int(found.manoeuvres.unstable.sum()),
+        unstable=int(manoeuvres.unstable.sum()),
         unstable_note=_unstable_note(found),
         course_unstable=int(found.course_unstable.sum()),
         criteria=[_criterion_row(name, one) for name, one in criteria.items()],
@@ -209,7 +211,8 @@ def _unstable_note(found: Verification) -> str:
 
 
 def _criteria_card(criteria: Mapping[str, Criterion]) -> Card:
-    verdicts = Counter([criterion.passed for criterion in criteria.values()])
+    passed = [criterion.passed for criterion in criteria.values()]
+    verdicts = Counter(passed)
     met = verdicts[True]
     missed = verdicts[False]
     undecided = verdicts[None]
@@ -302,9 +305,10 @@ def _design_notes(designed: Mapping[str, Controller]) -> list[str]:
     for name, design in designed.items():
         if design.kind != "turn-rate":
             continue
-        proportional = number(design.gains["proportional"])
-        integral = number(design.gains["integral"])
-        per_minute = np.degrees(60 * design.gains["rate"])
+        gains = design.gains
+        proportional = number(gains["proportional"])
+        integral = number(gains["integral"])
+        per_minute = np.degrees(60 * gains["rate"])
         notes.append(
             f"{name} steers a rate of turn: {proportional} rad per rad/s of its error,"
             f" {integral} per rad of its integral, and the rudder of the steady turn;"
