@@ -59,7 +59,8 @@ def check_controller(
     check_signature(controller, name)
     check_observations(controller, ship, asked, name)
 
-    asking = _Asking(controller, f"{name}.predict")
+    method = f"{name}.predict"
+    asking = _Asking(controller, method)
     engine = Engine(ship, N_SHIPS, asked)
     asking.check_episode(engine, n_steps)
 

@@ -108,7 +108,8 @@ def _names(value: Any, where: str) -> tuple[str, ...]:
         raise InputError(
             f"{where}: observation_names: expected a list of names, got {shown(value)}"
         )
-    return tuple(str(name) for name in value)
+    names = [str(name) for name in value]
+    return tuple(names)
 
 
 def _gains(value: Any, design: type[Controller]) -> dict[str, float]:

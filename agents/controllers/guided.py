@@ -269,7 +269,8 @@ def _scales_of(task: Task, model: ShipModel, names: Sequence[str]) -> tuple[floa
             raise InputError(
                 f"task: expected one that shows '{name}', got '{task.name}'"
             )
-    return tuple(scales[name] for name in names)
+    own = [scales[name] for name in names]
+    return tuple(own)
 
 
 def shown_course(seen: PathSignals, lookahead: float, path_radius: float) -> Number:

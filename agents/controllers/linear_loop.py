@@ -102,7 +102,12 @@ def sample_ship(model: ShipModel, dt: float, first_order: bool = False) -> Sampl
 
     lag = model.steering.time_constant
     A, B = sampled(linear, lag, dt)
-    return SampledShip(A=A, B=B[:, None], dt=dt, about=about)
+    return SampledShip(
+        A=A,
+        B=B[:, None],
+        dt=dt,
+        about=about,
+    )
 
 
 def _first_order(form: Nomoto, travel_time: float) -> Floats:

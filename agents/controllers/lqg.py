@@ -313,8 +313,9 @@ class LQG(Controller):
         """Parameters of its law; without a wave model those of the wave are zero."""
         n_states = len(Motions._fields)
         n_measured = len(Measured._fields)
+        square = (n_states, n_states)
         return Observer(
-            transition=_filled(Transition, self.transition, (n_states, n_states)),
+            transition=_filled(Transition, self.transition, square),
             effect=_filled(Motions, self.input, (n_states,)),
             kalman=_filled(KalmanGains, self.kalman, (n_states, n_measured)),
             output=_filled(Output, self.output, (n_measured, n_states)),

@@ -163,8 +163,9 @@ class MPC(WheelOver):
 
         course, _ = type(self).law(seen, Nothing(), self.parameters)
         knots = memory.steps / KNOT_STEPS
+        course = course + added(plans, knots)
         steps = (memory.steps + 1.0) % KNOT_STEPS
-        return course + added(plans, knots), PlanMemory(steps, current, plans.T)
+        return course, PlanMemory(steps, current, plans.T)
 
     def planned(
         self, seen: PathSignals, current: BodyCurrent, memory: PlanMemory
@@ -389,7 +390,8 @@ class DesignModels:
         place = self.place
         gains = self.guide.parameters
         course = course_over_ground(place.cross_track, place.turns, gains)
-        return np.asarray(place.course + course)
+        over_ground: Floats = place.course + course
+        return over_ground
 
     def steer(self, course: Floats) -> None:
         """Take one step towards a course over ground."""
@@ -412,9 +414,12 @@ class DesignModels:
         surge = self.read("u")
         sway = self.read("v")
         ahead, aside = turned(self.north, self.east, self.read("psi"))
+        ground_ahead = surge + ahead
+        ground_aside = sway + aside
         across = surge * aside - sway * ahead
-        along = surge * (surge + ahead) + sway * (sway + aside)
-        return np.asarray(np.arctan2(across, along))
+        along = surge * ground_ahead + sway * ground_aside
+        drift: Floats = np.arctan2(across, along)
+        return drift
 
     def signals(self, to_steer: Floats) -> Signals:
         """Signals for LQ, which steers a heading, rad."""
@@ -436,9 +441,10 @@ def add_step_cost(cost: Floats, guide: MPC, models: DesignModels) -> None:
     particulars = guide.ship.particulars
     full_way = particulars["speed"] * models.dt
     off_track = models.place.cross_track / weights.corridor
+    share_of_way = models.progress / full_way
     rudder_rate = models.moved * particulars["length"] / full_way
 
-    cost += off_track**2 - np.clip(models.progress / full_way, -1.0, 1.0)
+    cost += off_track**2 - np.clip(share_of_way, -1.0, 1.0)
     cost += weights.rudder * models.rudder**2
     cost += weights.rudder_travel / COARSE * models.moved
     cost += weights.rudder_rate * rudder_rate**2

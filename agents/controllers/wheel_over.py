@@ -161,8 +161,8 @@ def own_lead(model: ShipModel, autopilot: Policy | None) -> float:
 
     # the order is the angle: the heading error makes what the other gains do not
     gains = autopilot.gains
-    missing = turn.rudder * (1.0 - gains["rudder"])
-    missing = missing - gains["yaw_rate"] - gains["sway"] * turn.sway
+    unfed = turn.rudder * (1.0 - gains["rudder"])
+    missing = unfed - gains["yaw_rate"] - gains["sway"] * turn.sway
     heading_lag = missing / gains["heading_error"]  # s
 
     lag_m = heading_lag * model.particulars["speed"] - turn.sway

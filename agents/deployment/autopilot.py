@@ -97,7 +97,13 @@ def heading_step(
 ) -> Step:
     """Order of an autopilot that keeps a heading, and its next state."""
     error = wrapped(given.set_point - given.heading)
-    order, after = heading_order(error, given, state, p, law)
+    order, after = heading_order(
+        error,
+        given,
+        state,
+        p,
+        law=law,
+    )
     return limited(order, after, p)
 
 
@@ -435,4 +441,5 @@ def _no_memory(agent: Any) -> Any:
     if not isinstance(agent, Controller):
         return None
     nothing = np.zeros((agent.memory_size, 1))
-    return from_columns(agent.memory_record, iter(nothing))
+    columns = iter(nothing)
+    return from_columns(agent.memory_record, columns)

@@ -131,7 +131,8 @@ class ExpressionWriter:
             raise self.refusal(node)
         left = self.expression(node.left)
         right = self.expression(node.right)
-        if isinstance(node.op, ast.Div) and left.kind is int:
+        is_quotient = isinstance(node.op, ast.Div)
+        if is_quotient and left.kind is int:
             left = Expression(f"(double)({left.text})", float)
 
         are_integers = left.kind is int and right.kind is int

@@ -199,16 +199,17 @@ class Helm:
 
         keeps_heading = not self.follows_path and not known["rate_of_turn"]
         set_point = known.get("set_point", 0.0)
-        error = wrapped(set_point - known["heading"])
+        off_heading = abs(wrapped(set_point - known["heading"]))
         largest = radians(self.limits.off_heading_deg)
-        if keeps_heading and abs(error) > largest:
+        if keeps_heading and off_heading > largest:
             warnings.append("off heading")
 
         cross_track = known.get("cross_track", 0.0)
         if abs(cross_track) > self.limits.off_track_m:
             warnings.append("off track")
 
-        if self.seconds_to_turn(known, now) <= self.limits.early_s:
+        seconds_to_turn = self.seconds_to_turn(known, now)
+        if seconds_to_turn <= self.limits.early_s:
             warnings.append("course change ahead")
         return warnings
 

@@ -166,4 +166,5 @@ class HelmSensors:
             self.since.pop(what, None)
             return False
         begin = self.since.setdefault(what, now)
-        return now - begin > self.limits.persistence_s
+        lasted_s = now - begin
+        return lasted_s > self.limits.persistence_s

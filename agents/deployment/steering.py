@@ -150,6 +150,7 @@ def _fault(helm: Helm, connection: Connection, late_s: float) -> str | None:
     """A fault of the connection or the computer: it is closed, or the step is late."""
     if not connection.is_open:
         return "the connection was closed"
-    if helm.state == STEERING and late_s > helm.limits.late_s:
+    is_late = late_s > helm.limits.late_s
+    if helm.state == STEERING and is_late:
         return f"a step came {late_s:.1f} s late"
     return None

@@ -247,10 +247,12 @@ def step_response(
 def _step_responses(run: Rollout, n_samples: int) -> StepResponses:
     """Responses of a rollout that recorded a step of the set-point."""
     change = run.states["psi"] - run.states["set_point"]
+    rudder = run.states["delta"]
+    samples = np.arange(n_samples, dtype=np.float64)
     return StepResponses(
-        t=np.arange(n_samples, dtype=np.float64) * run.dt,
+        t=samples * run.dt,
         heading=_continued(change, n_samples),
-        rudder=_continued(run.states["delta"], n_samples),
+        rudder=_continued(rudder, n_samples),
     )
 
 

@@ -223,13 +223,15 @@ def changes_of_course(course: Floats, heading: Floats, dt: float) -> list[Course
     changes = []
     smallest_change = np.radians(5.0)  # of course, whose overshoot and settling count
     for begin, end in pairwise(limits):
-        is_small = abs(error[begin]) < smallest_change
-        if is_small or begin == end:
+        change = abs(error[begin])
+        if change < smallest_change or begin == end:
             continue
         # the error at the end may already be that against the next course
-        next_course = course[end] != course[begin]
-        after = end if next_course else end + 1
-        changes.append(step_figures(error[begin:after], dt))
+        after = end + 1
+        if course[end] != course[begin]:
+            after = end
+        figures = step_figures(error[begin:after], dt)
+        changes.append(figures)
     return changes
 
 
@@ -294,10 +296,9 @@ def distance_made_good(run: Rollout) -> Floats:
         distance = during(run, "distance_made_good")
         return np.asarray(distance.max(axis=0, initial=0.0))
     error = during(run, "heading_error")
-    surge = during(run, "u")
-    sway = during(run, "v")
-    along_course = surge * np.cos(error) + sway * np.sin(error)
-    return total(along_course) * run.dt
+    by_surge = during(run, "u") * np.cos(error)
+    by_sway = during(run, "v") * np.sin(error)
+    return total(by_surge + by_sway) * run.dt
 
 
 def path_following(run: Rollout) -> dict[str, Floats]:

@@ -206,7 +206,8 @@ def quantities(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Histories and read-outs that some of the runs have."""
     recorded: set[str] = set()
     for one in runs:
-        recorded.update(one["series"])
+        names = one["series"]
+        recorded.update(names)
 
     shown = []
     for quantity in QUANTITIES:

@@ -217,9 +217,9 @@ def _criteria_card(criteria: Mapping[str, Criterion]) -> Card:
     missed = verdicts[False]
     undecided = verdicts[None]
     return Card(
-        "IMO criteria",
-        f"{met} of {len(criteria)}",
-        f"met; {missed} missed, {undecided} not decided by these trials",
+        label="IMO criteria",
+        value=f"{met} of {len(criteria)}",
+        detail=f"met; {missed} missed, {undecided} not decided by these trials",
     )
 
 
@@ -276,8 +276,9 @@ def _introduction(found: Verification, designed: Mapping[str, Controller]) -> st
         sentences.append(
             f"{names} {verb} trained earlier, on another model, and used unchanged."
         )
-    K = number(found.nomoto.K)
-    T = number(found.nomoto.T)
+    nomoto = found.nomoto
+    K = number(nomoto.K)
+    T = number(nomoto.T)
     sentences.append(f"First-order form (Nomoto): K = {K} 1/s, T = {T} s.")
     return " ".join(sentences)
 
@@ -293,8 +294,8 @@ def _gain_rows(designs: Sequence[Controller]) -> list[GainRow]:
     rows = []
     for signal, (name, unit) in SIGNALS.items():
         gains = [own.get(signal) for own in by_signal]
-        row = GainRow(name, unit, gains)
         if any(gains):
+            row = GainRow(name, unit, gains)
             rows.append(row)
     return rows
 
