@@ -53,13 +53,14 @@ def check_controller(
         Control intervals.
     """
     check_whole(n_steps, "n_steps", at_least=2)
-    ship = load_model("mariner") if model is None else model
-    asked = course_keeping_task() if task is None else task
+    ship = model or load_model("mariner")
+    asked = task or course_keeping_task()
     name = type(controller).__name__
     check_signature(controller, name)
     check_observations(controller, ship, asked, name)
 
-    asking = _Asking(controller, f"{name}.predict")
+    method = f"{name}.predict"
+    asking = _Asking(controller, method)
     engine = Engine(ship, N_SHIPS, asked)
     asking.check_episode(engine, n_steps)
 
@@ -115,13 +116,14 @@ class _Asking:
         begins = np.ones(N_SHIPS, dtype=np.bool_)
         starts = begins
         for step in range(n_steps):
-            action, state = self.answer(seen, state, starts, f"step {step}")
+            where = f"step {step}"
+            action, state = self.answer(seen, state, starts, where)
             for i in range(N_SHIPS):
-                where = f"step {step}, ship {i} alone"
-                own, alone[i] = self.answer(seen[i], alone[i], starts[:1], where)
-                self.check_same(own, action[i], where)
+                place = f"{where}, ship {i} alone"
+                own, alone[i] = self.answer(seen[i], alone[i], starts[:1], place)
+                self.check_same(own, action[i], place)
             seen, *_ = engine.step(action)
-            starts = np.zeros(N_SHIPS, dtype=np.bool_)
+            starts = ~begins
 
         fresh, _ = self.answer(seen, None, begins, "a first observation")
         where = "episode_start True and the state of another episode"
@@ -132,7 +134,7 @@ class _Asking:
         self, seen: Any, state: Any, starts: Any, where: str
     ) -> tuple[NDArray[np.float32], Any]:
         """Action and state, computed three times; the inputs must not be changed."""
-        seen_before = np.copy(seen)
+        seen_before = deepcopy(seen)
         state_before = deepcopy(state)
         answer: Any = self.controller.predict(seen, state, starts, True)
         if not isinstance(answer, tuple) or len(answer) != 2:

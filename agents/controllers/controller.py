@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
@@ -207,7 +208,7 @@ class Controller:
 
     @property
     def memory_size(self) -> int:
-        """How many numbers of each ship are in the state that `predict` returns."""
+        """Count of the numbers that `predict` keeps of each ship in its state."""
         return size_of(self.memory_record)
 
     @cached_property
@@ -278,20 +279,25 @@ class Controller:
         """
         given = checked_observation(observation, self.observation_names)
         shape = given.shape[:-1]
-        size = self.memory_size
-        kept = recalled(state if size else None, episode_start, shape, size)
-
+        memory = self._memory_of(state, episode_start, shape)
         seen = self.signals(np.atleast_2d(given))
-        n_ships = len(seen.heading_error)
-        columns = kept.reshape(n_ships, size).T
-        memory = from_columns(self.memory_record, iter(columns))
         order, memory = self.steer(seen, memory)
 
         part = np.clip(order / self.rudder_limit, -1.0, 1.0)
         action = part.astype(np.float32).reshape(*shape, 1)
-        if size:
-            state = to_rows(memory, n_ships).reshape(*shape, size)
+        if self.memory_size:
+            n_ships = len(seen.heading_error)
+            rows = to_rows(memory, n_ships)
+            state = rows.reshape(*shape, self.memory_size)
         return action, state
+
+    def _memory_of(self, state: Any, episode_start: Any, shape: tuple[int, ...]) -> Any:
+        """Record of what is remembered of ships of a shape, from a state."""
+        size = self.memory_size
+        kept = recalled(state if size else None, episode_start, shape, size)
+        n_ships = math.prod(shape)
+        columns = kept.reshape(n_ships, size).T
+        return from_columns(self.memory_record, iter(columns))
 
     def signals(self, observations: Floats) -> Signals:
         """Signals by observations of shape (n_ships, n_observations), SI units."""
@@ -325,18 +331,23 @@ class Controller:
 
     def _linearised(self) -> Compensator:
         """Law about straight running by central differences; the episode has begun."""
-        n = len(SIGNALS)
+        n_signals = len(SIGNALS)
         remembered = np.array(leaves(self.memory_record)) != "started"
-        small = SMALL * np.eye(n + int(remembered.sum()))
+        n_inputs = n_signals + int(remembered.sum())
+        small = SMALL * np.eye(n_inputs)
         above = self._response(small, remembered)
         below = self._response(-small, remembered)
 
         slopes = (above - below).T / (2.0 * SMALL)
+        order = slice(1)
+        memory = slice(1, None)
+        by_signals = slopes[:, :n_signals]
+        by_memory = slopes[:, n_signals:]
         return Compensator(
-            A=slopes[1:, n:],
-            B=slopes[1:, :n],
-            C=slopes[:1, n:],
-            D=slopes[:1, :n],
+            A=by_memory[memory],
+            B=by_signals[memory],
+            C=by_memory[order],
+            D=by_signals[order],
         )
 
     def _response(self, deviations: Floats, remembered: Flags) -> Floats:
@@ -407,7 +418,13 @@ class Controller:
             f" (model '{self.model_name}'); design one on this model with"
             f" {type(self).__name__}.from_model"
         )
-        check_scales(names, scales, self.observation_scales, where, remedy)
+        check_scales(
+            names,
+            scales,
+            own=self.observation_scales,
+            where=where,
+            remedy=remedy,
+        )
 
     def check_fits_model(self, model: ShipModel) -> None:
         """Refuse a ship of another length, service speed or rudder limit."""
@@ -452,14 +469,15 @@ def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> No
             raise InputError(
                 f"{where}: observation {i}: expected '{wanted}', got '{name}'"
             )
-    if len(found) != len(expected):
-        missing = [name for name in expected if name not in found]
-        unknown = [name for name in found if name not in expected]
-        different = ", ".join(unknown + missing)
-        raise InputError(
-            f"{where}: expected {len(expected)} observations, got {len(found)}; in one"
-            f" and not in the other: {different}"
-        )
+    if len(found) == len(expected):
+        return
+    missing = [name for name in expected if name not in found]
+    unknown = [name for name in found if name not in expected]
+    different = ", ".join(unknown + missing)
+    raise InputError(
+        f"{where}: expected {len(expected)} observations, got {len(found)}; in one"
+        f" and not in the other: {different}"
+    )
 
 
 def check_scales(

@@ -58,17 +58,7 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
 
     Raises InputError, which names the field at fault.
     """
-    check_keys(content, content, where, ("format", "kind"))
-    check_format(content, FORMAT, where)
-    known_kinds = controller_kinds()
-    kind = check_choice(content["kind"], (*known_kinds, LEARNED), f"{where}: kind")
-    if kind == LEARNED:
-        raise InputError(
-            f"{where}: kind: expected a classical controller, {quoted(known_kinds)},"
-            f" got '{kind}'"
-        )
-
-    design = controller_class(kind)
+    design = _class_of(content, where)
     expected = (*FIELDS, *_further_fields(design))
     check_keys(content, expected, where, expected)
     names = _names(content["observation_names"], where)
@@ -89,6 +79,20 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
         )
 
 
+def _class_of(content: Mapping[str, Any], where: str) -> type[Controller]:
+    """Class of the kind of controller that a file names."""
+    check_keys(content, content, where, ("format", "kind"))
+    check_format(content, FORMAT, where)
+    known = controller_kinds()
+    kind = check_choice(content["kind"], (*known, LEARNED), f"{where}: kind")
+    if kind == LEARNED:
+        raise InputError(
+            f"{where}: kind: expected a classical controller, {quoted(known)},"
+            f" got '{kind}'"
+        )
+    return controller_class(kind)
+
+
 def _further_fields(design: type[Controller]) -> list[str]:
     """Fields that a kind of controller has in addition to `FIELDS`."""
     fields_of_kind = {
@@ -104,12 +108,13 @@ def _names(value: Any, where: str) -> tuple[str, ...]:
         raise InputError(
             f"{where}: observation_names: expected a list of names, got {shown(value)}"
         )
-    return tuple(str(name) for name in value)
+    names = [str(name) for name in value]
+    return tuple(names)
 
 
 def _gains(value: Any, design: type[Controller]) -> dict[str, float]:
     bounds = {}
-    for name in design.gain_names or design.feedback:
+    for name in _gain_names(design):
         bounds[name] = design.bounds.get(name, ANY_NUMBER)
     table = check_table(value, "gains", bounds)
     return _numbers(table, bounds, "gains")
@@ -118,10 +123,16 @@ def _gains(value: Any, design: type[Controller]) -> dict[str, float]:
 def _design(value: Any, design: type[Controller]) -> dict[str, float]:
     """Design settings: any numbers, those that the law needs within their bounds."""
     table = check_table(value, "design")
-    needed = dict(design.bounds)
-    for gain in design.gain_names or design.feedback:
-        needed.pop(gain, None)
+    gains = _gain_names(design)
+    needed = {}
+    for name, bounds in design.bounds.items():
+        if name not in gains:
+            needed[name] = bounds
     return _numbers(table, needed, "design")
+
+
+def _gain_names(design: type[Controller]) -> tuple[str, ...]:
+    return design.gain_names or tuple(design.feedback)
 
 
 def _parts(content: Mapping[str, Any], design: type[Controller]) -> dict[str, Any]:
@@ -148,12 +159,13 @@ def _arrays(value: Any, axes_of: Mapping[str, tuple[str | int, ...]]) -> dict[st
     lengths: dict[str, int] = {}  # of named axes
     arrays = {}
     for name, axes in axes_of.items():
-        array = check_array(table[name], _shape(axes, lengths), f"arrays.{name}")
+        where = f"arrays.{name}"
+        array = check_array(table[name], _shape(axes, lengths), where)
         if not _has_axes(array, axes, lengths) or not _is_bounded(array):
+            largest = ANY_NUMBER.largest
             expected = ", ".join(map(str, axes))
             raise InputError(
-                f"arrays.{name}: expected numbers of magnitude"
-                f" {ANY_NUMBER.largest:g} at most, of shape"
+                f"{where}: expected numbers of magnitude {largest:g} at most, of shape"
                 f" ({expected}), got shape {array.shape}; {REMEDY}"
             )
         arrays[name] = array
@@ -189,24 +201,28 @@ def _is_bounded(array: Floats) -> bool:
 
 def read_model(value: Any) -> dict[str, str]:
     """Name and hash of the model that an agent was made for, as its fields."""
-    table = check_table(value, "model", ("name", "sha256"))
-    name = check_text(table.get("name"), "model.name")
-    sha256 = check_text(table.get("sha256"), "model.sha256")
-    return {"model_name": name, "model_sha256": sha256}
+    names = ("name", "sha256")
+    table = check_table(value, "model", names)
+    texts = {}
+    for name in names:
+        text = table.get(name)
+        texts[f"model_{name}"] = check_text(text, f"model.{name}")
+    return texts
 
 
 def read_scales(value: Any, names: tuple[str, ...]) -> tuple[float, ...]:
     """Observation scales, positive numbers, one for each name."""
     where = "observation_scales"
-    n = len(names)
+    expected = f"expected {len(names)} numbers"
     if not isinstance(value, list):
-        raise InputError(f"{where}: expected {n} numbers, got {shown(value)}")
-    if len(value) != n:
-        raise InputError(f"{where}: expected {n} numbers, got {len(value)}")
+        raise InputError(f"{where}: {expected}, got {shown(value)}")
+    if len(value) != len(names):
+        raise InputError(f"{where}: {expected}, got {len(value)}")
 
     scales = []
     for i, name in enumerate(names):
-        scale = _number(value[i], SCALE, f"{where}[{i}] ('{name}')")
+        place = f"{where}[{i}] ('{name}')"
+        scale = _number(value[i], SCALE, place)
         scales.append(scale)
     return tuple(scales)
 

@@ -49,18 +49,16 @@ def design(
         `lq_`.
     """
     made: Any = controller_class(kind)
-    own = dict(settings or {})
+    given = dict(settings or {})
     if not made.has_autopilot:
         ship = _Ship(task.ship, model_hash(task.ship))
         interval = task.task.interval(task.ship)
-        return _designed(made, ship, interval, json.dumps(own, sort_keys=True))
+        text = json.dumps(given, sort_keys=True)
+        return _designed(made, ship, interval, text)
     if not task.task.follows_path:
         raise no_path(kind, task)
 
-    of_autopilot = {}
-    for name in list(own):
-        if name.startswith(INNER):
-            of_autopilot[name.removeprefix(INNER)] = own.pop(name)
+    own, of_autopilot = _divided(given)
     guide: Controller = made.from_model(
         task.ship,
         autopilot=design("lq", task, of_autopilot),
@@ -68,6 +66,18 @@ def design(
         **own,
     )
     return guide
+
+
+def _divided(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Settings of guidance and, by their own names, of the LQ that it leads."""
+    own = {}
+    inner = {}
+    for name, value in settings.items():
+        if name.startswith(INNER):
+            inner[name.removeprefix(INNER)] = value
+        else:
+            own[name] = value
+    return own, inner
 
 
 @lru_cache(maxsize=256)
@@ -86,7 +96,7 @@ def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:
     if kind == "best":
         kind = _cheapest(found, kind)
     elif kind == "base":
-        bases = {name: one for name, one in found.items() if name not in NO_BASES}
+        bases = {name: found[name] for name in found if name not in NO_BASES}
         kind = _cheapest(bases, kind)
 
     if not found:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import (
     ANY_NUMBER,
@@ -35,6 +35,8 @@ from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 from shipgym.tasks.scales import OBSERVATION_NAMES
 from shipgym.tasks.task import Task
+
+Observations = NDArray[np.float32]
 
 N_HEADING = len(OBSERVATION_NAMES)  # observations of a heading autopilot
 UNLIMITED = Margins(np.inf, np.inf, np.inf, np.inf)
@@ -127,7 +129,7 @@ class Guided(Controller):
 
     @classmethod
     def is_closed_form(cls) -> bool:
-        """Whether it guides by its `law` alone."""
+        """Return True if it guides by its `law` alone."""
         return cls.course is Guided.course
 
     def course(self, seen: PathSignals, memory: Any) -> tuple[Number, Any]:
@@ -166,21 +168,32 @@ class Guided(Controller):
         own, inner = (None, None) if state is None else state
         memory = self._recalled(own, episode_start, shape)
 
+        rows_shown, after = self._guided(rows, memory)
+        shown = rows_shown.reshape(*shape, N_HEADING)
+        starts = None if inner is None else memory.started == 0.0
+        action, inner = self.autopilot.predict(shown, inner, starts, deterministic)
+
+        own = to_rows(after, len(rows)).reshape(*shape, -1)
+        return action, (own, inner)
+
+    def _guided(
+        self, rows: Floats, memory: GuidanceMemory
+    ) -> tuple[Observations, GuidanceMemory]:
+        """Observations for the autopilot, of course keeping, and the next memory."""
         seen = self.path_signals(rows)
         course, law = self.course(seen, memory.law)
         error = wrapped(seen.heading_error + course)
         reach = self.observation_scales[N_HEADING - 1]
-        dt = self.design["dt"]
-        integral = gathered(memory.integral, error, memory.started, dt, reach)
-
+        integral = gathered(
+            memory.integral,
+            error,
+            started=memory.started,
+            dt=self.design["dt"],
+            reach=reach,
+        )
         shown = on_course(rows[:, :N_HEADING], error, integral, reach)
-        shown = shown.reshape(*shape, N_HEADING)
-        starts = None if inner is None else memory.started == 0.0
-        action, inner = self.autopilot.predict(shown, inner, starts, deterministic)
-
         after = GuidanceMemory(law, integral, started=np.ones(len(rows)))
-        own = to_rows(after, len(rows)).reshape(*shape, -1)
-        return action, (own, inner)
+        return shown, after
 
     def _recalled(
         self, own: Any, episode_start: Any, shape: tuple[int, ...]
@@ -199,7 +212,9 @@ class Guided(Controller):
         """Signals by observations of shape (n_ships, n_observations), SI units."""
         known = self.observed(observations)
         zero = np.zeros(len(observations))
-        error = np.arctan2(known["heading_error_sin"], known["heading_error_cos"])
+        sine = known["heading_error_sin"]
+        cosine = known["heading_error_cos"]
+        error = np.arctan2(sine, cosine)
         course_error = zero
         if "course_error_sin" in known:
             sine = known["course_error_sin"]
@@ -246,13 +261,16 @@ class Guided(Controller):
 
 def _scales_of(task: Task, model: ShipModel, names: Sequence[str]) -> tuple[float, ...]:
     """Scales of observations of a task; InputError for one that it does not show."""
-    scales = {quantity.name: quantity.scale for quantity in task.observed(model)}
+    scales = {}
+    for quantity in task.observed(model):
+        scales[quantity.name] = quantity.scale
     for name in names:
         if name not in scales:
             raise InputError(
                 f"task: expected one that shows '{name}', got '{task.name}'"
             )
-    return tuple(scales[name] for name in names)
+    own = [scales[name] for name in names]
+    return tuple(own)
 
 
 def shown_course(seen: PathSignals, lookahead: float, path_radius: float) -> Number:

@@ -40,8 +40,9 @@ class KalmanFilter:
 
         `noise`: in multiples of a sea trial's sensors.
         """
-        of_sensors = [SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise]
-        deviations = noise * np.array(of_sensors)
+        yaw_rate = SEA_TRIAL["r"]
+        heading = SEA_TRIAL["psi"]
+        deviations = noise * np.array([yaw_rate.noise, heading.noise])
         return kalman_gain(
             transition=self.transition,
             process=self.process,
@@ -110,7 +111,8 @@ def rudder_response(
     linear = np.column_stack(linearise(model, about))
     A, B = sampled(linear, lag=0.0, dt=dt)
     motions = slice(RUDDER)  # without rudder and integral
-    return A[motions, motions], B[motions]
+    transition = A[motions, motions]
+    return transition, B[motions]
 
 
 def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floats]:
@@ -151,7 +153,8 @@ def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floa
     variances = [1.0, spring]  # of heading and rate, by that of the heading
     steady = deviation**2 * np.diag(variances)
     left = transition @ steady @ transition.T
-    return transition, steady - left
+    driven = steady - left
+    return transition, driven
 
 
 def kalman_gain(
@@ -181,6 +184,7 @@ def kalman_gain(
     _, covariance, _ = control.dlqe(transition, disturbed, output, process, noise)
     of_output = output @ covariance
     innovation = of_output @ output.T + noise
-    gain: Floats = np.linalg.solve(innovation, of_output).T
-    deviations = np.sqrt(np.diag(innovation))
-    return gain, deviations
+    solved = np.linalg.solve(innovation, of_output)
+    gain: Floats = solved.T
+    variances = np.diag(innovation)
+    return gain, np.sqrt(variances)

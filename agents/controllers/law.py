@@ -20,7 +20,7 @@ Law: TypeAlias = Callable[[Any, Any, Any], tuple[Number, Any]]
 
 
 class Signals(NamedTuple):
-    """What an autopilot that keeps a heading may read of a ship."""
+    """Measurements of a ship for an autopilot that keeps a heading."""
 
     sway: Number  # m/s, through the water
     yaw_rate: Number  # rad/s
@@ -41,7 +41,7 @@ class Turns(NamedTuple):
 
 
 class PathSignals(NamedTuple):
-    """What guidance may read of a ship and of the path beside her."""
+    """Measurements of a ship and of the path beside her, for guidance."""
 
     heading_error: Number  # rad, direction of the path less heading
     cross_track: Number  # m, to starboard of the path

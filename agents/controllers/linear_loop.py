@@ -15,12 +15,19 @@ from agents.controllers.law import Gains
 from shipgym import ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
-from shipgym.ships.linear import StraightRunning, linearise, nomoto_of, straight_running
+from shipgym.ships.linear import (
+    Nomoto,
+    StraightRunning,
+    linearise,
+    nomoto_of,
+    straight_running,
+)
 from shipgym.tasks.scales import control_interval
 from shipgym.tasks.steering import RATE_WEIGHT
 
 SIGNALS = Gains._fields
 SWAY, YAW_RATE, ERROR, RUDDER, INTEGRAL = range(len(SIGNALS))
+ORDER = RUDDER + 1  # of the rudder, in a flow that holds it over an interval
 # heading error that costs as much as the rudder moving at full rate
 FULL_RATE_ERROR = np.radians(7.0)
 
@@ -88,22 +95,31 @@ def sample_ship(model: ShipModel, dt: float, first_order: bool = False) -> Sampl
     """
     about = straight_running(model)
     steering, rudder = linearise(model, about)
+    linear = np.column_stack([steering, rudder])
     if first_order:
         form = nomoto_of(steering, rudder)
-        sway_decay = 1.0 / model.travel_time
-        yaw_decay = 1.0 / form.T
-        steering = np.diag([-sway_decay, -yaw_decay])
-        rudder = np.array(
-            [
-                [0.0],
-                [form.rudder_effect],
-            ]
-        )
+        linear = _first_order(form, model.travel_time)
 
-    linear = np.column_stack([steering, rudder])
     lag = model.steering.time_constant
     A, B = sampled(linear, lag, dt)
-    return SampledShip(A=A, B=B[:, None], dt=dt, about=about)
+    return SampledShip(
+        A=A,
+        B=B[:, None],
+        dt=dt,
+        about=about,
+    )
+
+
+def _first_order(form: Nomoto, travel_time: float) -> Floats:
+    """Nomoto's form as `sampled` takes it; sway decays in one ship length."""
+    sway_decay = 1.0 / travel_time
+    yaw_decay = 1.0 / form.T
+    return np.array(
+        [
+            [-sway_decay, 0.0, 0.0],
+            [0.0, -yaw_decay, form.rudder_effect],
+        ]
+    )
 
 
 def sampled(linear: Floats, lag: float, dt: float) -> tuple[Floats, Floats]:
@@ -125,25 +141,14 @@ def sampled(linear: Floats, lag: float, dt: float) -> tuple[Floats, Floats]:
     """
     from scipy.linalg import expm
 
-    order = RUDDER + 1  # behind sway, yaw rate, heading error and rudder
-    by_motions = linear[:, :ERROR]
-    by_rudder = linear[:, ERROR]
-    flow = np.zeros((order + 1, order + 1))
-    flow[:ERROR, :ERROR] = by_motions
-    flow[ERROR, YAW_RATE] = -1.0
-    if lag > 0.0:
-        flow[:ERROR, RUDDER] = by_rudder
-        flow[RUDDER, RUDDER] = -1.0 / lag
-        flow[RUDDER, order] = 1.0 / lag
-    else:
-        flow[:ERROR, order] = by_rudder
-
+    flow = _held_flow(linear, lag)
     held = expm(dt * flow)
     n = len(SIGNALS)
     A = np.zeros((n, n))
     B = np.zeros(n)
-    A[:order, :order] = held[:order, :order]
-    B[:order] = held[:order, order]
+    states = slice(ORDER)  # sway, yaw rate, heading error and rudder
+    A[states, states] = held[states, states]
+    B[states] = held[states, ORDER]
     if lag == 0.0:
         A[RUDDER] = 0.0
         B[RUDDER] = 1.0
@@ -153,3 +158,22 @@ def sampled(linear: Floats, lag: float, dt: float) -> tuple[Floats, Floats]:
     A[INTEGRAL, INTEGRAL] = 1.0
     B[INTEGRAL] = dt * B[ERROR]
     return A, B
+
+
+def _held_flow(linear: Floats, lag: float) -> Floats:
+    """Rates of motions, heading error and rudder, while the order is held.
+
+    It comes last, in the place `ORDER`. For `linear` and `lag` see `sampled`.
+    """
+    motions = slice(ERROR)
+    by_rudder = linear[:, ERROR]
+    flow = np.zeros((ORDER + 1, ORDER + 1))
+    flow[motions, motions] = linear[:, motions]
+    flow[ERROR, YAW_RATE] = -1.0
+    if lag > 0.0:
+        flow[motions, RUDDER] = by_rudder
+        flow[RUDDER, RUDDER] = -1.0 / lag
+        flow[RUDDER, ORDER] = 1.0 / lag
+    else:
+        flow[motions, ORDER] = by_rudder
+    return flow

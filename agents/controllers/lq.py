@@ -29,7 +29,7 @@ from shipgym.tasks.steering import RUDDER_WEIGHT
 
 
 class SteeringCost(NamedTuple):
-    """What an LQ design minimises beside the squared heading error."""
+    """Weights of an LQ design; that of the squared heading error is 1."""
 
     rudder_weight: float  # of the squared rudder
     rate_weight_s2: float  # of the squared rudder rate, s^2
@@ -94,7 +94,12 @@ class LQ(Controller):
             Weight of the squared rudder rate, s^2; by default `rate_weight`.
         """
         interval = checked_interval(model, dt)
-        cost = steering_cost(model, integral_lengths, rudder_weight, rate_weight_s2)
+        cost = steering_cost(
+            model,
+            integral_lengths=integral_lengths,
+            rudder_weight=rudder_weight,
+            rate_weight_s2=rate_weight_s2,
+        )
         ship = measured = sample_ship(model, interval)
         if "q" in model.state_names:
             measured = sample_ship(model, interval, first_order=True)
@@ -133,11 +138,15 @@ def lq_gain(ship: SampledShip, cost: SteeringCost) -> Floats:
     """Gain G of order = -G x that minimises the steering cost on a ship, shape (5,)."""
     import control  # here, because it takes a second to import
 
-    C, D = cost_outputs(ship, cost)
     measured = np.eye(len(SIGNALS))
     plant = control.ss(ship.A, ship.B, measured, 0.0, ship.dt)
-    gain, _, _ = control.lqr(plant, C.T @ C, D.T @ D, C.T @ D)
-    return np.asarray(gain, dtype=np.float64).reshape(-1)
+    C, D = cost_outputs(ship, cost)
+    Q = C.T @ C
+    R = D.T @ D
+    N = C.T @ D
+    gain, _, _ = control.lqr(plant, Q, R, N)
+    row: Floats = np.ravel(gain)
+    return row
 
 
 def cost_outputs(ship: SampledShip, cost: SteeringCost) -> tuple[Floats, Floats]:
@@ -150,10 +159,18 @@ def cost_outputs(ship: SampledShip, cost: SteeringCost) -> tuple[Floats, Floats]
     of_rudder = np.sqrt(cost.rudder_weight)
     of_rate = np.sqrt(cost.rate_weight_s2) / ship.dt
     of_integral = 1.0 / cost.integral_time
-    weights = np.array([[1.0], [of_rudder], [of_rate], [of_integral]])
+    weights = np.array(
+        [
+            [1.0],
+            [of_rudder],
+            [of_rate],
+            [of_integral],
+        ]
+    )
 
     rows = [ERROR, RUDDER, RUDDER, INTEGRAL]
-    rate = 2
-    next_state = ship.A[rows]
-    next_state[rate, RUDDER] -= 1.0  # the change of the rudder
-    return weights * next_state, weights * ship.B[rows]
+    rate = 2  # row of the rudder rate
+    by_state = ship.A[rows]
+    by_state[rate, RUDDER] -= 1.0  # the change of the rudder
+    by_order = ship.B[rows]
+    return weights * by_state, weights * by_order

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from agents.controllers.controller import Bounds, Controller
-from agents.controllers.kalman import course_filter, with_waves
+from agents.controllers.kalman import KalmanFilter, course_filter, with_waves
 from agents.controllers.law import Gains, Law, Number, Signals, wrapped
 from agents.controllers.linear_loop import checked_interval, sample_ship
 from agents.controllers.lq import LQ, lq_gains, steering_cost
@@ -98,7 +98,8 @@ def lqg_law(seen: Signals, memory: LQGMemory, p: Observer) -> tuple[Number, LQGM
     """Correct the estimate by what is measured and feed it back."""
     rudder = seen.rudder - p.neutral_rudder
     before = np.where(memory.started > 0.0, memory.rudder, rudder)
-    expected = predicted(seen, memory, 0.5 * (before + rudder), p)
+    mean_rudder = 0.5 * (before + rudder)
+    expected = predicted(seen, memory, mean_rudder, p)
     now = updated(seen, expected, p)
 
     gains = p.gains
@@ -115,24 +116,25 @@ def lqg_law(seen: Signals, memory: LQGMemory, p: Observer) -> tuple[Number, LQGM
 
 def updated(seen: Signals, expected: Motions, p: Observer) -> Motions:
     """States expected at this measurement, corrected by it."""
-    expected_rate = product(p.output.yaw_rate, expected)
+    off_rate = seen.yaw_rate - product(p.output.yaw_rate, expected)
     expected_error = product(p.output.heading_error, expected)
-    off_rate = seen.yaw_rate - expected_rate
     off_heading = wrapped(seen.heading_error - expected_error)
     # a jump that neither noise nor the ship can make is a new course
     jump = np.where(np.abs(off_heading) > p.new_course, off_heading, 0.0)
     innovation = Measured(off_rate, off_heading - jump)
 
     gain = p.kalman
-    heading_error = expected.heading_error + jump
-    to_error = corrected(gain.heading_error, innovation)
+    sway = corrected(gain.sway, innovation)
+    yaw_rate = corrected(gain.yaw_rate, innovation)
+    heading_error = corrected(gain.heading_error, innovation)
+    wave_heading = corrected(gain.wave_heading, innovation)
+    wave_yaw_rate = corrected(gain.wave_yaw_rate, innovation)
     return Motions(
-        sway=expected.sway + corrected(gain.sway, innovation),
-        yaw_rate=expected.yaw_rate + corrected(gain.yaw_rate, innovation),
-        heading_error=wrapped(heading_error + to_error),
-        wave_heading=expected.wave_heading + corrected(gain.wave_heading, innovation),
-        wave_yaw_rate=expected.wave_yaw_rate
-        + corrected(gain.wave_yaw_rate, innovation),
+        sway=expected.sway + sway,
+        yaw_rate=expected.yaw_rate + yaw_rate,
+        heading_error=wrapped(expected.heading_error + jump + heading_error),
+        wave_heading=expected.wave_heading + wave_heading,
+        wave_yaw_rate=expected.wave_yaw_rate + wave_yaw_rate,
     )
 
 
@@ -146,13 +148,16 @@ def predicted(
     sway = product(rows.sway, before) + effect.sway * mean_rudder
     yaw_rate = product(rows.yaw_rate, before) + effect.yaw_rate * mean_rudder
     error = product(rows.heading_error, before) + effect.heading_error * mean_rudder
+    wave_heading = product(rows.wave_heading, before)
+    wave_yaw_rate = product(rows.wave_yaw_rate, before)
+
     began = memory.started > 0.0
     return Motions(
         sway=np.where(began, sway, 0.0),
         yaw_rate=np.where(began, yaw_rate, seen.yaw_rate),
         heading_error=np.where(began, error, seen.heading_error),
-        wave_heading=product(rows.wave_heading, before),
-        wave_yaw_rate=product(rows.wave_yaw_rate, before),
+        wave_heading=wave_heading,
+        wave_yaw_rate=wave_yaw_rate,
     )
 
 
@@ -269,17 +274,18 @@ class LQG(Controller):
         check_number(noise, "noise", above=0.0)
         check_number(disturbance_deg, "disturbance_deg", above=0.0)
         interval = checked_interval(model, dt)
-        cost = steering_cost(model, integral_lengths, rudder_weight, rate_weight_s2)
+        cost = steering_cost(
+            model,
+            integral_lengths=integral_lengths,
+            rudder_weight=rudder_weight,
+            rate_weight_s2=rate_weight_s2,
+        )
         ship = sample_ship(model, interval)
 
-        states = course_filter(model, ship.about, interval, np.radians(disturbance_deg))
+        disturbance = np.radians(disturbance_deg)
+        states = course_filter(model, ship.about, interval, disturbance)
         if wave_period is not None:
-            shortest = 2.0 * interval
-            hint = "two control intervals, in s"
-            check_number(wave_period, "wave_period", above=shortest, hint=hint)
-            check_number(wave_heading_deg, "wave_heading_deg", above=0.0)
-            deviation = np.radians(wave_heading_deg)
-            states = with_waves(states, wave_period, deviation, interval)
+            states = _in_waves(states, wave_period, wave_heading_deg, interval)
         gain, deviations = states.gain(noise)
 
         design = {
@@ -305,27 +311,38 @@ class LQG(Controller):
     @cached_property
     def parameters(self) -> Observer:
         """Parameters of its law; without a wave model those of the wave are zero."""
-        n = len(self.input)
-        transition = np.zeros((len(Transition._fields), len(Motions._fields)))
-        transition[:n, :n] = self.transition
-        effect = np.zeros(len(Motions._fields))
-        effect[:n] = self.input
-        kalman = np.zeros((len(KalmanGains._fields), len(Measured._fields)))
-        kalman[:n] = self.kalman
-        output = np.zeros((len(Output._fields), len(Motions._fields)))
-        output[:, :n] = self.output
+        n_states = len(Motions._fields)
+        n_measured = len(Measured._fields)
+        square = (n_states, n_states)
         return Observer(
-            transition=_filled(Transition, transition),
-            effect=_filled(Motions, effect),
-            kalman=_filled(KalmanGains, kalman),
-            output=_filled(Output, output),
+            transition=_filled(Transition, self.transition, square),
+            effect=_filled(Motions, self.input, (n_states,)),
+            kalman=_filled(KalmanGains, self.kalman, (n_states, n_measured)),
+            output=_filled(Output, self.output, (n_measured, n_states)),
             gains=self.linear_feedback.gains,
             neutral_rudder=self.neutral_rudder,
             new_course=self.design["new_course_rad"],
         )
 
 
-def _filled(record: Record, numbers: Floats) -> Any:
-    """Record of the numbers of an array, row by row."""
-    flat = numbers.ravel().tolist()
+def _in_waves(
+    course: KalmanFilter, period: float, heading_deg: float, interval: float
+) -> KalmanFilter:
+    """Filter with a wave model; InputError for a period or a heading out of range."""
+    check_number(
+        period,
+        "wave_period",
+        above=2.0 * interval,
+        hint="two control intervals, in s",
+    )
+    check_number(heading_deg, "wave_heading_deg", above=0.0)
+    deviation = np.radians(heading_deg)
+    return with_waves(course, period, deviation, interval)
+
+
+def _filled(record: Record, numbers: Floats, shape: tuple[int, ...]) -> Any:
+    """Record of an array, row by row, with zeros behind it up to a shape."""
+    missing = np.subtract(shape, numbers.shape)
+    whole = np.pad(numbers, [(0, n) for n in missing])
+    flat = whole.ravel().tolist()
     return from_columns(record, iter(flat))

@@ -17,7 +17,7 @@ SLOWEST, FASTEST = 1e-4, 0.999  # of them, over the Nyquist frequency
 
 @dataclass(frozen=True)
 class Margins:
-    """How much the rudder's effect on the ship may change before the loop is unstable.
+    """Largest changes of the rudder's effect on the ship that leave the loop stable.
 
     The loop is broken where the ship's motions are fed back; the rudder's own feedback,
     if there is one, belongs to the steering gear and stays closed.
@@ -94,7 +94,8 @@ class Compensator:
         )
         feeds_order = self.D[:, INTEGRAL].any()
         feeds_memory = self.B[:, INTEGRAL].any()
-        if feeds_order or feeds_memory:
+        is_fed_back = feeds_order or feeds_memory
+        if is_fed_back:
             return whole
         without = np.delete(whole, INTEGRAL, axis=0)
         return np.delete(without, INTEGRAL, axis=1)
@@ -108,6 +109,27 @@ class Compensator:
         """
         import control
 
+        self._check_closed_loop(ship, name)
+        omega = frequencies_of(ship)
+        response = self.responses(ship, omega)
+        loop: Any = control.frd(response.broken, omega)
+        figures = control.stability_margins(loop, returnall=True)
+        gains, phases, _, _, crossings, _ = map(np.asarray, figures)
+
+        raised = gains[gains > 1.0]
+        lowered = gains[gains < 1.0]
+        delays = np.radians(phases % 360.0) / crossings
+        size = np.abs(response.following)
+        return Margins(
+            gain_margin=least(raised),
+            phase_margin_deg=least(np.abs(phases)),
+            delay_margin_s=least(delays),
+            bandwidth_rad_s=bandwidth(omega, size),
+            lowest_gain=float(np.max(lowered, initial=0.0)),
+        )
+
+    def _check_closed_loop(self, ship: SampledShip, name: str) -> None:
+        """Refuse gains with which a ship is unstable, with a remedy."""
         matrix = self.closed_loop(ship)
         pole = largest_pole(matrix)
         if pole >= 1.0:
@@ -118,42 +140,39 @@ class Compensator:
                 " from_model"
             )
 
-        nyquist = np.pi / ship.dt
-        frequencies = 500  # of the frequency response; splines lie between them
-        omega = np.geomspace(SLOWEST * nyquist, FASTEST * nyquist, frequencies)
-        response = self.responses(ship, omega)
-        loop: Any = control.frd(response.broken, omega)
-        found = control.stability_margins(loop, returnall=True)
-        gains = np.asarray(found[0], dtype=float)
-        phases = np.asarray(found[1], dtype=float)
-        crossings = np.asarray(found[4], dtype=float)
-
-        delays = np.radians(phases % 360.0) / crossings
-        return Margins(
-            gain_margin=np.min(gains[gains > 1.0], initial=np.inf).item(),
-            phase_margin_deg=np.min(np.abs(phases), initial=np.inf).item(),
-            delay_margin_s=np.min(delays, initial=np.inf).item(),
-            bandwidth_rad_s=bandwidth(omega, np.abs(response.following)),
-            lowest_gain=np.max(gains[gains < 1.0], initial=0.0).item(),
-        )
-
     def responses(self, ship: SampledShip, omega: Floats) -> Responses:
         """Frequency responses at frequencies in rad/s, shape (n_frequencies,)."""
         z = np.exp(1j * omega * ship.dt)
-        motions = _transfer(ship.A, ship.B, z)[:, :, 0].T
+        by_order = _transfer(ship.A, ship.B, z)
+        motions = by_order[:, :, 0].T
         of_memory = self.C @ _transfer(self.A, self.B, z)
         orders = (of_memory + self.D)[:, 0].T
 
-        by_rudder = orders[RUDDER] * motions[RUDDER]
-        by_motions = (orders * motions).sum(axis=0) - by_rudder
+        fed_back = orders * motions
+        by_rudder = fed_back[RUDDER]
+        by_motions = fed_back.sum(axis=0) - by_rudder
         open_gear = 1.0 - by_rudder
 
         integral = ship.dt / (z - 1.0)  # of the set-point
         set_point = orders[ERROR] + orders[INTEGRAL] * integral
+        to_heading = -motions[ERROR] * set_point
+        closed = open_gear - by_motions
         return Responses(
             broken=-by_motions / open_gear,
-            following=-motions[ERROR] * set_point / (open_gear - by_motions),
+            following=to_heading / closed,
         )
+
+
+def frequencies_of(ship: SampledShip) -> Floats:
+    """Frequencies of the responses with a ship, rad/s; splines lie between them."""
+    n_frequencies = 500
+    nyquist = np.pi / ship.dt
+    return np.geomspace(SLOWEST * nyquist, FASTEST * nyquist, n_frequencies)
+
+
+def least(values: Floats) -> float:
+    """Smallest of some values; infinite without any."""
+    return float(np.min(values, initial=np.inf))
 
 
 def largest_pole(matrix: Floats) -> float:
@@ -182,11 +201,15 @@ def bandwidth(omega: Floats, size: Floats) -> float:
     if first == 0:
         return float(omega[0])
 
-    low, high = size[first], size[first - 1]
+    low = size[first]
+    high = size[first - 1]
     share = (high - half_power) / (high - low)
+
+    first_below = omega[first]
     last_above = omega[first - 1]
-    step = np.log(omega[first] / last_above)
-    return float(np.exp(np.log(last_above) + share * step))
+    step = np.log(first_below / last_above)
+    logarithm = np.log(last_above) + share * step
+    return float(np.exp(logarithm))
 
 
 def _transfer(A: Floats, B: Floats, z: Complexes) -> Complexes:

@@ -25,7 +25,8 @@ def from_columns(record: Record, columns: Iterator[Any]) -> Any:
         if is_record(kind):
             value = from_columns(kind, columns)
         elif is_table(kind):
-            value = np.array(list(islice(columns, kind.rows)))
+            rows = list(islice(columns, kind.rows))
+            value = np.array(rows)
         else:
             value = next(columns)
         values.append(value)
@@ -123,8 +124,8 @@ def recalled(memory: Any, starts: Any, shape: tuple[int, ...], size: int) -> Flo
     if memory is None:
         return np.zeros((*shape, size))
     given = checked_memory(memory, (*shape, size))
-    kept = np.array(given, dtype=np.float64)
     begins = checked_starts(starts, shape)
+    kept = given.astype(np.float64)
     kept[begins] = 0.0
     return kept
 

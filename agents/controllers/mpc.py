@@ -56,7 +56,7 @@ class BodyCurrent(NamedTuple):
 
 
 class PlanMemory(NamedTuple):
-    """What MPC remembers of each ship."""
+    """Memory of MPC, of each ship."""
 
     steps: Number  # control intervals since the last search
     current: BodyCurrent
@@ -64,7 +64,7 @@ class PlanMemory(NamedTuple):
 
 
 class PathCosts(NamedTuple):
-    """What a step of a plan costs, as the task has it."""
+    """Weights of the cost of a step of a plan, as the task has them."""
 
     corridor: float  # m
     rudder: float  # per rad^2
@@ -133,15 +133,16 @@ class MPC(WheelOver):
         asked = task or path_following_task()
         guide = super().from_model(model, autopilot=autopilot, task=asked, **settings)
 
-        step = COARSE * guide.design["dt"]
-        steps = round(horizon_lengths * model.travel_time / step)
-        search = {
+        horizon_s = horizon_lengths * model.travel_time
+        steps = round(horizon_s / (COARSE * guide.design["dt"]))
+        design = {
+            **guide.design,
             "horizon_steps": float(max(1, steps)),
             "deviation": float(np.radians(deviation_deg)),
             "water_depth": min(asked.water_depth, DEEP),
             **path_costs(asked, model)._asdict(),
         }
-        return replace(guide, design={**guide.design, **search})
+        return replace(guide, design=design)
 
     @cached_property
     def costs(self) -> PathCosts:
@@ -158,7 +159,22 @@ class MPC(WheelOver):
     ) -> tuple[Number, PlanMemory]:
         """See `Guided.course`: that of wheel-over and what the plan adds."""
         current = self.estimated_current(seen, memory.current)
-        plans = memory.plan.T.copy()
+        plans = self.planned(seen, current, memory)
+
+        course, _ = type(self).law(seen, Nothing(), self.parameters)
+        knots = memory.steps / KNOT_STEPS
+        course = course + added(plans, knots)
+        steps = (memory.steps + 1.0) % KNOT_STEPS
+        return course, PlanMemory(steps, current, plans.T)
+
+    def planned(
+        self, seen: PathSignals, current: BodyCurrent, memory: PlanMemory
+    ) -> Floats:
+        """Plans in memory, improved where a search is due, rad, shape (n_ships, KNOTS).
+
+        A search begins with the rest of the last plan.
+        """
+        plans: Floats = memory.plan.T.copy()
         due = np.flatnonzero(memory.steps == 0.0)
         if len(due):
             rest = np.zeros((len(due), KNOTS))
@@ -166,11 +182,7 @@ class MPC(WheelOver):
             seen_due = selected(seen, due)
             current_due = selected(current, due)
             plans[due] = self.improved(seen_due, current_due, rest)
-
-        course, _ = type(self).law(seen, Nothing(), self.parameters)
-        course = course + added(plans, memory.steps / KNOT_STEPS)
-        steps = (memory.steps + 1.0) % KNOT_STEPS
-        return course, PlanMemory(steps, current, plans.T)
+        return plans
 
     def estimated_current(self, seen: PathSignals, known: BodyCurrent) -> BodyCurrent:
         """Estimate the current by the last estimate, which turns with the ship.
@@ -202,11 +214,8 @@ class MPC(WheelOver):
         deviation = np.full(plans.shape, self.design["deviation"])
         least_deviation = np.radians(0.5)  # of a knot
         for drawn in draws():
-            candidates = mean[:, None] + deviation[:, None] * drawn
-            candidates[:, 0] = best
-            candidates[:, CANDIDATES // 2] = 0.0  # wheel-over itself
-            candidates[:, :, 0] = best[:, :1]
-
+            scattered = mean[:, None] + deviation[:, None] * drawn
+            candidates = with_known_plans(scattered, best)
             costs = self.simulated_costs(seen, current, candidates)
             elites = cheapest(candidates, costs)
             mean = elites.mean(axis=1)
@@ -228,27 +237,35 @@ class MPC(WheelOver):
         n_ships, n_plans, _ = plans.shape
         lanes = np.repeat(np.arange(n_ships), n_plans)
         plan = plans.reshape(-1, KNOTS)
-        seen = selected(seen, lanes)
-        models = DesignModels(self, seen, selected(current, lanes))
-        path = PathAhead(seen.turns, self.gains["path_radius"])
-
+        models = DesignModels(
+            self,
+            seen=selected(seen, lanes),
+            current=selected(current, lanes),
+        )
         cost = np.zeros(len(plan))
-        place = path.fix(models.x, models.y)
         for step in range(int(self.design["horizon_steps"])):
-            along_before = place.along_track
-            rudder_before = models.rudder
-            own_course = place.course + course_over_ground(
-                place.cross_track, place.turns, self.parameters
-            )
+            own_course = models.wheel_over_course()
             knots = step * COARSE / KNOT_STEPS
             models.steer(own_course + added(plan, knots))
+            add_step_cost(cost, self, models)
 
-            place = path.fix(models.x, models.y)
-            progress = place.along_track - along_before
-            moved = np.abs(models.rudder - rudder_before)
-            add_step_cost(cost, self, models, place, progress, moved)
-        cost = np.where(np.isfinite(cost), cost, np.inf)
+        is_known = np.isfinite(cost)
+        cost = np.where(is_known, cost, np.inf)
         return cost.reshape(n_ships, n_plans)
+
+
+def with_known_plans(drawn: Floats, best: Floats) -> Floats:
+    """Plans drawn, with the best so far and wheel-over itself in place of two.
+
+    All begin at the first knot of the best. `drawn`: rad, shape (n_ships, CANDIDATES,
+    KNOTS); `best`: shape (n_ships, KNOTS).
+    """
+    candidates = drawn.copy()
+    candidates[:, 0] = best
+    wheel_over = CANDIDATES // 2
+    candidates[:, wheel_over] = 0.0
+    candidates[:, :, 0] = best[:, :1]
+    return candidates
 
 
 def cheapest(plans: Floats, costs: Floats) -> Floats:
@@ -305,28 +322,50 @@ class DesignModels:
     ----------
     dt : float
         Step, s.
-    x, y : array of shape (n,)
-        Along and to starboard of the path where the ships were observed, m.
+    place : Place
+        Where they are on the path.
     rudder : array of shape (n,)
         rad.
+    progress : array of shape (n,)
+        Along the path in the last step, m.
+    moved : array of shape (n,)
+        Way of the rudder in the last step, rad.
     """
 
+    place: Place
+    rudder: Floats
+    progress: Floats
+    moved: Floats
+
     def __init__(self, guide: MPC, seen: PathSignals, current: BodyCurrent) -> None:
-        n = len(seen.cross_track)
+        self.guide = guide
         self.dt = COARSE * guide.design["dt"]
         self.time = 0.0
         self.feedback = guide.heading_autopilot("MPC").linear_feedback
         self.crab_share = guide.gains["crab_share"]
         self.rudder_limit = guide.ship.steering.limit
-        self.engine = _engine(guide.ship, n, self.dt, guide.design["water_depth"])
+        self.path = PathAhead(seen.turns, guide.gains["path_radius"])
 
-        heading = -seen.heading_error
-        self.north, self.east = turned(current.ahead, current.aside, -heading)
-        self.engine.reset(np.zeros(n, dtype=np.int64))
+        to_path = seen.heading_error
+        self.north, self.east = turned(current.ahead, current.aside, to_path)
+        n = len(to_path)
+        self.engine = _engine(
+            guide.ship,
+            n=n,
+            dt=self.dt,
+            depth=guide.design["water_depth"],
+        )
+        seeds = np.zeros(n, dtype=np.int64)
+        self.engine.reset(seeds)
+        self._begin(seen)
+        self._observe()
+
+    def _begin(self, seen: PathSignals) -> None:
+        """Put the models where the ships are, the path to the north."""
         start = {
-            "x": np.zeros(n),
+            "x": np.zeros_like(seen.cross_track),
             "y": seen.cross_track,
-            "psi": heading,
+            "psi": -seen.heading_error,
             "u": seen.surge,
             "v": seen.sway,
             "r": seen.yaw_rate,
@@ -334,7 +373,6 @@ class DesignModels:
         }
         for name, values in start.items():
             self.engine.write(name, values)
-        self._observe()
 
     def read(self, name: str) -> Floats:
         """A state of the models."""
@@ -342,60 +380,73 @@ class DesignModels:
 
     def _observe(self) -> None:
         """Read where the models are; the current has carried them along."""
-        self.x = self.read("x") + self.north * self.time
-        self.y = self.read("y") + self.east * self.time
+        x = self.read("x") + self.north * self.time
+        y = self.read("y") + self.east * self.time
+        self.place = self.path.fix(x, y)
         self.rudder = self.read("delta")
+
+    def wheel_over_course(self) -> Floats:
+        """Course over ground that wheel-over steers, rad."""
+        place = self.place
+        gains = self.guide.parameters
+        course = course_over_ground(place.cross_track, place.turns, gains)
+        over_ground: Floats = place.course + course
+        return over_ground
 
     def steer(self, course: Floats) -> None:
         """Take one step towards a course over ground."""
-        heading = self.read("psi")
-        surge = self.read("u")
-        sway = self.read("v")
-        ahead, aside = turned(self.north, self.east, heading)
-        # angle from the velocity through the water to that over ground
-        across = surge * aside - sway * ahead
-        along = surge * (surge + ahead) + sway * (sway + aside)
-        drift = np.arctan2(across, along)
+        place_before = self.place
+        rudder_before = self.rudder
 
-        to_steer = course - self.crab_share * drift
-        zero = np.zeros_like(heading)
-        seen = Signals(
-            sway=sway,
-            yaw_rate=self.read("r"),
-            heading_error=wrapped(to_steer - heading),
-            rudder=self.rudder,
-            heading_error_integral=zero,
-            surge=surge,
-            rate_of_turn=zero,
-        )
+        crab = self.crab_share * self.drift()
+        seen = self.signals(course - crab)
         order, _ = linear_law(seen, Nothing(), self.feedback)
         self.engine.command[0] = np.clip(order / self.rudder_limit, -1.0, 1.0)
         self.engine.advance()
         self.time += self.dt
+
         self._observe()
+        self.progress = self.place.along_track - place_before.along_track
+        self.moved = np.abs(self.rudder - rudder_before)
+
+    def drift(self) -> Floats:
+        """Angle from the velocity through the water to that over ground, rad."""
+        surge = self.read("u")
+        sway = self.read("v")
+        ahead, aside = turned(self.north, self.east, self.read("psi"))
+        ground_ahead = surge + ahead
+        ground_aside = sway + aside
+        across = surge * aside - sway * ahead
+        along = surge * ground_ahead + sway * ground_aside
+        drift: Floats = np.arctan2(across, along)
+        return drift
+
+    def signals(self, to_steer: Floats) -> Signals:
+        """Signals for LQ, which steers a heading, rad."""
+        zero = np.zeros_like(to_steer)
+        return Signals(
+            sway=self.read("v"),
+            yaw_rate=self.read("r"),
+            heading_error=wrapped(to_steer - self.read("psi")),
+            rudder=self.rudder,
+            heading_error_integral=zero,
+            surge=self.read("u"),
+            rate_of_turn=zero,
+        )
 
 
-def add_step_cost(
-    cost: Floats,
-    guide: MPC,
-    models: DesignModels,
-    place: Place,
-    progress: Floats,
-    moved: Floats,
-) -> None:
-    """Add the cost of a step to that of each ship so far.
-
-    `progress`: along the path, m; `moved`: of the rudder, rad.
-    """
+def add_step_cost(cost: Floats, guide: MPC, models: DesignModels) -> None:
+    """Add the cost of the last step to that of each ship so far."""
     weights = guide.costs
     particulars = guide.ship.particulars
     full_way = particulars["speed"] * models.dt
-    off_track = place.cross_track / weights.corridor
-    rudder_rate = moved * particulars["length"] / full_way
+    off_track = models.place.cross_track / weights.corridor
+    share_of_way = models.progress / full_way
+    rudder_rate = models.moved * particulars["length"] / full_way
 
-    cost += off_track**2 - np.clip(progress / full_way, -1.0, 1.0)
+    cost += off_track**2 - np.clip(share_of_way, -1.0, 1.0)
     cost += weights.rudder * models.rudder**2
-    cost += weights.rudder_travel / COARSE * moved
+    cost += weights.rudder_travel / COARSE * models.moved
     cost += weights.rudder_rate * rudder_rate**2
     if weights.roll > 0.0:
         cost += weights.roll * models.read("phi") ** 2

@@ -37,6 +37,14 @@ class PathLeg(NamedTuple):
     reached: Flags  # whether the ship has come to it
 
 
+class ArcPoint(NamedTuple):
+    """Points of ships at an arc, and how much of it is to come."""
+
+    point: PathPoint
+    distance: Floats  # m, to where it begins
+    angle: Floats  # rad, that is left of it
+
+
 class Arc:
     """Arc between two legs, for many ships; it keeps which of them have passed it.
 
@@ -58,23 +66,16 @@ class Arc:
         self.radius = radius
         self.passed = np.zeros(len(turn), dtype=np.bool_)
 
-    def fix(self, leg: PathLeg, before: PathPoint) -> tuple[PathPoint, Floats, Floats]:
-        """Points of the ships that are on the arc, of the others those from before.
-
-        Also the distance to the arc, m, and the angle that is left of it, rad.
-        """
+    def fix(self, leg: PathLeg, before: PathPoint) -> ArcPoint:
+        """Points of the ships that are on the arc, of the others those from before."""
         radius = self.radius
         past = leg.x - self.distance
         to_centre = radius - self.side * leg.y
         # of the radius: nearer to the centre of an arc no position is taken
         innermost = 0.1
-        swept = np.arctan2(past, np.maximum(to_centre, innermost * radius))
-
-        entered = leg.reached & (past > 0.0) & (self.angle > 0.0)
-        leaves = entered & (swept >= self.angle)
-        passed = self.passed | leaves
-        self.passed = passed
-        on_arc = entered & ~passed
+        inwards = np.maximum(to_centre, innermost * radius)
+        swept = np.arctan2(past, inwards)
+        on_arc = self._enter(leg, past, swept)
         bent = np.where(on_arc, swept, 0.0)
 
         from_centre = np.hypot(past, to_centre)
@@ -85,19 +86,31 @@ class Arc:
         )
         ahead = np.maximum(-past, 0.0)
         left = self.side * (self.angle - bent)
-        return (
-            chosen(on_arc, here, before),
-            np.where(passed, FAR, ahead),
-            np.where(passed, 0.0, left),
+        return ArcPoint(
+            point=chosen(on_arc, here, before),
+            distance=np.where(self.passed, FAR, ahead),
+            angle=np.where(self.passed, 0.0, left),
         )
+
+    def _enter(self, leg: PathLeg, past: Floats, swept: Floats) -> Flags:
+        """Flags of ships on the arc; those that have passed it are noted.
+
+        `past`: distance along the leg from where it begins, m; `swept`: angle of the
+        arc there, rad.
+        """
+        entered = leg.reached & (past > 0.0) & (self.angle > 0.0)
+        leaves = entered & (swept >= self.angle)
+        self.passed = self.passed | leaves
+        return entered & ~self.passed
 
     def next_leg(self, leg: PathLeg) -> PathLeg:
         """Leg behind the arc, for the ships that have passed it."""
         passed = self.passed
         radius = self.radius
-        ahead = leg.x - self.distance - radius * np.sin(self.angle)
-        aside = leg.y - self.side * radius * (1.0 - np.cos(self.angle))
-        x, y = turned(ahead, aside, self.turn)
+        past = leg.x - self.distance
+        ahead = past - radius * np.sin(self.angle)
+        arc_aside = self.side * radius * (1.0 - np.cos(self.angle))
+        x, y = turned(ahead, leg.y - arc_aside, self.turn)
         course = leg.course + self.turn
         return PathLeg(
             x=np.where(passed, x, leg.x),
@@ -126,18 +139,31 @@ class PathAhead:
         The axes are those of the path where the ships observed it.
         """
         nowhere = np.zeros_like(x)
-        everywhere = np.ones(len(x), dtype=np.bool_)
-        leg = PathLeg(x, y, begins=nowhere, course=nowhere, reached=everywhere)
+        everywhere = np.ones_like(x, dtype=np.bool_)
+        leg = PathLeg(
+            x,
+            y,
+            begins=nowhere,
+            course=nowhere,
+            reached=everywhere,
+        )
         point = PathPoint(along_track=x, cross_track=y, course=nowhere)
         to_come: list[Floats] = []
 
         for arc in self.arcs:
-            point, to_arc, left = arc.fix(leg, point)
-            to_come += [to_arc, left]
+            at_arc = arc.fix(leg, point)
+            to_come += [at_arc.distance, at_arc.angle]
 
             leg = arc.next_leg(leg)
-            behind = PathPoint(leg.begins + leg.x, leg.y, leg.course)
-            point = chosen(arc.passed, behind, point)
+            point = chosen(
+                arc.passed,
+                yes=PathPoint(
+                    along_track=leg.begins + leg.x,
+                    cross_track=leg.y,
+                    course=leg.course,
+                ),
+                no=at_arc.point,
+            )
         return Place(*point, turns=Turns(*to_come))
 
 

@@ -82,12 +82,11 @@ class PID(Controller):
         if damping is None:
             damping = optimal.damping
         check_number(damping, "damping", above=0.0)
-        # of the optimal regulator, which feeds back the rudder too and can be faster
-        frequency_share = 0.85
         if frequency is None:
-            # the gear's pole must stay no slower than the pair
-            sum_of_roots = 1.0 / lag + 1.0 / response.T
-            largest = (sum_of_roots - slow) / (2.0 * damping + 1.0)
+            # of the optimal regulator, which feeds back the rudder too and can be
+            # faster
+            frequency_share = 0.85
+            largest = largest_frequency(response, lag, damping, slow)
             frequency = min(frequency_share * optimal.frequency, largest)
         else:
             check_number(frequency, "frequency", above=0.0)
@@ -145,6 +144,17 @@ def optimal_poles(response: Nomoto, rate_weight: float) -> Poles:
     return Poles(frequency, damping=decay / (2.0 * frequency))
 
 
+def largest_frequency(
+    response: Nomoto, lag: float, damping: float, slow: float
+) -> float:
+    """Frequency of a pair of poles, rad/s, up to which the gear's is no slower.
+
+    For the arguments see `place_poles`.
+    """
+    sum_of_roots = 1.0 / lag + 1.0 / response.T
+    return (sum_of_roots - slow) / (2.0 * damping + 1.0)
+
+
 def place_poles(
     response: Nomoto, lag: float, frequency: float, damping: float, slow: float
 ) -> dict[str, float]:
@@ -174,7 +184,8 @@ def place_poles(
     fourth = sum_of_roots - sum_of_pair - slow
     pair = [1.0, sum_of_pair, frequency**2]
     others = np.polymul([1.0, slow], [1.0, fourth])
-    _, _, quadratic, linear, constant = np.polymul(pair, others).tolist()
+    polynomial = np.polymul(pair, others)
+    _, _, quadratic, linear, constant = polynomial.tolist()
 
     own_damping = 1.0 / (lag * response.T)  # of ship and gear
     per_rudder = lag / response.rudder_effect

@@ -50,8 +50,10 @@ def register_controller(controller: type[C]) -> type[C]:
         raise InputError(
             f"{where}: expected a subclass of agents.Controller, got {controller!r}"
         )
-    kind, name = controller.kind, controller.__name__
-    if not kind or set(kind) & set(",=+:/{}*. "):
+    kind = controller.kind
+    name = controller.__name__
+    reserved = set(",=+:/{}*. ")
+    if not kind or reserved & set(kind):
         raise InputError(
             f"{where}: {name}.kind: expected a name such as 'my-lq', got '{kind}'"
         )
@@ -92,6 +94,8 @@ def controller_class(kind: str, where: str = "controller") -> type[Controller]:
     check_choice(kind, controller_kinds(), where)
     if kind in _REGISTERED:
         return _REGISTERED[kind]
-    module, _, name = _HOMES[kind].partition(":")
-    controller: type[Controller] = getattr(import_module(module), name)
+    home = _HOMES[kind]
+    module_name, _, name = home.partition(":")
+    module = import_module(module_name)
+    controller: type[Controller] = getattr(module, name)
     return controller

@@ -60,8 +60,7 @@ def turn_rate_law(
     seen: Signals, memory: TurnRateMemory, p: TurnRateGains
 ) -> tuple[Number, TurnRateMemory]:
     """Steer the ordered rate of turn, or, if it is 0, one for the heading error."""
-    to_heading = np.clip(seen.heading_error / p.heading_time, -p.rate, p.rate)
-    wanted = np.where(seen.rate_of_turn == 0.0, to_heading, seen.rate_of_turn)
+    wanted = wanted_rate(seen, p)
     before = np.where(memory.started > 0.0, memory.followed, seen.yaw_rate)
     followed = before + p.smoothing * (wanted - before)
 
@@ -77,6 +76,13 @@ def turn_rate_law(
         started=1.0,
     )
     return order, memory
+
+
+def wanted_rate(seen: Signals, p: TurnRateGains) -> Number:
+    """Rate of turn that is ordered, or that comes to the heading, rad/s."""
+    uncut = seen.heading_error / p.heading_time
+    to_heading = np.clip(uncut, -p.rate, p.rate)
+    return np.where(seen.rate_of_turn == 0.0, to_heading, seen.rate_of_turn)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -149,17 +155,14 @@ class TurnRate(Controller):
         ship = sample_ship(model, interval)
         form = nomoto_of(*linearise(model, ship.about))
         if frequency is None:
-            lag = model.steering.time_constant + 0.5 * interval
-            frequency = min(PER_LAG / lag, PER_LENGTH / model.travel_time)
+            frequency = rate_frequency(model, interval)
         check_number(frequency, "frequency", above=0.0)
 
         turns = steady_turns(model, ship.about.rudder)
         if rate_deg_min is None:
             rate = course_rate(model, turns, ship.about.rudder)
         else:
-            most = 60.0 * float(np.degrees(turns.largest_rate))
-            check_number(rate_deg_min, "rate_deg_min", above=0.0, at_most=most)
-            rate = float(np.radians(rate_deg_min)) / 60.0
+            rate = checked_rate(rate_deg_min, turns)
 
         slower = 4.0  # time of the heading over that of the rate
         gains = {
@@ -169,7 +172,12 @@ class TurnRate(Controller):
         }
         design = {"frequency": frequency, "nomoto_K": form.K, "nomoto_T": form.T}
         return cls.designed(
-            model, ship, gains, design, rates=turns.rates, rudders=turns.rudders
+            model,
+            ship,
+            gains,
+            design,
+            rates=turns.rates,
+            rudders=turns.rudders,
         )
 
     @cached_property
@@ -187,6 +195,12 @@ class TurnRate(Controller):
             dt=self.design["dt"],
             rudder_limit=self.rudder_limit,
         )
+
+
+def rate_frequency(model: ShipModel, interval: float) -> float:
+    """Frequency of the yaw rate's poles that lag and length allow, rad/s."""
+    lag = model.steering.time_constant + 0.5 * interval
+    return float(min(PER_LAG / lag, PER_LENGTH / model.travel_time))
 
 
 def rate_gains(form: Nomoto, frequency: float) -> dict[str, float]:
@@ -218,12 +232,13 @@ def steady_turns(model: ShipModel, neutral: float) -> SteadyTurns:
 
     Raises InputError if the model has none to one of the sides.
     """
+    straight = (0.0, neutral)
     for slowed in (True, False):  # some models know no loss of speed
         to_port = _turns_to_one_side(model, -1.0, slowed)
         to_starboard = _turns_to_one_side(model, 1.0, slowed)
         if to_port and to_starboard:
-            turns = [*reversed(to_port), (0.0, neutral), *to_starboard]
-            rates, rudders = np.array(turns).T
+            to_port.reverse()
+            rates, rudders = np.array([*to_port, straight, *to_starboard]).T
             return SteadyTurns(rates, rudders)
     raise InputError(
         f"model {model.name!r}: expected steady turns to either side, got none"
@@ -234,10 +249,12 @@ def _turns_to_one_side(
     model: ShipModel, side: float, slowed: bool
 ) -> list[tuple[float, float]]:
     """Rates, rad/s, and rudders, rad, of steady turns from the slowest on."""
+    rates = side * GRID / model.travel_time
+    largest = LARGEST_RUDDER * model.steering.limit
     turns = []
-    for rate in (side * GRID / model.travel_time).tolist():
+    for rate in rates.tolist():
         rudder = steady_turn_rudder(model, rate, slowed)
-        if rudder is None or abs(rudder) > LARGEST_RUDDER * model.steering.limit:
+        if rudder is None or abs(rudder) > largest:
             break
         turns.append((rate, rudder))
     return turns
@@ -252,8 +269,16 @@ def course_rate(model: ShipModel, turns: SteadyTurns, neutral: float) -> float:
         rates=turns.rates[reached],
         rudders=turns.rudders[reached],
     )
-    least_rate = float(GRID[0]) / model.travel_time
+    slowest = float(GRID[0])
+    least_rate = slowest / model.travel_time
     return max(gentle.largest_rate, least_rate)
+
+
+def checked_rate(rate_deg_min: float, turns: SteadyTurns) -> float:
+    """Rate of course changes, rad/s; InputError for one that no turn reaches."""
+    largest = 60.0 * float(np.degrees(turns.largest_rate))
+    check_number(rate_deg_min, "rate_deg_min", above=0.0, at_most=largest)
+    return float(np.radians(rate_deg_min)) / 60.0
 
 
 def check_rising(values: Sequence[float], name: str) -> None:

@@ -50,7 +50,8 @@ def wheel_over_law(
     seen: PathSignals, memory: Nothing, p: WheelOverGains
 ) -> tuple[Number, Nothing]:
     """Course that comes to the path and turns with it, against a current's drift."""
-    crab = wrapped(seen.drift - np.arctan2(seen.sway, seen.surge))
+    leeway = np.arctan2(seen.sway, seen.surge)  # through the water
+    crab = wrapped(seen.drift - leeway)
     course = course_over_ground(seen.cross_track, seen.turns, p)
     return course - p.crab_share * crab, memory
 
@@ -147,7 +148,7 @@ class WheelOver(Guided):
 
 
 def own_lead(model: ShipModel, autopilot: Policy | None) -> float:
-    """How far ahead LQ has to see the course of an arc to keep to it, ship lengths.
+    """Distance ahead at which LQ has to see an arc to keep to it, ship lengths.
 
     In a steady turn the heading lags by what makes the rudder for it, and the way over
     ground by the drift angle; both in proportion to the yaw rate as long as the ship is
@@ -156,18 +157,30 @@ def own_lead(model: ShipModel, autopilot: Policy | None) -> float:
     """
     if not isinstance(autopilot, LQ):
         autopilot = LQ.from_model(model)
-    steering, rudder = linearise(model, straight_running(model))
-    by_sway, by_yaw_rate = steering.T
-    by_sway_and_rudder = np.column_stack([by_sway, rudder])
-    # in a steady turn, per yaw rate
-    sway, angle = np.linalg.solve(by_sway_and_rudder, -by_yaw_rate)
+    turn = steady_turn(model)
 
     # the order is the angle: the heading error makes what the other gains do not
     gains = autopilot.gains
-    missing = angle * (1.0 - gains["rudder"])
-    missing = missing - gains["yaw_rate"] - gains["sway"] * sway
+    unfed = turn.rudder * (1.0 - gains["rudder"])
+    missing = unfed - gains["yaw_rate"] - gains["sway"] * turn.sway
     heading_lag = missing / gains["heading_error"]  # s
 
-    lag_m = heading_lag * model.particulars["speed"] - sway
+    lag_m = heading_lag * model.particulars["speed"] - turn.sway
     lead = lag_m / model.particulars["length"] + LATE
     return float(np.clip(lead, SHORTEST_LEAD, LONGEST_LEAD))
+
+
+class SteadyTurn(NamedTuple):
+    """Steady turn of a linear ship, per yaw rate."""
+
+    sway: float  # m
+    rudder: float  # s
+
+
+def steady_turn(model: ShipModel) -> SteadyTurn:
+    """Solve 0 = A (v, r) + B delta for sway and rudder."""
+    steering, rudder = linearise(model, straight_running(model))
+    by_sway, by_yaw_rate = steering.T
+    by_sway_and_rudder = np.column_stack([by_sway, rudder])
+    solution = np.linalg.solve(by_sway_and_rudder, -by_yaw_rate)
+    return SteadyTurn(*solution)

@@ -9,6 +9,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller
 from agents.controllers.guided import COURSE_ERROR, Guided, shown_course
@@ -96,7 +97,13 @@ def heading_step(
 ) -> Step:
     """Order of an autopilot that keeps a heading, and its next state."""
     error = wrapped(given.set_point - given.heading)
-    order, after = heading_order(error, given, state, p, law)
+    order, after = heading_order(
+        error,
+        given,
+        state,
+        p,
+        law=law,
+    )
     return limited(order, after, p)
 
 
@@ -108,7 +115,14 @@ def path_step(
     The set-point is the direction of the path beside the ship.
     """
     error = wrapped(given.set_point - given.heading)
-    order, after = path_order(error, given, state, p, guide, law)
+    order, after = path_order(
+        error,
+        given,
+        state,
+        p,
+        guide=guide,
+        law=law,
+    )
     return limited(order, after, p)
 
 
@@ -123,7 +137,14 @@ def base_path_step(
     seen = path_signals(error, given)
     course = shown_course(seen, p.task_lookahead, p.path_radius)
     from_path = wrapped(error - course)
-    order, after = path_order(from_path, given, state, p, guide, law)
+    order, after = path_order(
+        from_path,
+        given,
+        state,
+        p,
+        guide=guide,
+        law=law,
+    )
     return limited(order, after, p)
 
 
@@ -131,7 +152,13 @@ def heading_order(
     error: Number, given: BridgeInput, state: BridgeState, p: BridgeParameters, law: Law
 ) -> Step:
     """Rudder for a heading error, rad, not yet limited."""
-    integral = gathered(state.integral, error, state.started, p.dt, p.reach)
+    integral = gathered(
+        state.integral,
+        error,
+        started=state.started,
+        dt=p.dt,
+        reach=p.reach,
+    )
     seen = Signals(
         sway=given.sway,
         yaw_rate=given.yaw_rate,
@@ -207,7 +234,13 @@ def policy_observations(
 ) -> tuple[OwnObservations, BridgeState]:
     """Observations of a policy's set-point and memory, and its next state."""
     error = wrapped(given.set_point - given.heading)
-    integral = gathered(state.integral, error, state.started, p.dt, p.reach)
+    integral = gathered(
+        state.integral,
+        error,
+        started=state.started,
+        dt=p.dt,
+        reach=p.reach,
+    )
     own = own_observations(error, integral, given, state.last_command)
     return own, state._replace(integral=integral)
 
@@ -256,12 +289,16 @@ class Autopilot:
         self.dt = self.parameters.dt
         self.limit = self.parameters.limit
         self.largest = self.limit
+        guidance: Any = Nothing()
+        if isinstance(agent, Guided):
+            guidance = _no_memory(agent)
+        zero = np.zeros(1)
         self.state = BridgeState(
-            integral=np.zeros(1),
-            last_command=np.zeros(1),
-            started=np.zeros(1),
+            integral=zero,
+            last_command=zero,
+            started=zero,
             memory=_no_memory(self.pilot),
-            guidance=_no_memory(agent) if isinstance(agent, Guided) else Nothing(),
+            guidance=guidance,
         )
         self._given: Any = None
 
@@ -311,21 +348,23 @@ class Autopilot:
         )
         known = {**self._given._asdict(), **own._asdict()}
 
-        pilot = self.pilot
-        scales = dict(
-            zip(pilot.observation_names, pilot.observation_scales, strict=True)
-        )
-        bounds = observation_bounds()
-        observation = []
-        for name, scale in scales.items():
-            low, high = bounds[name]
-            observation.append(np.clip(known[name] / scale, low, high))
-        shown = np.array(observation, dtype=np.float32).T
-
+        shown = observations(self.pilot, known)
         starts = self.state.started == 0.0
-        action, memory = pilot.predict(shown, memory, starts)
+        action, memory = self.pilot.predict(shown, memory, starts)
         rudder = action[:, 0].astype(np.float64)
         return rudder * self.limit, memory
+
+
+def observations(policy: Any, known: Mapping[str, Number]) -> NDArray[np.float32]:
+    """Observations of a policy, scaled and within bounds, of what is known, SI units."""
+    scales = dict(zip(policy.observation_names, policy.observation_scales, strict=True))
+    bounds = observation_bounds()
+    shown = []
+    for name, scale in scales.items():
+        low, high = bounds[name]
+        scaled = known[name] / scale
+        shown.append(np.clip(scaled, low, high))
+    return np.array(shown, dtype=np.float32).T
 
 
 def bridge_parameters(agent: Any) -> BridgeParameters:
@@ -374,9 +413,10 @@ def needed_inputs(agent: Any) -> list[str]:
     action = getattr(agent, "action", "rudder")
     if action == "rudder-shaft" or not names <= set(known):
         read = ", ".join(sorted(names))
+        readable = ", ".join(known)
         raise InputError(
             "autopilot: expected a policy that commands the rudder alone, by"
-            f" {', '.join(known)}, got one that commands {action} and"
+            f" {readable}, got one that commands {action} and"
             f" reads {read[:200]}"
         )
     return [name for name in known if name in names]
@@ -401,4 +441,5 @@ def _no_memory(agent: Any) -> Any:
     if not isinstance(agent, Controller):
         return None
     nothing = np.zeros((agent.memory_size, 1))
-    return from_columns(agent.memory_record, iter(nothing))
+    columns = iter(nothing)
+    return from_columns(agent.memory_record, columns)

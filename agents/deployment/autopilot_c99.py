@@ -108,7 +108,8 @@ def parameter_constant(
 ) -> dict[str, Any]:
     """Type and initialiser of the constant that holds an autopilot's parameters."""
     type_name = c.structures.type(kind)
-    initialiser = c.structures.initialiser(kind, numbers_of(p))
+    numbers = numbers_of(p)
+    initialiser = c.structures.initialiser(kind, numbers)
     return {"PARAMETERS": (type_name, initialiser)}
 
 
@@ -144,11 +145,21 @@ def policy_data(
     if policy.action != "rudder-discrete":
         data["toward"] = c.function(toward, float, float, float).name
     if policy.base is not None:
-        base_step = steering_step(c, policy.base, base_state, kind, base_path_step)
-        data["combined"] = c.function(combined, float, float, float).name
-        data["base_step"] = base_step.name
-        data["base_step_type"] = structures.type(base_step.returns)
+        data |= base_data(c, policy.base, base_state, kind)
     return data
+
+
+def base_data(
+    c: Translator, base: Any, state: Kind, parameters: Kind
+) -> dict[str, Any]:
+    """Data of the templates for the base that a policy adds to."""
+    step = steering_step(c, base, state, parameters, base_path_step)
+    sum_of_orders = c.function(combined, float, float, float)
+    return {
+        "combined": sum_of_orders.name,
+        "base_step": step.name,
+        "base_step_type": c.structures.type(step.returns),
+    }
 
 
 def steering_step(
@@ -160,7 +171,8 @@ def steering_step(
     kinds = (BridgeInput, state, parameters)
     if guide is None:
         return c.function(heading_step, *kinds, law)
-    return c.function(along_path, *kinds, law_of(guide), law)
+    guidance = law_of(guide)
+    return c.function(along_path, *kinds, guidance, law)
 
 
 def parts_of(agent: Any) -> tuple[Any, Any]:

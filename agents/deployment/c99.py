@@ -102,8 +102,10 @@ def array(numbers: Iterable[Any]) -> str:
     entries = []
     for entry in numbers:
         is_number = np.ndim(entry) == 0
-        entries.append(single(entry) if is_number else array(entry))
-    return f"{{{', '.join(entries)}}}"
+        text = single(entry) if is_number else array(entry)
+        entries.append(text)
+    inside = ", ".join(entries)
+    return f"{{{inside}}}"
 
 
 @cache

@@ -131,20 +131,25 @@ class ExpressionWriter:
             raise self.refusal(node)
         left = self.expression(node.left)
         right = self.expression(node.right)
-        if isinstance(node.op, ast.Div) and left.kind is int:
+        is_quotient = isinstance(node.op, ast.Div)
+        if is_quotient and left.kind is int:
             left = Expression(f"(double)({left.text})", float)
 
         are_integers = left.kind is int and right.kind is int
-        kind = int if are_integers else float
-        return binary(left, operator, right, kind)
+        return binary(
+            left,
+            operator,
+            right,
+            kind=int if are_integers else float,
+        )
 
     def _power(self, node: ast.BinOp) -> Expression:
         base = self.expression(node.left).text
         exponent = self.expression(node.right).text
         known = Constants(self.names).value(node.right)
-        if isinstance(known, int) and known > 0:
-            return Expression(f"whole_power({base}, {exponent})", float)
-        return Expression(f"pow({base}, {exponent})", float)
+        is_whole = isinstance(known, int) and known > 0
+        function = "whole_power" if is_whole else "pow"
+        return Expression(f"{function}({base}, {exponent})", float)
 
     def _signed(self, node: ast.UnaryOp) -> Expression:
         operand = self.expression(node.operand)
@@ -187,13 +192,16 @@ class ExpressionWriter:
         self, values: Sequence[Expression], record: Kind = None
     ) -> Expression:
         """A structure of given values, a tuple where no record is named."""
-        kind = record or tuple(stored_kind(value.kind) for value in values)
+        kind = record
+        if record is None:
+            kind = tuple(stored_kind(value.kind) for value in values)
         type_name = self.structures.type(kind)
         fields = []
         for name, value in zip(members(kind), values, strict=True):
             fields.append(f".{name} = {value.text}")
         inside = ", ".join(fields) or "0"
-        return Expression(f"({type_name}){{{inside}}}", kind)
+        text = f"({type_name}){{{inside}}}"
+        return Expression(text, kind)
 
     # Calls.
 
@@ -215,7 +223,7 @@ class ExpressionWriter:
         return call
 
     def _callee(self, node: ast.expr) -> Any:
-        """What is called, found where Python would find it."""
+        """Object that is called, found where Python would find it."""
         callee = None
         match node:
             case ast.Name(id=name) if isinstance(self.kinds.get(name), FunctionType):
@@ -231,16 +239,18 @@ class ExpressionWriter:
     def _arguments(self, node: ast.Call, function: Any) -> list[Expression]:
         """Arguments of a call in the order of the parameters, defaults among them."""
         named = {str(one.arg): one.value for one in node.keywords}
+        signature = inspect.signature(function)
         try:
-            bound = inspect.signature(function).bind(*node.args, **named)
+            bound = signature.bind(*node.args, **named)
         except TypeError:
             raise self.refusal(node) from None
         bound.apply_defaults()
 
         arguments = []
         for value in bound.arguments.values():
-            is_given = isinstance(value, ast.expr)
-            argument = value if is_given else ast.Constant(value)
+            argument = value
+            if not isinstance(value, ast.expr):  # a default
+                argument = ast.Constant(value)
             arguments.append(self._argument(argument))
         return arguments
 
@@ -263,7 +273,8 @@ class ExpressionWriter:
         if called is None:  # it calls itself
             raise self.refusal(node)
         texts = [argument.text for argument in arguments if argument.text]
-        return Expression(f"{called.name}({', '.join(texts)})", called.returns)
+        inside = ", ".join(texts)
+        return Expression(f"{called.name}({inside})", called.returns)
 
     def _replaced(self, node: ast.Call, record: Expression) -> Expression:
         """`record._replace(name=value)`, of a variable."""

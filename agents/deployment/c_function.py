@@ -146,7 +146,8 @@ class FunctionWriter:
         self.kinds[name] = int
         i = c_name(name)
         number = self.expressions.expression(end)
-        lines = [f"for ({i} = 0; {i} < {number.within(Level.SUM)}; ++{i}) {{"]
+        bound = number.within(Level.SUM)
+        lines = [f"for ({i} = 0; {i} < {bound}; ++{i}) {{"]
         lines += self._statements(body)
         lines.append("}")
         return lines

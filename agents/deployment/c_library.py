@@ -56,8 +56,9 @@ def library_call(function: Any, arguments: Sequence[Expression]) -> Expression |
     """Call of a function of Python's or NumPy's; None if C has no such function."""
     if isinstance(function, Hashable) and function in FUNCTIONS:
         name = FUNCTIONS[function]
-        texts = ", ".join([argument.text for argument in arguments])
-        return Expression(f"{name}({texts})", float)
+        texts = [argument.text for argument in arguments]
+        inside = ", ".join(texts)
+        return Expression(f"{name}({inside})", float)
 
     match function, arguments:
         case np.where, [test, yes, no]:
@@ -77,9 +78,8 @@ def interpolation(
     if not is_table(points.kind) or points.kind is not values.kind:
         return None
     rows = points.kind.rows
-    return Expression(
-        f"interpolated({x.text}, {rows}, {points.text}, {values.text})", float
-    )
+    arguments = f"{x.text}, {rows}, {points.text}, {values.text}"
+    return Expression(f"interpolated({arguments})", float)
 
 
 def table_entry(table: Expression, row: Expression) -> Expression:

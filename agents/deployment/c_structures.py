@@ -38,7 +38,8 @@ class Structures:
             return "const double *"
         if kind not in self.types:
             base = kind.__name__ if is_record(kind) else f"Tuple{len(kind)}"
-            self.declare(kind, self.free_name(base))
+            name = self.free_name(base)
+            self.declare(kind, name)
         return self.types[kind]
 
     def declare(self, kind: Kind, name: str) -> None:
@@ -74,7 +75,8 @@ class Structures:
         array = self.free_name(name)
         literals = [literal(number) for number in islice(numbers, rows)]
         inside = ", ".join(literals)
-        self.texts.append(f"static const double {array}[{rows}] = {{{inside}}};\n")
+        declaration = f"static const double {array}[{rows}] = {{{inside}}};\n"
+        self.texts.append(declaration)
         return array
 
     def free_name(self, name: str) -> str:

@@ -54,7 +54,7 @@ KEYWORDS = frozenset(
 
 
 class Level(IntEnum):
-    """How tightly an expression of C holds together."""
+    """Precedence of an expression of C."""
 
     CHOICE = 0
     LOGIC = 1
@@ -110,7 +110,8 @@ def binary(
     level = operator.level
     first = left.within(level)
     second = right.within(Level(level + 1))
-    return Expression(f"{first} {operator.sign} {second}", kind, level)
+    text = f"{first} {operator.sign} {second}"
+    return Expression(text, kind, level)
 
 
 def prefixed(sign: str, operand: Expression, kind: Kind) -> Expression:
@@ -124,7 +125,8 @@ def choice(test: Expression, yes: Expression, no: Expression) -> Expression:
     condition = test.within(Level.LOGIC)
     first = yes.within(Level.LOGIC)
     second = no.within(Level.LOGIC)
-    return Expression(f"{condition} ? {first} : {second}", kind, Level.CHOICE)
+    text = f"{condition} ? {first} : {second}"
+    return Expression(text, kind, Level.CHOICE)
 
 
 def stored_kind(kind: Kind) -> Kind:

@@ -54,11 +54,13 @@ def _texts(source: Source, fmi: str) -> dict[str, str]:
     version = int(fmi[0])
     name = source.name
     content = source.header + source.source + fmi
+    token = uuid.uuid5(uuid.NAMESPACE_URL, content)
+    title = f"Ship {name}" if source.ship else f"Autopilot {name}"
     data: dict[str, Any] = {
         **vars(source),
         "fmi": version,
-        "token": str(uuid.uuid5(uuid.NAMESPACE_URL, content)),
-        "title": f"Ship {name}" if source.ship else f"Autopilot {name}",
+        "token": str(token),
+        "title": title,
     }
     texts = {}
     for header in _headers(version):

@@ -111,8 +111,8 @@ class Helm:
         if self.follows_path:
             turns = {*TURNS} & {*self.pilot.inputs}
         has_route = self.route is not None
+        preposition = "with" if has_route else "without"
         if has_route != bool(turns) or not turns <= {*Route.GIVES}:
-            preposition = "with" if has_route else "without"
             raise InputError(
                 "route: expected 'wheel-over' or 'mpc' of shipgym autopilot with a"
                 f" route, or another without, got '{name}' {preposition} a route"
@@ -143,12 +143,11 @@ class Helm:
             self.state = STEERING
         elif self.state == STEERING and not fault:
             fault = self._fault(step, now)
+        self.warnings = []
         if fault and self.state == STEERING:
             self.state = MANUAL
             self.alarm = fault
-
-        self.warnings = []
-        if self.state == STEERING:
+        elif self.state == STEERING:
             self.warnings = self.warnings_of(inputs, now)
 
     def _fault(self, step: float, now: float) -> str:
@@ -200,16 +199,17 @@ class Helm:
 
         keeps_heading = not self.follows_path and not known["rate_of_turn"]
         set_point = known.get("set_point", 0.0)
-        error = wrapped(set_point - known["heading"])
+        off_heading = abs(wrapped(set_point - known["heading"]))
         largest = radians(self.limits.off_heading_deg)
-        if keeps_heading and abs(error) > largest:
+        if keeps_heading and off_heading > largest:
             warnings.append("off heading")
 
         cross_track = known.get("cross_track", 0.0)
         if abs(cross_track) > self.limits.off_track_m:
             warnings.append("off track")
 
-        if self.seconds_to_turn(known, now) <= self.limits.early_s:
+        seconds_to_turn = self.seconds_to_turn(known, now)
+        if seconds_to_turn <= self.limits.early_s:
             warnings.append("course change ahead")
         return warnings
 

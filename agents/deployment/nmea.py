@@ -143,7 +143,8 @@ class Link:
     async def _open_tcp(self, host: str, port: int, serve: bool) -> None:
         loop = asyncio.get_running_loop()
         if serve:
-            self.others.append(await loop.create_server(self.line, host, port))
+            server = await loop.create_server(self.line, host, port)
+            self.others.append(server)
         else:
             await loop.create_connection(self.line, host, port)
 

@@ -16,7 +16,7 @@ from shipgym.trials.readers.csv_file import read_csv
 
 
 class _Scale(NamedTuple):
-    """What the environment's functions read of ship and settings, m."""
+    """Numbers of ship and settings that the environment's functions read, m."""
 
     length: float
     turn_radius: float
@@ -52,7 +52,8 @@ class Route:
         self.origin = float(latitudes[0]), float(longitudes[0])
         north, east = local_metres(latitudes, longitudes, self.origin)
         path = Path(np.column_stack([north, east]))
-        farthest_km = float(np.abs(path.waypoints).max()) / 1e3
+        distances = np.abs(path.waypoints)
+        farthest_km = float(distances.max()) / 1e3
         if farthest_km > 100.0:  # too far for a plane
             raise InputError(
                 "waypoints: expected at most 100 km from the first, got"
@@ -75,17 +76,19 @@ class Route:
         for name, largest in {"latitude": 89.0, "longitude": 180.0}.items():
             values = table.numbers(name)
             for row, value in enumerate(values.tolist()):
+                place = table.place(row)
                 check_number(
                     value,
-                    f"{path}: {table.place(row)}, column '{name}'",
+                    f"{path}: {place}, column '{name}'",
                     at_least=-largest,
                     at_most=largest,
                     hint="degrees",
                 )
             columns.append(values)
-        if len(table.rows) < 2:
+        n_waypoints = len(table.rows)
+        if n_waypoints < 2:
             raise InputError(
-                f"{path}: expected at least 2 waypoints, got {len(table.rows)}"
+                f"{path}: expected at least 2 waypoints, got {n_waypoints}"
             )
         with placed(str(path)):
             return cls(np.column_stack(columns), radius)
@@ -97,14 +100,18 @@ class Route:
         """
         here = self._fix(latitude, longitude)
         leg = self.leg
-        self.ended = leg.turn == 0.0 and here.along_track >= leg.turn_at
-        turn_to_go = max(fabs(leg.turn) - here.turned, 0.0)
+        to_turn = leg.turn_at - here.along_track
+        to_second = leg.second_at - here.along_track
+        self.ended = leg.turn == 0.0 and to_turn <= 0.0
+
+        turned = copysign(here.turned, leg.turn)
+        left = max(fabs(leg.turn) - here.turned, 0.0)
         return {
-            "set_point": leg.course + copysign(here.turned, leg.turn),
+            "set_point": leg.course + turned,
             "cross_track": here.cross_track,
-            "next_turn_distance": leg.turn_at - here.along_track,
-            "next_turn_angle": copysign(turn_to_go, leg.turn),
-            "second_turn_distance": leg.second_at - here.along_track,
+            "next_turn_distance": to_turn,
+            "next_turn_angle": copysign(left, leg.turn),
+            "second_turn_distance": to_second,
             "second_turn_angle": leg.second_turn,
         }
 

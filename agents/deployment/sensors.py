@@ -95,7 +95,10 @@ class HelmSensors:
             return values
 
         drift = course - heading
-        over_ground = {"surge": speed * cos(drift), "sway": speed * sin(drift)}
+        over_ground = {
+            "surge": speed * cos(drift),
+            "sway": speed * sin(drift),
+        }
         for quantity, value in over_ground.items():
             if quantity in values and quantity not in self.newest:
                 values[quantity] = value
@@ -149,8 +152,8 @@ class HelmSensors:
         low = min(self.expected, order)
         high = max(self.expected, order)
         off = max(low - rudder, rudder - high)
-        is_off = off > radians(self.limits.rudder_deg)
-        if self._lasts("order", is_off, now):
+        tolerance = radians(self.limits.rudder_deg)
+        if self._lasts("order", off > tolerance, now):
             return "the rudder does not follow its order"
         return ""
 
@@ -163,4 +166,5 @@ class HelmSensors:
             self.since.pop(what, None)
             return False
         begin = self.since.setdefault(what, now)
-        return now - begin > self.limits.persistence_s
+        lasted_s = now - begin
+        return lasted_s > self.limits.persistence_s

@@ -79,6 +79,7 @@ def ship_source(
     name = checked_name(name or model.name)
     longest = LONGEST_STEP * model.travel_time
     weather, note = _weather(model, water_depth)
+    numbers = [*model.ship_numbers(water_depth, longest), *weather]
     inputs = _inputs(model, windy=not note)
     outputs = _outputs(model)
     data = {
@@ -91,9 +92,7 @@ def ship_source(
         "speed": model.particulars["speed"],
         "shaft": _start(model)["shaft"],
         "limit": model.steering.limit,
-        **_translated(
-            model, name, [*model.ship_numbers(water_depth, longest), *weather]
-        ),
+        **_translated(model, name, numbers),
     }
     return Source(
         name=name,
@@ -151,14 +150,16 @@ def _translated(
 
 def _weather(model: ShipModel, water_depth: float) -> tuple[Floats, str]:
     """Numbers of a weather whose wind comes later, and a note if it has no wind."""
-    wind = Weather(wind=Wind(1.0, 0.0, gust=False))
+    wind = Wind(1.0, 0.0, gust=False)
+    weather = Weather(wind=wind)
     note = ""
     try:
-        column = weather_column(model, wind, 1.0, water_depth)
+        column = weather_column(model, weather, 1.0, water_depth)
     except InputError as error:
         note = f"wind is left out: {error}"
         column = np.array(flat(CALM))
-    column[leaves(SeaParameters).index("wind_speed")] = 0.0
+    wind_speed = leaves(SeaParameters).index("wind_speed")
+    column[wind_speed] = 0.0
     return column, note
 
 
@@ -188,5 +189,6 @@ def _started(model: ShipModel, names: set[str], variables: Variables) -> Variabl
     started = {}
     for name, variable in variables.items():
         if name in names:
-            started[name] = variable._replace(start=start.get(name, 0.0))
+            value = start.get(name, 0.0)
+            started[name] = variable._replace(start=value)
     return started

@@ -100,16 +100,14 @@ class SimulatedShip:
         surge = state["u"]
         sway = state["v"] * cos(state.get("phi", 0.0))  # in the horizontal plane
 
-        sea = np.zeros(len(SEA_CHANNELS))
-        if self.passage.windy:
-            sea = self.states[0, -len(SEA_CHANNELS) :]
         # the first-order motion that compass and gyro feel, and the current
-        psi_wave, r_wave, _, _, current_north, current_east = sea[:6].tolist()
-
+        psi_wave, r_wave, _, _, current_north, current_east = self._sea()
         north = current_north + surge * cos(psi) - sway * sin(psi)
         east = current_east + surge * sin(psi) + sway * cos(psi)
+
         latitude = START[0] + state["x"] / MINUTE / 60.0
-        longitude = START[1] + state["y"] / MINUTE / 60.0 / cos(radians(latitude))
+        per_degree = cos(radians(latitude))
+        longitude = START[1] + state["y"] / MINUTE / 60.0 / per_degree
         return {
             "heading": psi + psi_wave,
             "yaw_rate": state["r"] + r_wave,
@@ -122,6 +120,14 @@ class SimulatedShip:
             "longitude": radians(longitude),
         }
 
+    def _sea(self) -> list[float]:
+        """The first six of `SEA_CHANNELS`; zeros in calm water."""
+        sea = np.zeros(len(SEA_CHANNELS))
+        if self.passage.windy:
+            sea = self.states[0, -len(SEA_CHANNELS) :]
+        channels: list[float] = sea[:6].tolist()
+        return channels
+
     def _of_plotter(self) -> dict[str, float]:
         """Readings of the chart plotter: the leg, and a waypoint ten miles along it."""
         x = self.now["x"]
@@ -130,10 +136,12 @@ class SimulatedShip:
         waypoint_m = 10.0 * MINUTE
         north_to_go = waypoint_m * cos(leg) - x
         east_to_go = waypoint_m * sin(leg) - y
+        cross_track = y * cos(leg) - x * sin(leg)
+        bearing = atan2(east_to_go, north_to_go)
         return {
-            "cross_track": y * cos(leg) - x * sin(leg),
+            "cross_track": cross_track,
             "leg": leg,
-            "waypoint_bearing": atan2(east_to_go, north_to_go),
+            "waypoint_bearing": bearing,
             "waypoint_distance": hypot(north_to_go, east_to_go),
         }
 
@@ -197,7 +205,8 @@ async def simulate_ship(
     """
     check_number(speed_up, "speed_up", above=0.0)
     dropped = dict(drop or {})
-    types = {_type(line) for line in ship.sentences().splitlines()}
+    lines = ship.sentences().splitlines()
+    types = {_type(line) for line in lines}
     check_keys(dropped, sorted(types), "drop")
 
     loop = asyncio.get_running_loop()
@@ -208,8 +217,10 @@ async def simulate_ship(
         now = ship.steps * ship.step
         while now < duration:
             due = begin + now / speed_up
-            await asyncio.sleep(max(0.0, due - loop.time()))
-            link.send(_still_sent(ship.sentences(), dropped, now))
+            pause = due - loop.time()
+            await asyncio.sleep(max(0.0, pause))
+            text = _still_sent(ship.sentences(), dropped, now)
+            link.send(text)
             ship.advance()
             now = ship.steps * ship.step
 

@@ -95,7 +95,10 @@ async def steer(
     def ship_time() -> float:
         return loop.time() * speed_up
 
-    link = Link(lambda line: helm.hear(line, ship_time()))
+    def hear(line: str) -> None:
+        helm.hear(line, ship_time())
+
+    link = Link(hear)
     connection = Connection(link, address)
     await connection.open(first=True)
 
@@ -107,9 +110,11 @@ async def steer(
     with closing(link), suppress(asyncio.CancelledError):  # an interruption ends it
         while number * tick < duration:
             due = begin + number * tick
-            await asyncio.sleep(max(0.0, (due - ship_time()) / speed_up))
+            pause = (due - ship_time()) / speed_up
+            await asyncio.sleep(max(0.0, pause))
             now = ship_time()
-            helm.watch(tick, now, _fault(helm, connection, (now - due) / speed_up))
+            late_s = (now - due) / speed_up
+            helm.watch(tick, now, _fault(helm, connection, late_s))
             if number % ticks_per_step == 0:
                 helm.steer(now)
             link.send(helm.sentences())
@@ -121,12 +126,17 @@ async def steer(
             await connection.retry()
             number += 1
 
+    _check_heard(helm, connection, number * tick)
+    return helm
+
+
+def _check_heard(helm: Helm, connection: Connection, seconds: float) -> None:
+    """Refuse a closed connection from which nothing came for some time, s."""
     if connection.problem and not any(helm.counts.values()):
         raise InputError(
-            f"{connection.problem}; no data received for {number * tick:g} s; is the"
+            f"{connection.problem}; no data received for {seconds:g} s; is the"
             " other end running?"
         )
-    return helm
 
 
 def _status(helm: Helm, connection: Connection) -> str:
@@ -140,6 +150,7 @@ def _fault(helm: Helm, connection: Connection, late_s: float) -> str | None:
     """A fault of the connection or the computer: it is closed, or the step is late."""
     if not connection.is_open:
         return "the connection was closed"
-    if helm.state == STEERING and late_s > helm.limits.late_s:
+    is_late = late_s > helm.limits.late_s
+    if helm.state == STEERING and is_late:
         return f"a step came {late_s:.1f} s late"
     return None

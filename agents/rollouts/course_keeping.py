@@ -1,6 +1,6 @@
 """Episodes of course keeping and step responses of one controller on many ships."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ RECORDED = ("psi", "delta", "set_point", *course_keeping_task().info_names)
 
 @dataclass(frozen=True, eq=False)
 class Episodes:
-    """What episodes of course keeping cost, each array of the shape of the seeds.
+    """Costs of episodes of course keeping, each array of the shape of the seeds.
 
     Attributes
     ----------
@@ -114,31 +114,44 @@ def sail(
     asked = task or course_keeping_task()
     check_fits(controller, asked, ships[0], f"model '{ships[0].name}'")
 
-    flat = numbers.ravel()
-    per_ship = numbers.size // len(ships)
     groups = []
-    # ships, of a structure and its recordings, that fit into little memory
-    at_once = 1024
-    for first in range(0, numbers.size, at_once):
-        some = flat[first : first + at_once]
-        models_of_group = ships
-        if len(ships) > 1:
-            lanes = first + np.arange(len(some))
-            models_of_group = [ships[lane // per_ship] for lane in lanes]
+    for group in _groups(ships, numbers):
         engine = Engine(
-            models_of_group,
-            len(some),
+            group.ships,
+            len(group.seeds),
             asked,
             allow_unstable=allow_unstable,
         )
-        run = rollout(controller, engine, some, record=RECORDED)
+        run = rollout(controller, engine, group.seeds, record=RECORDED)
         groups.append(_figures(run))
 
     figures = {}
     for name in groups[0]:
-        values = np.concatenate([group[name] for group in groups])
+        of_groups = [group_figures[name] for group_figures in groups]
+        values = np.concatenate(of_groups)
         figures[name] = values.reshape(numbers.shape)
     return Episodes(**figures, seeds=numbers)
+
+
+class _Group(NamedTuple):
+    """Episodes that are sailed together."""
+
+    ships: list[ShipModel]  # one of all episodes, or one of each
+    seeds: Integers
+
+
+def _groups(ships: list[ShipModel], seeds: Integers) -> Iterator[_Group]:
+    """Groups of episodes whose recordings fit into little memory."""
+    flat = seeds.ravel()
+    per_ship = len(flat) // len(ships)
+    at_once = 1024
+    for first in range(0, len(flat), at_once):
+        some = flat[first : first + at_once]
+        own_ships = ships
+        if len(ships) > 1:
+            lanes = first + np.arange(len(some))
+            own_ships = [ships[lane // per_ship] for lane in lanes]
+        yield _Group(own_ships, some)
 
 
 def _seeds(seeds: ArrayLike, n_models: int) -> Integers:
@@ -220,18 +233,26 @@ def step_response(
     steps = int(np.ceil(duration / asked.interval(first)))
     straight = asked.changed(course_change_deg=0.0, episode_steps=steps)
     engine = Engine(ships, len(ships), straight, allow_unstable=allow_unstable)
+    step = float(np.radians(step_deg))
     run = rollout(
         controller,
         engine,
         np.zeros(len(ships), dtype=np.int64),
         record=RECORDED,
-        show=_NewCourse(engine, float(np.radians(step_deg))),
+        show=_NewCourse(engine, step),
     )
+    return _step_responses(run, steps + 1)
+
+
+def _step_responses(run: Rollout, n_samples: int) -> StepResponses:
+    """Responses of a rollout that recorded a step of the set-point."""
     change = run.states["psi"] - run.states["set_point"]
+    rudder = run.states["delta"]
+    samples = np.arange(n_samples, dtype=np.float64)
     return StepResponses(
-        t=np.arange(steps + 1, dtype=np.float64) * engine.dt,
-        heading=_continued(change, steps + 1),
-        rudder=_continued(run.states["delta"], steps + 1),
+        t=samples * run.dt,
+        heading=_continued(change, n_samples),
+        rudder=_continued(rudder, n_samples),
     )
 
 
@@ -247,7 +268,8 @@ class _NewCourse:
     def __init__(self, engine: Engine, step: float) -> None:
         self.engine = engine
         self.step = step
-        self.largest_integral = observation_scales(engine.model)[-1]
+        scales = observation_scales(engine.model)
+        self.largest_integral = scales[-1]
         self.integral = np.zeros(engine.num_envs)
         self.started = 0.0
 
@@ -266,7 +288,9 @@ class _NewCourse:
 
 
 def _ships(models: ShipModel | Sequence[ShipModel]) -> list[ShipModel]:
-    ships = [models] if isinstance(models, ShipModel) else list(models)
+    if isinstance(models, ShipModel):
+        return [models]
+    ships = list(models)
     if not ships:
         raise InputError("models: expected at least one, got none")
     return ships

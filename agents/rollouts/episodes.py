@@ -1,7 +1,7 @@
 """Histories of single episodes of a task, as they are replayed."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -33,12 +33,17 @@ def recorded(
     several control intervals, in which rewards are summed. The last one is filled up:
     the ship stays where her episode ended.
     """
-    n = len(seeds)
-    engine = task.engine(n)
-    run = rollout(policy, engine, np.asarray(seeds), record=True, tolerant=True)
+    engine = task.engine(len(seeds))
+    run = rollout(
+        policy,
+        engine,
+        seeds,
+        record=True,
+        tolerant=True,
+    )
     stride = math.ceil(task.task.episode_steps / samples)
     episodes = []
-    for lane in range(n):
+    for lane in range(len(seeds)):
         episode = episode_of(run, task, lane, engine, stride)
         episodes.append(episode)
 
@@ -75,6 +80,23 @@ class _Lane:
         running = np.append(0.0, np.cumsum(own))
         return np.diff(running[self.samples])
 
+    def commands(self, states: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Orders of the ship over the steps, from the states at the samples."""
+        commands = {}
+        for name in self.run.model.command_names:
+            order = f"{name}_command"
+            if order in states:
+                commands[name] = states[order][1:]
+        return commands
+
+    def reward_parts(self, names: Iterable[str]) -> dict[str, Floats]:
+        """Parts of the reward, summed between the samples."""
+        parts = {}
+        for name in names:
+            per_step = self.run.infos[name][1:]
+            parts[name] = self.summed(per_step)
+        return parts
+
     def success(self) -> bool | None:
         """Return True if the episode was a success; None if its task knows none."""
         infos = self.run.infos
@@ -97,20 +119,14 @@ def episode_of(
     if len(history.samples) < 2:
         return None
 
-    parts = {}
-    for name in task.task.reward_parts:
-        parts[name] = history.summed(run.infos[name][1:])
+    parts = history.reward_parts(task.task.reward_parts)
     infos = {}
     for name, values in run.infos.items():
         if name not in parts and name not in SUCCESS:
             infos[name] = values
 
     states = history.at_samples(run.states)
-    commands = {}
-    for name in ship.command_names:
-        order = f"{name}_command"
-        if order in states:
-            commands[name] = states[order][1:]
+    arguments = plain({"model": task.model, **task.arguments})
     return Episode(
         environment=task.env_id,
         model=ship.name,
@@ -121,13 +137,13 @@ def episode_of(
         states=states,
         actions=run.actions[history.samples[:-1], lane],
         rewards=history.summed(run.rewards),
-        commands=commands,
+        commands=history.commands(states),
         reward_parts=parts,
         info=history.at_samples(infos),
         waypoints=engine.waypoints(lane),
         corridor=engine.path_metres("corridor"),
         turn_radius=engine.path_metres("turn_radius"),
-        arguments=plain({"model": task.model, **task.arguments}),
+        arguments=arguments,
         seed=int(run.seeds[lane]),
         terminated=bool(run.terminated[lane]) and not history.failed,
         truncated=bool(run.truncated[lane]) and not history.failed,

@@ -45,7 +45,7 @@ class CourseChange(NamedTuple):
 
 
 def recorded_for_metrics(task: Task) -> tuple[str, ...]:
-    """What a rollout has to record for `metrics`."""
+    """Names of what a rollout has to record for `metrics`."""
     # Physical states that `metrics` needs, beside all of `info`.
     states = ("psi", "u", "v", "n", "delta", "set_point")
     return (*states, *task.info_names)
@@ -109,7 +109,8 @@ def task_figures(run: Rollout) -> dict[str, Floats]:
         return {**course_changes(run), "success": kept.astype(np.float64)}
 
     # a task of a user's own, which charges ships that are lost
-    charged = total(during(run, "reward_end")) < 0.0
+    end_cost = total(during(run, "reward_end"))
+    charged = end_cost < 0.0
     kept = ~(charged | run.failed)
     return {"success": kept.astype(np.float64)}
 
@@ -141,12 +142,14 @@ def steering(run: Rollout) -> dict[str, Floats]:
 
     minutes = run.steps * run.dt / 60.0
     rudder = run.states["delta"]
+    n_reversals = reversals(rudder, run.sailing)
     moved = np.abs(np.diff(rudder, axis=0))
-    travel = total(np.where(run.sailing, moved, 0.0))
+    moved[~run.sailing] = 0.0
+    travel_deg = np.degrees(total(moved))
     return {
         "heading_rmse_deg": np.degrees(heading_rmse),
-        "rudder_travel_deg_min": ratio(np.degrees(travel), minutes),
-        "rudder_reversals_min": ratio(reversals(rudder, run.sailing), minutes),
+        "rudder_travel_deg_min": ratio(travel_deg, minutes),
+        "rudder_reversals_min": ratio(n_reversals, minutes),
     }
 
 
@@ -191,19 +194,20 @@ def course_changes(run: Rollout) -> dict[str, Floats]:
     that has not counts as unsettled, with the whole of its duration as the time.
     Returns the fields of `CourseChange`, each of shape (n,).
     """
-    figures = CourseChange._fields
-    n_episodes = len(run.seeds)
-    means = np.full((len(figures), n_episodes), np.nan)
     courses = run.states["set_point"].T
     headings = run.states["psi"].T
-    for episode in range(n_episodes):
-        n_samples = int(run.steps[episode]) + 1
-        course = courses[episode, :n_samples]
-        heading = headings[episode, :n_samples]
-        changes = changes_of_course(course, heading, run.dt)
+    undefined = np.full(len(CourseChange._fields), np.nan)
+    means = []
+    for course, heading, steps in zip(courses, headings, run.steps, strict=True):
+        sailed = slice(int(steps) + 1)
+        changes = changes_of_course(course[sailed], heading[sailed], run.dt)
         if changes:
-            means[:, episode] = np.mean(changes, axis=0)
-    return dict(zip(figures, means, strict=True))
+            means.append(np.mean(changes, axis=0))
+        else:
+            means.append(undefined)
+
+    columns = np.transpose(means)
+    return dict(zip(CourseChange._fields, columns, strict=True))
 
 
 def changes_of_course(course: Floats, heading: Floats, dt: float) -> list[CourseChange]:
@@ -219,13 +223,15 @@ def changes_of_course(course: Floats, heading: Floats, dt: float) -> list[Course
     changes = []
     smallest_change = np.radians(5.0)  # of course, whose overshoot and settling count
     for begin, end in pairwise(limits):
-        is_small = abs(error[begin]) < smallest_change
-        if is_small or begin == end:
+        change = abs(error[begin])
+        if change < smallest_change or begin == end:
             continue
         # the error at the end may already be that against the next course
-        next_course = course[end] != course[begin]
-        after = end if next_course else end + 1
-        changes.append(step_figures(error[begin:after], dt))
+        after = end + 1
+        if course[end] != course[begin]:
+            after = end
+        figures = step_figures(error[begin:after], dt)
+        changes.append(figures)
     return changes
 
 
@@ -237,7 +243,8 @@ def step_figures(error: Floats, dt: float) -> CourseChange:
     """
     change = abs(float(error[0]))
     beyond = -np.sign(error[0]) * error  # on the other side
-    overshoot = max(0.0, float(beyond.max()))
+    farthest = float(beyond.max())
+    overshoot = max(0.0, farthest)
 
     band = max(SETTLED_SHARE * change, SETTLED_LEAST)
     outside = np.flatnonzero(np.abs(error) > band)
@@ -270,11 +277,13 @@ def fuel_per_distance(run: Rollout) -> Floats:
     # power over that at service speed
     power = run.sailing.astype(np.float64)
     if service > 0.0:
-        power = (during(run, "n") / service) ** 3
+        shaft_speed = during(run, "n") / service
+        power = shaft_speed**3
 
     spent = total(power) * run.dt
-    in_calm_water = distance_made_good(run) / model.particulars["speed"]
-    return ratio(spent, np.maximum(in_calm_water, 0.0))
+    made_good = np.maximum(distance_made_good(run), 0.0)
+    in_calm_water = made_good / model.particulars["speed"]
+    return ratio(spent, in_calm_water)
 
 
 def distance_made_good(run: Rollout) -> Floats:
@@ -287,19 +296,20 @@ def distance_made_good(run: Rollout) -> Floats:
         distance = during(run, "distance_made_good")
         return np.asarray(distance.max(axis=0, initial=0.0))
     error = during(run, "heading_error")
-    surge = during(run, "u")
-    sway = during(run, "v")
-    along_course = surge * np.cos(error) + sway * np.sin(error)
-    return total(along_course) * run.dt
+    by_surge = during(run, "u") * np.cos(error)
+    by_sway = during(run, "v") * np.sin(error)
+    return total(by_surge + by_sway) * run.dt
 
 
 def path_following(run: Rollout) -> dict[str, Floats]:
-    """How each episode followed its path, see `metrics`."""
-    outside = run.sailing & (during(run, "in_corridor") == 0.0)
+    """Figures of path following of each episode, see `metrics`."""
+    is_outside = during(run, "in_corridor") == 0.0
+    outside = run.sailing & is_outside
+    left = outside.any(axis=0)
     return {
         "cross_track_rmse_m": root_mean_square(run, "cross_track"),
         "outside_corridor": ratio(total(outside), run.steps),
-        "left_corridor": outside.any(axis=0).astype(np.float64),
+        "left_corridor": left.astype(np.float64),
         "grounded": _ever(run, "grounded"),
         "success": _ever(run, "success"),
     }

@@ -34,7 +34,8 @@ def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
     titles = names(files)
     episodes = {}
     for title, path in zip(titles, files, strict=True):
-        episodes[title] = Episode.load(path)
+        episode = Episode.load(path)
+        episodes[title] = episode
 
     page = replay_page(episodes)
     write_text(page, target)

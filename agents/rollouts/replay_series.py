@@ -57,19 +57,9 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
     parts = {}
     for part, values in episode.reward_parts.items():
         parts[part] = np.append(0.0, values)
-    seed = None if episode.seed is None else str(episode.seed)
-    beam = 1.0 / 6.5  # of the length, drawn where the beam is not known
     return {
         "name": name,
-        "environment": episode.environment,
-        "model": episode.model,
-        "number": episode.number,
-        "seed": seed,  # a string: too long for a number in a browser
-        "dt": episode.dt,
-        "steps": episode.n_steps,
-        "length": episode.length,
-        "beam": episode.beam or beam * episode.length,
-        "rudderLimit": float(np.degrees(episode.rudder_limit)),
+        **_facts(episode),
         "outcome": outcome(episode),
         "total": float(np.sum(episode.rewards)),
         "corridor": episode.corridor,
@@ -82,12 +72,33 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
     }
 
 
+def _facts(episode: Episode) -> dict[str, Any]:
+    """Numbers that say which episode it is, and of which ship."""
+    beam = episode.beam
+    if not beam:  # it is not known
+        beam_share = 1.0 / 6.5  # of the length
+        beam = beam_share * episode.length
+    rudder_limit_deg = np.degrees(episode.rudder_limit)
+    seed = None if episode.seed is None else str(episode.seed)
+    return {
+        "environment": episode.environment,
+        "model": episode.model,
+        "number": episode.number,
+        "seed": seed,  # a string: too long for a number in a browser
+        "dt": episode.dt,
+        "steps": episode.n_steps,
+        "length": episode.length,
+        "beam": beam,
+        "rudderLimit": float(rudder_limit_deg),
+    }
+
+
 def _points(points: Floats | None) -> list[Any] | None:
     return None if points is None else rounded(points)
 
 
 def _other(episode: Episode) -> dict[str, Floats]:
-    """What was recorded and is not shown by a series."""
+    """Recorded histories that no series shows."""
     recorded = {**episode.info, **episode.states}
     order = _first(COURSE_ORDERS, recorded)
     cross_track = _first(CROSS_TRACK, recorded)
@@ -100,7 +111,7 @@ def _other(episode: Episode) -> dict[str, Floats]:
 
 
 def series(episode: Episode) -> dict[str, Floats]:
-    """What is shown over time, each of shape (n_steps + 1,); angles in degrees."""
+    """Histories that are shown, each of shape (n_steps + 1,); angles in degrees."""
     states = episode.states
     found: dict[str, Floats] = {
         "x": states["x"],
@@ -135,9 +146,10 @@ def _angles(states: Mapping[str, Floats]) -> dict[str, Floats]:
     heading = heading - full_turn * whole_turns
 
     radians = {"psi": heading, "delta": states["delta"]}
-    for name, state in {"yaw_rate": "r", "heel": "phi"}.items():
-        if state in states:
-            radians[name] = states[state]
+    if "r" in states:
+        radians["yaw_rate"] = states["r"]
+    if "phi" in states:
+        radians["heel"] = states["phi"]
     order = _first(COURSE_ORDERS, states)
     if order is not None:
         error = wrapped(states[order] - heading)
@@ -155,7 +167,8 @@ def _orders(episode: Episode) -> dict[str, Floats]:
     found: dict[str, Floats] = {}
     commands = episode.commands
     if "delta" in commands:
-        found["rudder_order"] = np.degrees(_before_steps(commands["delta"]))
+        rudder = _before_steps(commands["delta"])
+        found["rudder_order"] = np.degrees(rudder)
     if "n" in episode.states:
         found["shaft_speed"] = 60.0 * episode.states["n"]
     elif "n" in commands:
@@ -193,7 +206,8 @@ def quantities(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Histories and read-outs that some of the runs have."""
     recorded: set[str] = set()
     for one in runs:
-        recorded.update(one["series"])
+        names = one["series"]
+        recorded.update(names)
 
     shown = []
     for quantity in QUANTITIES:
@@ -203,7 +217,7 @@ def quantities(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def outcome(episode: Episode) -> str:
-    """How an episode ended, in a word or two."""
+    """End of an episode, in a word or two."""
     if episode.success:
         return "success"
     if episode.terminated:
@@ -229,7 +243,8 @@ def rounded(values: Floats) -> list[Any]:
     array = np.asarray(values, dtype=np.float64)
     smallest = np.finfo(np.float64).tiny  # zero has no logarithm
     size = np.maximum(np.abs(array), smallest)
-    before_point = 1.0 + np.floor(np.log10(size))
+    magnitude = np.floor(np.log10(size))
+    before_point = 1.0 + magnitude
     # significant digits of the numbers in the page: a millimetre in a kilometre
     digits = 7
     most_decimals = 9

@@ -106,14 +106,16 @@ def rollout(
 
     starts = log.sailing
     while log.sailing.any():
-        seen = observations if show is None else show(observations)
+        seen = observations
+        if show is not None:
+            seen = show(observations)
         command = helmsman.steer(seen, starts, log.sailing, engine)
         log.give_up(command.missing)
         if not log.sailing.any():  # the policy has failed in all episodes
             break
         observations, rewards, terminated, truncated = engine.step(command.values)
         log.note(command.values, rewards, terminated, truncated)
-        starts = np.zeros(engine.num_envs, dtype=np.bool_)
+        starts = np.zeros_like(starts)
     return log.rollout(np.asarray(seeds), helmsman)
 
 
@@ -211,9 +213,11 @@ def _checked_command(actions: Any, shape: tuple[int, int], sailing: Flags) -> _C
     fault = ""
     if missing.any():
         first = int(np.argmax(missing))
+        n_missing = missing.sum()
+        n_sailing = sailing.sum()
         fault = (
             f"expected numbers in [-1, 1], got {values[first]} for ship {first}: no"
-            f" finite number for {missing.sum()} of {sailing.sum()} ships; look for a"
+            f" finite number for {n_missing} of {n_sailing} ships; look for a"
             " division by zero in the controller"
         )
     values[missing | ~sailing] = 0.0
@@ -221,19 +225,18 @@ def _checked_command(actions: Any, shape: tuple[int, int], sailing: Flags) -> _C
 
 
 class _Log:
-    """What has become of the episodes so far."""
+    """Record of the episodes so far."""
 
     def __init__(self, engine: Engine, record: bool | Collection[str]) -> None:
         self.engine = engine
         self.record = record
 
-        n = engine.num_envs
-        none: Flags = np.zeros(n, dtype=np.bool_)
+        none: Flags = np.zeros(engine.num_envs, dtype=np.bool_)
         self.sailing = ~none
         self.terminated = none
         self.truncated = none
         self.failed = none
-        self.costs = np.zeros(n)
+        self.costs = np.zeros(engine.num_envs)
 
         self.sailed: list[Flags] = []
         self.actions: list[NDArray[np.float32]] = []

@@ -91,7 +91,8 @@ class BenchmarkTask:
         steered = self.evaluation.observed()
         for on_model, on_ship in zip(designed, steered, strict=True):
             same_name = on_model.name == on_ship.name
-            if not same_name or on_model.scale != on_ship.scale:
+            same_scale = on_model.scale == on_ship.scale
+            if not (same_name and same_scale):
                 raise InputError(
                     f"task '{self.name}': ship: expected the particulars of"
                     f" '{self.model}', got '{self.true_ship}', whose '{on_ship.name}'"
@@ -113,22 +114,22 @@ class BenchmarkTask:
 
     @cached_property
     def design(self) -> Scenario:
-        """What controllers are made for."""
+        """Scenario that controllers are made for."""
         return self._scenario(self.model, self.options)
 
     @cached_property
     def evaluation(self) -> Scenario:
-        """What controllers are evaluated in."""
+        """Scenario that controllers are evaluated in."""
         if not self.true_ship and not self.far:
             return self.design
         options = {**self.options, **self.far}
         changes = options.pop("gear", {})
         scenario = self._scenario(self.true_ship or self.model, options)
 
-        ship = scenario.ship
-        gear = {**asdict(ship.steering), **changes}
+        gear = {**asdict(scenario.ship.steering), **changes}
         steering = SteeringGear.from_mapping(gear, "far.gear")
-        return scenario._replace(ship=replace(ship, steering=steering))
+        ship = replace(scenario.ship, steering=steering)
+        return scenario._replace(ship=ship)
 
     def _scenario(self, model: str, options: Mapping[str, Any]) -> Scenario:
         task = SHORT_NAMES.get(self.environment, self.environment)
@@ -153,7 +154,7 @@ class BenchmarkTask:
 
     @property
     def task(self) -> Task:
-        """What is asked of the autopilot."""
+        """Task of the autopilot."""
         return self.design.task
 
     @property
@@ -179,16 +180,21 @@ class BenchmarkTask:
         """Files of the user's own that it names: tasks, models, rewards, sensors."""
         options = {**self.options, **self.far}
         named = [self.environment, self.model, self.true_ship, *options.values()]
+        suffixes = (".py", ".json")
         files = []
         for name in named:
-            path = Path(name if isinstance(name, str) else "")
-            if path.suffix in (".py", ".json") and path.is_file():
+            if not isinstance(name, str):
+                continue
+            path = Path(name)
+            if path.suffix in suffixes and path.is_file():
                 files.append(path)
         return files
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `from_dict` reads, ready for JSON."""
-        content = {part.name: getattr(self, part.name) for part in fields(self)}
+        content = {}
+        for part in fields(self):
+            content[part.name] = getattr(self, part.name)
         for name in OPTION_FIELDS:
             options = dict(content[name])
             sea = options.get("sea")

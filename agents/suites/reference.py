@@ -36,7 +36,8 @@ def best_known(suite: str) -> dict[str, dict[str, Any]]:
     content = read_json(path, "file of best known costs", "take another copy")
     check_shape(content, BEST, str(path))
     for task, known in content.items():
-        n_costs, n_by = len(known["costs"]), len(known["by"])
+        n_costs = len(known["costs"])
+        n_by = len(known["by"])
         if n_costs != N_EPISODES or n_by != N_EPISODES:
             raise InputError(
                 f"{path}: {task}: expected costs of {N_EPISODES} episodes and what"
@@ -53,7 +54,8 @@ def reference_costs(suite: str) -> dict[str, ScoreScale]:
     scales = {}
     for task, known in best_known(suite).items():
         zero = float(known["zero"])
-        best = float(np.mean(known["costs"]))
+        costs = known["costs"]
+        best = float(np.mean(costs))
         scales[task] = (zero, best)
     return scales
 
@@ -78,9 +80,10 @@ def load_tuned(suite: str) -> dict[str, dict[str, Any]]:
     path = suite_file(suite, "tuned")
     remedy = "make it again with scripts/tune_controllers.py"
     content = read_json(path, "file of tuned settings", remedy)
-    tasks = check_table(content.get("tasks"), f"{path}: tasks")
+    where = f"{path}: tasks"
+    tasks = check_table(content.get("tasks"), where)
     settings = {}
     for name, controllers in tasks.items():
-        table = check_table(controllers, f"{path}: tasks.{name}")
+        table = check_table(controllers, f"{where}.{name}")
         settings[name] = dict(table)
     return settings

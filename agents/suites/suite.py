@@ -73,7 +73,8 @@ class Suite:
         if names is None:
             return self.tasks
         if isinstance(names, str):
-            names = [name.strip() for name in names.split(",")]
+            parts = names.split(",")
+            names = [name.strip() for name in parts]
         if not names:
             raise InputError("tasks: expected at least one, got none")
 
@@ -147,7 +148,8 @@ def find_task(
     Raises InputError for an unknown name, with the nearest, or as `load_suite`.
     """
     known = {}
-    for task in load_suite(suite, allow_code).tasks:
+    found = load_suite(suite, allow_code)
+    for task in found.tasks:
         if task.on == "ship":
             known[task.name] = task
     check_choice(name, known, "task")
@@ -189,11 +191,12 @@ def _read_suite(text: str, where: str, reader: "_Reader", source: str) -> Suite:
     content = parse_toml(text, f"{where}:")
     check_keys(content, ("name", "tasks"), where)
     name = check_text(content.get("name"), f"{where}: name")
-    tables = check_table(content.get("tasks"), f"{where}: tasks")
+    tasks_field = f"{where}: tasks"
+    tables = check_table(content.get("tasks"), tasks_field)
 
     tasks: list[BenchmarkTask] = []
     for task_name, table in tables.items():
-        field = f"{where}: tasks.{task_name}"
+        field = f"{tasks_field}.{task_name}"
         task = reader.read(task_name, table, field)
         tasks += _sets_of(replace(task, suite=source))
 
@@ -220,20 +223,17 @@ class _Reader:
             raise InputError(
                 f"{where}.far: expected `ship` too, the one behind the model, got none"
             )
-        environment_text = check_text(table.get("environment"), f"{where}.environment")
-        self.check_code(environment_text, table, where)
+        field = f"{where}.environment"
+        text = check_text(table.get("environment"), field)
+        self.check_code(text, table, where)
 
-        environment = read_environment(
-            environment_text, self.folder, f"{where}.environment"
-        )
-        options = dict(environment.options)
-        options |= self.options(table.get("options", {}), f"{where}.options")
-        if "sea" in table:
-            options |= self.options({"sea": table["sea"]}, where)
+        environment = read_environment(text, self.folder, field)
+        options = {**environment.options, **self.own_options(table, where)}
         far = self.options(table.get("far", {}), f"{where}.far")
 
         default_model = options.pop("model", None)
-        model = check_text(table.get("model", default_model), f"{where}.model")
+        named_model = table.get("model", default_model)
+        model = check_text(named_model, f"{where}.model")
         ship = ""
         if "ship" in table:
             ship = check_text(table["ship"], f"{where}.ship")
@@ -248,6 +248,14 @@ class _Reader:
                 far=far,
                 design_name=name,
             )
+
+    def own_options(self, table: Mapping[str, Any], where: str) -> dict[str, Any]:
+        """Keywords of an environment that a task's table gives, its sea among them."""
+        options = self.options(table.get("options", {}), f"{where}.options")
+        if "sea" in table:
+            sea = {"sea": table["sea"]}
+            options |= self.options(sea, where)
+        return options
 
     def check_code(
         self, environment: str, table: Mapping[str, Any], where: str
@@ -270,7 +278,10 @@ class _Reader:
     def without_allowed(self, value: Any) -> Any:
         """Copy a value of TOML without the code that is allowed."""
         if isinstance(value, Mapping):
-            return {key: self.without_allowed(part) for key, part in value.items()}
+            kept = {}
+            for key, part in value.items():
+                kept[key] = self.without_allowed(part)
+            return kept
         if isinstance(value, list):
             return [self.without_allowed(part) for part in value]
         if isinstance(value, str) and self.allows(value):

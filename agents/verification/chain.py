@@ -16,7 +16,8 @@ from agents.jobs import HERE, EngineError, JobEngine
 from agents.output import whole_folder
 from agents.rollouts.rollout import check_fits
 from agents.verification.refusal import refused_designs, why_refused
-from agents.verification.result import AutopilotResult, Verification
+from agents.verification.result import AutopilotResult, Pilot, Verification
+from agents.verification.tracks import Track
 from agents.verification.verify import DESIGNS, verify
 from identification import IdentificationResult, identify
 from identification.progress import PROGRESS, Progress
@@ -119,7 +120,7 @@ def examined(
     guests: Sequence[tuple[str, Agent]],
     verified: Callable[[], Verification],
 ) -> AutopilotResult:
-    """What is found on an identified model: its verification, or why there is none.
+    """Result on an identified model: its verification, or why there is none.
 
     `guests`: further autopilots, each after its name.
     """
@@ -137,8 +138,7 @@ def examined(
     refusal = why_refused(fit)
     if refusal is not None:
         return result(refusal=refusal)
-    for name, guest in guests:
-        check_guest(guest, fit.model, f"agent '{name}'")
+    check_guests(guests, fit.model)
     try:
         found = verified()
     except EngineError:
@@ -160,6 +160,12 @@ def _measured(found: Verification, fit: IdentificationResult) -> Verification:
     return replace(found, manoeuvres=replace(manoeuvres, criteria=criteria))
 
 
+def check_guests(guests: Sequence[tuple[str, Agent]], model: ShipModel) -> None:
+    """Refuse guests, each after its name, that do not keep this ship's course."""
+    for name, guest in guests:
+        check_guest(guest, model, f"agent '{name}'")
+
+
 def check_guest(guest: Agent, model: ShipModel, where: str) -> None:
     """Refuse a guest that was not made for keeping this ship's course."""
     task = course_keeping_task()
@@ -178,12 +184,13 @@ def with_standards(found: Verification, model: ShipModel) -> Verification:
     """A verification with the standards of its best heading and path autopilot."""
     from agents.verification.standards import standards
 
+    refused = found.refused
     designs = []
     for pilot in found.pilots:
-        if pilot.design is not None and pilot.key not in found.refused:
+        if pilot.design is not None and pilot.key not in refused:
             designs.append(pilot.design)
     best = designs[0]
-    tracks = [track for track in found.tracks if track.key not in found.refused]
+    tracks = [track for track in found.tracks if track.key not in refused]
     requirements = standards(model, best, tracks)
     return replace(found, standards=tuple(requirements))
 
@@ -196,12 +203,10 @@ def write_result(result: AutopilotResult, folder: Path) -> None:
     found = result.verification
     if found is not None:
         result.model.save(folder / "model.json")
-        agents: dict[str, Any] = {}
-        for pilot in found.pilots:
-            agents[pilot.key] = pilot.controller
-        for track in found.tracks:
-            agents[track.key] = track.controller
-        for key, agent in agents.items():
+        autopilots: list[Pilot | Track] = [*found.pilots, *found.tracks]
+        for autopilot in autopilots:
+            key = autopilot.key
+            agent = autopilot.controller
             if isinstance(agent, Controller) and key not in found.refused:
                 agent.save(folder / f"{key}.json")
     write_report(result, folder / "report.html")

@@ -74,8 +74,7 @@ def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
         traces += _marks_of(criterion, row)
         names.append(criterion_name(name, criterion))
     ends = [-0.5, len(criteria) - 0.5]
-    limit = line([100.0, 100.0], ends, "IMO limit", LIMIT, 1.8, line_dash="dash")
-    traces.append(limit)
+    traces.append(_limit_line(ends))
 
     names_axis = axis(
         tickvals=list(range(len(names))),
@@ -87,6 +86,12 @@ def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
     panel = Panel(traces, shares_axis, names_axis)
     height = 46 * len(criteria) + 100
     return panels([panel], height, left=190, hovermode="closest")
+
+
+def _limit_line(heights: list[float]) -> Any:
+    """The limit of all criteria, which is 100 per cent."""
+    limit = [100.0, 100.0]
+    return line(limit, heights, "IMO limit", LIMIT, 1.8, line_dash="dash")
 
 
 def _draws_of(criterion: Criterion, row: int, jitter: np.random.Generator) -> Any:
@@ -118,7 +123,8 @@ def _marks_of(criterion: Criterion, row: int) -> list[Any]:
         if value is not None:
             share = 100.0 * value / criterion.limit
             heights = [row - 0.32, row + 0.32]
-            marks.append(line([share, share], heights, name, colour, 2.2))
+            mark = line([share, share], heights, name, colour, 2.2)
+            marks.append(mark)
     return marks
 
 
@@ -137,7 +143,8 @@ def _zigzag_lines(run: Trial, headings: Floats) -> list[Any]:
     """Heading and rudder of the model over the band of the draws' headings."""
     lines = []
     if len(headings):
-        lines.append(band(run.t, np.degrees(headings), "95 % of draws", MODEL))
+        headings_deg = np.degrees(headings)
+        lines.append(band(run.t, headings_deg, "95 % of draws", MODEL))
     rudder = np.degrees(run["delta"])
     heading = np.degrees(run["psi"])
     lines.append(line(run.t, rudder, "rudder", RUDDER, 1.2))
@@ -158,8 +165,8 @@ def _circle_lines(run: Trial, paths: Sequence[Floats], length: float) -> list[An
         lines.append(line(east, north, "single draws", pale, 1.0))
     north = run["x"] / length
     east = run["y"] / length
-    lines.append(line(east, north, "identified model", MODEL, 2.0))
-    return lines
+    circle = line(east, north, "identified model", MODEL, 2.0)
+    return [*lines, circle]
 
 
 def _side_by_side(left: Panel, right: Panel) -> Figure:
@@ -183,11 +190,7 @@ def steps_figure(
         headings += _step_lines(t, np.degrees(heading), name, colour)
         rudders += _step_lines(t, np.degrees(rudder), name, colour)
 
-    ends = [t[0], t[-1]]
-    course = [step_deg, step_deg]
-    set_course = line(ends, course, "set course", MUTED, 1.2, line_dash="dot")
-    headings.append(set_course)
-
+    headings.append(_set_course(t, step_deg))
     rudder_axis = axis("rudder, deg", zero=True)
     shown = [
         Panel(headings, "", "heading change, deg"),
@@ -195,6 +198,13 @@ def steps_figure(
     ]
     grid = {"shared_xaxes": True, "vertical_spacing": 0.06, "row_heights": [0.58, 0.42]}
     return panels(shown, 500, grid=grid)
+
+
+def _set_course(t: Floats, step_deg: float) -> Any:
+    """Line of the course that is steered."""
+    ends = [t[0], t[-1]]
+    course = [step_deg, step_deg]
+    return line(ends, course, "set course", MUTED, 1.2, line_dash="dot")
 
 
 def _step_lines(t: Floats, angles: Floats, name: str, colour: str) -> list[Any]:
@@ -210,22 +220,40 @@ def _step_lines(t: Floats, angles: Floats, name: str, colour: str) -> list[Any]:
 def tracks_figure(tracks: Mapping[str, Track], length: float) -> Figure:
     """Tracks of the identified model under each path autopilot, and their errors."""
     first = next(iter(tracks.values()))
-    north, east = first.waypoints.T / length
-    paths = [line(east, north, "waypoints", MUTED, 1.2, line_dash="dot")]
+    waypoints = _path_line(
+        first.waypoints / length,
+        name="waypoints",
+        colour=MUTED,
+        width=1.2,
+        line_dash="dot",
+    )
+    paths = [waypoints]
     errors = []
     for (name, track), colour in zip(tracks.items(), PILOT_COLOURS, strict=False):
-        north, east = track.positions.T / length
-        paths.append(line(east, north, name, colour, 2.0))
-
-        steps = np.hypot(np.diff(north), np.diff(east))
-        sailed = np.append(0.0, np.cumsum(steps))
-        errors.append(line(sailed, track.cross_track, name, colour, 1.6))
+        paths.append(_path_line(track.positions / length, name, colour, 2.0))
+        errors.append(_error_line(track, length, name, colour))
 
     north_axis = axis("north, ship lengths", scaleanchor="x", scaleratio=1)
     left = Panel(paths, "east, ship lengths", north_axis, "Track")
     aside = axis("m, positive to starboard", zero=True)
     right = Panel(errors, "way, ship lengths", aside, "Cross-track error")
     return _side_by_side(left, right)
+
+
+def _path_line(
+    places: Floats, name: str, colour: str, width: float, **more: Any
+) -> Any:
+    """A line through places, shape (n, 2), north and east."""
+    north, east = places.T
+    return line(east, north, name, colour, width, **more)
+
+
+def _error_line(track: Track, length: float, name: str, colour: str) -> Any:
+    """Cross-track error of a track over the way sailed, in ship lengths."""
+    steps = np.diff(track.positions / length, axis=0)
+    distances = np.hypot(*steps.T)
+    sailed = np.append(0.0, np.cumsum(distances))
+    return line(sailed, track.cross_track, name, colour, 1.6)
 
 
 def costs_figure(costs: Mapping[str, Floats]) -> Figure:
@@ -247,5 +275,7 @@ def costs_figure(costs: Mapping[str, Floats]) -> Figure:
             showlegend=False,
         )
         boxes.append(box)
-    panel = Panel(boxes, "steering cost of an episode", axis(autorange="reversed"))
-    return panels([panel], 90 * len(costs) + 90, hovermode="closest")
+    from_top = axis(autorange="reversed")
+    panel = Panel(boxes, "steering cost of an episode", from_top)
+    height = 90 * len(costs) + 90
+    return panels([panel], height, hovermode="closest")

@@ -46,7 +46,7 @@ class NominalRuns(NamedTuple):
 
 
 class SailedDraws(NamedTuple):
-    """What became of some models drawn in the standard manoeuvres."""
+    """Results of some models drawn in the standard manoeuvres."""
 
     #: by manoeuvre and index, shape (n_draws,), NaN where there is none
     values: dict[str, dict[str, Floats]]
@@ -82,13 +82,9 @@ def nominal_runs(model: ShipModel) -> NominalRuns:
 
 def sail_draws(model: ShipModel, draws: Sequence[ShipModel]) -> SailedDraws:
     """Put models drawn from one through the standard manoeuvres."""
-    needed = imo_manoeuvres(model)
-    no_indices = {name: test.no_indices for name, test in needed.items()}
-    evaluations = {name: test.evaluate for name, test in needed.items()}
-    intervals = intervals_of(no_indices, draws, evaluations)
     values = {}
     ran_away = {}
-    for name, indices in intervals.items():
+    for name, indices in _index_intervals(model, draws).items():
         values[name] = {index: one.values for index, one in indices.items()}
         first = next(iter(indices.values()))
         ran_away[name] = first.ran_away
@@ -114,8 +110,20 @@ def sail_draws(model: ShipModel, draws: Sequence[ShipModel]) -> SailedDraws:
     )
 
 
+def _index_intervals(
+    model: ShipModel, draws: Sequence[ShipModel]
+) -> dict[str, dict[str, IndexInterval]]:
+    """Intervals of the indices of the IMO criteria over draws, by manoeuvre."""
+    no_indices = {}
+    evaluations = {}
+    for name, test in imo_manoeuvres(model).items():
+        no_indices[name] = test.no_indices
+        evaluations[name] = test.evaluate
+    return intervals_of(no_indices, draws, evaluations)
+
+
 def joined(parts: Iterable[SailedDraws]) -> SailedDraws:
-    """What became of all draws, from parts in their order."""
+    """Results of all draws, from parts in their order."""
     parts = list(parts)
     values: dict[str, dict[str, Floats]] = {}
     ran_away = {}

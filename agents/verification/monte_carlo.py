@@ -33,7 +33,7 @@ DRAWS_A_JOB = 25
 
 @dataclass(frozen=True, eq=False)
 class MonteCarlo:
-    """What became of the models drawn."""
+    """Results of the models drawn."""
 
     draws: tuple[ShipModel, ...]  # the models drawn
     #: standard manoeuvres and IMO criteria over the draws
@@ -76,15 +76,12 @@ def monte_carlo(
     parts = run_jobs(do_draws, jobs, where, on_progress)
     sailed = joined([SailedDraws(**part["sailed"]) for part in parts])
     course_unstable = [part["course_unstable"] for part in parts]
-    episodes = []
-    for i in range(len(controllers)):
-        of_parts = [part["episodes"][i] for part in parts]
-        episodes.append(_joined_episodes(of_parts))
+    by_controller = zip(*[part["episodes"] for part in parts], strict=True)
     return MonteCarlo(
         draws=tuple(drawn),
         manoeuvres=uncertainty_of(model, nominal, sailed),
         course_unstable=np.concatenate(course_unstable),
-        episodes=tuple(episodes),
+        episodes=tuple(map(_joined_episodes, by_controller)),
     )
 
 

@@ -12,6 +12,7 @@ from agents.verification.view import (
     is_certain,
     verification_view,
 )
+from identification import IdentificationResult
 from identification.report.view import fit_view, trial_figures
 from identification.validation.warnings import held_out_error
 from shipgym.files import write_text
@@ -33,8 +34,7 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
         length = float(result.model.particulars["length"])
         view = verification_view(found, length)
         cheaper = cheaper_sentence(view)
-        drawn = trial_figures(result.identification)
-        drawn |= verification_figures(found, length)
+        drawn = result_figures(result.identification, found, length)
     verdict, kind = verdict_of(result)
     page = render(
         "agents.verification/report.html",
@@ -59,11 +59,13 @@ def _origin(result: AutopilotResult) -> dict[str, str]:
     how = []
     for key in ("structure", "method", "samples"):
         how.append(str(provenance.get(key, NONE)))
+    origin = ", ".join(how)
     own_version = f"shipgym {shipgym.__version__}"
+    software = provenance.get("software", own_version)
     return {
-        "software": provenance.get("software", own_version),
+        "software": software,
         "ship file": result.ship.path.name,
-        "structure, method, samples": ", ".join(how),
+        "structure, method, samples": origin,
     }
 
 
@@ -87,6 +89,13 @@ def verdict_of(result: AutopilotResult) -> tuple[str, str]:
         sentences.insert(0, f"No autopilot is given: {result.refusal}.")
         kind = "bad"
     return " ".join(sentences), kind
+
+
+def result_figures(
+    fit: IdentificationResult, found: Verification, length: float
+) -> dict[str, Any]:
+    """Figures of an identification and a verification by name."""
+    return {**trial_figures(fit), **verification_figures(found, length)}
 
 
 def verification_figures(found: Verification, length: float) -> dict[str, Any]:

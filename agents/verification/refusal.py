@@ -42,7 +42,8 @@ def why_refused(fit: Fit) -> str | None:
         drawn = []
         for ship in (model, *model.sample(60, 0)):
             A, B = steering_state_space(ship)
-            drawn.append(Steering(A, B))
+            steering = Steering(A, B)
+            drawn.append(steering)
     except InputError:  # no straight course: the designs say so
         return None
 
@@ -69,13 +70,15 @@ def _steers_to_other_side(fit: Fit, steering: Steering) -> str | None:
 
 def why_driven(drawn: Sequence[Steering]) -> str | None:
     """Damping of the wrong sign in 97.5 % of models; None without one."""
-    for row, name in enumerate(("sway damping (Y_v)", "yaw damping (N_r)")):
+    dampings = ("sway damping (Y_v)", "yaw damping (N_r)")
+    for row, name in enumerate(dampings):
         driven = [steering.A[row, row] > 0.0 for steering in drawn]
         share = float(np.mean(driven))
+        per_cent = 100.0 * share
         if share >= 0.975:
             return (
                 f"its {name} has the sign of a force that drives the motion, in"
-                f" {100.0 * share:.0f} % of the models drawn, which no ship has"
+                f" {per_cent:.0f} % of the models drawn, which no ship has"
             )
     return None
 
@@ -90,6 +93,11 @@ def rudder_effect(trials: Sequence[Trial], model: ShipModel) -> float:
     parts = [_changes(trial, window) for trial in trials]
     X = np.concatenate([part.features for part in parts])
     y = np.concatenate([part.changes for part in parts])
+    return _t_statistic(X, y, RUDDER)
+
+
+def _t_statistic(X: Floats, y: Floats, column: int) -> float:
+    """Student's t of the coefficient of a column; 0 for too few samples."""
     freedom = len(y) - X.shape[1]
     if freedom <= 0:
         return 0.0
@@ -98,11 +106,10 @@ def rudder_effect(trials: Sequence[Trial], model: ShipModel) -> float:
     residuals = y - X @ coefficients
     variance = float(residuals @ residuals) / freedom
     covariance = variance * np.linalg.pinv(X.T @ X)
-    rudder = 1  # its column
-    error = float(np.sqrt(covariance[rudder, rudder]))
+    error = float(np.sqrt(covariance[column, column]))
     if error == 0.0:
         return 0.0
-    return float(coefficients[rudder]) / error
+    return float(coefficients[column]) / error
 
 
 class _Changes(NamedTuple):
@@ -110,6 +117,9 @@ class _Changes(NamedTuple):
 
     features: Floats  # yaw rate, rudder and 1, shape (n_windows, 3)
     changes: Floats  # shape (n_windows,)
+
+
+RUDDER = 1  # column of `_Changes.features`
 
 
 def _changes(trial: Trial, window: float) -> _Changes:
@@ -185,7 +195,8 @@ def refused_designs(
     designed = [pilot for pilot in found.pilots if pilot.design is not None]
     lost = {}
     for pilot in designed:
-        why = lost_control(pilot.episodes.terminated, most_lost)
+        terminated = pilot.episodes.terminated
+        why = lost_control(terminated, most_lost)
         if why is not None:
             lost[pilot.key] = why
     if not lost:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +53,7 @@ class Pilot:
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """What was found out about a stable model and its autopilots."""
+    """Findings about a stable model and its autopilots."""
 
     draws: int  # number of models drawn from the coefficient covariance
     seed: int  # of the draw and of the episodes
@@ -93,7 +94,7 @@ class AutopilotResult:
 
     @property
     def stable(self) -> bool:
-        """Whether the model can be used."""
+        """True if the model can be used."""
         return self.instability is None
 
     @property
@@ -116,12 +117,8 @@ class AutopilotResult:
 
 
 def verification_metrics(found: Verification) -> dict[str, Any]:
-    """What metrics.json says of a verification."""
+    """Contents of metrics.json about a verification."""
     criteria = found.manoeuvres.criteria
-    standards = {}
-    for requirement in found.standards:
-        fields = {**asdict(requirement), "passed": requirement.passed}
-        standards[requirement.name] = fields
     return {
         "draws": {
             "count": found.draws,
@@ -135,8 +132,17 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
         "ranking": [pilot.key for pilot in found.pilots],
         "refused": found.refused,
         "tracks": {track.key: track_metrics(track) for track in found.tracks},
-        "standards": standards,
+        "standards": _standards_metrics(found.standards),
     }
+
+
+def _standards_metrics(standards: Sequence[Requirement]) -> dict[str, Any]:
+    """Requirements by name, with their verdicts."""
+    metrics = {}
+    for requirement in standards:
+        fields = asdict(requirement)
+        metrics[requirement.name] = {**fields, "passed": requirement.passed}
+    return metrics
 
 
 def track_metrics(track: Track) -> dict[str, Any]:
@@ -146,8 +152,9 @@ def track_metrics(track: Track) -> dict[str, Any]:
     if not len(drawn):
         drawn = track.largest
     not_arrived = ~track.arrived[1:]
+    gains = track.controller.gains
     return {
-        "gains": _floats(track.controller.gains),
+        "gains": _floats(gains),
         "cross_track_largest_m": float(own),
         "cross_track_rmse_m": float(track.rms[0]),
         "cross_track_largest_m_quantile_95": upper_95(drawn),
@@ -170,6 +177,7 @@ def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
 
     episodes = pilot.episodes
     rmse_deg = episodes.heading_rmse_deg
+    travel_deg_min = episodes.rudder_travel_deg_min
     return {
         "gains": gains,
         "margins": margins,
@@ -177,7 +185,7 @@ def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
         "cost_quantile_95": upper_95(episodes.cost),
         "heading_rmse_deg_mean": float(np.mean(rmse_deg)),
         "heading_rmse_deg_quantile_95": upper_95(rmse_deg),
-        "rudder_travel_deg_min_mean": float(np.mean(episodes.rudder_travel_deg_min)),
+        "rudder_travel_deg_min_mean": float(np.mean(travel_deg_min)),
         "extrapolating_mean": float(np.mean(episodes.extrapolating)),
         "lost_control": int(np.sum(episodes.terminated)),
     }

@@ -24,7 +24,7 @@ from agents.verification.steered import (
 )
 from agents.verification.tracks import Track
 from identification.arrays import root_mean_square
-from shipgym.arrays import Floats, Integers
+from shipgym.arrays import Integers
 from shipgym.errors import InputError
 from shipgym.files import read_toml
 from shipgym.manoeuvres.quantiles import upper_95
@@ -52,7 +52,7 @@ class Requirement:
 
     @property
     def passed(self) -> bool | None:
-        """Whether it is met; None where that is not known."""
+        """True if it is met; None where that is not known."""
         if self.value is None:
             return None
         return self.value >= self.limit if self.least else self.value <= self.limit
@@ -88,7 +88,12 @@ def heading_control(model: ShipModel, pilot: Controller) -> dict[str, float]:
     small = steer_to_heading(model, pilot, heading=turn_deg, limits=narrow)
     straight = steer_to_heading(model, pilot)
     silent = steer_to_heading(model, pilot, lost=["heading"])
-    return heading_values(turn, small, straight, silent)
+    return heading_values(
+        turn=turn,
+        small=small,
+        straight=straight,
+        silent=silent,
+    )
 
 
 def heading_values(
@@ -116,15 +121,13 @@ def heading_values(
 
 def heading_control_in_waves(model: ShipModel, pilot: Controller) -> dict[str, float]:
     """Values of heading control in a seaway; none if the particulars do not suffice."""
-    wave = 2.0 * np.pi / sea_states()["moderate"].peak_period
-    north_east = radians(45.0)
-    met = encounter_frequency(wave, model.particulars["speed"], north_east)
-    period = 2.0 * np.pi / float(met)
+    period = _encounter_period(model)
     try:
         values = {}
         for sea in ("moderate", "rough"):
             run = steer_to_heading(model, pilot, sea)
-            values[f"heading_{sea}"] = root_mean_square(settled(run.error))
+            error = settled(run.error)
+            values[f"heading_{sea}"] = root_mean_square(error)
         with_filter = LQG.from_model(model, wave_period=period)
         without = LQG.from_model(model, wave_period=None)
     except InputError:
@@ -133,6 +136,15 @@ def heading_control_in_waves(model: ShipModel, pilot: Controller) -> dict[str, f
     unfiltered = _rudder_travel(model, without)
     values["sea_state"] = filtered / unfiltered
     return values
+
+
+def _encounter_period(model: ShipModel) -> float:
+    """Period of the waves of a moderate sea as the ship meets them, s."""
+    sea = sea_states()["moderate"]
+    wave = 2.0 * np.pi / sea.peak_period
+    north_east = radians(45.0)
+    met = encounter_frequency(wave, model.particulars["speed"], north_east)
+    return 2.0 * np.pi / float(met)
 
 
 def _rudder_travel(model: ShipModel, pilot: Controller) -> float:
@@ -149,16 +161,20 @@ def rate_of_turn(model: ShipModel) -> dict[str, float]:
         return {}
     rate = 0.8 * pilot.gains["rate"]
     run = steer_to_heading(model, pilot, rate=rate)
-    off = np.abs(settled(run.yaw_rate) / rate - 1.0)
-    return {"rate_of_turn": 100.0 * float(off.max())}
+    share = settled(run.yaw_rate) / rate
+    off = np.abs(share - 1.0)
+    largest = float(off.max())
+    return {"rate_of_turn": 100.0 * largest}
 
 
 def track_control(model: ShipModel, track: Track) -> dict[str, float]:
     """Values of track control in the current of the track."""
     limits = Limits(off_track_m=OFF_TRACK_M)
+    far_aside = 3.0 * OFF_TRACK_M
+    position = ("latitude", "longitude")
     along = steer_along(model, track, limits)
-    aside = steer_along(model, track, limits, aside=3.0 * OFF_TRACK_M)
-    silent = steer_along(model, track, limits, lost=("latitude", "longitude"))
+    aside = steer_along(model, track, limits, aside=far_aside)
+    silent = steer_along(model, track, limits, lost=position)
     length = model.particulars["length"]
     own_error = float(track.largest[0])
     drawn_error = upper_95(track.largest[1:])
@@ -213,12 +229,14 @@ def _wheel_overs(guide: Controller, along: SteeredRun) -> Integers:
 
     The end of the route is no turn.
     """
-    reach = guide.gains["turn_reach"]
-    distances = [given["next_turn_distance"] for given in along.given]
-    angles = [given["next_turn_angle"] for given in along.given]
-    is_turn = np.array(angles) != 0.0
-    to_go: Floats = np.where(is_turn, distances, np.nan)
+    to_go = []
+    for given in along.given:
+        distance = given["next_turn_distance"]
+        is_turn = given["next_turn_angle"] != 0.0
+        to_go.append(distance if is_turn else np.nan)
 
-    was_far = to_go[:-1] > reach
-    is_near = to_go[1:] <= reach
-    return 1 + np.flatnonzero(was_far & is_near)
+    reach = guide.gains["turn_reach"]
+    before = np.array(to_go[:-1])
+    after = np.array(to_go[1:])
+    enters = (before > reach) & (after <= reach)
+    return 1 + np.flatnonzero(enters)

@@ -95,9 +95,10 @@ def show(
 ) -> None:
     """Show an autopilot what is measured, but for quantities that are silent."""
     for quantity, value in measured.items():
-        if quantity not in silent:
-            reading = NmeaReading(quantity, value, talker="II")
-            helm.sensors.take(reading, now)
+        if quantity in silent:
+            continue
+        reading = NmeaReading(quantity, value, talker="II")
+        helm.sensors.take(reading, now)
 
 
 def steer_to_heading(
@@ -113,11 +114,20 @@ def steer_to_heading(
 
     `heading`: deg; `rate`: rad/s.
     """
-    step = pilot.design["dt"] / PER_INTERVAL
-    ship = SimulatedShip(model, weather=sea, seed=1, step=step)
-    set_point = radians(heading) if rate is None else None
-    helm = Helm(pilot, set_point, limits or Limits(), rate=rate)
-    return steer(helm, ship, LENGTHS * model.travel_time, lost)
+    ship = SimulatedShip(
+        model,
+        weather=sea,
+        seed=1,
+        step=pilot.design["dt"] / PER_INTERVAL,
+    )
+    helm = Helm(
+        pilot,
+        heading=radians(heading) if rate is None else None,
+        limits=limits or Limits(),
+        rate=rate,
+    )
+    seconds = LENGTHS * model.travel_time
+    return steer(helm, ship, seconds, lost)
 
 
 def positions(places: Floats) -> Floats:
@@ -140,11 +150,14 @@ def steer_along(
 ) -> SteeredRun:
     """Keep a ship to a track, from a distance to starboard of where it begins, m."""
     pilot = track.controller
-    route = Route(positions(track.waypoints), pilot.gains["path_radius"])
+    waypoints = positions(track.waypoints)
+    route = Route(waypoints, pilot.gains["path_radius"])
 
-    step = pilot.design["dt"] / PER_INTERVAL
-    weather = track_task(model).weather
-    ship = SimulatedShip(model, weather=weather, step=step)
+    ship = SimulatedShip(
+        model,
+        weather=track_task(model).weather,
+        step=pilot.design["dt"] / PER_INTERVAL,
+    )
     y = model.state_names.index("y")
     ship.states[0, y] = aside
     helm = Helm(pilot, heading=None, limits=limits, route=route)

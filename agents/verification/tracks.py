@@ -11,7 +11,7 @@ import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.rollouts.metrics import path_following
-from agents.rollouts.rollout import rollout
+from agents.rollouts.rollout import Rollout, rollout
 from shipgym.arrays import Flags, Floats
 from shipgym.envs.engine import Engine
 from shipgym.sea.conditions import Weather
@@ -57,7 +57,8 @@ def track_task(model: ShipModel) -> Task:
     legs = leg_lengths * model.particulars["length"] * directions
     ends = np.cumsum(legs, axis=0)
     waypoints = np.vstack([np.zeros(2), ends])
-    current = Current(0.1 * model.particulars["speed"], towards_deg=90.0)
+    speed = 0.1 * model.particulars["speed"]
+    current = Current(speed, towards_deg=90.0)
     return Task.of(
         "PathFollowing",
         waypoints=waypoints,
@@ -74,23 +75,34 @@ def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:
     run = rollout(guide, engine, seeds, record=RECORDED)
     figures = path_following(run)
 
-    settled_lengths = 6.0  # way after the start that does not count
-    settled = settled_lengths * models[0].particulars["length"]
-    made_good = run.infos["distance_made_good"][1:]
-    cross_track = run.infos["cross_track"]
-    counts = run.sailing & (made_good > settled)
-    counted = np.where(counts, np.abs(cross_track[1:]), 0.0)
-
-    own_samples = int(run.steps[0]) + 1
-    x = run.states["x"][:own_samples, 0]
-    y = run.states["y"][:own_samples, 0]
+    x = _of_first(run, run.states["x"])
+    y = _of_first(run, run.states["y"])
+    cross_track = _of_first(run, run.infos["cross_track"])
     return Track(
         key=guide.kind,
         controller=guide,
         waypoints=np.reshape(task.settings.waypoints[1:], (-1, 2)),
         positions=np.column_stack([x, y]),
-        cross_track=cross_track[:own_samples, 0],
-        largest=counted.max(axis=0),
+        cross_track=cross_track,
+        largest=_largest_error(run),
         rms=figures["cross_track_rmse_m"],
         arrived=figures["success"] > 0.0,
     )
+
+
+def _of_first(run: Rollout, history: Floats) -> Floats:
+    """History of the first ship up to the end of her episode."""
+    n_samples = int(run.steps[0]) + 1
+    return history[:n_samples, 0]
+
+
+def _largest_error(run: Rollout) -> Floats:
+    """Largest cross-track error of each ship once the start is behind, m, shape (n,)."""
+    settled_lengths = 6.0  # way after the start that does not count
+    settled = settled_lengths * run.model.particulars["length"]
+    made_good = run.infos["distance_made_good"][1:]
+    counts = run.sailing & (made_good > settled)
+
+    off_track = np.abs(run.infos["cross_track"][1:])
+    counted = np.where(counts, off_track, 0.0)
+    return np.asarray(counted.max(axis=0))

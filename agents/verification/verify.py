@@ -58,10 +58,8 @@ def verify(
     for guest in guests:
         episodes.append(sail(guest, found.draws, seeds=seed + np.arange(draws)))
 
-    ships = [model]
-    for draw, is_lost in zip(found.draws, found.manoeuvres.unstable, strict=True):
-        if not is_lost:
-            ships.append(draw)
+    stable = np.flatnonzero(~found.manoeuvres.unstable)
+    ships = [model, *[found.draws[i] for i in stable]]
     autopilots = [*designed.controllers, *guests]
     pilots = run_pilots(autopilots, episodes, ships, tell)
     tracks, late = kept_tracks(designed.guides, ships)

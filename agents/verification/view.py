@@ -80,7 +80,7 @@ class CriterionRow:
 
 @dataclass(frozen=True, eq=False)
 class VerificationView:
-    """What the template shows of a verification but for its figures."""
+    """Contents of the report about a verification, but for its figures."""
 
     draws: int
     seed: int
@@ -108,11 +108,13 @@ class VerificationView:
 
 
 def verification_view(found: Verification, length: float) -> VerificationView:
-    """What the template shows of a verification of a ship of some length, m."""
-    criteria = found.manoeuvres.criteria
-    designed = {
-        pilot.name: pilot.design for pilot in found.by_name if pilot.design is not None
-    }
+    """Contents of the report about a verification; `length`: of the ship, m."""
+    manoeuvres = found.manoeuvres
+    criteria = manoeuvres.criteria
+    designed = {}
+    for pilot in found.by_name:
+        if pilot.design is not None:
+            designed[pilot.name] = pilot.design
     linear = {name: design for name, design in designed.items() if design.feedback}
     pilots = {pilot.name: pilot_metrics(pilot) for pilot in found.pilots}
     return VerificationView(
@@ -122,7 +124,7 @@ def verification_view(found: Verification, length: float) -> VerificationView:
         headline=headline(found),
         certain=is_certain(found),
         cards=[_criteria_card(criteria), _best_card(found, pilots)],
-        unstable=int(found.manoeuvres.unstable.sum()),
+        unstable=int(manoeuvres.unstable.sum()),
         unstable_note=_unstable_note(found),
         course_unstable=int(found.course_unstable.sum()),
         criteria=[_criterion_row(name, one) for name, one in criteria.items()],
@@ -157,9 +159,27 @@ def is_certain(found: Verification) -> bool:
 
 def headline(found: Verification) -> str:
     """The verdict in two or three sentences."""
+    sentences = _criteria_sentences(found.manoeuvres.criteria)
+    unstable = int(found.manoeuvres.unstable.sum())
+    if unstable:
+        sentences.append(
+            f"{unstable} of {found.draws} models drawn run away in a manoeuvre."
+        )
+    best = found.pilots[0]
+    terminated = best.episodes.terminated
+    lost = int(np.sum(terminated))
+    control = f"loses control of {lost} of" if lost else "keeps control of all"
+    sentences.append(
+        f"{best.name} steers best and {control} {found.draws} models drawn."
+    )
+    return " ".join(sentences)
+
+
+def _criteria_sentences(criteria: Mapping[str, Criterion]) -> list[str]:
+    """The verdict on the IMO criteria, and those that are not decided."""
     missed: list[str] = []
     undecided: list[str] = []
-    for name, criterion in found.manoeuvres.criteria.items():
+    for name, criterion in criteria.items():
         words = criterion_name(name, criterion).lower()
         if criterion.passed is False:
             missed.append(words)
@@ -175,18 +195,7 @@ def headline(found: Verification) -> str:
     sentences = [f"The model is stable {verdict}."]
     if undecided:
         sentences.append(f"Not decided by these trials: {', '.join(undecided)}.")
-    unstable = int(found.manoeuvres.unstable.sum())
-    if unstable:
-        sentences.append(
-            f"{unstable} of {found.draws} models drawn run away in a manoeuvre."
-        )
-    best = found.pilots[0]
-    lost = int(np.sum(best.episodes.terminated))
-    control = f"loses control of {lost} of" if lost else "keeps control of all"
-    sentences.append(
-        f"{best.name} steers best and {control} {found.draws} models drawn."
-    )
-    return " ".join(sentences)
+    return sentences
 
 
 def _unstable_note(found: Verification) -> str:
@@ -202,14 +211,15 @@ def _unstable_note(found: Verification) -> str:
 
 
 def _criteria_card(criteria: Mapping[str, Criterion]) -> Card:
-    verdicts = Counter([criterion.passed for criterion in criteria.values()])
+    passed = [criterion.passed for criterion in criteria.values()]
+    verdicts = Counter(passed)
     met = verdicts[True]
     missed = verdicts[False]
     undecided = verdicts[None]
     return Card(
-        "IMO criteria",
-        f"{met} of {len(criteria)}",
-        f"met; {missed} missed, {undecided} not decided by these trials",
+        label="IMO criteria",
+        value=f"{met} of {len(criteria)}",
+        detail=f"met; {missed} missed, {undecided} not decided by these trials",
     )
 
 
@@ -222,7 +232,11 @@ def _best_card(found: Verification, metrics: Mapping[str, dict[str, Any]]) -> Ca
     if best.design is not None:
         margin_deg = number(best.design.margins.phase_margin_deg, 2)
         detail = f"phase margin {margin_deg}°, {detail}"
-    return Card("Best autopilot", best.name, f"mean cost {cost}; {detail}")
+    return Card(
+        label="Best autopilot",
+        value=best.name,
+        detail=f"mean cost {cost}; {detail}",
+    )
 
 
 def _criterion_row(name: str, criterion: Criterion) -> CriterionRow:
@@ -249,7 +263,7 @@ def _criterion_row(name: str, criterion: Criterion) -> CriterionRow:
 
 
 def _introduction(found: Verification, designed: Mapping[str, Controller]) -> str:
-    """How the autopilots were made, and the model in its first-order form."""
+    """Sentences on how the autopilots were made, and on the first-order model."""
     names = ", ".join(designed)
     sentences = [
         f"{names} are designed on the identified model, linearised about straight"
@@ -262,8 +276,9 @@ def _introduction(found: Verification, designed: Mapping[str, Controller]) -> st
         sentences.append(
             f"{names} {verb} trained earlier, on another model, and used unchanged."
         )
-    K = number(found.nomoto.K)
-    T = number(found.nomoto.T)
+    nomoto = found.nomoto
+    K = number(nomoto.K)
+    T = number(nomoto.T)
     sentences.append(f"First-order form (Nomoto): K = {K} 1/s, T = {T} s.")
     return " ".join(sentences)
 
@@ -280,7 +295,8 @@ def _gain_rows(designs: Sequence[Controller]) -> list[GainRow]:
     for signal, (name, unit) in SIGNALS.items():
         gains = [own.get(signal) for own in by_signal]
         if any(gains):
-            rows.append(GainRow(name, unit, gains))
+            row = GainRow(name, unit, gains)
+            rows.append(row)
     return rows
 
 
@@ -290,9 +306,10 @@ def _design_notes(designed: Mapping[str, Controller]) -> list[str]:
     for name, design in designed.items():
         if design.kind != "turn-rate":
             continue
-        proportional = number(design.gains["proportional"])
-        integral = number(design.gains["integral"])
-        per_minute = np.degrees(60 * design.gains["rate"])
+        gains = design.gains
+        proportional = number(gains["proportional"])
+        integral = number(gains["integral"])
+        per_minute = np.degrees(60 * gains["rate"])
         notes.append(
             f"{name} steers a rate of turn: {proportional} rad per rad/s of its error,"
             f" {integral} per rad of its integral, and the rudder of the steady turn;"
@@ -307,8 +324,10 @@ def _margin_rows(designs: Sequence[Controller]) -> list[MarginRow]:
         shown = []
         for design in designs:
             value = getattr(design.margins, field)
-            shown.append("∞" if value == np.inf else number(value))
-        rows.append(MarginRow(name, unit, shown))
+            text = "∞" if value == np.inf else number(value)
+            shown.append(text)
+        row = MarginRow(name, unit, shown)
+        rows.append(row)
     return rows
 
 
