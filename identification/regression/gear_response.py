@@ -4,6 +4,7 @@ A rudder far from its order moves at the gear's rate; where its gear has a lag, 
 of the way, rate times lag, decays exponentially.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,8 +56,9 @@ class GearResponse(NamedTuple):
         orders = delta[:-1] + np.sign(moves) * distances
 
         # a ramp does not tell how far it goes on
-        ramps_throughout = sizes >= (1.0 - RAMP) * self.rate * steps
-        orders[ramps_throughout] = np.copysign(np.inf, moves[ramps_throughout])
+        longest_ramps = (1.0 - RAMP) * self.rate * steps
+        ramps_on = sizes >= longest_ramps
+        orders[ramps_on] = np.copysign(np.inf, moves[ramps_on])
         return orders
 
     def _distances(self, steps: Floats, sizes: Floats) -> Floats:
@@ -81,7 +83,8 @@ class GearResponse(NamedTuple):
         """Share of the intervals that go on under the order before them."""
         if self.rate == 0.0 or len(t) < 4:
             return 0.0
-        return float(np.mean(goes_on(self.orders(t, delta), delta)))
+        orders = self.orders(t, delta)
+        return float(np.mean(goes_on(orders, delta)))
 
 
 def goes_on(orders: Floats, delta: Floats) -> Flags:
@@ -132,7 +135,15 @@ def estimate_gear(t: Floats, delta: Floats) -> GearResponse:
         jumps[~np.isfinite(jumps)] = 0.0
         return float(np.minimum(jumps, largest_jump).sum())
 
-    usual_step = float(np.median(steps))
+    lag = _steadiest_lag(unsteadiness, usual_step=float(np.median(steps)))
+    return GearResponse(rate, lag)
+
+
+def _steadiest_lag(
+    unsteadiness: Callable[[float], float],
+    usual_step: float,
+) -> float:
+    """Lag of the least unsteadiness of the order; 0 where that does nearly as well."""
     lags = np.geomspace(0.1, 20.0, 48) * usual_step
     costs = [unsteadiness(lag) for lag in lags]
     best = int(np.argmin(costs))
@@ -145,5 +156,5 @@ def estimate_gear(t: Floats, delta: Floats) -> GearResponse:
         options={"xatol": 1e-10 * high},
     )
     if unsteadiness(0.0) <= 1.01 * refined.fun:
-        return GearResponse(rate, 0.0)
-    return GearResponse(rate, float(refined.x))
+        return 0.0
+    return float(refined.x)

@@ -66,8 +66,9 @@ def without_current(
 
     Returns a report on each; `remarks` get those that were doubtful.
     """
-    one_heading = _keep_to_one_heading(found.values())
-    currents = currents_of(list(found.values()), length, speed, option)
+    trials = list(found.values())
+    one_heading = _keep_to_one_heading(trials)
+    currents = currents_of(trials, length, speed, option)
     rows: dict[str, Any] = {}
     doubtful: dict[str, list[str]] = {}
     for name, current in currents.items():
@@ -84,8 +85,8 @@ def without_current(
         rows[name] = _row(current, taken_out, one_heading)
 
     for doubt, names in doubtful.items():
-        trials = ", ".join(names)
-        remarks.append(f"{trials}: no current is removed: {doubt}; {REMEDY}")
+        which = ", ".join(names)
+        remarks.append(f"{which}: no current is removed: {doubt}; {REMEDY}")
     return rows
 
 
@@ -140,7 +141,8 @@ def _keep_to_one_heading(trials: Iterable[Trial]) -> bool:
     if not headings:
         return False
     directions = np.exp(1j * np.concatenate(headings))
-    return bool(abs(directions.mean()) > 0.85)
+    concentration = abs(directions.mean())
+    return bool(concentration > 0.85)
 
 
 def currents_of(
@@ -237,11 +239,14 @@ def _contradict(currents: Floats, covariance: Floats, chance: float = 1e-6) -> b
     """
     n_others = len(currents) // 2 - 1
     first = -np.ones((n_others, 1))
-    from_first = np.hstack([first, np.eye(n_others)])
+    others = np.eye(n_others)
+    from_first = np.hstack([first, others])
     apart = np.kron(from_first, np.eye(2))
+
     differences = apart @ currents
     of_differences = apart @ covariance @ apart.T
-    return wald_probability(differences, of_differences) < chance
+    probability = wald_probability(differences, of_differences)
+    return probability < chance
 
 
 def _known_current(

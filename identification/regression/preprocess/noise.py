@@ -39,9 +39,11 @@ def noise_level(t: ArrayLike, values: ArrayLike) -> float:
         expected += weight * values[i : i + n_compared]
         gain += weight**2
 
-    scaled = (values[2:-2] - expected) / np.sqrt(gain)
+    deviations = values[2:-2] - expected
+    scaled = deviations / np.sqrt(gain)
+    median = np.median(np.abs(scaled))
     quartile_of_normal = 0.6745
-    return float(np.median(np.abs(scaled)) / quartile_of_normal)
+    return float(median / quartile_of_normal)
 
 
 def noise_ratio(t: ArrayLike, values: ArrayLike, window: int = 1) -> float:
@@ -50,13 +52,12 @@ def noise_ratio(t: ArrayLike, values: ArrayLike, window: int = 1) -> float:
     Both are root mean squares.
     """
     values = np.asarray(values, dtype=float)
-    change = values[window:] - values[:-window]
+    before = values[:-window]
+    change = values[window:] - before
     if not np.any(change):
         return 0.0
-    size = root_mean_square(change)
     noise_of_change = np.sqrt(2.0) * noise_level(t, values)
-    ratio: float = noise_of_change / size
-    return ratio
+    return float(noise_of_change / root_mean_square(change))
 
 
 def is_noisy(t: ArrayLike, channels: Iterable[ArrayLike]) -> bool:
