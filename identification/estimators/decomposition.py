@@ -64,9 +64,11 @@ class Decomposition:
     @property
     def numerical_rank(self) -> int:
         """Number of directions above rounding, at least 1."""
+        s = self.singular_values
         largest_side = max(self.n_samples, len(self.scale))
-        rounding = largest_side * np.finfo(float).eps * self.singular_values[0]
-        return max(int(np.sum(self.singular_values > rounding)), 1)
+        rounding = largest_side * np.finfo(float).eps * s[0]
+        n_above = int(np.sum(s > rounding))
+        return max(n_above, 1)
 
     def filters(self, C: ArrayLike, rank: int) -> Floats:
         """Factors s / (s^2 + 1/C) of directions, 0 beyond `rank` and below rounding.
@@ -86,8 +88,25 @@ class Decomposition:
 
     def coefficients(self, filters: Floats) -> Floats:
         """Coefficients of the unscaled features, shape (n_features,)."""
-        of_scaled = self.directions.T @ (filters * self.projections)
+        along = filters * self.projections
+        of_scaled = self.directions.T @ along
         return np.asarray(of_scaled / self.scale)
+
+    def inverse_moment(self, filters: Floats) -> Floats:
+        """Regularised inverse of X'X (X centred), shape (n_features, n_features)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inverse = filters / self.singular_values
+        inverse = np.where(filters > 0.0, inverse, 0.0)
+        unscaled = self.directions / self.scale
+        return np.asarray((unscaled.T * inverse) @ unscaled)
+
+    def noise_variance(self, filters: Floats, residuals: Floats) -> float:
+        """Variance of the noise by the degrees of freedom; NaN if there are none."""
+        n_effective = float(np.sum(self.singular_values * filters))
+        freedom = self.n_free - n_effective
+        if freedom <= 0.5:
+            return np.nan
+        return float(residuals @ residuals) / freedom
 
 
 def triangle(
@@ -156,7 +175,8 @@ def decompose_triangle(
     out_of_reach = R[-1, -1]
 
     size = _sizes(centred, n_samples)
-    size[size <= CONSTANT * _sizes(uncentred, n_samples)] = 0.0
+    smallest = CONSTANT * _sizes(uncentred, n_samples)
+    size[size <= smallest] = 0.0
     scales = scales_of(size, scale)
 
     left, singular_values, directions = np.linalg.svd(centred / scales)
@@ -210,23 +230,13 @@ def keep_solution(
     if weights is not None:
         counted = residuals * weights
         inflation = len(y) / float(weights.sum())
-
-    singular_values = problem.singular_values
-    n_effective = float(np.sum(singular_values * filters))
-    freedom = problem.n_free - n_effective
-    noise_variance = np.nan
-    if freedom > 0.5:
-        noise_variance = float(counted @ counted) / freedom
-
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inverse = np.where(filters > 0.0, filters / singular_values, 0.0)
-    unscaled = problem.directions / problem.scale
+    noise_variance = problem.noise_variance(filters, counted)
     root = (problem.directions.T * filters) / problem.scale[:, None]
 
     estimator.coef_ = coefficients
     estimator.intercept_ = intercept
-    estimator.singular_values_ = singular_values
-    estimator.inverse_moment_ = (unscaled.T * inverse) @ unscaled
+    estimator.singular_values_ = problem.singular_values
+    estimator.inverse_moment_ = problem.inverse_moment(filters)
     estimator.noise_variance_ = noise_variance
     estimator.covariance_ = noise_variance * inflation * (root @ root.T)
     return residuals

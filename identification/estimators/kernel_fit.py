@@ -62,7 +62,8 @@ def stabilised(model: ShipModel) -> ShipModel:
     c["b_v"] -= shift
     c["c_r"] -= shift
     # surge must be damped too, in the prime system
-    c["a_du"] = min(c["a_du"], -0.05 - 2.0 * c["a_0"])
+    largest = -0.05 - 2.0 * c["a_0"]
+    c["a_du"] = min(c["a_du"], largest)
     return replace(model, coefficients=c)
 
 
@@ -200,12 +201,11 @@ def chosen_centres(
     offset = np.array([0.0, 0.0, 0.0, speed.mean()])
     deviations = x - offset
     scale = np.maximum(column_rms(deviations), 0.02)  # an input may hardly change
-    z = deviations / scale
-    drifts_to_port = z[:, 1:2] < 0.0
-    folded = z * np.where(drifts_to_port, MIRROR, 1.0)
+    folded = _folded(deviations / scale)
 
     needed = 3 * number
-    if len(np.unique(folded, axis=0)) < needed:
+    different = np.unique(folded, axis=0)
+    if len(different) < needed:
         raise InputError(
             f"trials: expected at least {needed} different samples for {number} centres"
             f" of the kernel, got {len(x)} samples; add trials, or give fewer centres"
@@ -215,6 +215,13 @@ def chosen_centres(
     means = clusters.cluster_centers_
     centres = np.concatenate([means, means * MIRROR])
     return offset, scale, centres
+
+
+def _folded(z: Floats) -> Floats:
+    """Inputs with those of a drift to port mirrored."""
+    drifts_to_port = z[:, 1:2] < 0.0
+    sides = np.where(drifts_to_port, MIRROR, 1.0)
+    return np.asarray(z * sides)
 
 
 def principal(
@@ -231,10 +238,11 @@ def principal(
     scaled = (x - kernel.offset) / kernel.scale
     z = _thinned(scaled, most_samples)
     both_sides = np.concatenate([z, z * MIRROR])
-    values = gaussians(both_sides, kernel.centres)
+    centres = kernel.centres
+    values = gaussians(both_sides, centres)
     moment = values.T @ values / len(values)
 
-    among_centres = gaussians(kernel.centres, kernel.centres)
+    among_centres = gaussians(centres, centres)
     jitter = 1e-9 * np.eye(len(among_centres))
     _, vectors = eigh(moment, among_centres + jitter)
     leading_first = vectors[:, ::-1]
@@ -279,22 +287,26 @@ class _Search:
         """SI units, by row, of a weight of errors by ship length, prime system."""
         ship = self.blank.particulars
         window = np.mean(samples.duration)
-        return float(1.0 / (ship["length"] * window * ship["speed"] ** 3))
+        unit = ship["length"] * window * ship["speed"] ** 3
+        return float(1.0 / unit)
 
     def error(self, stage: KernelFit, weight: float) -> float:
         """Mean error of the simulated headings of what is held out.
 
         Weight 0 gives that of the reference ship.
         """
-        C = weight * self.unit(stage.samples)
+        samples = stage.samples
+        C = weight * self.unit(samples)
         errors = []
-        for rows, held in held_out_rows(self.trials, stage.samples, self.folds):
-            fitted = stage.samples.select(rows)
+        for rows, held in held_out_rows(self.trials, samples, self.folds):
+            fitted = samples.select(rows)
             coefficients = {}
             for q, X, y in fitted.by_equation():
                 coefficients[q] = _ridge(X, y, C)
+
             model = stage.model.with_accelerations(coefficients)
-            errors.append(heading_error(model, held, "rmse"))
+            error = heading_error(model, held, "rmse")
+            errors.append(error)
         return float(np.mean(errors))
 
     def smoothest(
@@ -334,4 +346,5 @@ def _ridge(X: Floats, y: Floats, C: float) -> Floats:
     """Coefficients by ridge regression with a weight C of the squared errors."""
     penalty = np.eye(X.shape[1])
     moment = X.T @ X * C + penalty
-    return np.asarray(np.linalg.solve(moment, C * (X.T @ y)))
+    projected = C * (X.T @ y)
+    return np.asarray(np.linalg.solve(moment, projected))

@@ -127,7 +127,8 @@ class Recursion(LinearRegressor):
         self._begin(features, targets[:, None])
 
         n_samples = len(targets)
-        gathered = min(self.start_samples * self.start_interval, n_samples)
+        wanted = self.start_samples * self.start_interval
+        gathered = min(wanted, n_samples)
         picked = slice(0, gathered, self.start_interval)
         if gathered:
             self._start_from(features[picked], targets[picked])
@@ -135,13 +136,13 @@ class Recursion(LinearRegressor):
 
         rest = slice(gathered, None)
         history = self._run(features[rest, None], targets[rest, None])
-        of_rest = history[:, 0]
 
         counts = np.zeros(n_samples)
         counts[picked] = 1.0
         counts[rest] = 1.0
-        self._summarise(features, targets, counts)
-        return np.concatenate([start, of_rest])
+        self.weights_ = counts * self._influence(n_samples)
+        self._summarise(features, targets)
+        return np.concatenate([start, history[:, 0]])
 
     def update(self, phi: ArrayLike, y: ArrayLike) -> Self:
         """Take in the next sample or samples.
@@ -193,14 +194,16 @@ class Recursion(LinearRegressor):
             return None
         unscale = np.outer(self.scale_, self.scale_)
         unscaled: Floats = self._P / unscale
-        return unscaled.reshape(*self.coef_.shape, -1)
+        shape = self.coef_.shape
+        return unscaled.reshape(*shape, -1)
 
     def _begin(self, features: Floats, targets: Floats) -> None:
         """Begin with zero coefficients, in scales that the samples give."""
         n_signals = targets.shape[1]
         n_features = features.shape[-1]
         every_row = features.reshape(-1, n_features)
-        self.scale_ = scales_of(column_rms(every_row), self.scale)
+        size = column_rms(every_row)
+        self.scale_ = scales_of(size, self.scale)
         unit = column_rms(targets)
         self._unit = np.where(unit > 0.0, unit, 1.0)
 
@@ -248,21 +251,16 @@ class Recursion(LinearRegressor):
             self._keep(history[-1])
         return history
 
-    def _summarise(
-        self,
-        features: Floats,
-        targets: Floats,
-        counts: Floats,
-    ) -> None:
-        """Set weights and covariance of the estimate that the recursion tends to.
-
-        `counts` are 1 for samples that are used, else 0.
-        """
+    def _influence(self, n_samples: int) -> Floats:
+        """Weights of samples that are taken in, of which the older ones count less."""
+        age = np.arange(n_samples - 1.0, -1.0, -1.0)
         # a sample is seen again while it is among the last
-        age = np.arange(len(targets) - 1.0, -1.0, -1.0)
         times_seen = np.minimum(self.innovations, age + 1.0)
-        weights = counts * times_seen * self.forgetting**age
+        return np.asarray(times_seen * self.forgetting**age)
 
+    def _summarise(self, features: Floats, targets: Floats) -> None:
+        """Set moment and covariance of the estimate that the recursion tends to."""
+        weights = self.weights_
         scaled = features / self.scale_
         start = np.eye(scaled.shape[1]) / self.C
         moment = (scaled.T * weights) @ scaled + start
@@ -276,7 +274,6 @@ class Recursion(LinearRegressor):
         covariance = variance * (inverse @ middle @ inverse)
 
         unscale = np.outer(self.scale_, self.scale_)
-        self.weights_ = weights
         self.inverse_moment_ = inverse / unscale
         self.noise_variance_ = variance
         self.covariance_ = covariance / unscale
@@ -308,12 +305,13 @@ class RecursiveLeastSquares(Recursion):
         n_signals, n_features = self._theta.shape
         start = self.C * np.eye(n_features)
         self._P = np.tile(start, (n_signals, 1, 1))
-        self._ceiling = np.full(self._theta.shape, float(self.C))
+        self._ceiling = np.full((n_signals, n_features), float(self.C))
         self._past_phi = np.empty((0, n_signals, n_features))
         self._past_y = np.empty((0, n_signals))
 
     def _remember_start(self, scaled: Floats, inverse_moment: Floats) -> None:
-        self._P[0] = inverse_moment * np.outer(self.scale_, self.scale_)
+        to_scaled = np.outer(self.scale_, self.scale_)
+        self._P[0] = inverse_moment * to_scaled
 
     def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
         n_past = len(self._past_y)
