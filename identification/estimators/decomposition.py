@@ -102,11 +102,13 @@ class Decomposition:
 
     def noise_variance(self, filters: Floats, residuals: Floats) -> float:
         """Variance of the noise by the degrees of freedom; NaN if there are none."""
-        n_effective = float(np.sum(self.singular_values * filters))
+        shares = self.singular_values * filters
+        n_effective = float(np.sum(shares))
         freedom = self.n_free - n_effective
         if freedom <= 0.5:
             return np.nan
-        return float(residuals @ residuals) / freedom
+        squares = float(residuals @ residuals)
+        return squares / freedom
 
 
 def triangle(
@@ -169,14 +171,10 @@ def decompose_triangle(
     """Decompose the features of a regression of which the `triangle` is known."""
     first = int(fit_intercept)
     n_features = len(R) - 1 - first
-    uncentred = R[:, first:-1]
     centred = R[first:-1, first:-1]
     targets = R[first:-1, -1]
     out_of_reach = R[-1, -1]
-
-    size = _sizes(centred, n_samples)
-    smallest = CONSTANT * _sizes(uncentred, n_samples)
-    size[size <= smallest] = 0.0
+    size = _variations(R[:, first:-1], centred, n_samples)
     scales = scales_of(size, scale)
 
     left, singular_values, directions = np.linalg.svd(centred / scales)
@@ -199,6 +197,14 @@ def decompose_triangle(
         scale=scales,
         n_samples=n_samples,
     )
+
+
+def _variations(uncentred: Floats, centred: Floats, n_samples: int) -> Floats:
+    """Sizes of the centred features; 0 of those that are constant but for rounding."""
+    size = _sizes(centred, n_samples)
+    smallest = CONSTANT * _sizes(uncentred, n_samples)
+    size[size <= smallest] = 0.0
+    return size
 
 
 def _sizes(triangle: Floats, n_samples: int) -> Floats:
@@ -262,7 +268,9 @@ def centre_and_scale(
 def scales_of(size: Floats, scale: bool | ArrayLike) -> Floats:
     """Divisors of features of the given sizes; 1 for a feature that is zero."""
     if isinstance(scale, bool | np.bool_):
-        return np.where(size > 0.0, size, 1.0) if scale else np.ones(len(size))
+        if not scale:
+            return np.ones(len(size))
+        return np.where(size > 0.0, size, 1.0)
 
     given = check_scale(scale)
     if given.shape != size.shape:

@@ -9,7 +9,7 @@ principal components of the data in feature space.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh
@@ -139,20 +139,36 @@ def fit_kernel(
     weights = WEIGHTS if asked.C is None else (float(asked.C),)
     kernels = _kernels(inputs, asked.centres, lengths)
     stages = {length: search.stage(kernel) for length, kernel in kernels.items()}
-    weight, length, errors = search.smoothest(stages, weights)
+    choice = search.smoothest(stages, weights)
+    fitted = search.fitted(stages[choice.length], choice.weight)
+    report = _report(asked.kernel, kernels[choice.length], choice)
+    return replace(fitted, report=report)
 
-    kernel = kernels[length]
-    fitted = search.fitted(stages[length], weight)
-    report = {
-        "kind": asked.kernel,
+
+class _Choice(NamedTuple):
+    """Weight of the errors and length of the kernel, and the errors with these.
+
+    Errors are those of headings held out, with the kernel, where there was a choice,
+    and by the reference ship alone.
+    """
+
+    weight: float
+    length: float
+    errors: dict[str, float]
+
+
+def _report(kind: str, kernel: Kernel, choice: _Choice) -> dict[str, Any]:
+    """What was chosen, for the provenance."""
+    errors = {name: finite(error) for name, error in choice.errors.items()}
+    return {
+        "kind": kind,
         "centres": len(kernel.centres),
         "features": kernel.basis.shape[1],
-        "length": length,
-        "C": weight,
-        "remarks": _remarks(errors),
-        "heading_errors_held_out": {name: finite(e) for name, e in errors.items()},
+        "length": choice.length,
+        "C": choice.weight,
+        "remarks": _remarks(choice.errors),
+        "heading_errors_held_out": errors,
     }
-    return replace(fitted, report=report)
 
 
 def _kernels(
@@ -237,7 +253,8 @@ def principal(
     """
     scaled = (x - kernel.offset) / kernel.scale
     z = _thinned(scaled, most_samples)
-    both_sides = np.concatenate([z, z * MIRROR])
+    mirrored = z * MIRROR
+    both_sides = np.concatenate([z, mirrored])
     centres = kernel.centres
     values = gaussians(both_sides, centres)
     moment = values.T @ values / len(values)
@@ -311,11 +328,10 @@ class _Search:
 
     def smoothest(
         self, stages: dict[float, KernelFit], weights: Sequence[float]
-    ) -> tuple[float, float, dict[str, float]]:
-        """Weight and length of the smoothest kernel nearly as good as the best.
+    ) -> _Choice:
+        """The smoothest kernel nearly as good as the best.
 
-        The stages are by length, the smoothest first. Also returns the errors with that
-        kernel, where there is a choice, and of the reference ship alone.
+        The stages are by length, the smoothest first.
         """
         pairs = list(product(weights, stages))  # the smoothest first
         best = pairs[0]
@@ -323,10 +339,12 @@ class _Search:
         if len(pairs) > 1:
             tried = [self.error(stages[length], weight) for weight, length in pairs]
             best = most_regularised(pairs, tried)
-            errors["kernel"] = tried[pairs.index(best)]
+            place = pairs.index(best)
+            errors["kernel"] = tried[place]
+
         weight, length = best
         errors["reference"] = self.error(stages[length], 0.0)
-        return weight, length, errors
+        return _Choice(weight, length, errors)
 
     def fitted(self, stage: KernelFit, weight: float) -> KernelFit:
         """The fit to all rows."""

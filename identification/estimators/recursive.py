@@ -124,7 +124,8 @@ class Recursion(LinearRegressor):
         """
         self.check()
         features, targets = validated(self, X, y)
-        self._begin(features, targets[:, None])
+        of_one_signal = targets[:, None]
+        self._begin(features, of_one_signal)
 
         n_samples = len(targets)
         wanted = self.start_samples * self.start_interval
@@ -135,7 +136,7 @@ class Recursion(LinearRegressor):
         start = np.tile(self.coef_, (gathered, 1))
 
         rest = slice(gathered, None)
-        history = self._run(features[rest, None], targets[rest, None])
+        history = self._run(features[rest, None], of_one_signal[rest])
 
         counts = np.zeros(n_samples)
         counts[picked] = 1.0
@@ -267,7 +268,8 @@ class Recursion(LinearRegressor):
         inverse = np.linalg.inv(moment)
 
         errors = targets - features @ self.coef_
-        n_effective = float(np.sum(inverse * (moment - start)))
+        of_samples = moment - start
+        n_effective = float(np.sum(inverse * of_samples))
         freedom = max(weights.sum() - n_effective, 1.0)
         variance = float(weights @ errors**2) / freedom
         middle = (scaled.T * weights**2) @ scaled
@@ -428,19 +430,18 @@ def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
     if targets.ndim == 1:
         targets = targets[:, None]
 
-    fits = features.ndim == 3 and targets.ndim == 2 and len(features) == len(targets)
-    if not fits:
+    have_axes = features.ndim == 3 and targets.ndim == 2
+    if not have_axes or len(features) != len(targets):
         raise InputError(
             "phi, y: expected shapes (n_samples, n_features) and (n_samples,), or"
             " (n_samples, n_signals, n_features) and (n_samples, n_signals), got"
             f" {np.shape(phi)} and {np.shape(y)}"
         )
     n_signals = targets.shape[1]
-    if features.shape[1] not in (1, n_signals):
-        raise InputError(
-            f"phi: expected {n_signals} signals as in y, got {features.shape[1]}"
-        )
-    if not (np.all(np.isfinite(features)) and np.all(np.isfinite(targets))):
+    n_given = features.shape[1]
+    if n_given not in (1, n_signals):
+        raise InputError(f"phi: expected {n_signals} signals as in y, got {n_given}")
+    if not (np.isfinite(features).all() and np.isfinite(targets).all()):
         raise InputError(
             "phi, y: expected finite numbers, got one that is not; repair the samples"
             " first"

@@ -205,35 +205,34 @@ class _Standardised:
 
     def __init__(self, X: Floats, y: Floats, constant: int | None) -> None:
         n_samples, n_features = X.shape
-        penalised = np.arange(n_features) != constant
-        duration = np.ones(n_samples)
-        if constant is not None:
-            duration = X[:, constant]
-        rows = X / duration[:, None]
-        targets = y / duration
-
-        centre = np.zeros(n_features)
-        self._level = 0.0
-        if constant is not None:
-            centre = np.where(penalised, rows.mean(axis=0), 0.0)
-            self._level = float(targets.mean())
-        deviations = rows - centre
-        size = column_rms(deviations)
-        has_size = (size > 0.0) & penalised
-        scale = np.where(has_size, size, 1.0)
-        standardised = deviations / scale
-        self.features = standardised[:, penalised]
-
         self._X = X
         self._constant = constant
-        self._penalised = penalised
-        self._duration = duration
-        self._centre = centre
-        self._scale = scale
+        self._penalised = np.arange(n_features) != constant
+        self._duration = np.ones(n_samples)
+        if constant is not None:
+            self._duration = X[:, constant]
+        self._standardise_features(X / self._duration[:, None])
+        self._standardise_targets(y / self._duration)
 
-        target_deviations = targets - self._level
-        self._deviation = root_mean_square(target_deviations) or 1.0
-        self.targets = target_deviations / self._deviation
+    def _standardise_features(self, rows: Floats) -> None:
+        self._centre = np.zeros(rows.shape[1])
+        if self._constant is not None:
+            means = rows.mean(axis=0)
+            self._centre = np.where(self._penalised, means, 0.0)
+        deviations = rows - self._centre
+        size = column_rms(deviations)
+        has_size = (size > 0.0) & self._penalised
+        self._scale = np.where(has_size, size, 1.0)
+        standardised = deviations / self._scale
+        self.features = standardised[:, self._penalised]
+
+    def _standardise_targets(self, targets: Floats) -> None:
+        self._level = 0.0
+        if self._constant is not None:
+            self._level = float(targets.mean())
+        deviations = targets - self._level
+        self._deviation = root_mean_square(deviations) or 1.0
+        self.targets = deviations / self._deviation
 
     def coefficients(self, slopes: Floats, offset: float) -> Floats:
         """Coefficients of the features as given, shape (n_features,)."""
@@ -320,7 +319,8 @@ class _Tuner:
 
     def _free_constant(self, equation: str) -> int | None:
         """Column of the constant that has no penalty."""
-        names = [term.name for term in self.blank.table.terms(equation)]
+        terms = self.blank.table.terms(equation)
+        names = [term.name for term in terms]
         if self.asked.free_constant and "0" in names:
             return names.index("0")
         return None
@@ -346,7 +346,8 @@ class _Tuner:
             errors = []
             for rows, held in folds:
                 model = self.model(weight, self.first_bands, rows)
-                errors.append(heading_error(model, held, "rmse"))
+                own = heading_error(model, held, "rmse")
+                errors.append(own)
             return float(np.mean(errors))
 
         errors = [error(weight) for weight in WEIGHTS]
