@@ -100,6 +100,12 @@ class Decomposition:
         unscaled = self.directions / self.scale
         return np.asarray((unscaled.T * inverse) @ unscaled)
 
+    def unit_covariance(self, filters: Floats) -> Floats:
+        """Covariance of the coefficients for noise of unit variance."""
+        of_scaled = self.directions.T * filters
+        root = of_scaled / self.scale[:, None]
+        return np.asarray(root @ root.T)
+
     def noise_variance(self, filters: Floats, residuals: Floats) -> float:
         """Variance of the noise by the degrees of freedom; NaN if there are none."""
         shares = self.singular_values * filters
@@ -237,14 +243,14 @@ def keep_solution(
         counted = residuals * weights
         inflation = len(y) / float(weights.sum())
     noise_variance = problem.noise_variance(filters, counted)
-    root = (problem.directions.T * filters) / problem.scale[:, None]
+    by_unit_noise = problem.unit_covariance(filters)
 
     estimator.coef_ = coefficients
     estimator.intercept_ = intercept
     estimator.singular_values_ = problem.singular_values
     estimator.inverse_moment_ = problem.inverse_moment(filters)
     estimator.noise_variance_ = noise_variance
-    estimator.covariance_ = noise_variance * inflation * (root @ root.T)
+    estimator.covariance_ = noise_variance * inflation * by_unit_noise
     return residuals
 
 

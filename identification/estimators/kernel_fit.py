@@ -260,11 +260,16 @@ def principal(
     moment = values.T @ values / len(values)
 
     among_centres = gaussians(centres, centres)
-    jitter = 1e-9 * np.eye(len(among_centres))
-    _, vectors = eigh(moment, among_centres + jitter)
-    leading_first = vectors[:, ::-1]
-    basis = np.ascontiguousarray(leading_first[:, :most_features])
+    basis = _leading_directions(moment, among_centres, most_features)
     return replace(kernel, basis=basis)
+
+
+def _leading_directions(moment: Floats, metric: Floats, most: int) -> Floats:
+    """Directions of the largest moment by a metric, the leading one first."""
+    jitter = 1e-9 * np.eye(len(metric))
+    _, vectors = eigh(moment, metric + jitter)
+    leading_first = vectors[:, ::-1]
+    return np.ascontiguousarray(leading_first[:, :most])
 
 
 def inputs_of(channels: Sequence[dict[str, Floats]], ship: Any) -> Floats:

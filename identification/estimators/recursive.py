@@ -128,8 +128,7 @@ class Recursion(LinearRegressor):
         self._begin(features, of_one_signal)
 
         n_samples = len(targets)
-        wanted = self.start_samples * self.start_interval
-        gathered = min(wanted, n_samples)
+        gathered = min(self.start_samples * self.start_interval, n_samples)
         picked = slice(0, gathered, self.start_interval)
         if gathered:
             self._start_from(features[picked], targets[picked])

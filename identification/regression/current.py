@@ -222,15 +222,17 @@ class _Record(NamedTuple):
     def seen_on(self, grid: Floats) -> Floats:
         """Velocities at the times of a grid; NaN after the end, shape (n_times, 3)."""
         velocities = _on_grid(grid, self.t, self.seen)
-        velocities[grid > self.t[-1]] = np.nan
+        is_after = grid > self.t[-1]
+        velocities[is_after] = np.nan
         return velocities
 
 
 def _record(trial: Trial, travel_time: float, speed: float) -> _Record:
     wind = wind_accelerations(trial) * travel_time / speed
     shaft = trial["n"] if "n" in trial else np.zeros(len(trial))
+    psi = trial["psi"]
     ahead, aside = over_ground(trial)
-    north, east = rotate_to_body(ahead, aside, -trial["psi"])
+    north, east = rotate_to_body(ahead, aside, -psi)
     logged = np.full(len(trial), np.nan)
     if "v" in trial.derived and "u" not in trial.derived:
         logged = trial["u"]
@@ -245,7 +247,7 @@ def _record(trial: Trial, travel_time: float, speed: float) -> _Record:
     return _Record(
         t=(trial.t - trial.t[0]) / travel_time,
         inputs=inputs,
-        psi=trial["psi"],
+        psi=psi,
         seen=(north / speed, east / speed, logged / speed),
     )
 
@@ -296,9 +298,12 @@ def _starting_shaft_speed(trials: Sequence[Trial]) -> float | None:
     """Median shaft speed at the start, 1/s; None where not all trials turn ahead."""
     starts = []
     for trial in trials:
-        if "n" not in trial or not trial["n"][0] > 0.0:
+        if "n" not in trial:
             return None
-        starts.append(trial["n"][0])
+        start = trial["n"][0]
+        if not start > 0.0:
+            return None
+        starts.append(start)
     return float(np.median(starts))
 
 
@@ -328,16 +333,17 @@ class _Problem:
 
     def __init__(self, runs: _Runs, shared: bool, known: Floats | None) -> None:
         self.runs = runs
-        pairs = np.arange(2 * runs.n_trials).reshape(-1, 2)
+        n_trials = runs.n_trials
+        n_currents = 1 if shared else n_trials
+        pairs = np.arange(2 * n_trials).reshape(-1, 2)
         self.start_columns = N_COEFFICIENTS + pairs
         self.current_columns = self.start_columns + pairs.size
-        n_currents = runs.n_trials
         if shared:
-            self.current_columns = np.tile(self.current_columns[0], (len(pairs), 1))
-            n_currents = 1
+            first = self.current_columns[0]
+            self.current_columns = np.tile(first, (n_trials, 1))
 
         of_coefficients = np.ones(N_COEFFICIENTS)
-        of_starts = np.tile([0.3, 0.15], runs.n_trials)  # u and v
+        of_starts = np.tile([0.3, 0.15], n_trials)  # u and v
         of_currents = np.full(2 * n_currents, 0.5)
         deviations = np.concatenate([of_coefficients, of_starts, of_currents])
         self.centre = np.zeros(len(deviations))
@@ -402,11 +408,13 @@ class _Problem:
         as_given = lanes[..., :1]
         moved = lanes[..., 1:]
         by_unknown = (moved - as_given) / DIFFERENCE
+        by_coefficient = by_unknown[..., :N_COEFFICIENTS]
         by_start = by_unknown[..., N_COEFFICIENTS:]
 
+        *shape, _ = lanes.shape
         n_unknowns = len(self.centre)
-        slopes = np.zeros((*lanes.shape[:-1], n_unknowns))
-        slopes[..., :N_COEFFICIENTS] = by_unknown[..., :N_COEFFICIENTS]
+        slopes = np.zeros((*shape, n_unknowns))
+        slopes[..., :N_COEFFICIENTS] = by_coefficient
         for k in range(self.runs.n_trials):
             own_start = self.start_columns[k]
             slopes[:, :, k, own_start] = by_start[:, :, k]
@@ -450,7 +458,8 @@ class _Problem:
 
     def _scale(self, errors: Floats) -> float:
         """Standard deviation of the errors, at least that of the sensors' rounding."""
-        n_measured = int(np.isfinite(self.runs.seen).sum())
+        is_measured = np.isfinite(self.runs.seen)
+        n_measured = int(is_measured.sum())
         freedom = max(n_measured - len(self.centre), 1)
         variance = np.sum(errors**2) / freedom
         rounding = 0.003

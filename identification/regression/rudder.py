@@ -122,7 +122,8 @@ def _reproduces_samples(rudder: Rudder) -> bool:
     intervals = np.arange(len(steps))
     ends = rudder.within(intervals, steps)
     misses = np.abs(ends - rudder.delta[1:])
-    return bool(misses.max() <= TOLERANCE * np.ptp(rudder.delta))
+    allowed = TOLERANCE * np.ptp(rudder.delta)
+    return bool(misses.max() <= allowed)
 
 
 def straight(t: Floats, delta: Floats) -> Rudder:
@@ -294,21 +295,28 @@ def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
     largest_deg = float(np.degrees(largest))
     limit_deg = min(max(35.0, largest_deg), 90.0)
 
-    exact = []
+    exact = _exact_gears(trials)
+    if exact:
+        rate, lag = np.median(exact, axis=0).tolist()
+    else:
+        rate = _usual_rate(trials)
+        lag = 0.0
+    rate_deg = float(np.degrees(rate))
+    return SteeringGear(limit_deg, rate_deg, lag)
+
+
+def _exact_gears(trials: Sequence[Trial]) -> list[GearResponse]:
+    """Gears that explain the rudders of records without noise."""
+    found = []
     for trial in trials:
         velocities = [trial[name] for name in ("u", "v", "r")]
         if is_noisy(trial.t, velocities):
             continue
         rudder = rebuild(trial.t, trial["delta"])
         if rudder.follows_gear:
-            exact.append((rudder.rate, rudder.time_constant))
-
-    if exact:
-        rate, lag = np.median(exact, axis=0).tolist()
-    else:
-        rate = _usual_rate(trials)
-        lag = 0.0
-    return SteeringGear(limit_deg, float(np.degrees(rate)), lag)
+            gear = GearResponse(rudder.rate, rudder.time_constant)
+            found.append(gear)
+    return found
 
 
 def _usual_rate(trials: Sequence[Trial]) -> float:

@@ -242,7 +242,8 @@ class _Regression:
         """Integrals of the terms over each step; the memory's follow those of `r`."""
         terms, moments = self._integrals(trial, channels)
         if "q" in terms:
-            memory = twice_integrated(trial.t, terms.pop("q"), moments["q"])
+            of_memory = terms.pop("q")
+            memory = twice_integrated(trial.t, of_memory, moments["q"])
             terms["r"] = np.hstack([terms["r"], memory])
         return terms
 
@@ -303,7 +304,8 @@ class _Windows:
         """Sum over each window of rows, one a step."""
         if self.steps == 1:
             return rows
-        from_start = np.pad(np.cumsum(rows, axis=0), ((1, 0), (0, 0)))
+        sums = np.cumsum(rows, axis=0)
+        from_start = np.pad(sums, ((1, 0), (0, 0)))
         return self.changes(from_start)
 
 

@@ -93,7 +93,8 @@ def _mean_wind_speeds(trials: Mapping[str, Trial]) -> dict[str, float]:
     speeds = {}
     for name, trial in trials.items():
         if "wind_udot" in trial:
-            speeds[name] = float(trial["wind_speed"].mean())
+            mean = trial["wind_speed"].mean()
+            speeds[name] = float(mean)
     return speeds
 
 

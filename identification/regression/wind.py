@@ -70,7 +70,8 @@ def _forces_on(trial: Trial, curves: WindCurves, relative: bool) -> Floats:
     forces = _forces(curves, ahead, aside)
     # her resistance in still air is the model's own
     still_ahead, *_ = curves.X
-    forces[0] -= 0.5 * AIR_DENSITY * still_ahead * trial["u"] ** 2
+    u = trial["u"]
+    forces[0] -= 0.5 * AIR_DENSITY * still_ahead * u**2
     return forces
 
 
@@ -156,8 +157,9 @@ def _explains(features: Floats, target: Floats, rounding: float = 1e-6) -> bool:
     """Tell whether features explain a target but for rounding."""
     solution, *_ = np.linalg.lstsq(features, target)
     left = target - features @ solution
-    smallest = rounding * np.linalg.norm(target)
-    return bool(np.linalg.norm(left) < smallest)
+    size_left = np.linalg.norm(left)
+    size = np.linalg.norm(target)
+    return bool(size_left < rounding * size)
 
 
 def with_constant_wind(

@@ -161,5 +161,7 @@ def _filled_times(t: Floats) -> Floats:
         if 1.5 * usual < step <= 10.5 * usual:
             n_steps = round(step / usual)
             filled = np.linspace(start, end, n_steps + 1)
-            times.append(filled[1:-1])
-    return np.unique(np.concatenate(times))
+            missing = filled[1:-1]
+            times.append(missing)
+    every_time = np.concatenate(times)
+    return np.unique(every_time)
