@@ -367,7 +367,9 @@ class _Search:
 
 def _ridge(X: Floats, y: Floats, C: float) -> Floats:
     """Coefficients by ridge regression with a weight C of the squared errors."""
-    penalty = np.eye(X.shape[1])
+    _, n_features = X.shape
+    penalty = np.eye(n_features)
     moment = X.T @ X * C + penalty
     projected = C * (X.T @ y)
-    return np.asarray(np.linalg.solve(moment, projected))
+    coefficients = np.linalg.solve(moment, projected)
+    return np.asarray(coefficients)

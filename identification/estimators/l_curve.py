@@ -81,10 +81,12 @@ def corner_rank(curve: LCurve, n_samples: int, significance: float = 0.1) -> int
 
 def _allowed_growth(full: int, freedom: int, significance: float) -> Floats:
     """Growth of the squared residuals that chance explains, of each rank (F test)."""
-    dropped = np.arange(full - 1, -1, -1)
+    dropped = np.arange(full)[::-1]
     numerator = np.maximum(dropped, 1)
-    quantile = fdtri(numerator, freedom, 1.0 - significance)
-    return np.asarray(1.0 + dropped / freedom * quantile)
+    probability = 1.0 - significance
+    quantile = fdtri(numerator, freedom, probability)
+    growth = dropped / freedom * quantile
+    return np.asarray(1.0 + growth)
 
 
 def gcv_rank(curve: LCurve, n_samples: int) -> int:

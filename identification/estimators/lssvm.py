@@ -154,7 +154,8 @@ class LSSVM(LinearRegressor):
 
         # the free b takes so much of the ones that the multipliers sum to zero
         ridge = self._kernel_ridge()
-        targets = np.column_stack([y, np.ones(len(y))])
+        ones = np.ones(len(y))
+        targets = np.column_stack([y, ones])
         ridge.fit(self.support_, targets, weights)
         of_targets, of_ones = ridge.dual_coef_.T
         self.intercept_ = 0.0

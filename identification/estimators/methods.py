@@ -171,7 +171,8 @@ class Adapted(LinearRegressor):
         inverse[block] = np.linalg.pinv(used.T @ used, hermitian=True)
 
         residuals = targets - features @ self.coef_
-        freedom = max(len(targets) - used.shape[1], 1)
+        n_used = int(is_used.sum())
+        freedom = max(len(targets) - n_used, 1)
         variance = float(residuals @ residuals) / freedom
         self.inverse_moment_ = inverse
         self.covariance_ = variance * inverse

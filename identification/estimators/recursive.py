@@ -305,9 +305,10 @@ class RecursiveLeastSquares(Recursion):
     def _begin_memory(self) -> None:
         n_signals, n_features = self._theta.shape
         start = self.C * np.eye(n_features)
+        shape = (n_signals, n_features)
         self._P = np.tile(start, (n_signals, 1, 1))
-        self._ceiling = np.full((n_signals, n_features), float(self.C))
-        self._past_phi = np.empty((0, n_signals, n_features))
+        self._ceiling = np.full(shape, float(self.C))
+        self._past_phi = np.empty((0, *shape))
         self._past_y = np.empty((0, n_signals))
 
     def _remember_start(self, scaled: Floats, inverse_moment: Floats) -> None:
@@ -332,7 +333,8 @@ class RecursiveLeastSquares(Recursion):
             history,
             np.empty(phi.shape[-1]),
         )
-        first_kept = len(y) - min(self.innovations - 1, len(y))
+        n_kept = min(self.innovations - 1, len(y))
+        first_kept = len(y) - n_kept
         self._past_phi = phi[first_kept:].copy()
         self._past_y = y[first_kept:].copy()
 

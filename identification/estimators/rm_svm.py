@@ -328,7 +328,8 @@ class _Tuner:
     def model(self, weight: float, bands: Sequence[float], rows: Flags) -> ShipModel:
         """The grey box with the corrections fitted to some of the rows."""
         coefficients = {}
-        for q, band in zip(self.samples.features, bands, strict=True):
+        equations = self.samples.features
+        for q, band in zip(equations, bands, strict=True):
             estimator = self.fitted(q, weight, band, rows)
             coefficients[q] = estimator.coef_
         return self.blank.with_accelerations(coefficients)

@@ -180,8 +180,9 @@ def _covariance(problem: "_Problem", fit: "_Fit", n_parts: int) -> Floats:
 
     n_changes = len(changes)
     inflation = (n_changes - 1) ** 2 / n_changes
-    jackknife = np.cov(np.transpose(changes)) * inflation
-    return np.asarray(jackknife + np.linalg.inv(information))
+    scatter = np.cov(np.transpose(changes))
+    of_noise = np.linalg.inv(information)
+    return np.asarray(scatter * inflation + of_noise)
 
 
 def _change_without(
@@ -273,8 +274,8 @@ def _together(trials: Sequence[Trial], length: float, speed: float) -> _Runs:
 
     longest = max(record.t[-1] for record in records)
     window = STEP * STEPS
-    n_windows = int(longest / window)
-    grid: Floats = np.arange(n_windows * STEPS + 1, dtype=np.float64) * STEP
+    n_steps = int(longest / window) * STEPS
+    grid: Floats = np.arange(n_steps + 1, dtype=np.float64) * STEP
 
     inputs, headings, seen = [], [], []
     for record in records:
@@ -484,11 +485,13 @@ class _Problem:
     def information(self, slopes: Floats) -> Floats:
         """Inverse covariance of the unknowns by the slopes and the prior."""
         J = slopes.reshape(-1, len(self.weights))
-        return J.T @ J + np.diag(self.weights**2)
+        of_prior = np.diag(self.weights**2)
+        return J.T @ J + of_prior
 
     def _cost(self, x: Floats, residuals: Floats) -> float:
         from_prior = self.weights * (x - self.centre)
-        return float(np.sum(residuals**2) + np.sum(from_prior**2))
+        misfit = np.sum(residuals**2)
+        return float(misfit + np.sum(from_prior**2))
 
 
 def _coefficients_by_lane(deviations: Floats) -> Coefficients:
@@ -502,8 +505,9 @@ def _coefficients_by_lane(deviations: Floats) -> Coefficients:
     moved = np.arange(N_COEFFICIENTS)
     own_lane = 1 + moved
     values[own_lane, moved] += DIFFERENCE * DEVIATION
-    columns = values.T[:, :, None]
-    return Coefficients(*columns)
+
+    by_coefficient = values.T
+    return Coefficients(*by_coefficient[:, :, None])
 
 
 def _midpoint_step(

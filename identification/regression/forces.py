@@ -166,10 +166,10 @@ def between_jumps(trial: Trial) -> list[slice]:
         velocity = trial[name]
         changes = np.abs(np.diff(velocity))
         usual = float(np.median(changes))
-        rounding = 1e-9 * float(np.abs(velocity).max())
+        fastest = float(np.abs(velocity).max())
+        rounding = 1e-9 * fastest
         largest = max(jump * usual, rounding)
         is_jump |= changes > largest + rounding
-
     return stretches(is_jump, FEWEST)
 
 
@@ -188,8 +188,9 @@ def _prime_motion(trial: Trial, ship: Particulars) -> dict[str, Floats]:
         velocity = trial[name]
         spline = CubicSpline(trial.t, velocity)
         rate = spline(trial.t, nu=1)
-        motion[name] = velocity * scale / speed
-        motion[f"|{name}|"] = np.abs(motion[name])
+        prime = velocity * scale / speed
+        motion[name] = prime
+        motion[f"|{name}|"] = np.abs(prime)
         motion[f"{name}dot"] = rate * length / speed**2 * scale
     return motion
 
@@ -257,7 +258,8 @@ def fit_forces(
     targets = regression.targets / scales
     estimator.fit(features, targets)
 
-    residuals = targets - estimator.predict(features)
+    fitted = estimator.predict(features)
+    residuals = targets - fitted
     half = features @ estimator.inverse_moment_
     leverages = np.sum(half * features, axis=1)
     by_force = force_variances(regression.equation, residuals, leverages)

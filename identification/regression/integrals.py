@@ -42,8 +42,10 @@ def step_integrals(t: Floats, channels: Channels, terms: Terms, rule: str) -> In
     found = Integrals({}, {})
     for equation, values in terms(channels).items():
         start = values[:-1]
-        end = values[1:]
-        mean = start if rule == "euler" else 0.5 * (start + end)
+        mean = start
+        if rule != "euler":
+            end = values[1:]
+            mean = 0.5 * (start + end)
         integral = mean * steps
         found.terms[equation] = integral
         found.moments[equation] = 0.5 * integral * steps
@@ -94,8 +96,10 @@ def _quadrature(t: Floats, corners: Floats) -> _Quadrature:
     middle = 0.5 * (edges[1:] + edges[:-1])
     half = 0.5 * np.diff(edges)[:, None]
     nodes = middle[:, None] + half * NODES
-    step = np.searchsorted(t, middle, side="right") - 1
-    ends = t[step + 1]
+
+    following = np.searchsorted(t, middle, side="right")
+    ends = t[following]
+    step = following - 1
     return _Quadrature(
         nodes=nodes,
         weights=half * WEIGHTS,
@@ -184,7 +188,8 @@ def _is_solvable(t: Floats, knots: Floats) -> bool:
     ends = knots[DEGREE + 1 :]
     has_sample = (begins < t) & (t < ends)
     # the first and the last function have the samples at the ends
-    return bool(np.all(has_sample[1:-1]))
+    inner = has_sample[1:-1]
+    return bool(np.all(inner))
 
 
 def twice_integrated(t: Floats, integrals: Floats, moments: Floats) -> Floats:

@@ -292,8 +292,9 @@ class _Windows:
 
     def __init__(self, n_samples: int, steps: int) -> None:
         half = max(steps // 2, 1)
+        end = n_samples - steps
         self.steps = steps
-        self.first = np.arange(0, n_samples - steps, half)
+        self.first = np.arange(0, end, half)
         self.last = self.first + steps
 
     def changes(self, values: Floats) -> Floats:
@@ -333,10 +334,11 @@ def default_window(trial: Trial, particulars: Particulars) -> int:
 
     window = 1
     for channel in "uvr":
-        ratio = noise_ratio(trial.t, trial[channel])
+        values = trial[channel]
+        ratio = noise_ratio(trial.t, values)
         while ratio > NOISY and window < longest:
             window += 1
-            ratio = noise_ratio(trial.t, trial[channel], window)
+            ratio = noise_ratio(trial.t, values, window)
     return window
 
 

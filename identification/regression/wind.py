@@ -52,7 +52,8 @@ def measured_wind(
     table: dict[str, Any] = {"coefficients": option}
     if isinstance(option, Mapping):
         table = dict(option)
-    if not {"wind_speed", "wind_from", "psi", "u", "v"} <= trial.channels.keys():
+    needed = {"wind_speed", "wind_from", "psi", "u", "v"}
+    if not needed <= trial.channels.keys():
         return trial
 
     curves = _curves(particulars, table.get("coefficients", "auto"))
@@ -82,7 +83,8 @@ def _forces(curves: WindCurves, ahead: Floats, aside: Floats) -> Floats:
     for row in (curves.X, curves.Y, curves.N):
         at_angle = np.interp(angle, curves.angle, row, period=2.0 * np.pi)
         coefficients.append(at_angle)
-    pressure = 0.5 * AIR_DENSITY * (ahead**2 + aside**2)
+    square = ahead**2 + aside**2
+    pressure = 0.5 * AIR_DENSITY * square
     return pressure * np.array(coefficients)
 
 

@@ -147,16 +147,17 @@ class Reinsch:
         """
         *n_splines, n_knots = values.shape
         n_inner = n_knots - 2
+        around = [slice(first, first + n_inner) for first in range(3)]
         differences = np.zeros((*n_splines, n_inner))
-        for offset, diagonal in enumerate(self.diagonals):
-            differences += diagonal * values[..., offset : offset + n_inner]
+        for knots, diagonal in zip(around, self.diagonals, strict=True):
+            differences += diagonal * values[..., knots]
 
         bands = self.gram + stiffness * self.square
         curvature = solveh_banded(bands, differences.T).T
 
         pull = np.zeros_like(values)
-        for offset, diagonal in enumerate(self.diagonals):
-            pull[..., offset : offset + n_inner] += diagonal * curvature
+        for knots, diagonal in zip(around, self.diagonals, strict=True):
+            pull[..., knots] += diagonal * curvature
         return values - stiffness * pull
 
 

@@ -94,11 +94,13 @@ def heading_motion(t: Floats) -> RandomWalkMotion:
     transitions[:, psi, r] = h
     transitions[:, r, rdot] = h
     transitions[:, psi, rdot] = 0.5 * h**2
+
+    steps = h[:, None, None]
     return RandomWalkMotion(
         states=(*HEADING, "rdot"),
         guessed_by=("r", "psi"),
         transitions=transitions,
-        process=WALK_FACTORS * h[:, None, None] ** WALK_POWERS,
+        process=WALK_FACTORS * steps**WALK_POWERS,
         start_variances=np.array([1.0, 1e-2, 1.0]),
     )
 
@@ -113,8 +115,10 @@ def plane_motion(t: Floats, psi: Floats) -> RandomWalkMotion:
     transitions = _plane_transitions(t, psi)
     process = np.zeros_like(transitions)
     walk = heading_motion(t).process[:, 1:, 1:]
+    steps = range(len(walk))
     for axis in ([u, udot], [v, vdot]):
-        process[:, np.array(axis)[:, None], axis] = walk
+        block = np.ix_(steps, axis, axis)
+        process[block] = walk
     return RandomWalkMotion(
         states=(*PLANE, "udot", "vdot"),
         guessed_by=("u", "x", "v"),
@@ -127,6 +131,7 @@ def plane_motion(t: Floats, psi: Floats) -> RandomWalkMotion:
 def _plane_transitions(t: Floats, psi: Floats) -> Floats:
     h = np.diff(t)
     x, y, u, v, udot, vdot = range(6)
+    half_square = 0.5 * h**2
     cosine = _midpoints(np.cos(psi))
     sine = _midpoints(np.sin(psi))
     transitions = np.tile(np.eye(6), (len(h), 1, 1))
@@ -138,7 +143,7 @@ def _plane_transitions(t: Floats, psi: Floats) -> Floats:
     ]
     for position, velocity, acceleration, part in parts:
         transitions[:, position, velocity] = h * part
-        transitions[:, position, acceleration] = 0.5 * h**2 * part
+        transitions[:, position, acceleration] = half_square * part
     transitions[:, u, udot] = h
     transitions[:, v, vdot] = h
     return transitions
