@@ -77,14 +77,10 @@ def coefficient_history(
     **sampling
         `samples`, `window`, `gear`, `smooth` of `build_samples`.
     """
-    table = get_structure(structure) if isinstance(structure, str) else structure
-    estimator = get_method(method).make() if isinstance(method, str) else method
-    if not isinstance(estimator, Recursion):
-        raise InputError(
-            "method: expected a recursive one, such as 'rls', got"
-            f" {method!r}, which fits all samples at once"
-        )
-
+    table = structure
+    if isinstance(table, str):
+        table = get_structure(table)
+    estimator = _recursion(method)
     ship = particulars
     if table.quantity == "force":
         ship = particulars.completed()
@@ -108,6 +104,19 @@ def coefficient_history(
         trial=samples.trial,
         values=np.asarray(coefficients.T),
     )
+
+
+def _recursion(method: str | Recursion) -> Recursion:
+    """The estimator of a recursive method."""
+    estimator: Any = method
+    if isinstance(method, str):
+        estimator = get_method(method).make()
+    if not isinstance(estimator, Recursion):
+        raise InputError(
+            "method: expected a recursive one, such as 'rls', got"
+            f" {method!r}, which fits all samples at once"
+        )
+    return estimator
 
 
 def _acceleration_history(

@@ -117,26 +117,27 @@ class LinearSupportVectorMachine(LinearRegressor):
         features, targets = validated(self, X, y)
         centre, scale = centre_and_scale(features, True, self.fit_intercept)
         scaled = (features - centre) / scale
-        mean = float(targets.mean()) if self.fit_intercept else 0.0
+        mean = 0.0
+        if self.fit_intercept:
+            mean = float(targets.mean())
         deviations = targets - mean
         size = root_mean_square(deviations) or 1.0
 
         slopes, offset = self._solved(scaled, deviations / size)
         self.coef_ = slopes * size / scale
-        self.intercept_ = mean + size * offset - float(centre @ self.coef_)
+        at_centre = float(centre @ self.coef_)
+        self.intercept_ = mean + size * offset - at_centre
 
         errors = targets - features @ self.coef_ - self.intercept_
-        self.weights_ = _huber_weights(errors)
         self._set_covariance(scaled, scale, errors)
         return self
 
     def _set_covariance(self, scaled: Floats, scale: Floats, errors: Floats) -> None:
-        """Set inverse moment and covariance, from features of unit size."""
-        weights = self.weights_
+        """Set weights, inverse moment and covariance, from features of unit size."""
+        weights = _huber_weights(errors)
         moment = (scaled.T * weights) @ scaled
-        inverse_scaled = np.linalg.pinv(moment, hermitian=True)
-        inverse = inverse_scaled / np.outer(scale, scale)
-        self.inverse_moment_ = inverse
+        inverse = np.linalg.pinv(moment, hermitian=True)
+        inverse = inverse / np.outer(scale, scale)
 
         n_samples, n_features = scaled.shape
         freedom = max(n_samples - n_features, 1)
@@ -144,6 +145,9 @@ class LinearSupportVectorMachine(LinearRegressor):
         variance = float(np.sum(counted**2)) / freedom
         unscaled = scaled * scale
         whole = unscaled.T @ unscaled
+
+        self.weights_ = weights
+        self.inverse_moment_ = inverse
         self.covariance_ = variance * inverse @ whole @ inverse
 
     def _solved(self, features: Floats, targets: Floats) -> tuple[Floats, float]:
@@ -163,7 +167,8 @@ class LinearSupportVectorMachine(LinearRegressor):
             warnings.simplefilter("always", ConvergenceWarning)
             estimator.fit(features, targets)
         self.converged_ = not caught
-        return estimator.coef_, float(np.sum(estimator.intercept_))
+        offset = float(np.sum(estimator.intercept_))
+        return estimator.coef_, offset
 
 
 def _huber_weights(errors: Floats) -> Floats:

@@ -64,9 +64,11 @@ class Decomposition:
     @property
     def numerical_rank(self) -> int:
         """Number of directions above rounding, at least 1."""
+        s = self.singular_values
         largest_side = max(self.n_samples, len(self.scale))
-        rounding = largest_side * np.finfo(float).eps * self.singular_values[0]
-        return max(int(np.sum(self.singular_values > rounding)), 1)
+        rounding = largest_side * np.finfo(float).eps * s[0]
+        n_above = int(np.sum(s > rounding))
+        return max(n_above, 1)
 
     def filters(self, C: ArrayLike, rank: int) -> Floats:
         """Factors s / (s^2 + 1/C) of directions, 0 beyond `rank` and below rounding.
@@ -86,8 +88,33 @@ class Decomposition:
 
     def coefficients(self, filters: Floats) -> Floats:
         """Coefficients of the unscaled features, shape (n_features,)."""
-        of_scaled = self.directions.T @ (filters * self.projections)
+        along = filters * self.projections
+        of_scaled = self.directions.T @ along
         return np.asarray(of_scaled / self.scale)
+
+    def inverse_moment(self, filters: Floats) -> Floats:
+        """Regularised inverse of X'X (X centred), shape (n_features, n_features)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inverse = filters / self.singular_values
+        inverse = np.where(filters > 0.0, inverse, 0.0)
+        unscaled = self.directions / self.scale
+        return np.asarray((unscaled.T * inverse) @ unscaled)
+
+    def unit_covariance(self, filters: Floats) -> Floats:
+        """Covariance of the coefficients for noise of unit variance."""
+        of_scaled = self.directions.T * filters
+        root = of_scaled / self.scale[:, None]
+        return np.asarray(root @ root.T)
+
+    def noise_variance(self, filters: Floats, residuals: Floats) -> float:
+        """Variance of the noise by the degrees of freedom; NaN if there are none."""
+        shares = self.singular_values * filters
+        n_effective = float(np.sum(shares))
+        freedom = self.n_free - n_effective
+        if freedom <= 0.5:
+            return np.nan
+        squares = float(residuals @ residuals)
+        return squares / freedom
 
 
 def triangle(
@@ -150,13 +177,10 @@ def decompose_triangle(
     """Decompose the features of a regression of which the `triangle` is known."""
     first = int(fit_intercept)
     n_features = len(R) - 1 - first
-    uncentred = R[:, first:-1]
     centred = R[first:-1, first:-1]
     targets = R[first:-1, -1]
     out_of_reach = R[-1, -1]
-
-    size = _sizes(centred, n_samples)
-    size[size <= CONSTANT * _sizes(uncentred, n_samples)] = 0.0
+    size = _variations(R[:, first:-1], centred, n_samples)
     scales = scales_of(size, scale)
 
     left, singular_values, directions = np.linalg.svd(centred / scales)
@@ -179,6 +203,14 @@ def decompose_triangle(
         scale=scales,
         n_samples=n_samples,
     )
+
+
+def _variations(uncentred: Floats, centred: Floats, n_samples: int) -> Floats:
+    """Sizes of the centred features; 0 of those that are constant but for rounding."""
+    size = _sizes(centred, n_samples)
+    smallest = CONSTANT * _sizes(uncentred, n_samples)
+    size[size <= smallest] = 0.0
+    return size
 
 
 def _sizes(triangle: Floats, n_samples: int) -> Floats:
@@ -210,25 +242,15 @@ def keep_solution(
     if weights is not None:
         counted = residuals * weights
         inflation = len(y) / float(weights.sum())
-
-    singular_values = problem.singular_values
-    n_effective = float(np.sum(singular_values * filters))
-    freedom = problem.n_free - n_effective
-    noise_variance = np.nan
-    if freedom > 0.5:
-        noise_variance = float(counted @ counted) / freedom
-
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inverse = np.where(filters > 0.0, filters / singular_values, 0.0)
-    unscaled = problem.directions / problem.scale
-    root = (problem.directions.T * filters) / problem.scale[:, None]
+    noise_variance = problem.noise_variance(filters, counted)
+    by_unit_noise = problem.unit_covariance(filters)
 
     estimator.coef_ = coefficients
     estimator.intercept_ = intercept
-    estimator.singular_values_ = singular_values
-    estimator.inverse_moment_ = (unscaled.T * inverse) @ unscaled
+    estimator.singular_values_ = problem.singular_values
+    estimator.inverse_moment_ = problem.inverse_moment(filters)
     estimator.noise_variance_ = noise_variance
-    estimator.covariance_ = noise_variance * inflation * (root @ root.T)
+    estimator.covariance_ = noise_variance * inflation * by_unit_noise
     return residuals
 
 
@@ -252,7 +274,9 @@ def centre_and_scale(
 def scales_of(size: Floats, scale: bool | ArrayLike) -> Floats:
     """Divisors of features of the given sizes; 1 for a feature that is zero."""
     if isinstance(scale, bool | np.bool_):
-        return np.where(size > 0.0, size, 1.0) if scale else np.ones(len(size))
+        if not scale:
+            return np.ones(len(size))
+        return np.where(size > 0.0, size, 1.0)
 
     given = check_scale(scale)
     if given.shape != size.shape:

@@ -9,7 +9,7 @@ principal components of the data in feature space.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh
@@ -62,7 +62,8 @@ def stabilised(model: ShipModel) -> ShipModel:
     c["b_v"] -= shift
     c["c_r"] -= shift
     # surge must be damped too, in the prime system
-    c["a_du"] = min(c["a_du"], -0.05 - 2.0 * c["a_0"])
+    largest = -0.05 - 2.0 * c["a_0"]
+    c["a_du"] = min(c["a_du"], largest)
     return replace(model, coefficients=c)
 
 
@@ -138,20 +139,36 @@ def fit_kernel(
     weights = WEIGHTS if asked.C is None else (float(asked.C),)
     kernels = _kernels(inputs, asked.centres, lengths)
     stages = {length: search.stage(kernel) for length, kernel in kernels.items()}
-    weight, length, errors = search.smoothest(stages, weights)
+    choice = search.smoothest(stages, weights)
+    fitted = search.fitted(stages[choice.length], choice.weight)
+    report = _report(asked.kernel, kernels[choice.length], choice)
+    return replace(fitted, report=report)
 
-    kernel = kernels[length]
-    fitted = search.fitted(stages[length], weight)
-    report = {
-        "kind": asked.kernel,
+
+class _Choice(NamedTuple):
+    """Weight of the errors and length of the kernel, and the errors with these.
+
+    Errors are those of headings held out, with the kernel, where there was a choice,
+    and by the reference ship alone.
+    """
+
+    weight: float
+    length: float
+    errors: dict[str, float]
+
+
+def _report(kind: str, kernel: Kernel, choice: _Choice) -> dict[str, Any]:
+    """What was chosen, for the provenance."""
+    errors = {name: finite(error) for name, error in choice.errors.items()}
+    return {
+        "kind": kind,
         "centres": len(kernel.centres),
         "features": kernel.basis.shape[1],
-        "length": length,
-        "C": weight,
-        "remarks": _remarks(errors),
-        "heading_errors_held_out": {name: finite(e) for name, e in errors.items()},
+        "length": choice.length,
+        "C": choice.weight,
+        "remarks": _remarks(choice.errors),
+        "heading_errors_held_out": errors,
     }
-    return replace(fitted, report=report)
 
 
 def _kernels(
@@ -200,12 +217,11 @@ def chosen_centres(
     offset = np.array([0.0, 0.0, 0.0, speed.mean()])
     deviations = x - offset
     scale = np.maximum(column_rms(deviations), 0.02)  # an input may hardly change
-    z = deviations / scale
-    drifts_to_port = z[:, 1:2] < 0.0
-    folded = z * np.where(drifts_to_port, MIRROR, 1.0)
+    folded = _folded(deviations / scale)
 
     needed = 3 * number
-    if len(np.unique(folded, axis=0)) < needed:
+    different = np.unique(folded, axis=0)
+    if len(different) < needed:
         raise InputError(
             f"trials: expected at least {needed} different samples for {number} centres"
             f" of the kernel, got {len(x)} samples; add trials, or give fewer centres"
@@ -215,6 +231,13 @@ def chosen_centres(
     means = clusters.cluster_centers_
     centres = np.concatenate([means, means * MIRROR])
     return offset, scale, centres
+
+
+def _folded(z: Floats) -> Floats:
+    """Inputs with those of a drift to port mirrored."""
+    drifts_to_port = z[:, 1:2] < 0.0
+    sides = np.where(drifts_to_port, MIRROR, 1.0)
+    return np.asarray(z * sides)
 
 
 def principal(
@@ -230,16 +253,23 @@ def principal(
     """
     scaled = (x - kernel.offset) / kernel.scale
     z = _thinned(scaled, most_samples)
-    both_sides = np.concatenate([z, z * MIRROR])
-    values = gaussians(both_sides, kernel.centres)
+    mirrored = z * MIRROR
+    both_sides = np.concatenate([z, mirrored])
+    centres = kernel.centres
+    values = gaussians(both_sides, centres)
     moment = values.T @ values / len(values)
 
-    among_centres = gaussians(kernel.centres, kernel.centres)
-    jitter = 1e-9 * np.eye(len(among_centres))
-    _, vectors = eigh(moment, among_centres + jitter)
-    leading_first = vectors[:, ::-1]
-    basis = np.ascontiguousarray(leading_first[:, :most_features])
+    among_centres = gaussians(centres, centres)
+    basis = _leading_directions(moment, among_centres, most_features)
     return replace(kernel, basis=basis)
+
+
+def _leading_directions(moment: Floats, metric: Floats, most: int) -> Floats:
+    """Directions of the largest moment by a metric, the leading one first."""
+    jitter = 1e-9 * np.eye(len(metric))
+    _, vectors = eigh(moment, metric + jitter)
+    leading_first = vectors[:, ::-1]
+    return np.ascontiguousarray(leading_first[:, :most])
 
 
 def inputs_of(channels: Sequence[dict[str, Floats]], ship: Any) -> Floats:
@@ -279,31 +309,34 @@ class _Search:
         """SI units, by row, of a weight of errors by ship length, prime system."""
         ship = self.blank.particulars
         window = np.mean(samples.duration)
-        return float(1.0 / (ship["length"] * window * ship["speed"] ** 3))
+        unit = ship["length"] * window * ship["speed"] ** 3
+        return float(1.0 / unit)
 
     def error(self, stage: KernelFit, weight: float) -> float:
         """Mean error of the simulated headings of what is held out.
 
         Weight 0 gives that of the reference ship.
         """
-        C = weight * self.unit(stage.samples)
+        samples = stage.samples
+        C = weight * self.unit(samples)
         errors = []
-        for rows, held in held_out_rows(self.trials, stage.samples, self.folds):
-            fitted = stage.samples.select(rows)
+        for rows, held in held_out_rows(self.trials, samples, self.folds):
+            fitted = samples.select(rows)
             coefficients = {}
             for q, X, y in fitted.by_equation():
                 coefficients[q] = _ridge(X, y, C)
+
             model = stage.model.with_accelerations(coefficients)
-            errors.append(heading_error(model, held, "rmse"))
+            error = heading_error(model, held, "rmse")
+            errors.append(error)
         return float(np.mean(errors))
 
     def smoothest(
         self, stages: dict[float, KernelFit], weights: Sequence[float]
-    ) -> tuple[float, float, dict[str, float]]:
-        """Weight and length of the smoothest kernel nearly as good as the best.
+    ) -> _Choice:
+        """The smoothest kernel nearly as good as the best.
 
-        The stages are by length, the smoothest first. Also returns the errors with that
-        kernel, where there is a choice, and of the reference ship alone.
+        The stages are by length, the smoothest first.
         """
         pairs = list(product(weights, stages))  # the smoothest first
         best = pairs[0]
@@ -311,10 +344,12 @@ class _Search:
         if len(pairs) > 1:
             tried = [self.error(stages[length], weight) for weight, length in pairs]
             best = most_regularised(pairs, tried)
-            errors["kernel"] = tried[pairs.index(best)]
+            place = pairs.index(best)
+            errors["kernel"] = tried[place]
+
         weight, length = best
         errors["reference"] = self.error(stages[length], 0.0)
-        return weight, length, errors
+        return _Choice(weight, length, errors)
 
     def fitted(self, stage: KernelFit, weight: float) -> KernelFit:
         """The fit to all rows."""
@@ -332,6 +367,9 @@ class _Search:
 
 def _ridge(X: Floats, y: Floats, C: float) -> Floats:
     """Coefficients by ridge regression with a weight C of the squared errors."""
-    penalty = np.eye(X.shape[1])
+    _, n_features = X.shape
+    penalty = np.eye(n_features)
     moment = X.T @ X * C + penalty
-    return np.asarray(np.linalg.solve(moment, C * (X.T @ y)))
+    projected = C * (X.T @ y)
+    coefficients = np.linalg.solve(moment, projected)
+    return np.asarray(coefficients)

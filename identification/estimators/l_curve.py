@@ -70,15 +70,23 @@ def corner_rank(curve: LCurve, n_samples: int, significance: float = 0.1) -> int
     if freedom < 1:
         return corner
 
-    dropped = np.arange(full - 1, -1, -1)
-    quantile = fdtri(np.maximum(dropped, 1), freedom, 1.0 - significance)
-    allowed = 1.0 + dropped / freedom * quantile
     # once: as array and as number a square may differ in the last bit
     squared = residual * residual
     least = max(squared[-1], floor**2)
+    allowed = _allowed_growth(full, freedom, significance)
     is_adequate = squared <= allowed * least
     passed_over = np.argmax(is_adequate[corner - 1 :])
     return corner + int(passed_over)
+
+
+def _allowed_growth(full: int, freedom: int, significance: float) -> Floats:
+    """Growth of the squared residuals that chance explains, of each rank (F test)."""
+    dropped = np.arange(full)[::-1]
+    numerator = np.maximum(dropped, 1)
+    probability = 1.0 - significance
+    quantile = fdtri(numerator, freedom, probability)
+    growth = dropped / freedom * quantile
+    return np.asarray(1.0 + growth)
 
 
 def gcv_rank(curve: LCurve, n_samples: int) -> int:
@@ -89,12 +97,14 @@ def gcv_rank(curve: LCurve, n_samples: int) -> int:
     divisor = np.maximum(freedom, 1) ** 2
     score = curve.residual_norm**2 / divisor
     score[freedom <= 0] = np.inf
-    return int(ranks[np.argmin(score)])
+    best = np.argmin(score)
+    return int(ranks[best])
 
 
 def variance_rank(singular_values: Floats, share: float) -> int:
     """Least rank that holds a share, 0 to 1, of the variance of the features."""
     held = np.cumsum(singular_values**2)
     # the last sum is compared with itself, so that a share of 1 keeps all
-    needed = int(np.searchsorted(held, share * held[-1])) + 1
+    wanted = share * held[-1]
+    needed = int(np.searchsorted(held, wanted)) + 1
     return min(needed, len(held))

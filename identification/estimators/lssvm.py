@@ -151,26 +151,31 @@ class LSSVM(LinearRegressor):
             )
         self.centre_, self.scale_ = centre_and_scale(X, self.scale, self.fit_intercept)
         self.support_ = (X - self.centre_) / self.scale_
-        self.ridge_ = KernelRidge(
+
+        # the free b takes so much of the ones that the multipliers sum to zero
+        ridge = self._kernel_ridge()
+        ones = np.ones(len(y))
+        targets = np.column_stack([y, ones])
+        ridge.fit(self.support_, targets, weights)
+        of_targets, of_ones = ridge.dual_coef_.T
+        self.intercept_ = 0.0
+        if self.fit_intercept:
+            self.intercept_ = float(of_targets.sum() / of_ones.sum())
+        self.dual_coef_ = of_targets - self.intercept_ * of_ones
+
+        ridge.dual_coef_ = self.dual_coef_
+        self.ridge_ = ridge
+        fitted = ridge.predict(self.support_)
+        return np.asarray(y - fitted - self.intercept_)
+
+    def _kernel_ridge(self) -> KernelRidge:
+        return KernelRidge(
             alpha=1.0 / self.C,
             kernel=self.kernel,
             gamma=self.gamma,
             degree=self.degree,
             coef0=self.coef0,
         )
-
-        # the free b takes so much of the ones that the multipliers sum to zero
-        targets = np.column_stack([y, np.ones(len(y))])
-        self.ridge_.fit(self.support_, targets, weights)
-        of_targets, of_ones = self.ridge_.dual_coef_.T
-        self.intercept_ = 0.0
-        if self.fit_intercept:
-            self.intercept_ = float(of_targets.sum() / of_ones.sum())
-        self.dual_coef_ = of_targets - self.intercept_ * of_ones
-
-        self.ridge_.dual_coef_ = self.dual_coef_
-        fitted = self.ridge_.predict(self.support_)
-        return np.asarray(y - fitted - self.intercept_)
 
     def predict(self, X: ArrayLike) -> Floats:
         """Targets, shape (n_samples,), of samples of shape (n_samples, n_features)."""
@@ -179,7 +184,8 @@ class LSSVM(LinearRegressor):
         check_is_fitted(self)
         features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
         scaled = (features - self.centre_) / self.scale_
-        return np.asarray(self.ridge_.predict(scaled) + self.intercept_)
+        without_constant = self.ridge_.predict(scaled)
+        return np.asarray(without_constant + self.intercept_)
 
 
 @dataclass(eq=False, repr=False)
@@ -301,7 +307,8 @@ class TruncatedLSSVM(LinearRegressor):
         names = getattr(self, "feature_names_in_", names)
         groups = []
         for group in self.collinear_groups_:
-            groups.append(tuple(str(names[i]) for i in group))
+            own_names = [str(names[i]) for i in group]
+            groups.append(tuple(own_names))
         return tuple(groups)
 
     def _chosen_rank(self, problem: Decomposition, distinct: int) -> int:

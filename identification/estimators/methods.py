@@ -158,19 +158,24 @@ class Adapted(LinearRegressor):
                 f" coefficient for each of the {n_features} terms, got {self.inner!r}"
             )
 
+        self._set_covariance(features, targets)
+        return self
+
+    def _set_covariance(self, features: Floats, targets: Floats) -> None:
+        """Set moment and covariance as of least squares on the features in use."""
         is_used = self.coef_ != 0.0
         used = features[:, is_used]
+        n_features = len(is_used)
         inverse = np.zeros((n_features, n_features))
-        inverse[np.ix_(is_used, is_used)] = np.linalg.pinv(
-            used.T @ used, hermitian=True
-        )
+        block = np.ix_(is_used, is_used)
+        inverse[block] = np.linalg.pinv(used.T @ used, hermitian=True)
 
         residuals = targets - features @ self.coef_
-        freedom = max(len(targets) - used.shape[1], 1)
+        n_used = int(is_used.sum())
+        freedom = max(len(targets) - n_used, 1)
         variance = float(residuals @ residuals) / freedom
         self.inverse_moment_ = inverse
         self.covariance_ = variance * inverse
-        return self
 
 
 def without_constant(estimator: Any) -> Estimator:
@@ -193,7 +198,8 @@ def without_constant(estimator: Any) -> Estimator:
 def method_options(name: str) -> tuple[str, ...]:
     """Names of the settings that a method of `METHODS` has."""
     kind, _ = METHODS[name]
-    own: tuple[str, ...] = getattr(identification, kind).options
+    estimator = getattr(identification, kind)
+    own: tuple[str, ...] = estimator.options
     if kind == "Refinement":
         return (*own, *TruncatedLSSVM.options)
     return own

@@ -1,5 +1,6 @@
 """The polynomial that an LS-SVM with polynomial kernel is."""
 
+from collections.abc import Iterator
 from itertools import combinations_with_replacement
 from math import factorial
 
@@ -8,6 +9,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from identification.estimators.lssvm import LSSVM
 from shipgym import InputError
+from shipgym.arrays import Floats
 
 
 def polynomial_coefficients(estimator: LSSVM) -> dict[tuple[int, ...], float]:
@@ -38,30 +40,44 @@ def polynomial_coefficients(estimator: LSSVM) -> dict[tuple[int, ...], float]:
     check_is_fitted(estimator)
     degree = int(estimator.degree)
     n_features = estimator.n_features_in_
-    gamma = estimator.gamma
-    if gamma is None:
-        gamma = 1.0 / n_features
-    slope = gamma * estimator.support_ / estimator.scale_  # of features as given
-    constant = estimator.coef0 - slope @ estimator.centre_
-
+    slope, constant = _lines(estimator)
     found = {}
-    features = range(n_features)
-    for total in range(degree + 1):
-        for chosen in combinations_with_replacement(features, total):
-            powers = tuple(chosen.count(j) for j in features)
-            products = np.prod(slope ** np.array(powers), axis=1)
-            by_sample = products * constant ** (degree - total)
-            sum_over_samples = float(estimator.dual_coef_ @ by_sample)
-            found[powers] = _multinomial(degree, powers) * sum_over_samples
+    for powers in _all_powers(degree, n_features):
+        products = np.prod(slope ** np.array(powers), axis=1)
+        by_sample = products * constant ** (degree - sum(powers))
+        sum_over_samples = float(estimator.dual_coef_ @ by_sample)
+        found[powers] = _multinomial(degree, powers) * sum_over_samples
 
     no_power = (0,) * n_features
     found[no_power] += estimator.intercept_
     return found
 
 
+def _lines(estimator: LSSVM) -> tuple[Floats, Floats]:
+    """Slopes and constant of the line of each sample, of which the kernel is a power.
+
+    Of features as given; shapes (n_samples, n_features) and (n_samples,).
+    """
+    gamma = estimator.gamma
+    if gamma is None:
+        gamma = 1.0 / estimator.n_features_in_
+    slope = gamma * estimator.support_ / estimator.scale_
+    constant = estimator.coef0 - slope @ estimator.centre_
+    return slope, constant
+
+
+def _all_powers(degree: int, n_features: int) -> Iterator[tuple[int, ...]]:
+    """Powers of the features in every product up to a degree."""
+    features = range(n_features)
+    for total in range(degree + 1):
+        for chosen in combinations_with_replacement(features, total):
+            yield tuple(chosen.count(j) for j in features)
+
+
 def _multinomial(degree: int, powers: tuple[int, ...]) -> float:
     """Number of times these powers occur in a multiplied-out power of a sum."""
-    ways = factorial(degree) / factorial(degree - sum(powers))
+    left = degree - sum(powers)
+    ways = factorial(degree) / factorial(left)
     for power in powers:
         ways /= factorial(power)
     return ways

@@ -124,7 +124,8 @@ class Recursion(LinearRegressor):
         """
         self.check()
         features, targets = validated(self, X, y)
-        self._begin(features, targets[:, None])
+        of_one_signal = targets[:, None]
+        self._begin(features, of_one_signal)
 
         n_samples = len(targets)
         gathered = min(self.start_samples * self.start_interval, n_samples)
@@ -134,14 +135,14 @@ class Recursion(LinearRegressor):
         start = np.tile(self.coef_, (gathered, 1))
 
         rest = slice(gathered, None)
-        history = self._run(features[rest, None], targets[rest, None])
-        of_rest = history[:, 0]
+        history = self._run(features[rest, None], of_one_signal[rest])
 
         counts = np.zeros(n_samples)
         counts[picked] = 1.0
         counts[rest] = 1.0
-        self._summarise(features, targets, counts)
-        return np.concatenate([start, of_rest])
+        self.weights_ = counts * self._influence(n_samples)
+        self._summarise(features, targets)
+        return np.concatenate([start, history[:, 0]])
 
     def update(self, phi: ArrayLike, y: ArrayLike) -> Self:
         """Take in the next sample or samples.
@@ -193,14 +194,16 @@ class Recursion(LinearRegressor):
             return None
         unscale = np.outer(self.scale_, self.scale_)
         unscaled: Floats = self._P / unscale
-        return unscaled.reshape(*self.coef_.shape, -1)
+        shape = self.coef_.shape
+        return unscaled.reshape(*shape, -1)
 
     def _begin(self, features: Floats, targets: Floats) -> None:
         """Begin with zero coefficients, in scales that the samples give."""
         n_signals = targets.shape[1]
         n_features = features.shape[-1]
         every_row = features.reshape(-1, n_features)
-        self.scale_ = scales_of(column_rms(every_row), self.scale)
+        size = column_rms(every_row)
+        self.scale_ = scales_of(size, self.scale)
         unit = column_rms(targets)
         self._unit = np.where(unit > 0.0, unit, 1.0)
 
@@ -248,35 +251,30 @@ class Recursion(LinearRegressor):
             self._keep(history[-1])
         return history
 
-    def _summarise(
-        self,
-        features: Floats,
-        targets: Floats,
-        counts: Floats,
-    ) -> None:
-        """Set weights and covariance of the estimate that the recursion tends to.
-
-        `counts` are 1 for samples that are used, else 0.
-        """
+    def _influence(self, n_samples: int) -> Floats:
+        """Weights of samples that are taken in, of which the older ones count less."""
+        age = np.arange(n_samples - 1.0, -1.0, -1.0)
         # a sample is seen again while it is among the last
-        age = np.arange(len(targets) - 1.0, -1.0, -1.0)
         times_seen = np.minimum(self.innovations, age + 1.0)
-        weights = counts * times_seen * self.forgetting**age
+        return np.asarray(times_seen * self.forgetting**age)
 
+    def _summarise(self, features: Floats, targets: Floats) -> None:
+        """Set moment and covariance of the estimate that the recursion tends to."""
+        weights = self.weights_
         scaled = features / self.scale_
         start = np.eye(scaled.shape[1]) / self.C
         moment = (scaled.T * weights) @ scaled + start
         inverse = np.linalg.inv(moment)
 
         errors = targets - features @ self.coef_
-        n_effective = float(np.sum(inverse * (moment - start)))
+        of_samples = moment - start
+        n_effective = float(np.sum(inverse * of_samples))
         freedom = max(weights.sum() - n_effective, 1.0)
         variance = float(weights @ errors**2) / freedom
         middle = (scaled.T * weights**2) @ scaled
         covariance = variance * (inverse @ middle @ inverse)
 
         unscale = np.outer(self.scale_, self.scale_)
-        self.weights_ = weights
         self.inverse_moment_ = inverse / unscale
         self.noise_variance_ = variance
         self.covariance_ = covariance / unscale
@@ -307,13 +305,15 @@ class RecursiveLeastSquares(Recursion):
     def _begin_memory(self) -> None:
         n_signals, n_features = self._theta.shape
         start = self.C * np.eye(n_features)
+        shape = (n_signals, n_features)
         self._P = np.tile(start, (n_signals, 1, 1))
-        self._ceiling = np.full(self._theta.shape, float(self.C))
-        self._past_phi = np.empty((0, n_signals, n_features))
+        self._ceiling = np.full(shape, float(self.C))
+        self._past_phi = np.empty((0, *shape))
         self._past_y = np.empty((0, n_signals))
 
     def _remember_start(self, scaled: Floats, inverse_moment: Floats) -> None:
-        self._P[0] = inverse_moment * np.outer(self.scale_, self.scale_)
+        to_scaled = np.outer(self.scale_, self.scale_)
+        self._P[0] = inverse_moment * to_scaled
 
     def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
         n_past = len(self._past_y)
@@ -333,7 +333,8 @@ class RecursiveLeastSquares(Recursion):
             history,
             np.empty(phi.shape[-1]),
         )
-        first_kept = len(y) - min(self.innovations - 1, len(y))
+        n_kept = min(self.innovations - 1, len(y))
+        first_kept = len(y) - n_kept
         self._past_phi = phi[first_kept:].copy()
         self._past_y = y[first_kept:].copy()
 
@@ -430,19 +431,18 @@ def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
     if targets.ndim == 1:
         targets = targets[:, None]
 
-    fits = features.ndim == 3 and targets.ndim == 2 and len(features) == len(targets)
-    if not fits:
+    have_axes = features.ndim == 3 and targets.ndim == 2
+    if not have_axes or len(features) != len(targets):
         raise InputError(
             "phi, y: expected shapes (n_samples, n_features) and (n_samples,), or"
             " (n_samples, n_signals, n_features) and (n_samples, n_signals), got"
             f" {np.shape(phi)} and {np.shape(y)}"
         )
     n_signals = targets.shape[1]
-    if features.shape[1] not in (1, n_signals):
-        raise InputError(
-            f"phi: expected {n_signals} signals as in y, got {features.shape[1]}"
-        )
-    if not (np.all(np.isfinite(features)) and np.all(np.isfinite(targets))):
+    n_given = features.shape[1]
+    if n_given not in (1, n_signals):
+        raise InputError(f"phi: expected {n_signals} signals as in y, got {n_given}")
+    if not (np.isfinite(features).all() and np.isfinite(targets).all()):
         raise InputError(
             "phi, y: expected finite numbers, got one that is not; repair the samples"
             " first"

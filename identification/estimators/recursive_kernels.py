@@ -37,8 +37,9 @@ def forget(P: Any, forgetting: float, ceiling: Any, stretch: Any) -> None:
     full = 1.0 / np.sqrt(forgetting)
     for i in range(ceiling.size):
         room = 1.0
-        if P[i, i] > 0.0:
-            room = np.sqrt(ceiling[i] / P[i, i])
+        variance = P[i, i]
+        if variance > 0.0:
+            room = np.sqrt(ceiling[i] / variance)
         stretch[i] = min(full, max(room, 1.0))
 
     for i in range(ceiling.size):
@@ -124,13 +125,15 @@ def matrix_updates(
             if forgetting < 1.0:
                 forget(P[s], forgetting, ceiling[s], scratch)
 
-            X = np.ascontiguousarray(phi[oldest : t + 1, s])
-            errors = y[oldest : t + 1, s] - X @ theta[s]
+            latest = slice(oldest, t + 1)
+            X = np.ascontiguousarray(phi[latest, s])
+            errors = y[latest, s] - X @ theta[s]
             for i in range(errors.size):
                 errors[i] = innovation(errors[i], omega)
 
             XP = X @ P[s]
-            gain = np.linalg.solve(np.eye(errors.size) + XP @ X.T, XP)
+            covariance = np.eye(errors.size) + XP @ X.T
+            gain = np.linalg.solve(covariance, XP)
             theta[s] += errors @ gain
             P[s] -= XP.T @ gain
             P[s] = 0.5 * (P[s] + P[s].T)  # else forgetting blows rounding errors up
@@ -156,8 +159,9 @@ def gradient_updates(
             error = y[t, s]
             size = 0.0
             for j in range(n_features):
-                error -= theta[s, j] * phi[t, s, j]
-                size += phi[t, s, j] * phi[t, s, j]
+                regressor = phi[t, s, j]
+                error -= theta[s, j] * regressor
+                size += regressor * regressor
 
             r[s] = forgetting * r[s] + size
             step = 0.0

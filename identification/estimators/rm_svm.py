@@ -140,12 +140,15 @@ class RMSVM(LinearRegressor):
 
     def _solve(self, rows: "_Standardised", weight: float) -> tuple[Floats, float]:
         """Slopes and offset for standardised features and targets."""
-        Z, e = rows.features, rows.targets
+        Z = rows.features
+        e = rows.targets
         if not Z.shape[1]:
             return np.zeros(0), 0.0
 
         has_offset = self.constant is not None
-        band = FIRST_BAND if self.epsilon is None else float(self.epsilon)
+        band = FIRST_BAND
+        if self.epsilon is not None:
+            band = float(self.epsilon)
         C = weight / len(e)
         if self.regression == "ls-svm":
             solver = Ridge(alpha=1.0 / C, fit_intercept=has_offset)
@@ -156,7 +159,8 @@ class RMSVM(LinearRegressor):
 
         solver.fit(Z, e)
         slopes = np.asarray(solver.coef_, dtype=float).ravel()
-        return slopes, float(np.sum(solver.intercept_))
+        offset = float(np.sum(solver.intercept_))
+        return slopes, offset
 
     def fit_equations(self, task: FitTask) -> Estimators:
         """Copies fitted to all equations, weight and bands chosen where not given.
@@ -165,10 +169,11 @@ class RMSVM(LinearRegressor):
         InputError for a model without a reference ship.
         """
         self.check()
-        if not isinstance(task.blank.table, GreyBox):
+        blank = task.blank
+        if not isinstance(blank.table, GreyBox):
             raise InputError(
                 "method 'rm-svm': expected structure 'grey-box', which has a reference"
-                f" ship, got {task.blank.structure!r}; give the structure with a"
+                f" ship, got {blank.structure!r}; give the structure with a"
                 " reference_model ('auto', a shipped model's name or a model file), or"
                 " choose another method, such as 'tls-svm'"
             )
@@ -178,8 +183,9 @@ class RMSVM(LinearRegressor):
 
         found: Estimators = {}
         for k, q in enumerate(task.samples.features):
-            estimator = tuner.fitted(q, weight, bands[k], tuner.everything)
-            estimator.chosen_ = {"C": weight, "epsilon": bands[k]}
+            band = bands[k]
+            estimator = tuner.fitted(q, weight, band, tuner.everything)
+            estimator.chosen_ = {"C": weight, "epsilon": band}
             if search is not None:
                 estimator.search_ = search.of(k, BAND)
             found[q] = estimator
@@ -205,29 +211,35 @@ class _Standardised:
         self._duration = np.ones(n_samples)
         if constant is not None:
             self._duration = X[:, constant]
-        rows = X / self._duration[:, None]
-        targets = y / self._duration
+        self._standardise_features(X / self._duration[:, None])
+        self._standardise_targets(y / self._duration)
 
-        self._centre = np.zeros(n_features)
-        self._level = 0.0
-        if constant is not None:
-            self._centre = np.where(self._penalised, rows.mean(axis=0), 0.0)
-            self._level = float(targets.mean())
+    def _standardise_features(self, rows: Floats) -> None:
+        self._centre = np.zeros(rows.shape[1])
+        if self._constant is not None:
+            means = rows.mean(axis=0)
+            self._centre = np.where(self._penalised, means, 0.0)
         deviations = rows - self._centre
         size = column_rms(deviations)
         has_size = (size > 0.0) & self._penalised
         self._scale = np.where(has_size, size, 1.0)
-        self.features = (deviations / self._scale)[:, self._penalised]
+        standardised = deviations / self._scale
+        self.features = standardised[:, self._penalised]
 
-        target_deviations = targets - self._level
-        self._deviation = root_mean_square(target_deviations) or 1.0
-        self.targets = target_deviations / self._deviation
+    def _standardise_targets(self, targets: Floats) -> None:
+        self._level = 0.0
+        if self._constant is not None:
+            self._level = float(targets.mean())
+        deviations = targets - self._level
+        self._deviation = root_mean_square(deviations) or 1.0
+        self.targets = deviations / self._deviation
 
     def coefficients(self, slopes: Floats, offset: float) -> Floats:
         """Coefficients of the features as given, shape (n_features,)."""
-        found = np.zeros(len(self._penalised))
-        scale = self._scale[self._penalised]
-        found[self._penalised] = slopes * self._deviation / scale
+        penalised = self._penalised
+        found = np.zeros(len(penalised))
+        scale = self._scale[penalised]
+        found[penalised] = slopes * self._deviation / scale
         if self._constant is not None:
             level = self._level + self._deviation * offset
             at_centre = self._centre @ found
@@ -242,7 +254,8 @@ class _Standardised:
         penalty = strength * self._scale**2
         penalty[~self._penalised] = 0.0
         moment = X.T @ X + np.diag(penalty)
-        return np.asarray(np.linalg.pinv(moment, hermitian=True))
+        inverse = np.linalg.pinv(moment, hermitian=True)
+        return np.asarray(inverse)
 
 
 def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
@@ -297,7 +310,8 @@ class _Tuner:
                 epsilon=band,
                 constant=self._free_constant(equation),
             )
-            used = np.flatnonzero(rows)[:: self.every]
+            chosen = np.flatnonzero(rows)
+            used = chosen[:: self.every]
             X = self.samples.features[equation][used]
             y = self.samples.targets[equation][used]
             self._known[key] = estimator.fit(X, y)
@@ -305,7 +319,8 @@ class _Tuner:
 
     def _free_constant(self, equation: str) -> int | None:
         """Column of the constant that has no penalty."""
-        names = [term.name for term in self.blank.table.terms(equation)]
+        terms = self.blank.table.terms(equation)
+        names = [term.name for term in terms]
         if self.asked.free_constant and "0" in names:
             return names.index("0")
         return None
@@ -313,7 +328,8 @@ class _Tuner:
     def model(self, weight: float, bands: Sequence[float], rows: Flags) -> ShipModel:
         """The grey box with the corrections fitted to some of the rows."""
         coefficients = {}
-        for q, band in zip(self.samples.features, bands, strict=True):
+        equations = self.samples.features
+        for q, band in zip(equations, bands, strict=True):
             estimator = self.fitted(q, weight, band, rows)
             coefficients[q] = estimator.coef_
         return self.blank.with_accelerations(coefficients)
@@ -331,7 +347,8 @@ class _Tuner:
             errors = []
             for rows, held in folds:
                 model = self.model(weight, self.first_bands, rows)
-                errors.append(heading_error(model, held, "rmse"))
+                own = heading_error(model, held, "rmse")
+                errors.append(own)
             return float(np.mean(errors))
 
         errors = [error(weight) for weight in WEIGHTS]
@@ -349,7 +366,8 @@ class _Tuner:
             model = self.model(weight, bands.tolist(), self.everything)
             errors = []
             for trial in self.trials:
-                errors.append(heading_error(model, trial, asked.objective))
+                own = heading_error(model, trial, asked.objective)
+                errors.append(own)
             return float(np.mean(errors))
 
         search = pattern_search(
@@ -401,4 +419,5 @@ def heading_error(model: ShipModel, trial: Trial, objective: str) -> float:
         return root_mean_square(predicted - measured)
     if np.ptp(predicted) == 0.0 or np.ptp(measured) == 0.0:
         return 1.0
-    return 1.0 - float(np.corrcoef(predicted, measured)[0, 1])
+    correlations = np.corrcoef(predicted, measured)
+    return 1.0 - float(correlations[0, 1])

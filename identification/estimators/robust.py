@@ -22,7 +22,8 @@ def hampel_weights(residuals: Floats, largest: float) -> Floats:
     middle = np.median(residuals)
     deviations = np.abs(residuals - middle)
     scale = MAD * float(np.median(deviations))
-    rounding = 64 * np.finfo(float).eps * largest
+    machine = np.finfo(float)
+    rounding = 64 * machine.eps * largest
     if scale <= rounding:
         return np.ones(len(residuals))
 

@@ -243,8 +243,9 @@ def _relative_error(predicted: Trial, trial: Trial) -> float:
     for channel in ("u", "v", "r"):
         measured = trial[channel]
         if np.ptp(measured) > 0.0:
-            square = mean_square(predicted[channel] - measured)
-            ratios.append(square / np.var(measured))
+            errors = predicted[channel] - measured
+            ratio = mean_square(errors) / np.var(measured)
+            ratios.append(ratio)
     return float(np.mean(ratios))
 
 

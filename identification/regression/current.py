@@ -20,7 +20,7 @@ import numpy as np
 
 from identification.regression.velocities import over_ground
 from shipgym import Trial
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, Integers
 from shipgym.ships.simulate import wind_accelerations
 from shipgym.trials.navigation import rotate_to_body
 
@@ -100,7 +100,11 @@ def accelerations(
     u: Any, v: Any, at: SurgeSwayInputs, c: Coefficients
 ) -> tuple[Any, Any]:
     """Surge and sway acceleration by quadratic equations of any ship."""
-    surge = (
+    return _surge_acceleration(u, v, at, c), _sway_acceleration(u, v, at, c)
+
+
+def _surge_acceleration(u: Any, v: Any, at: SurgeSwayInputs, c: Coefficients) -> Any:
+    return (
         c.X_0
         + c.X_u * (u - at.n)
         + c.X_uu * (u**2 - at.n**2)
@@ -110,7 +114,10 @@ def accelerations(
         + (c.X_dd + c.X_uudd * u**2) * at.delta**2
         + c.wind * at.ahead
     )
-    sway = (
+
+
+def _sway_acceleration(u: Any, v: Any, at: SurgeSwayInputs, c: Coefficients) -> Any:
+    return (
         c.Y_0
         + c.Y_uv * u * v
         + c.Y_vv * v * abs(v)
@@ -121,7 +128,6 @@ def accelerations(
         + (c.Y_uud * u**2 + c.Y_d) * at.delta
         + c.wind * at.aside
     )
-    return surge, sway
 
 
 def estimate_current(
@@ -147,15 +153,11 @@ def estimate_current(
     known : array of shape (18,), optional
         Coefficients of another estimate, which are then not fitted.
     """
-    travel_time = length / speed
-    records = [_record(trial, travel_time, speed) for trial in trials]
-    runs = _together(records, _starting_shaft_speed(trials))
+    runs = _together(trials, length, speed)
     problem = _Problem(runs, shared, known)
     fit = problem.fitted()
-    information = problem.information(fit.slopes)
     n_parts = 1 if shared and len(trials) > 2 else 3
-    jackknife = _jackknife(fit, runs, information, n_parts)
-    covariance = jackknife + np.linalg.inv(information)
+    covariance = _covariance(problem, fit, n_parts)
 
     columns = problem.current_columns.ravel()
     return CurrentEstimate(
@@ -165,31 +167,36 @@ def estimate_current(
     )
 
 
-def _jackknife(
-    fit: "_Fit",
-    runs: "_Runs",
-    information: Floats,
-    n_parts: int,
-) -> Floats:
-    """Covariance by estimates with each part of each trial left out.
-
-    Each is one step of Gauss & Newton away from the estimate by all.
-    """
+def _covariance(problem: "_Problem", fit: "_Fit", n_parts: int) -> Floats:
+    """Covariance of the unknowns, with that by each part of each trial left out."""
+    information = problem.information(fit.slopes)
     changes = []
-    for k in range(runs.n_trials):
-        is_measured = np.isfinite(runs.seen[:, 0, k])
+    for k, seen in enumerate(problem.runs.seen.T):
+        is_measured = np.isfinite(seen[0])
         windows = np.flatnonzero(is_measured)
         for part in np.array_split(windows, n_parts):
-            slopes = fit.slopes[part, :, k].reshape(-1, len(fit.x))
-            residuals = fit.residuals[part, :, k].ravel()
-            score = slopes.T @ residuals
-            information_left = information - slopes.T @ slopes
-            change = np.linalg.solve(information_left, score)
+            change = _change_without(part, k, fit, information)
             changes.append(change)
 
     n_changes = len(changes)
     inflation = (n_changes - 1) ** 2 / n_changes
-    return np.asarray(np.cov(np.transpose(changes)) * inflation)
+    scatter = np.cov(np.transpose(changes))
+    of_noise = np.linalg.inv(information)
+    return np.asarray(scatter * inflation + of_noise)
+
+
+def _change_without(
+    windows: Integers,
+    trial: int,
+    fit: "_Fit",
+    information: Floats,
+) -> Floats:
+    """One step of Gauss & Newton to the estimate without some windows of a trial."""
+    slopes = fit.slopes[windows, :, trial].reshape(-1, len(fit.x))
+    residuals = fit.residuals[windows, :, trial].ravel()
+    score = slopes.T @ residuals
+    information_left = information - slopes.T @ slopes
+    return np.asarray(np.linalg.solve(information_left, score))
 
 
 class _Record(NamedTuple):
@@ -202,12 +209,31 @@ class _Record(NamedTuple):
     #: measured
     seen: tuple[Floats, Floats, Floats]
 
+    def inputs_on(self, grid: Floats, shaft_speed: float | None) -> Floats:
+        """Inputs at the times of a grid, shaft speeds by that at the start.
+
+        Shape (n_times, 5).
+        """
+        shaft = np.ones(len(self.t))
+        if shaft_speed is not None:
+            shaft = self.inputs.n / shaft_speed
+        relative = self.inputs._replace(n=shaft)
+        return _on_grid(grid, self.t, relative)
+
+    def seen_on(self, grid: Floats) -> Floats:
+        """Velocities at the times of a grid; NaN after the end, shape (n_times, 3)."""
+        velocities = _on_grid(grid, self.t, self.seen)
+        is_after = grid > self.t[-1]
+        velocities[is_after] = np.nan
+        return velocities
+
 
 def _record(trial: Trial, travel_time: float, speed: float) -> _Record:
     wind = wind_accelerations(trial) * travel_time / speed
     shaft = trial["n"] if "n" in trial else np.zeros(len(trial))
+    psi = trial["psi"]
     ahead, aside = over_ground(trial)
-    north, east = rotate_to_body(ahead, aside, -trial["psi"])
+    north, east = rotate_to_body(ahead, aside, -psi)
     logged = np.full(len(trial), np.nan)
     if "v" in trial.derived and "u" not in trial.derived:
         logged = trial["u"]
@@ -222,7 +248,7 @@ def _record(trial: Trial, travel_time: float, speed: float) -> _Record:
     return _Record(
         t=(trial.t - trial.t[0]) / travel_time,
         inputs=inputs,
-        psi=trial["psi"],
+        psi=psi,
         seen=(north / speed, east / speed, logged / speed),
     )
 
@@ -240,26 +266,22 @@ class _Runs:
         return len(self.psi[0])
 
 
-def _together(records: Sequence[_Record], shaft_speed: float | None) -> _Runs:
-    """The records on one grid, shaft speeds by that at the start."""
+def _together(trials: Sequence[Trial], length: float, speed: float) -> _Runs:
+    """The trials on one grid, in units of length and service speed."""
+    travel_time = length / speed
+    records = [_record(trial, travel_time, speed) for trial in trials]
+    shaft_speed = _starting_shaft_speed(trials)
+
     longest = max(record.t[-1] for record in records)
     window = STEP * STEPS
-    n_windows = int(longest / window)
-    grid: Floats = np.arange(n_windows * STEPS + 1, dtype=np.float64) * STEP
+    n_steps = int(longest / window) * STEPS
+    grid: Floats = np.arange(n_steps + 1, dtype=np.float64) * STEP
 
     inputs, headings, seen = [], [], []
     for record in records:
-        t = record.t
-        shaft = np.ones(len(t))
-        if shaft_speed is not None:
-            shaft = record.inputs.n / shaft_speed
-        moving = record.inputs._replace(n=shaft)
-        inputs.append(_on_grid(grid, t, moving))
-        headings.append(np.interp(grid, t, record.psi))
-
-        motion = _on_grid(grid, t, record.seen)
-        motion[grid > t[-1]] = np.nan
-        seen.append(motion)
+        inputs.append(record.inputs_on(grid, shaft_speed))
+        headings.append(np.interp(grid, record.t, record.psi))
+        seen.append(record.seen_on(grid))
     return _Runs(
         inputs=np.stack(inputs, axis=-1),
         psi=np.stack(headings, axis=-1),
@@ -269,16 +291,20 @@ def _together(records: Sequence[_Record], shaft_speed: float | None) -> _Runs:
 
 def _on_grid(grid: Floats, t: Floats, rows: Sequence[Floats]) -> Floats:
     """Rows of samples at the times of the grid, shape (n_times, n_rows)."""
-    return np.column_stack([np.interp(grid, t, row) for row in rows])
+    columns = [np.interp(grid, t, row) for row in rows]
+    return np.column_stack(columns)
 
 
 def _starting_shaft_speed(trials: Sequence[Trial]) -> float | None:
     """Median shaft speed at the start, 1/s; None where not all trials turn ahead."""
     starts = []
     for trial in trials:
-        if "n" not in trial or not trial["n"][0] > 0.0:
+        if "n" not in trial:
             return None
-        starts.append(trial["n"][0])
+        start = trial["n"][0]
+        if not start > 0.0:
+            return None
+        starts.append(start)
     return float(np.median(starts))
 
 
@@ -308,16 +334,17 @@ class _Problem:
 
     def __init__(self, runs: _Runs, shared: bool, known: Floats | None) -> None:
         self.runs = runs
-        pairs = np.arange(2 * runs.n_trials).reshape(-1, 2)
+        n_trials = runs.n_trials
+        n_currents = 1 if shared else n_trials
+        pairs = np.arange(2 * n_trials).reshape(-1, 2)
         self.start_columns = N_COEFFICIENTS + pairs
         self.current_columns = self.start_columns + pairs.size
-        n_currents = runs.n_trials
         if shared:
-            self.current_columns = np.tile(self.current_columns[0], (len(pairs), 1))
-            n_currents = 1
+            first = self.current_columns[0]
+            self.current_columns = np.tile(first, (n_trials, 1))
 
         of_coefficients = np.ones(N_COEFFICIENTS)
-        of_starts = np.tile([0.3, 0.15], runs.n_trials)  # u and v
+        of_starts = np.tile([0.3, 0.15], n_trials)  # u and v
         of_currents = np.full(2 * n_currents, 0.5)
         deviations = np.concatenate([of_coefficients, of_starts, of_currents])
         self.centre = np.zeros(len(deviations))
@@ -335,21 +362,25 @@ class _Problem:
         """
         c = _coefficients_by_lane(x[:N_COEFFICIENTS])
         u, v = self._starts_by_lane(x, n_lanes=len(c.X_0))
-        motion = [(u, v)]
+        surge, sway = [u], [v]
         for now, then in pairwise(self.runs.inputs):
             u, v = _midpoint_step(u, v, now, then, c)
-            motion.append((u, v))
+            surge.append(u)
+            sway.append(v)
 
-        ahead, aside = np.array(motion).swapaxes(0, 1)
+        ahead = np.array(surge)
+        aside = np.array(sway)
         heading = self.runs.psi[:, None]
         north, east = rotate_to_body(ahead, aside, -heading)
-        return _averaged(np.stack([north, east, ahead], axis=1))
+        velocities = np.stack([north, east, ahead], axis=1)
+        return _averaged(velocities)
 
     def _starts_by_lane(self, x: Floats, n_lanes: int) -> tuple[Floats, Floats]:
         """Starting u and v, shape (n_lanes, n_trials), each moved in its own lane."""
         at_start = SurgeSwayInputs(*self.runs.inputs[0])
         u, v = x[self.start_columns].T
-        u = np.tile(u + at_start.n, (n_lanes, 1))
+        u = u + at_start.n
+        u = np.tile(u, (n_lanes, 1))
         v = np.tile(v, (n_lanes, 1))
         u[-2] += DIFFERENCE
         v[-1] += DIFFERENCE
@@ -361,44 +392,50 @@ class _Problem:
         Shapes (n_windows, 3, n_trials) and (n_windows, 3, n_trials, n_unknowns): north,
         east, and ahead through the water; 0 where nothing was measured.
         """
-        lanes = np.moveaxis(self.simulated(x), 2, -1)
-        as_given = lanes[..., 0]
+        simulated = self.simulated(x)
+        lanes = np.moveaxis(simulated, 2, -1)
+        predicted = lanes[..., 0].copy()
+        predicted[:, :2] += x[self.current_columns].T
+        errors = self.runs.seen - predicted
+        slopes = self._slopes(lanes)
+
+        is_missing = np.isnan(self.runs.seen)
+        errors[is_missing] = 0.0
+        slopes[is_missing] = 0.0
+        return errors, slopes
+
+    def _slopes(self, lanes: Floats) -> Floats:
+        """Slopes of velocities by the unknowns, from simulated lanes as last axis."""
+        as_given = lanes[..., :1]
         moved = lanes[..., 1:]
-        by_unknown = (moved - as_given[..., None]) / DIFFERENCE
+        by_unknown = (moved - as_given) / DIFFERENCE
+        by_coefficient = by_unknown[..., :N_COEFFICIENTS]
         by_start = by_unknown[..., N_COEFFICIENTS:]
 
-        predicted = as_given.copy()
-        predicted[:, :2] += x[self.current_columns].T
-        slopes = np.zeros((*predicted.shape, len(x)))
-        slopes[..., :N_COEFFICIENTS] = by_unknown[..., :N_COEFFICIENTS]
+        *shape, _ = lanes.shape
+        n_unknowns = len(self.centre)
+        slopes = np.zeros((*shape, n_unknowns))
+        slopes[..., :N_COEFFICIENTS] = by_coefficient
         for k in range(self.runs.n_trials):
             own_start = self.start_columns[k]
             slopes[:, :, k, own_start] = by_start[:, :, k]
             north, east = self.current_columns[k]
             slopes[:, 0, k, north] = 1.0
             slopes[:, 1, k, east] = 1.0
-
-        measured = self.runs.seen
-        is_missing = np.isnan(measured)
-        slopes[is_missing] = 0.0
-        errors = np.where(is_missing, 0.0, measured - predicted)
-        return errors, slopes
+        return slopes
 
     def fitted(self, most_rounds: int = 20, enough: float = 1e-3) -> _Fit:
         """Fit by Levenberg & Marquardt; each round renews the residuals' scale."""
-        rounding = 0.003  # of the sensors
-        n_measured = int(np.isfinite(self.runs.seen).sum())
-        freedom = max(n_measured - len(self.centre), 1)
-
         x = self.centre
         damping = 1e-2
         scale = 0.1
         errors, slopes = self.errors(x)
         for _ in range(most_rounds):
-            before = self._cost(x, errors / scale)
+            residuals = errors / scale
+            before = self._cost(x, residuals)
             moved = x + self._step(
                 x,
-                residuals=errors / scale,
+                residuals=residuals,
                 slopes=slopes / scale,
                 damping=damping,
             )
@@ -409,8 +446,7 @@ class _Problem:
                 errors = new_errors
                 slopes = new_slopes
                 damping = max(0.1 * damping, 1e-9)
-                deviation = np.sqrt(np.sum(errors**2) / freedom)
-                scale = max(float(deviation), rounding)
+                scale = self._scale(errors)
             else:
                 damping *= 10.0
             if abs(before - after) < enough * before:
@@ -420,6 +456,15 @@ class _Problem:
             slopes=slopes / scale,
             residuals=errors / scale,
         )
+
+    def _scale(self, errors: Floats) -> float:
+        """Standard deviation of the errors, at least that of the sensors' rounding."""
+        is_measured = np.isfinite(self.runs.seen)
+        n_measured = int(is_measured.sum())
+        freedom = max(n_measured - len(self.centre), 1)
+        variance = np.sum(errors**2) / freedom
+        rounding = 0.003
+        return max(float(np.sqrt(variance)), rounding)
 
     def _step(
         self,
@@ -433,17 +478,20 @@ class _Problem:
         from_prior = self.weights**2 * (x - self.centre)
         downhill = J.T @ residuals.ravel() - from_prior
         hessian = self.information(slopes)
-        damped = hessian + damping * np.diag(np.diag(hessian))
+        diagonal = np.diag(np.diag(hessian))
+        damped = hessian + damping * diagonal
         return np.asarray(np.linalg.solve(damped, downhill))
 
     def information(self, slopes: Floats) -> Floats:
         """Inverse covariance of the unknowns by the slopes and the prior."""
         J = slopes.reshape(-1, len(self.weights))
-        return J.T @ J + np.diag(self.weights**2)
+        of_prior = np.diag(self.weights**2)
+        return J.T @ J + of_prior
 
     def _cost(self, x: Floats, residuals: Floats) -> float:
         from_prior = self.weights * (x - self.centre)
-        return float(np.sum(residuals**2) + np.sum(from_prior**2))
+        misfit = np.sum(residuals**2)
+        return float(misfit + np.sum(from_prior**2))
 
 
 def _coefficients_by_lane(deviations: Floats) -> Coefficients:
@@ -455,9 +503,11 @@ def _coefficients_by_lane(deviations: Floats) -> Coefficients:
     mean = MEAN + deviations * DEVIATION
     values = np.tile(mean, (n_lanes, 1))
     moved = np.arange(N_COEFFICIENTS)
-    values[1 + moved, moved] += DIFFERENCE * DEVIATION
-    columns = values.T[:, :, None]
-    return Coefficients(*columns)
+    own_lane = 1 + moved
+    values[own_lane, moved] += DIFFERENCE * DEVIATION
+
+    by_coefficient = values.T
+    return Coefficients(*by_coefficient[:, :, None])
 
 
 def _midpoint_step(
@@ -471,8 +521,9 @@ def _midpoint_step(
     surge, sway = accelerations(u, v, SurgeSwayInputs(*now), c)
     u_half = u + 0.5 * STEP * surge
     v_half = v + 0.5 * STEP * sway
-    halfway = 0.5 * (now + then)
-    surge, sway = accelerations(u_half, v_half, SurgeSwayInputs(*halfway), c)
-    u = np.clip(u + STEP * surge, -2.0, 3.0)
-    v = np.clip(v + STEP * sway, -2.0, 2.0)
-    return u, v
+
+    mean = 0.5 * (now + then)
+    surge, sway = accelerations(u_half, v_half, SurgeSwayInputs(*mean), c)
+    u = u + STEP * surge
+    v = v + STEP * sway
+    return np.clip(u, -2.0, 3.0), np.clip(v, -2.0, 2.0)

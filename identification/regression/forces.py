@@ -5,7 +5,7 @@ one column; the rows of X, Y and N are stacked. Source: Xu, Hassani & Guedes Soa
 2020, equations 18 to 22, who fit the equations one after the other.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_choice
 from shipgym.manoeuvres.towing_tank import rigid_body_forces
-from shipgym.ships import get_structure
+from shipgym.ships import Term, get_structure
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
 
 FORCES = ("X", "Y", "N")
@@ -62,8 +62,10 @@ class ForceRegression:
         sizes = []
         for i in range(len(FORCES)):
             own = self.targets[self.equation == i]
-            sizes.append(root_mean_square(own) or 1.0)
-        return np.array(sizes)[self.equation]
+            size = root_mean_square(own)
+            sizes.append(size or 1.0)
+        by_force = np.array(sizes)
+        return by_force[self.equation]
 
     def r_squared(self, coefficients: Floats) -> dict[str, float]:
         """Share of the variance of X, Y and N that is explained (equation 22)."""
@@ -71,7 +73,8 @@ class ForceRegression:
         shares = {}
         for i, force in enumerate(FORCES):
             own = self.equation == i
-            shares[force] = float(r2_score(self.targets[own], fitted[own]))
+            share = r2_score(self.targets[own], fitted[own])
+            shares[force] = float(share)
         return shares
 
 
@@ -107,14 +110,12 @@ def force_regression(
         )
     ship = particulars.completed()
     features, targets, index = [], [], []
-    for i, trial in enumerate(trials):
-        _check_channels(trial, structure)
-        for rows in between_jumps(trial):
-            piece = trial.part(rows)
-            motion = _prime_motion(piece, ship)
-            features.append(_shares(motion, structure))
-            targets.append(_prime_forces(piece, motion, ship, model_inertia))
-            index += [i] * len(piece)
+    for i, piece in _pieces(trials, structure):
+        motion = _prime_motion(piece, ship)
+        forces = _prime_forces(piece, motion, ship, model_inertia)
+        features.append(_shares(motion, structure))
+        targets.append(forces)
+        index += [i] * len(piece)
     if not index:
         raise InputError(
             f"trial {trials[0].name!r}: expected {FEWEST} samples somewhere between"
@@ -130,6 +131,16 @@ def force_regression(
         equation=np.repeat(np.arange(n_forces), n_rows),
         trial=np.tile(index, n_forces),
     )
+
+
+def _pieces(
+    trials: Sequence[Trial], structure: SharedStructure
+) -> Iterator[tuple[int, Trial]]:
+    """Parts of trials between jumps of the velocity, each with its trial's index."""
+    for i, trial in enumerate(trials):
+        _check_channels(trial, structure)
+        for rows in between_jumps(trial):
+            yield i, trial.part(rows)
 
 
 def _check_channels(trial: Trial, structure: SharedStructure) -> None:
@@ -155,10 +166,10 @@ def between_jumps(trial: Trial) -> list[slice]:
         velocity = trial[name]
         changes = np.abs(np.diff(velocity))
         usual = float(np.median(changes))
-        rounding = 1e-9 * float(np.abs(velocity).max())
+        fastest = float(np.abs(velocity).max())
+        rounding = 1e-9 * fastest
         largest = max(jump * usual, rounding)
         is_jump |= changes > largest + rounding
-
     return stretches(is_jump, FEWEST)
 
 
@@ -176,9 +187,10 @@ def _prime_motion(trial: Trial, ship: Particulars) -> dict[str, Floats]:
     for name, scale in scales.items():
         velocity = trial[name]
         spline = CubicSpline(trial.t, velocity)
-        rate = spline(trial.t, 1)
-        motion[name] = velocity * scale / speed
-        motion[f"|{name}|"] = np.abs(motion[name])
+        rate = spline(trial.t, nu=1)
+        prime = velocity * scale / speed
+        motion[name] = prime
+        motion[f"|{name}|"] = np.abs(prime)
         motion[f"{name}dot"] = rate * length / speed**2 * scale
     return motion
 
@@ -218,12 +230,19 @@ def _shares(motion: dict[str, Floats], structure: SharedStructure) -> Floats:
     found = np.zeros((len(AXES), n_samples, len(names)))
     for i, axis in enumerate(AXES):
         for share in structure.shares[axis]:
-            factors = []
-            for symbol, power in share.term.powers:
-                factors.append(motion[symbol] ** float(power))
             column = names.index(share.coefficient)
-            found[i, :, column] += share.sign * np.prod(factors, axis=0)
+            value = _value(share.term, motion)
+            found[i, :, column] += share.sign * value
     return found
+
+
+def _value(term: Term, motion: dict[str, Floats]) -> Floats:
+    """The product of a term's powers."""
+    factors = []
+    for symbol, power in term.powers:
+        factor = motion[symbol] ** float(power)
+        factors.append(factor)
+    return np.asarray(np.prod(factors, axis=0))
 
 
 def fit_forces(
@@ -239,13 +258,15 @@ def fit_forces(
     targets = regression.targets / scales
     estimator.fit(features, targets)
 
-    residuals = targets - estimator.predict(features)
+    fitted = estimator.predict(features)
+    residuals = targets - fitted
     half = features @ estimator.inverse_moment_
     leverages = np.sum(half * features, axis=1)
     by_force = force_variances(regression.equation, residuals, leverages)
     variances = by_force[regression.equation]
     covariance = (half.T * variances) @ half
-    return estimator.coef_, 0.5 * (covariance + covariance.T)
+    symmetric = 0.5 * (covariance + covariance.T)
+    return estimator.coef_, symmetric
 
 
 def force_variances(equation: Integers, residuals: Floats, leverages: Floats) -> Floats:
@@ -260,7 +281,8 @@ def force_variances(equation: Integers, residuals: Floats, leverages: Floats) ->
         own = equation == i
         own_residuals = residuals[own]
         squares = np.sum(own_residuals**2, axis=0)
-        freedom = float(np.sum(1.0 - leverages[own]))
+        free = 1.0 - leverages[own]
+        freedom = float(np.sum(free))
         variances.append(squares / max(freedom, 1.0))
     return np.array(variances)
 
@@ -297,12 +319,7 @@ def identify_forces(
     steering, name : optional
         Of the model; the name by default the ship's.
     """
-    check_choice(method, METHODS, "method")
-    if rank is not None and method != "tls-svm":
-        raise InputError(
-            f"rank: expected none with method {method!r}, which keeps all, got {rank};"
-            " choose 'tls-svm'"
-        )
+    estimator = _estimator(method, rank)
     if particulars is None:
         raise InputError(
             "particulars: expected at least length, speed and mass of the ship, got"
@@ -314,9 +331,6 @@ def identify_forces(
         structure=table,
         particulars=particulars,
         model_inertia=model_inertia,
-    )
-    estimator = TruncatedLSSVM(
-        selection=METHODS[method], rank=rank, fit_intercept=False
     )
     values, covariance = fit_forces(regression, estimator)
     provenance = {
@@ -334,6 +348,20 @@ def identify_forces(
         covariance=covariance,
         provenance=provenance,
         coefficients=by_name(regression.names, values),
+    )
+
+
+def _estimator(method: str, rank: int | None) -> TruncatedLSSVM:
+    check_choice(method, METHODS, "method")
+    if rank is not None and method != "tls-svm":
+        raise InputError(
+            f"rank: expected none with method {method!r}, which keeps all, got {rank};"
+            " choose 'tls-svm'"
+        )
+    return TruncatedLSSVM(
+        selection=METHODS[method],
+        rank=rank,
+        fit_intercept=False,
     )
 
 

@@ -51,5 +51,6 @@ def _gaps(t: Floats, particulars: Particulars) -> Flags:
     # unless it is shorter than this part of the time to sail one ship length
     shortest_gap = 0.15
     longest = np.maximum(largest_steps * usual, shortest_gap * one_length)
-    is_gap: Flags = steps > (1.0 + 1e-6) * longest
+    but_for_rounding = 1.0 + 1e-6
+    is_gap: Flags = steps > but_for_rounding * longest
     return is_gap

@@ -83,7 +83,8 @@ def chosen_box(
         otherwise = 'choose structure "abkowitz" or "cubic"'
         check_alike(reference, similarity[reference], otherwise)
     box = grey_box(reference)
-    return replace(box, shaft=box.shaft and "n" in recorded), similarity
+    has_shaft = box.shaft and "n" in recorded
+    return replace(box, shaft=has_shaft), similarity
 
 
 def explained_samples(
@@ -115,11 +116,12 @@ def bare_metrics(model: ShipModel, trials: Sequence[Trial]) -> dict[str, Any]:
 
     Returns her name and the `trial_metrics` by trial.
     """
-    assert isinstance(model.table, GreyBox)
+    box = model.table
+    assert isinstance(box, GreyBox)
     no_correction = dict.fromkeys(model.coefficients, 0.0)
     bare = replace(model, coefficients=no_correction, covariance=None)
     metrics = {}
     for trial in trials:
         predicted = predict(bare, trial)
         metrics[trial.name] = trial_metrics(bare, trial, predicted)
-    return {"name": model.table.ship.name, "trials": metrics}
+    return {"name": box.ship.name, "trials": metrics}

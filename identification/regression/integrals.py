@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from identification.regression.rudder import Rudder
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, Integers
 
 Channels = Mapping[str, Floats]
 #: The terms of each equation, arrays of shape (n_samples, n_terms), from the channels
@@ -42,8 +42,10 @@ def step_integrals(t: Floats, channels: Channels, terms: Terms, rule: str) -> In
     found = Integrals({}, {})
     for equation, values in terms(channels).items():
         start = values[:-1]
-        end = values[1:]
-        mean = start if rule == "euler" else 0.5 * (start + end)
+        mean = start
+        if rule != "euler":
+            end = values[1:]
+            mean = 0.5 * (start + end)
         integral = mean * steps
         found.terms[equation] = integral
         found.moments[equation] = 0.5 * integral * steps
@@ -60,27 +62,50 @@ def spline_integrals(
 
     Both break where the rudder has corners.
     """
-    edges = np.union1d(t, rudder.corners)
+    rule = _quadrature(t, rudder.corners)
+    at_nodes = _interpolated(t, channels, rudder, rule.nodes.ravel())
+    moment_weights = rule.weights * rule.to_end
+    found = Integrals({}, {})
+    for equation, values in terms(at_nodes).items():
+        found.terms[equation] = rule.integrated(values, rule.weights)
+        found.moments[equation] = rule.integrated(values, moment_weights)
+    return found
+
+
+class _Quadrature(NamedTuple):
+    """Gauss quadrature between edges, the samples and the rudder's corners.
+
+    Nodes, their weights and their times to the end of the step have the shape
+    (n_pieces, 5).
+    """
+
+    nodes: Floats
+    weights: Floats
+    to_end: Floats
+    first_of_step: Integers  # index of each step's first piece
+
+    def integrated(self, values: Floats, weights: Floats) -> Floats:
+        """Integrals over each step of values at the nodes, (n_nodes, n_terms)."""
+        by_piece = values.reshape(*self.nodes.shape, -1)
+        pieces = np.einsum("ijk,ij->ik", by_piece, weights)
+        return np.asarray(np.add.reduceat(pieces, self.first_of_step, axis=0))
+
+
+def _quadrature(t: Floats, corners: Floats) -> _Quadrature:
+    edges = np.union1d(t, corners)
     middle = 0.5 * (edges[1:] + edges[:-1])
     half = 0.5 * np.diff(edges)[:, None]
     nodes = middle[:, None] + half * NODES
-    at_nodes = _interpolated(t, channels, rudder, nodes.ravel())
 
-    weights = half * WEIGHTS
-    step = np.searchsorted(t, middle, side="right") - 1
-    to_end = t[step + 1][:, None] - nodes
-    first_of_step = np.flatnonzero(np.diff(step, prepend=-1))
-
-    def integrated(values: Floats, weights: Floats) -> Floats:
-        between_edges = np.einsum("ijk,ij->ik", values, weights)
-        return np.asarray(np.add.reduceat(between_edges, first_of_step, axis=0))
-
-    found = Integrals({}, {})
-    for equation, values in terms(at_nodes).items():
-        of_nodes = values.reshape(*nodes.shape, -1)
-        found.terms[equation] = integrated(of_nodes, weights)
-        found.moments[equation] = integrated(of_nodes, weights * to_end)
-    return found
+    following = np.searchsorted(t, middle, side="right")
+    ends = t[following]
+    step = following - 1
+    return _Quadrature(
+        nodes=nodes,
+        weights=half * WEIGHTS,
+        to_end=ends[:, None] - nodes,
+        first_of_step=np.flatnonzero(np.diff(step, prepend=-1)),
+    )
 
 
 def _interpolated(
@@ -111,6 +136,11 @@ def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
     """
     if len(t) <= DEGREE:
         return make_interp_spline(t, values, k=1)
+    return make_interp_spline(t, values, k=DEGREE, t=_broken_knots(t, rudder))
+
+
+def _broken_knots(t: Floats, rudder: Rudder) -> Floats:
+    """Knots of the spline, at samples and corners."""
     not_a_knot = slice(2, len(t) - 2)
     knots = t[not_a_knot]
     corners: list[float] = []
@@ -125,14 +155,14 @@ def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
         if _is_solvable(t, _with_ends(t, kept, broken)):
             knots = kept
             corners = broken
-    every_knot = _with_ends(t, knots, corners)
-    return make_interp_spline(t, values, k=DEGREE, t=every_knot)
+    return _with_ends(t, knots, corners)
 
 
 def _is_far(t: Floats, knots: Floats, corner: float) -> bool:
     """Return whether a knot is more than two samples away from a corner."""
     at_corner = np.searchsorted(t, corner)
-    samples_away = np.abs(np.searchsorted(t, knots) - at_corner)
+    at_knots = np.searchsorted(t, knots)
+    samples_away = np.abs(at_knots - at_corner)
     return bool(np.any(samples_away > 2))
 
 
@@ -158,7 +188,8 @@ def _is_solvable(t: Floats, knots: Floats) -> bool:
     ends = knots[DEGREE + 1 :]
     has_sample = (begins < t) & (t < ends)
     # the first and the last function have the samples at the ends
-    return bool(np.all(has_sample[1:-1]))
+    inner = has_sample[1:-1]
+    return bool(np.all(inner))
 
 
 def twice_integrated(t: Floats, integrals: Floats, moments: Floats) -> Floats:

@@ -73,36 +73,21 @@ def pose(trials: Sequence[Trial], options: Options) -> Problem:
     if is_yaw_alone:
         used = [_at_service_speed(trial, particulars) for trial in used]
         everything = [_at_service_speed(trial, particulars) for trial in everything]
-    check_trials(used, table)
-    ship = _ship(particulars, used, table)
-    for trial in used:
-        check_scale(trial, ship, f"trial {trial.name!r}")
-
+    ship = _checked_ship(particulars, used, table)
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
-    sampling: dict[str, Any] = {
-        "samples": options.samples.rule,
-        "window": options.samples.window,
-        "smoothing": options.preprocessing.smoothing,
-        "gear": options.steering,
-    }
-    samples = build_samples(
-        used,
-        structure=table,
-        particulars=ship,
-        shaft_speed=shaft,
+    sampling = _sampling(options)
+    regression = {
+        "structure": table,
+        "particulars": ship,
+        "shaft_speed": shaft,
         **sampling,
-    )
+    }
+    samples = build_samples(used, **regression)
     if options.wind == "constant":
         constants = constant_wind(used, samples, options.structure)
         used = [with_constant_wind(trial, constants) for trial in used]
         everything = [with_constant_wind(trial, constants) for trial in everything]
-        samples = build_samples(
-            used,
-            structure=table,
-            particulars=ship,
-            shaft_speed=shaft,
-            **sampling,
-        )
+        samples = build_samples(used, **regression)
         sea["wind"] = {"option": "constant", "accelerations": constants}
     check_samples(samples, used, table)
 
@@ -118,6 +103,27 @@ def pose(trials: Sequence[Trial], options: Options) -> Problem:
     )
 
 
+def _sampling(options: Options) -> dict[str, Any]:
+    """Keywords of `build_samples` that the options give."""
+    return {
+        "samples": options.samples.rule,
+        "window": options.samples.window,
+        "smoothing": options.preprocessing.smoothing,
+        "gear": options.steering,
+    }
+
+
+def _checked_ship(
+    particulars: Given, used: Sequence[Trial], table: Structure
+) -> Particulars:
+    """The ship's particulars, once her trials suit the structure and her scale."""
+    check_trials(used, table)
+    ship = _ship(particulars, used, table)
+    for trial in used:
+        check_scale(trial, ship, f"trial {trial.name!r}")
+    return ship
+
+
 def _at_service_speed(trial: Trial, particulars: Given) -> Trial:
     """A trial of heading and rudder alone, as if sailed at the service speed."""
     if particulars is None or {"u", "v"} & trial.channels.keys():
@@ -128,7 +134,8 @@ def _at_service_speed(trial: Trial, particulars: Given) -> Trial:
 
     n_samples = len(trial)
     ahead = np.full(n_samples, float(speed))
-    return trial.with_channels({"u": ahead, "v": np.zeros(n_samples)})
+    aside = np.zeros(n_samples)
+    return trial.with_channels({"u": ahead, "v": aside})
 
 
 def _blank(
@@ -144,10 +151,6 @@ def _blank(
         gear = estimated_gear(used) if table.has_rudder else SteeringGear()
 
     dynamics = get_dynamics(MMG) if table is MMG_CHANNELS else table
-    samples = []
-    for channel in ("u", "v", "r", "delta"):
-        of_trials = [trial[channel] for trial in used]
-        samples.append(np.concatenate(of_trials))
     return ShipModel(
         name=options.name or ship["name"],
         structure=table.name,
@@ -156,8 +159,16 @@ def _blank(
         service_shaft_speed=shaft,
         coefficients=dict.fromkeys(dynamics.coefficient_names, 0.0),
         dynamics=dynamics,
-        envelope=Envelope.from_samples(*samples),
+        envelope=_envelope(used),
     )
+
+
+def _envelope(trials: Sequence[Trial]) -> Envelope:
+    samples = []
+    for channel in ("u", "v", "r", "delta"):
+        of_trials = [trial[channel] for trial in trials]
+        samples.append(np.concatenate(of_trials))
+    return Envelope.from_samples(*samples)
 
 
 def held_out(trials: Any, names: str | Sequence[str]) -> Sequence[Trial]:

@@ -67,8 +67,8 @@ class Rudder:
         if not self.follows_gear:
             return np.asarray(np.interp(times, self.t, self.delta))
         following = np.searchsorted(self.t, times, side="right")
-        n_intervals = len(self.t) - 1
-        interval = np.clip(following - 1, 0, n_intervals - 1)
+        last = len(self.t) - 2
+        interval = np.clip(following - 1, 0, last)
         elapsed = times - self.t[interval]
         return self.within(interval, elapsed)
 
@@ -110,14 +110,20 @@ def rebuild(t: ArrayLike, delta: ArrayLike, gear: SteeringGear | None = None) ->
         return straight(t, delta)
 
     rudder = _with_gear(t, delta, response)
-    intervals = np.arange(len(t) - 1)
-    ends = rudder.within(intervals, np.diff(t))
-    largest_miss = np.abs(ends - delta[1:]).max()
-    reproduces = largest_miss <= TOLERANCE * np.ptp(delta)
     n_changes = int(np.sum(rudder.smoothness == 0))
-    if not reproduces or 8 * n_changes > len(t):
+    if not _reproduces_samples(rudder) or 8 * n_changes > len(t):
         return straight(t, delta)
     return rudder
+
+
+def _reproduces_samples(rudder: Rudder) -> bool:
+    """Whether each interval ends where the next one starts."""
+    steps = np.diff(rudder.t)
+    intervals = np.arange(len(steps))
+    ends = rudder.within(intervals, steps)
+    misses = np.abs(ends - rudder.delta[1:])
+    allowed = TOLERANCE * np.ptp(rudder.delta)
+    return bool(misses.max() <= allowed)
 
 
 def straight(t: Floats, delta: Floats) -> Rudder:
@@ -144,14 +150,43 @@ class _Corner(NamedTuple):
     smoothness: int
 
 
+class _Orders(NamedTuple):
+    """Orders of the intervals, as of `Rudder`."""
+
+    before: Floats
+    after: Floats
+    switch: Floats
+
+
 def _with_gear(t: Floats, delta: Floats, gear: GearResponse) -> Rudder:
     """The rudder of a gear, with the changes of its order."""
+    orders, corners = _changing_orders(t, delta, gear)
+    corners += _ramp_ends(gear, t, delta, orders)
+    inside = [corner for corner in sorted(corners) if t[0] < corner.time < t[-1]]
+    times = [corner.time for corner in inside]
+    smoothness = [corner.smoothness for corner in inside]
+    return Rudder(
+        t=t,
+        delta=delta,
+        rate=gear.rate,
+        time_constant=gear.lag,
+        follows_gear=True,
+        before=orders.before,
+        after=orders.after,
+        switch=orders.switch,
+        corners=np.array(times),
+        smoothness=np.array(smoothness, dtype=np.int64),
+    )
+
+
+def _changing_orders(
+    t: Floats, delta: Floats, gear: GearResponse
+) -> tuple[_Orders, list[_Corner]]:
+    """Orders of the intervals, and the corners where they change."""
     orders = gear.orders(t, delta)
     continues = goes_on(orders, delta).tolist()
     follows = [True, *continues, True]  # each interval the one before it
-    before = orders.copy()
-    after = orders.copy()
-    switch = np.diff(t)
+    found = _Orders(orders.copy(), orders.copy(), np.diff(t))
     corners: list[_Corner] = []
     for k, is_continued in enumerate(follows[:-1]):
         if is_continued:
@@ -171,29 +206,15 @@ def _with_gear(t: Floats, delta: Floats, gear: GearResponse) -> Rudder:
             end=delta[k + 1],
             first=first,
             second=second,
-            step=switch[k],
+            step=found.switch[k],
         )
         if elapsed is not None:
-            before[k] = first
-            after[k] = second
-            switch[k] = elapsed
+            found.before[k] = first
+            found.after[k] = second
+            found.switch[k] = elapsed
             time = float(t[k] + elapsed)
         corners.append(_Corner(time, 0))
-
-    corners += _ramp_ends(gear, t, delta, before, after, switch)
-    inside = [corner for corner in sorted(corners) if t[0] < corner.time < t[-1]]
-    return Rudder(
-        t=t,
-        delta=delta,
-        rate=gear.rate,
-        time_constant=gear.lag,
-        follows_gear=True,
-        before=before,
-        after=after,
-        switch=switch,
-        corners=np.array([corner.time for corner in inside]),
-        smoothness=np.array([corner.smoothness for corner in inside], dtype=np.int64),
-    )
+    return found, corners
 
 
 def _switch_time(
@@ -223,25 +244,24 @@ def _ramp_ends(
     gear: GearResponse,
     t: Floats,
     delta: Floats,
-    before: Floats,
-    after: Floats,
-    switch: Floats,
+    orders: _Orders,
 ) -> list[_Corner]:
     """Times at which a ramp ends inside an interval."""
     begins = t[:-1]
     starts = delta[:-1]
+    switch = orders.switch
     first = _ends_of_ramps(
         gear,
         begin=begins,
         start=starts,
-        order=before,
+        order=orders.before,
         length=switch,
     )
     second = _ends_of_ramps(
         gear,
         begin=begins + switch,
-        start=gear.angle(starts, before, switch),
-        order=after,
+        start=gear.angle(starts, orders.before, switch),
+        order=orders.after,
         length=np.diff(t) - switch,
     )
     smoothness = int(gear.lag > 0.0)
@@ -275,21 +295,28 @@ def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
     largest_deg = float(np.degrees(largest))
     limit_deg = min(max(35.0, largest_deg), 90.0)
 
-    exact = []
+    exact = _exact_gears(trials)
+    if exact:
+        rate, lag = np.median(exact, axis=0).tolist()
+    else:
+        rate = _usual_rate(trials)
+        lag = 0.0
+    rate_deg = float(np.degrees(rate))
+    return SteeringGear(limit_deg, rate_deg, lag)
+
+
+def _exact_gears(trials: Sequence[Trial]) -> list[GearResponse]:
+    """Gears that explain the rudders of records without noise."""
+    found = []
     for trial in trials:
         velocities = [trial[name] for name in ("u", "v", "r")]
         if is_noisy(trial.t, velocities):
             continue
         rudder = rebuild(trial.t, trial["delta"])
         if rudder.follows_gear:
-            exact.append((rudder.rate, rudder.time_constant))
-
-    if exact:
-        rate, lag = np.median(exact, axis=0).tolist()
-    else:
-        rate = _usual_rate(trials)
-        lag = 0.0
-    return SteeringGear(limit_deg, float(np.degrees(rate)), lag)
+            gear = GearResponse(rudder.rate, rudder.time_constant)
+            found.append(gear)
+    return found
 
 
 def _usual_rate(trials: Sequence[Trial]) -> float:
@@ -297,7 +324,8 @@ def _usual_rate(trials: Sequence[Trial]) -> float:
     by_trial = []
     for trial in trials:
         moves = np.diff(trial["delta"])
-        by_trial.append(np.abs(moves) / np.diff(trial.t))
+        steps = np.diff(trial.t)
+        by_trial.append(np.abs(moves) / steps)
     rates = np.concatenate(by_trial)
 
     moving = rates[rates > 0.0]

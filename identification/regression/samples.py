@@ -7,7 +7,7 @@ of Cao 2015), the spline structure Gauss quadrature on splines through the sampl
 broken where the rudder has corners.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -157,10 +157,14 @@ def build_samples(
     parts = []
     for index, trial in enumerate(trials):
         parts += regression.of_trial(trial, index)
+    return _stacked(parts, structure.regressed)
 
+
+def _stacked(parts: Sequence[Samples], equations: Iterable[str]) -> Samples:
+    """The rows of all parts, one after the other."""
     features = {}
     targets = {}
-    for q in structure.regressed:
+    for q in equations:
         features[q] = np.concatenate([part.features[q] for part in parts])
         targets[q] = np.concatenate([part.targets[q] for part in parts])
     return Samples(
@@ -210,22 +214,15 @@ class _Regression:
         t = trial.t
         names = self.structure.required_channels
         channels = smoothed_channels(trial, names, self.smoothing)
-        terms, moments = self._integrals(trial, channels)
-        if "q" in terms:
-            memory = twice_integrated(t, terms.pop("q"), moments["q"])
-            terms["r"] = np.hstack([terms["r"], memory])
-
         windows = _Windows(len(t), window)
         features, targets = {}, {}
-        for q, steps in terms.items():
+        for q, steps in self._terms_by_step(trial, channels).items():
             features[q] = windows.summed(steps)
             targets[q] = windows.changes(channels[q])
-            if f"wind_{q}dot" in trial:
-                by_wind = integral(t, trial[f"wind_{q}dot"])
+            wind = f"wind_{q}dot"
+            if wind in trial:
+                by_wind = integral(t, trial[wind])
                 targets[q] -= windows.changes(by_wind)
-            if isinstance(self.structure, GreyBox):
-                targets[q] -= features[q][:, -1]
-                features[q] = features[q][:, :-1]
 
         rows = Samples(
             features=features,
@@ -235,9 +232,20 @@ class _Regression:
             trial=np.full(len(windows.first), index),
             window=window,
         )
+        if isinstance(self.structure, GreyBox):
+            rows = _without_reference(rows)
         if "q" in self.structure.equations:
-            return without_memory(rows)
+            rows = without_memory(rows)
         return rows
+
+    def _terms_by_step(self, trial: Trial, channels: Channels) -> dict[str, Floats]:
+        """Integrals of the terms over each step; the memory's follow those of `r`."""
+        terms, moments = self._integrals(trial, channels)
+        if "q" in terms:
+            of_memory = terms.pop("q")
+            memory = twice_integrated(trial.t, of_memory, moments["q"])
+            terms["r"] = np.hstack([terms["r"], memory])
+        return terms
 
     def _integrals(self, trial: Trial, channels: Channels) -> Integrals:
         """Integrals of the terms over each step."""
@@ -284,8 +292,9 @@ class _Windows:
 
     def __init__(self, n_samples: int, steps: int) -> None:
         half = max(steps // 2, 1)
+        end = n_samples - steps
         self.steps = steps
-        self.first = np.arange(0, n_samples - steps, half)
+        self.first = np.arange(0, end, half)
         self.last = self.first + steps
 
     def changes(self, values: Floats) -> Floats:
@@ -296,8 +305,19 @@ class _Windows:
         """Sum over each window of rows, one a step."""
         if self.steps == 1:
             return rows
-        from_start = np.pad(np.cumsum(rows, axis=0), ((1, 0), (0, 0)))
+        sums = np.cumsum(rows, axis=0)
+        from_start = np.pad(sums, ((1, 0), (0, 0)))
         return self.changes(from_start)
+
+
+def _without_reference(rows: Samples) -> Samples:
+    """Rows of a grey box, whose last feature, her reference's, goes to the targets."""
+    features = {}
+    targets = {}
+    for q, columns, target in rows.by_equation():
+        features[q] = columns[:, :-1]
+        targets[q] = target - columns[:, -1]
+    return replace(rows, features=features, targets=targets)
 
 
 def default_window(trial: Trial, particulars: Particulars) -> int:
@@ -309,14 +329,16 @@ def default_window(trial: Trial, particulars: Particulars) -> int:
     one_length = particulars["length"] / particulars["speed"]
     longest_window = 1.0 / 3.0  # of the time to sail one ship length
     by_travel = int(longest_window * one_length / usual_step(trial.t))
-    longest = min(by_travel, len(trial) // 20)
+    by_trial = len(trial) // 20
+    longest = min(by_travel, by_trial)
 
     window = 1
     for channel in "uvr":
-        ratio = noise_ratio(trial.t, trial[channel])
+        values = trial[channel]
+        ratio = noise_ratio(trial.t, values)
         while ratio > NOISY and window < longest:
             window += 1
-            ratio = noise_ratio(trial.t, trial[channel], window)
+            ratio = noise_ratio(trial.t, values, window)
     return window
 
 
@@ -346,9 +368,12 @@ def without_memory(rows: Samples) -> Samples:
     duration = rows.duration
     both = 0.5 * (duration[first] + duration[second])
     mean_features = rows.features["r"] / duration[:, None]
-    features = (mean_features[second] - mean_features[first]) * both[:, None]
+    features = mean_features[second] - mean_features[first]
+    features *= both[:, None]
+
     mean_targets = rows.targets["r"] / duration
-    targets = (mean_targets[second] - mean_targets[first]) * both
+    targets = mean_targets[second] - mean_targets[first]
+    targets *= both
 
     chosen = rows.select(first)
     return replace(

@@ -45,11 +45,11 @@ def in_still_water(
         ship = Particulars.from_mapping(ship)
     remarks: list[str] = []
     report: dict[str, Any] = {}
-    free_running = {
-        trial.name: trial
-        for trial in trials
-        if trial.use != "skip" and trial.kind != "captive"
-    }
+    free_running = {}
+    for trial in trials:
+        if trial.use != "skip" and trial.kind != "captive":
+            free_running[trial.name] = trial
+
     found = _with_wind(
         free_running,
         ship=ship,
@@ -60,16 +60,27 @@ def in_still_water(
     if wind_speeds:
         report["wind"] = {"option": wind, "mean_speeds": wind_speeds}
 
-    speed = ship.speed or _starting_speed(found.values())
-    if current != "none" and speed > 0.0:
-        from identification.regression.trial_currents import without_current
-
-        rows = without_current(found, ship.length, speed, current, remarks)
-        if rows:
-            report["currents"] = rows
+    rows = _take_current_out(found, ship, current, remarks)
+    if rows:
+        report["currents"] = rows
     if remarks:
         report["sea_remarks"] = remarks
     return [found.get(trial.name, trial) for trial in trials], report
+
+
+def _take_current_out(
+    trials: dict[str, Trial],
+    ship: Particulars,
+    option: Any,
+    remarks: list[str],
+) -> dict[str, Any]:
+    """Take the current out of trials, where asked; a report on each."""
+    speed = ship.speed or _starting_speed(trials.values())
+    if option == "none" or not speed > 0.0:
+        return {}
+    from identification.regression.trial_currents import without_current
+
+    return without_current(trials, ship.length, speed, option, remarks)
 
 
 def _feels_sea(trial: Trial) -> bool:
@@ -82,7 +93,8 @@ def _mean_wind_speeds(trials: Mapping[str, Trial]) -> dict[str, float]:
     speeds = {}
     for name, trial in trials.items():
         if "wind_udot" in trial:
-            speeds[name] = float(trial["wind_speed"].mean())
+            mean = trial["wind_speed"].mean()
+            speeds[name] = float(mean)
     return speeds
 
 
@@ -92,8 +104,11 @@ def _starting_speed(trials: Iterable[Trial]) -> float:
     for trial in trials:
         if {"u", "v"} <= trial.channels.keys():
             ahead, aside = over_ground(trial)
-            starts.append(np.hypot(ahead[0], aside[0]))
-    return float(np.median(starts or [0.0]))
+            start = np.hypot(ahead[0], aside[0])
+            starts.append(start)
+    if not starts:
+        return 0.0
+    return float(np.median(starts))
 
 
 def _with_wind(

@@ -66,27 +66,35 @@ def without_current(
 
     Returns a report on each; `remarks` get those that were doubtful.
     """
-    one_heading = _keep_to_one_heading(found.values())
-    currents = currents_of(list(found.values()), length, speed, option)
+    trials = list(found.values())
+    one_heading = _keep_to_one_heading(trials)
+    currents = currents_of(trials, length, speed, option)
     rows: dict[str, Any] = {}
     doubtful: dict[str, list[str]] = {}
     for name, current in currents.items():
         doubt = _doubt(current, speed, one_heading)
-        if doubt and (option != "auto" or current.covariance is None):
-            _refuse(name, doubt, current)
         if doubt:
-            doubtful.setdefault(doubt, []).append(PurePath(name).name)
+            if option != "auto" or current.covariance is None:
+                _refuse(name, doubt, current)
+            doubtful.setdefault(doubt, []).append(name)
 
         is_chance = option == "auto" and current.probability > SIGNIFICANT
         taken_out = not doubt and not is_chance
         if taken_out:
             found[name] = through_water(found[name], *current.velocity)
         rows[name] = _row(current, taken_out, one_heading)
-
-    for doubt, names in doubtful.items():
-        trials = ", ".join(names)
-        remarks.append(f"{trials}: no current is removed: {doubt}; {REMEDY}")
+    remarks += _remarks(doubtful)
     return rows
+
+
+def _remarks(doubtful: dict[str, list[str]]) -> list[str]:
+    """A sentence for each doubt, with the trials that it concerns."""
+    remarks = []
+    for doubt, names in doubtful.items():
+        trials = ", ".join(PurePath(name).name for name in names)
+        remark = f"{trials}: no current is removed: {doubt}; {REMEDY}"
+        remarks.append(remark)
+    return remarks
 
 
 def _row(current: TrialCurrent, taken_out: bool, one_heading: bool) -> dict[str, Any]:
@@ -118,7 +126,8 @@ def _doubt(current: TrialCurrent, speed: float, one_heading: bool) -> str:
         # drift by the current and drift by the ship's own neutral helm look the same
         if one_heading:
             return "the trials keep to one heading"
-        largest_error = np.sqrt(np.diag(current.covariance)).max()
+        errors = np.sqrt(np.diag(current.covariance))
+        largest_error = errors.max()
         if largest_error > 0.05 * speed:
             return f"its standard error is {largest_error:.2g} m/s"
 
@@ -140,7 +149,8 @@ def _keep_to_one_heading(trials: Iterable[Trial]) -> bool:
     if not headings:
         return False
     directions = np.exp(1j * np.concatenate(headings))
-    return bool(abs(directions.mean()) > 0.85)
+    concentration = abs(directions.mean())
+    return bool(concentration > 0.85)
 
 
 def currents_of(
@@ -237,18 +247,17 @@ def _contradict(currents: Floats, covariance: Floats, chance: float = 1e-6) -> b
     """
     n_others = len(currents) // 2 - 1
     first = -np.ones((n_others, 1))
-    from_first = np.hstack([first, np.eye(n_others)])
+    others = np.eye(n_others)
+    from_first = np.hstack([first, others])
     apart = np.kron(from_first, np.eye(2))
+
     differences = apart @ currents
     of_differences = apart @ covariance @ apart.T
-    return wald_probability(differences, of_differences) < chance
+    probability = wald_probability(differences, of_differences)
+    return probability < chance
 
 
-def _known_current(
-    trial: Trial,
-    option: Any,
-    contradiction: float = 0.1,
-) -> Floats | None:
+def _known_current(trial: Trial, option: Any) -> Floats | None:
     """North and east of a current in columns or given; None where unknown.
 
     Shape (2,) or (2, n_samples).
@@ -260,17 +269,24 @@ def _known_current(
         return given if trial.over_ground else None
 
     columns = np.array([trial[name] for name in CURRENT_COLUMNS])
-    if given is None:
-        return columns
-    north, east = columns.mean(axis=1)
-    contradicts = np.hypot(north - given[0], east - given[1]) > contradiction
-    if contradicts:
+    if given is not None:
+        _check_agreement(trial, columns.mean(axis=1), given)
+    return columns
+
+
+def _check_agreement(
+    trial: Trial, means: Floats, given: Floats, contradiction: float = 0.1
+) -> None:
+    """Refuse a given current that is not that of the columns, m/s."""
+    difference = means - given
+    if np.hypot(*difference) > contradiction:
+        north, east = given
+        mean_north, mean_east = means
         raise InputError(
             f"trial {trial.name!r}: expected columns current_north and current_east to"
-            f" agree with current = {{ north = {given[0]:g}, east = {given[1]:g} }},"
-            f" got means of {north:.2f} and {east:.2f} m/s; leave one of them out"
+            f" agree with current = {{ north = {north:g}, east = {east:g} }}, got means"
+            f" of {mean_north:.2f} and {mean_east:.2f} m/s; leave one of them out"
         )
-    return columns
 
 
 def wald_probability(mean: Floats, covariance: Floats) -> float:

@@ -22,6 +22,7 @@ def over_ground(trial: Trial) -> tuple[Floats, Floats]:
     derived = {"u", "v"} & trial.derived
     if len(derived) != 1:
         return trial["u"], trial["v"]
+
     # the other one was logged, and is through the water
     north = time_derivative(trial.t, trial["x"])
     east = time_derivative(trial.t, trial["y"])
@@ -46,10 +47,11 @@ def through_water(trial: Trial, north: Any, east: Any) -> Trial:
     if trial.over_ground and trial.channels.keys() >= {"u", "v", "psi"}:
         ahead, aside = over_ground(trial)
         drift_ahead, drift_aside = rotate_to_body(north, east, trial["psi"])
-        one_is_logged = bool(trial.derived & {"u", "v"})
-        if "u" in trial.derived or not one_is_logged:
+        derived = trial.derived & {"u", "v"}
+        over = derived or {"u", "v"}  # one derived alone: the other was logged
+        if "u" in over:
             channels["u"] = ahead - drift_ahead
-        if "v" in trial.derived or not one_is_logged:
+        if "v" in over:
             channels["v"] = aside - drift_aside
     still = trial.with_channels(channels)
     return still.with_(over_ground=False)

@@ -52,20 +52,28 @@ def measured_wind(
     table: dict[str, Any] = {"coefficients": option}
     if isinstance(option, Mapping):
         table = dict(option)
-    if not {"wind_speed", "wind_from", "psi", "u", "v"} <= trial.channels.keys():
+    needed = {"wind_speed", "wind_from", "psi", "u", "v"}
+    if not needed <= trial.channels.keys():
         return trial
 
     curves = _curves(particulars, table.get("coefficients", "auto"))
-    ahead, aside = _felt_wind(trial, relative=table.get("relative", False))
-    forces = _forces(curves, ahead, aside)
-    # her resistance in still air is the model's own
-    still_ahead, *_ = curves.X
-    forces[0] -= 0.5 * AIR_DENSITY * still_ahead * trial["u"] ** 2
-
+    relative = table.get("relative", False)
+    forces = _forces_on(trial, curves, relative)
     inertia = particulars_inertia(particulars.completed())[:, :3]
     accelerations = np.linalg.solve(inertia, forces)
     channels = dict(zip(WIND.values(), accelerations, strict=True))
     return trial.with_channels(channels)
+
+
+def _forces_on(trial: Trial, curves: WindCurves, relative: bool) -> Floats:
+    """X, Y and N by the wind of a trial, shape (3, n_samples)."""
+    ahead, aside = _felt_wind(trial, relative)
+    forces = _forces(curves, ahead, aside)
+    # her resistance in still air is the model's own
+    still_ahead, *_ = curves.X
+    u = trial["u"]
+    forces[0] -= 0.5 * AIR_DENSITY * still_ahead * u**2
+    return forces
 
 
 def _forces(curves: WindCurves, ahead: Floats, aside: Floats) -> Floats:
@@ -75,7 +83,8 @@ def _forces(curves: WindCurves, ahead: Floats, aside: Floats) -> Floats:
     for row in (curves.X, curves.Y, curves.N):
         at_angle = np.interp(angle, curves.angle, row, period=2.0 * np.pi)
         coefficients.append(at_angle)
-    pressure = 0.5 * AIR_DENSITY * (ahead**2 + aside**2)
+    square = ahead**2 + aside**2
+    pressure = 0.5 * AIR_DENSITY * square
     return pressure * np.array(coefficients)
 
 
@@ -91,8 +100,10 @@ def _curves(particulars: Particulars, coefficients: Any) -> WindCurves:
 
 def _felt_wind(trial: Trial, relative: bool) -> tuple[Floats, Floats]:
     """Wind felt on board, from ahead and from starboard, m/s."""
-    along = trial["wind_speed"] * np.cos(trial["wind_from"])
-    across = trial["wind_speed"] * np.sin(trial["wind_from"])
+    speed = trial["wind_speed"]
+    direction = trial["wind_from"]
+    along = speed * np.cos(direction)
+    across = speed * np.sin(direction)
     if relative:
         return along, across
 
@@ -133,10 +144,11 @@ def constant_wind(
 def _constants(samples: Samples, equation: str, n_trials: int) -> Floats:
     """The constant of each trial in the regression of an equation."""
     features = samples.features[equation]
+    targets = samples.targets[equation]
     is_own = samples.trial[:, None] == np.arange(n_trials)
     of_trials = is_own * samples.duration[:, None]
     columns = np.hstack([features, of_trials])
-    solution = np.linalg.lstsq(columns, samples.targets[equation])[0]
+    solution, *_ = np.linalg.lstsq(columns, targets)
     constants: Floats = solution[-n_trials:]
     if _explains(features, samples.duration):
         constants = constants - constants.mean()
@@ -144,10 +156,12 @@ def _constants(samples: Samples, equation: str, n_trials: int) -> Floats:
 
 
 def _explains(features: Floats, target: Floats, rounding: float = 1e-6) -> bool:
-    """Return whether features explain a target but for rounding."""
-    solution = np.linalg.lstsq(features, target)[0]
+    """Tell whether features explain a target but for rounding."""
+    solution, *_ = np.linalg.lstsq(features, target)
     left = target - features @ solution
-    return bool(np.linalg.norm(left) < rounding * np.linalg.norm(target))
+    size_left = np.linalg.norm(left)
+    size = np.linalg.norm(target)
+    return bool(size_left < rounding * size)
 
 
 def with_constant_wind(

@@ -13,7 +13,7 @@ from identification import Uncertainty, identify
 from identification.regression.current import (
     MEAN,
     Coefficients,
-    Inputs,
+    SurgeSwayInputs,
     accelerations,
     estimate_current,
 )
@@ -429,7 +429,7 @@ def test_captive_trials_and_those_of_unknown_speed_keep_their_current(
 def test_what_a_ship_of_the_prior_does_is_the_same_to_both_sides() -> None:
     """Sway changes sign with drift, turn, rudder and wind; surge does not."""
     c = Coefficients(*np.random.default_rng(0).normal(size=len(MEAN)))._replace(Y_0=0.0)
-    at = Inputs(r=0.4, delta=0.3, n=1.1, ahead=0.02, aside=0.05)
+    at = SurgeSwayInputs(r=0.4, delta=0.3, n=1.1, ahead=0.02, aside=0.05)
     mirrored = at._replace(r=-0.4, delta=-0.3, aside=-0.05)
     surge, sway = accelerations(0.9, 0.2, at, c)
     expected = (pytest.approx(surge), pytest.approx(-sway))

@@ -48,9 +48,10 @@ def savitzky_golay(t: ArrayLike, values: ArrayLike, width: int | None = None) ->
             return values
 
     steps = np.diff(t)
-    is_even = np.ptp(steps) <= 1e-3 * np.median(steps)
-    if is_even:
+    unevenness = np.ptp(steps)
+    if unevenness <= 1e-3 * np.median(steps):
         return _savitzky_golay(values, width)
+
     grid = np.linspace(t[0], t[-1], len(t))
     on_grid = np.interp(grid, t, values)
     filtered = _savitzky_golay(on_grid, width)
@@ -102,7 +103,8 @@ def smooth(t: ArrayLike, values: ArrayLike) -> Floats:
     both = np.stack([values, signs])
 
     def criterion(stiffness: float) -> float:
-        left_out, rest = both - spline.smoothed(both, 10.0**stiffness)
+        smoothed = spline.smoothed(both, 10.0**stiffness)
+        left_out, rest = both - smoothed
         freedom = max(float(signs @ rest), 1.0)
         return float(left_out @ left_out) / freedom**2
 
@@ -124,37 +126,45 @@ class Reinsch:
         left = 1.0 / h[:-1]
         right = 1.0 / h[1:]
         middle = -left - right
-        n_inner = len(middle)
         #: the three diagonals of Q'
         self.diagonals = (left, middle, right)
 
-        # upper bands, the diagonal last, as scipy.linalg.solveh_banded wants them
-        self.gram = np.zeros((3, n_inner))
-        _, beside, diagonal = self.gram
-        diagonal[:] = (h[:-1] + h[1:]) / 3.0
-        beside[1:] = h[1:-1] / 6.0
-
-        self.square = np.zeros((3, n_inner))  # Q'Q
-        two_beside, beside, diagonal = self.square
-        diagonal[:] = left**2 + middle**2 + right**2
-        beside[1:] = middle[:-1] * left[1:]
-        beside[1:] += right[:-1] * middle[1:]
-        two_beside[2:] = right[:-2] * left[2:]
+        self.gram = _banded(
+            diagonal=(h[:-1] + h[1:]) / 3.0,
+            beside=h[1:-1] / 6.0,
+            two_beside=0.0,
+        )
+        self.square = _banded(  # Q'Q
+            diagonal=left**2 + middle**2 + right**2,
+            beside=middle[:-1] * left[1:] + right[:-1] * middle[1:],
+            two_beside=right[:-2] * left[2:],
+        )
 
     def smoothed(self, values: Floats, stiffness: float) -> Floats:
         """Values of the spline at the knots.
 
         Shape (n_knots,) or (n_splines, n_knots), as the values.
         """
-        n_inner = self.gram.shape[1]
-        differences = np.zeros((*values.shape[:-1], n_inner))
-        for offset, diagonal in enumerate(self.diagonals):
-            differences += diagonal * values[..., offset : offset + n_inner]
+        *n_splines, n_knots = values.shape
+        n_inner = n_knots - 2
+        around = [slice(first, first + n_inner) for first in range(3)]
+        differences = np.zeros((*n_splines, n_inner))
+        for knots, diagonal in zip(around, self.diagonals, strict=True):
+            differences += diagonal * values[..., knots]
 
         bands = self.gram + stiffness * self.square
         curvature = solveh_banded(bands, differences.T).T
 
         pull = np.zeros_like(values)
-        for offset, diagonal in enumerate(self.diagonals):
-            pull[..., offset : offset + n_inner] += diagonal * curvature
+        for knots, diagonal in zip(around, self.diagonals, strict=True):
+            pull[..., knots] += diagonal * curvature
         return values - stiffness * pull
+
+
+def _banded(diagonal: Floats, beside: Floats, two_beside: Floats | float) -> Floats:
+    """Upper bands of a symmetric matrix as `scipy.linalg.solveh_banded` wants them."""
+    bands = np.zeros((3, len(diagonal)))
+    bands[2] = diagonal
+    bands[1, 1:] = beside
+    bands[0, 2:] = two_beside
+    return bands

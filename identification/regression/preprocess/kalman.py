@@ -71,9 +71,7 @@ class LinearSystem:
         log_likelihood = 0.0
         for k in range(n_samples):
             if k > 0:
-                F = self.transitions[k - 1]
-                x = F @ x
-                P = F @ P @ F.T + self.process[k - 1]
+                x, P = self._moved(x, P, k - 1)
             predicted[k] = x
             predicted_covariances[k] = P
 
@@ -92,6 +90,11 @@ class LinearSystem:
             log_likelihood=log_likelihood,
         )
 
+    def _moved(self, x: Floats, P: Floats, k: int) -> tuple[Floats, Floats]:
+        """State and covariance of sample k at the next one, before it is measured."""
+        F = self.transitions[k]
+        return F @ x, F @ P @ F.T + self.process[k]
+
     def smoothed(self, measured: Floats) -> Floats:
         """States by all measurements, shape (n_samples, n_states).
 
@@ -99,7 +102,8 @@ class LinearSystem:
         """
         found = self.filtered(measured)
         states = found.states.copy()
-        for k in reversed(range(len(measured) - 1)):
+        last = len(measured) - 1
+        for k in reversed(range(last)):
             following = k + 1
             moved = self.transitions[k] @ found.covariances[k]
             predicted_covariance = found.predicted_covariances[following]

@@ -1,7 +1,7 @@
 """Positions, heading and velocities smoothed together, as derivatives of each other."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -41,20 +41,24 @@ def smooth_kinematics(trial: Trial) -> Trial:
             ' preprocessing = "spline"'
         )
     t = trial.t
-    turning = [name for name in HEADING if name in trial]
-    states = {name: trial[name] for name in turning}
+    states = _recorded(trial, HEADING)
     if "psi" not in trial or is_noisy(t, states.values()):
-        states = _smoothed(trial, turning, heading_motion(t))
+        motion = heading_motion(t)
+        states = _smoothed(trial, list(states), motion)
 
-    moving = [name for name in PLANE if name in trial]
-    recorded = {name: trial[name] for name in moving}
-    has_motion = {"u", "v"} & recorded.keys() or {"x", "y"} <= recorded.keys()
-    if has_motion and is_noisy(t, recorded.values()):
+    moving = _recorded(trial, PLANE)
+    has_motion = {"u", "v"} & moving.keys() or {"x", "y"} <= moving.keys()
+    if has_motion and is_noisy(t, moving.values()):
         motion = plane_motion(t, states["psi"])
-        states |= _smoothed(trial, moving, motion)
+        states |= _smoothed(trial, list(moving), motion)
 
-    smoothed = {name: states[name] for name in states if name in trial}
-    return trial.with_channels(smoothed)
+    return trial.with_channels(
+        {name: values for name, values in states.items() if name in trial}
+    )
+
+
+def _recorded(trial: Trial, names: Sequence[str]) -> dict[str, Floats]:
+    return {name: trial[name] for name in names if name in trial}
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +94,13 @@ def heading_motion(t: Floats) -> RandomWalkMotion:
     transitions[:, psi, r] = h
     transitions[:, r, rdot] = h
     transitions[:, psi, rdot] = 0.5 * h**2
+
+    steps = h[:, None, None]
     return RandomWalkMotion(
         states=(*HEADING, "rdot"),
         guessed_by=("r", "psi"),
         transitions=transitions,
-        process=WALK_FACTORS * h[:, None, None] ** WALK_POWERS,
+        process=WALK_FACTORS * steps**WALK_POWERS,
         start_variances=np.array([1.0, 1e-2, 1.0]),
     )
 
@@ -105,8 +111,27 @@ def plane_motion(t: Floats, psi: Floats) -> RandomWalkMotion:
     The mean of the heading's cosine and sine holds over each step. The random walk acts
     on velocities and accelerations as on those of `heading_motion`.
     """
+    _, _, u, v, udot, vdot = range(6)
+    transitions = _plane_transitions(t, psi)
+    process = np.zeros_like(transitions)
+    walk = heading_motion(t).process[:, 1:, 1:]
+    steps = range(len(walk))
+    for axis in ([u, udot], [v, vdot]):
+        block = np.ix_(steps, axis, axis)
+        process[block] = walk
+    return RandomWalkMotion(
+        states=(*PLANE, "udot", "vdot"),
+        guessed_by=("u", "x", "v"),
+        transitions=transitions,
+        process=process,
+        start_variances=np.array([1e4, 1e4, 1e2, 1e2, 1.0, 1.0]),
+    )
+
+
+def _plane_transitions(t: Floats, psi: Floats) -> Floats:
     h = np.diff(t)
     x, y, u, v, udot, vdot = range(6)
+    half_square = 0.5 * h**2
     cosine = _midpoints(np.cos(psi))
     sine = _midpoints(np.sin(psi))
     transitions = np.tile(np.eye(6), (len(h), 1, 1))
@@ -118,21 +143,10 @@ def plane_motion(t: Floats, psi: Floats) -> RandomWalkMotion:
     ]
     for position, velocity, acceleration, part in parts:
         transitions[:, position, velocity] = h * part
-        transitions[:, position, acceleration] = 0.5 * h**2 * part
+        transitions[:, position, acceleration] = half_square * part
     transitions[:, u, udot] = h
     transitions[:, v, vdot] = h
-
-    process = np.zeros((len(h), 6, 6))
-    walk = heading_motion(t).process[:, 1:, 1:]
-    for axis in ([u, udot], [v, vdot]):
-        process[:, np.array(axis)[:, None], axis] = walk
-    return RandomWalkMotion(
-        states=(*PLANE, "udot", "vdot"),
-        guessed_by=("u", "x", "v"),
-        transitions=transitions,
-        process=process,
-        start_variances=np.array([1e4, 1e4, 1e2, 1e2, 1.0, 1.0]),
-    )
+    return transitions
 
 
 def _midpoints(values: Floats) -> Floats:
@@ -148,28 +162,22 @@ def _smoothed(
     The roughness is that of greatest likelihood on the first samples.
     """
     measured = np.column_stack([trial[name] for name in names])
-    recorded = [motion.states.index(name) for name in names]
-    n_states = len(motion.states)
-    start = np.zeros(n_states)
-    start[recorded] = measured[0]
-    noise = np.array([_least_noise(trial, name) for name in names])
+    unit = _unit_system(trial, names, motion)
     guess = _guessed_roughness(trial, motion)
 
     def system(decade: float, n_samples: int) -> LinearSystem:
         steps = slice(n_samples - 1)
         roughness = guess * 10.0**decade
-        return LinearSystem(
-            transitions=motion.transitions[steps],
-            process=roughness * motion.process[steps],
-            observation=np.eye(n_states)[recorded],
-            variances=noise**2,
-            start=start,
-            start_variances=motion.start_variances,
+        return replace(
+            unit,
+            transitions=unit.transitions[steps],
+            process=roughness * unit.process[steps],
         )
 
     def unlikelihood(decade: float) -> float:
         first = measured[:LONGEST_SEARCH]
-        return -system(decade, len(first)).filtered(first).log_likelihood
+        filtered = system(decade, len(first)).filtered(first)
+        return -filtered.log_likelihood
 
     decades = 4.0  # to either side of the first guess of the roughness
     best = minimize_scalar(
@@ -182,11 +190,30 @@ def _smoothed(
     return dict(zip(motion.states, states.T, strict=True))
 
 
+def _unit_system(
+    trial: Trial, names: Sequence[str], motion: RandomWalkMotion
+) -> LinearSystem:
+    """The motion of unit roughness, of which the named channels are measured."""
+    recorded = [motion.states.index(name) for name in names]
+    n_states = len(motion.states)
+    start = np.zeros(n_states)
+    start[recorded] = [trial[name][0] for name in names]
+    noise = np.array([_least_noise(trial, name) for name in names])
+    return LinearSystem(
+        transitions=motion.transitions,
+        process=motion.process,
+        observation=np.eye(n_states)[recorded],
+        variances=noise**2,
+        start=start,
+        start_variances=motion.start_variances,
+    )
+
+
 def _guessed_roughness(trial: Trial, motion: RandomWalkMotion) -> float:
     """Roughness as if velocity changed by its range in a twentieth of the trial."""
-    recorded = [name for name in motion.guessed_by if name in trial]
-    guessed_by = recorded[0]
-    size = float(np.ptp(trial[guessed_by])) or 1.0
+    recorded = _recorded(trial, motion.guessed_by)
+    first, *_ = recorded.values()
+    size = float(np.ptp(first)) or 1.0
     usual_time = max(trial.duration / 20.0, 1e-9)
     return size**2 / usual_time**3
 
@@ -195,5 +222,7 @@ def _least_noise(trial: Trial, name: str) -> float:
     """Standard deviation of a channel's noise, at least that of its resolution."""
     # of the range of a channel: resolution, and channels without noise
     least_noise = 1e-4
-    resolution = least_noise * float(np.ptp(trial[name]))
-    return max(noise_level(trial.t, trial[name]), resolution, 1e-9)
+    values = trial[name]
+    resolution = least_noise * float(np.ptp(values))
+    level = noise_level(trial.t, values)
+    return max(level, resolution, 1e-9)

@@ -6,10 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.arrays import root_mean_square
+from shipgym.arrays import Floats
 
 #: Noise beyond this part of what a channel changes by from one sample to the next makes
 #: it noisy.
 NOISY = 0.02
+NEIGHBOURS = (0, 1, 3, 4)  # of the middle one of five samples
 
 
 def noise_level(t: ArrayLike, values: ArrayLike) -> float:
@@ -25,23 +27,33 @@ def noise_level(t: ArrayLike, values: ArrayLike) -> float:
     if n_compared < 1:
         return 0.0
 
-    neighbours = (0, 1, 3, 4)
-    times = [t[i : i + n_compared] for i in range(5)]
-    middle = times[2]
     expected = np.zeros(n_compared)
     gain = np.ones(n_compared)  # of the variance of a difference by that of a sample
-    for i in neighbours:
-        # Lagrange's polynomial of this neighbour in the middle
-        weight = np.ones(n_compared)
-        for j in neighbours:
-            if j != i:
-                weight *= (middle - times[j]) / (times[i] - times[j])
+    for i in NEIGHBOURS:
+        weight = _lagrange_weight(t, i)
         expected += weight * values[i : i + n_compared]
         gain += weight**2
 
-    scaled = (values[2:-2] - expected) / np.sqrt(gain)
+    deviations = values[2:-2] - expected
+    scaled = deviations / np.sqrt(gain)
+    median = np.median(np.abs(scaled))
     quartile_of_normal = 0.6745
-    return float(np.median(np.abs(scaled)) / quartile_of_normal)
+    return float(median / quartile_of_normal)
+
+
+def _lagrange_weight(t: Floats, i: int) -> Floats:
+    """Lagrange's polynomial of the i-th of five samples in the middle one.
+
+    Of all fives of samples in a row, shape (n_samples - 4,).
+    """
+    n_fives = len(t) - 4
+    times = [t[j : j + n_fives] for j in range(5)]
+    middle = times[2]
+    weight = np.ones(n_fives)
+    for j in NEIGHBOURS:
+        if j != i:
+            weight *= (middle - times[j]) / (times[i] - times[j])
+    return weight
 
 
 def noise_ratio(t: ArrayLike, values: ArrayLike, window: int = 1) -> float:
@@ -50,13 +62,12 @@ def noise_ratio(t: ArrayLike, values: ArrayLike, window: int = 1) -> float:
     Both are root mean squares.
     """
     values = np.asarray(values, dtype=float)
-    change = values[window:] - values[:-window]
+    before = values[:-window]
+    change = values[window:] - before
     if not np.any(change):
         return 0.0
-    size = root_mean_square(change)
     noise_of_change = np.sqrt(2.0) * noise_level(t, values)
-    ratio: float = noise_of_change / size
-    return ratio
+    return float(noise_of_change / root_mean_square(change))
 
 
 def is_noisy(t: ArrayLike, channels: Iterable[ArrayLike]) -> bool:

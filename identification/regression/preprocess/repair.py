@@ -48,7 +48,8 @@ def outliers(
     rounding = 1e-9 * np.ptp(middle)
     least = threshold * noise_level(t, values) + rounding
     allowed = least + 0.5 * WIDTH * _usual_steps(middle)
-    found: Flags = np.abs(values - middle) > allowed
+    deviations = np.abs(values - middle)
+    found: Flags = deviations > allowed
 
     if not may_step and len(values) >= 3 * WIDTH:
         first, last = _ends_that_jump(t, values, middle, least)
@@ -84,7 +85,8 @@ def _ends_that_jump(
     def is_jump(end: int) -> bool:
         # next to a gap the signal moves further
         longer = max(steps[end] / np.median(steps), 1.0)
-        return bool(jumps[end] > (least + WIDTH * largest_move) * longer)
+        largest = (least + WIDTH * largest_move) * longer
+        return bool(jumps[end] > largest)
 
     return is_jump(0), is_jump(-1)
 
@@ -111,16 +113,21 @@ def repaired(trial: Trial, threshold: float = OUTLYING) -> Trial:
         if sound.all():
             continue
 
-        known = trial.t[~wrong]
         good = values[~wrong]
-        curve = PchipInterpolator(known, good)
-        between = np.clip(times, known[0], known[-1])
-        channels[name] = curve(between)
-        channels[name][sound] = good  # to the bit as they were
+        filled = _interpolated(times, trial.t[~wrong], good)
+        filled[sound] = good  # to the bit as they were
+        channels[name] = filled
         counts[name] = int((~sound).sum())
     if not counts:
         return trial
     return trial.with_channels(channels, t=times, repaired=counts)
+
+
+def _interpolated(times: Floats, known: Floats, values: Floats) -> Floats:
+    """PCHIP through values at known times; beyond these the first or the last."""
+    curve = PchipInterpolator(known, values)
+    within = np.clip(times, known[0], known[-1])
+    return np.asarray(curve(within))
 
 
 def _outliers_of(trial: Trial, name: str, threshold: float) -> Flags:
@@ -154,5 +161,7 @@ def _filled_times(t: Floats) -> Floats:
         if 1.5 * usual < step <= 10.5 * usual:
             n_steps = round(step / usual)
             filled = np.linspace(start, end, n_steps + 1)
-            times.append(filled[1:-1])
-    return np.unique(np.concatenate(times))
+            missing = filled[1:-1]
+            times.append(missing)
+    every_time = np.concatenate(times)
+    return np.unique(every_time)
