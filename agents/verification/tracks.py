@@ -97,7 +97,7 @@ def _of_first(run: Rollout, history: Floats) -> Floats:
 
 
 def _largest_error(run: Rollout) -> Floats:
-    """Largest cross-track error of each ship once the start is behind, m, shape (n,)."""
+    """Largest cross-track error of each ship after the start, m, shape (n,)."""
     settled_lengths = 6.0  # way after the start that does not count
     settled = settled_lengths * run.model.particulars["length"]
     made_good = run.infos["distance_made_good"][1:]

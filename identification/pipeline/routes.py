@@ -94,7 +94,7 @@ def by_kernel(
 def _reference_box(
     trials: Sequence[Trial], options: Options, problem: Problem
 ) -> tuple[ShipModel, GreyBox]:
-    """The reference ship beneath a kernel, and her table; fitted where none is named."""
+    """Reference ship beneath a kernel, and her table; fitted where none is named."""
     if isinstance(problem.table, GreyBox):
         return problem.blank, problem.table
 

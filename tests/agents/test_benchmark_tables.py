@@ -49,7 +49,8 @@ def result():
         "tasks": {"calm": {"lq": of_lq, "pid": of_pid}, "rough": {"lq": slower}},
         "controllers": {"lq": {"runs": 1}, "pid": {"runs": 3}},
     }
-    return SimpleNamespace(summary=summary, tasks=tuple(summary["tasks"]))
+    tasks = summary["tasks"]
+    return SimpleNamespace(summary=summary, tasks=tuple(tasks), cells=tasks.get)
 
 
 def test_controllers_are_shown_with_the_mean_of_their_times():

@@ -17,7 +17,7 @@ import typer
 from typer.testing import CliRunner
 
 from agents.cli import app, main, reproduction
-from agents.cli.command import Commands, shared_options
+from agents.cli.command import CommandGroup, shared_options
 from agents.jobs import JobError
 from agents.training.run_folder import CHECKPOINT
 from shipgym import InputError, ManoeuvreError, UnstableModelError, load_model
@@ -339,7 +339,7 @@ def test_options_of_a_training_reach_its_plan(tmp_path, monkeypatch):
 
 def failing_command(error):
     """A command line whose one command raises an error."""
-    app = typer.Typer(cls=Commands)
+    app = typer.Typer(cls=CommandGroup)
 
     @app.callback()
     def group():
