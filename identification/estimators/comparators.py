@@ -175,7 +175,8 @@ def _huber_weights(errors: Floats) -> Floats:
     """Influence of samples: 1 for errors within the robust scale, then their ratio."""
     sizes = np.abs(errors)
     usual = MAD * float(np.median(sizes))
-    weights = np.ones(len(errors))
     is_large = sizes > usual
-    weights[is_large] = usual / sizes[is_large]
+    large = sizes[is_large]
+    weights = np.ones(len(errors))
+    weights[is_large] = usual / large
     return weights

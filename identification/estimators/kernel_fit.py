@@ -135,13 +135,18 @@ def fit_kernel(
         build_rows=build_rows,
         folds=asked.folds,
     )
-    lengths = LENGTHS if asked.length is None else (float(asked.length),)
-    weights = WEIGHTS if asked.C is None else (float(asked.C),)
+    lengths: Sequence[float] = LENGTHS
+    if asked.length is not None:
+        lengths = (float(asked.length),)
+    weights: Sequence[float] = WEIGHTS
+    if asked.C is not None:
+        weights = (float(asked.C),)
     kernels = _kernels(inputs, asked.centres, lengths)
     stages = {length: search.stage(kernel) for length, kernel in kernels.items()}
     choice = search.smoothest(stages, weights)
     fitted = search.fitted(stages[choice.length], choice.weight)
-    report = _report(asked.kernel, kernels[choice.length], choice)
+    kernel = kernels[choice.length]
+    report = _report(asked.kernel, kernel, choice)
     return replace(fitted, report=report)
 
 
@@ -349,7 +354,11 @@ class _Search:
 
         weight, length = best
         errors["reference"] = self.error(stages[length], 0.0)
-        return _Choice(weight, length, errors)
+        return _Choice(
+            weight=weight,
+            length=length,
+            errors=errors,
+        )
 
     def fitted(self, stage: KernelFit, weight: float) -> KernelFit:
         """The fit to all rows."""
@@ -362,7 +371,11 @@ class _Search:
             estimators[q] = estimator.fit(X, y)
             coefficients[q] = estimator.coef_
         model = stage.model.with_accelerations(coefficients)
-        return KernelFit(model, samples, estimators)
+        return KernelFit(
+            model=model,
+            samples=samples,
+            estimators=estimators,
+        )
 
 
 def _ridge(X: Floats, y: Floats, C: float) -> Floats:

@@ -142,7 +142,14 @@ class LSSVM(LinearRegressor):
         )
         n_directions = len(problem.singular_values)
         filters = problem.filters(self.error_weight(), n_directions)
-        return keep_solution(self, problem, filters, X, y, weights)
+        return keep_solution(
+            self,
+            problem=problem,
+            filters=filters,
+            X=X,
+            y=y,
+            weights=weights,
+        )
 
     def _fit_dual(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
         if not np.isfinite(self.C):
@@ -297,7 +304,14 @@ class TruncatedLSSVM(LinearRegressor):
         self.directions_ = problem.directions
         dropped = problem.directions[self.rank_ :]
         self.collinear_groups_ = tuple(_main_features(row) for row in dropped)
-        return keep_solution(self, problem, filters, X, y, weights)
+        return keep_solution(
+            self,
+            problem=problem,
+            filters=filters,
+            X=X,
+            y=y,
+            weights=weights,
+        )
 
     @property
     def collinear_names_(self) -> tuple[tuple[str, ...], ...]:

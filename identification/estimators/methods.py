@@ -110,7 +110,11 @@ def get_method(method: str | Any) -> Method:
             make=make,
             regularised=method.regularised,
         )
-    return Method(type(method).__name__, make, regularised=False)
+    return Method(
+        name=type(method).__name__,
+        make=make,
+        regularised=False,
+    )
 
 
 def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Estimators:
@@ -123,10 +127,11 @@ def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Est
     """
     window = float(np.mean(samples.duration))
     penalty = len(samples) * strength**2
+    C = 1.0 / penalty
     estimators: Estimators = {}
     for q, X, y in samples.by_equation():
         ridge = LSSVM(
-            C=1.0 / penalty,
+            C=C,
             scale=sizes[q] * window,
             fit_intercept=False,
         )

@@ -155,7 +155,8 @@ class RMSVM(LinearRegressor):
         elif has_offset:
             solver = SVR(kernel="linear", C=C, epsilon=band)
         else:
-            return _through_zero(Z, e, C, band), 0.0
+            slopes = _through_zero(Z, e, C=C, band=band)
+            return slopes, 0.0
 
         solver.fit(Z, e)
         slopes = np.asarray(solver.coef_, dtype=float).ravel()
@@ -184,7 +185,12 @@ class RMSVM(LinearRegressor):
         found: Estimators = {}
         for k, q in enumerate(task.samples.features):
             band = bands[k]
-            estimator = tuner.fitted(q, weight, band, tuner.everything)
+            estimator = tuner.fitted(
+                q,
+                weight=weight,
+                band=band,
+                rows=tuner.everything,
+            )
             estimator.chosen_ = {"C": weight, "epsilon": band}
             if search is not None:
                 estimator.search_ = search.of(k, BAND)
@@ -346,7 +352,11 @@ class _Tuner:
         def error(weight: float) -> float:
             errors = []
             for rows, held in folds:
-                model = self.model(weight, self.first_bands, rows)
+                model = self.model(
+                    weight,
+                    bands=self.first_bands,
+                    rows=rows,
+                )
                 own = heading_error(model, held, "rmse")
                 errors.append(own)
             return float(np.mean(errors))
@@ -363,7 +373,11 @@ class _Tuner:
             return first, None
 
         def error(bands: Floats) -> float:
-            model = self.model(weight, bands.tolist(), self.everything)
+            model = self.model(
+                weight,
+                bands=bands.tolist(),
+                rows=self.everything,
+            )
             errors = []
             for trial in self.trials:
                 own = heading_error(model, trial, asked.objective)

@@ -279,7 +279,11 @@ def _fit_free_running(settings: TunedLSSVM, task: FitTask) -> Estimators:
 
     bounds = [settings.log_bounds()] * len(decomposed)
     optimiser = get_optimiser(settings.optimiser)
-    search = optimiser.minimise(errors, bounds, settings.seed)
+    search = optimiser.minimise(
+        errors,
+        bounds=bounds,
+        seed=settings.seed,
+    )
 
     found: Estimators = {}
     for k, (q, X, y) in enumerate(samples.by_equation()):

@@ -175,7 +175,12 @@ def _covariance(problem: "_Problem", fit: "_Fit", n_parts: int) -> Floats:
         is_measured = np.isfinite(seen[0])
         windows = np.flatnonzero(is_measured)
         for part in np.array_split(windows, n_parts):
-            change = _change_without(part, k, fit, information)
+            change = _change_without(
+                part,
+                trial=k,
+                fit=fit,
+                information=information,
+            )
             changes.append(change)
 
     n_changes = len(changes)
@@ -192,7 +197,8 @@ def _change_without(
     information: Floats,
 ) -> Floats:
     """One step of Gauss & Newton to the estimate without some windows of a trial."""
-    slopes = fit.slopes[windows, :, trial].reshape(-1, len(fit.x))
+    n_unknowns = len(fit.x)
+    slopes = fit.slopes[windows, :, trial].reshape(-1, n_unknowns)
     residuals = fit.residuals[windows, :, trial].ravel()
     score = slopes.T @ residuals
     information_left = information - slopes.T @ slopes
@@ -230,7 +236,9 @@ class _Record(NamedTuple):
 
 def _record(trial: Trial, travel_time: float, speed: float) -> _Record:
     wind = wind_accelerations(trial) * travel_time / speed
-    shaft = trial["n"] if "n" in trial else np.zeros(len(trial))
+    shaft = np.zeros(len(trial))
+    if "n" in trial:
+        shaft = trial["n"]
     psi = trial["psi"]
     ahead, aside = over_ground(trial)
     north, east = rotate_to_body(ahead, aside, -psi)

@@ -73,7 +73,8 @@ class ForceRegression:
         shares = {}
         for i, force in enumerate(FORCES):
             own = self.equation == i
-            share = r2_score(self.targets[own], fitted[own])
+            targets = self.targets[own]
+            share = r2_score(targets, fitted[own])
             shares[force] = float(share)
         return shares
 
@@ -112,7 +113,12 @@ def force_regression(
     features, targets, index = [], [], []
     for i, piece in _pieces(trials, structure):
         motion = _prime_motion(piece, ship)
-        forces = _prime_forces(piece, motion, ship, model_inertia)
+        forces = _prime_forces(
+            piece,
+            motion=motion,
+            ship=ship,
+            model_inertia=model_inertia,
+        )
         features.append(_shares(motion, structure))
         targets.append(forces)
         index += [i] * len(piece)
@@ -164,7 +170,8 @@ def between_jumps(trial: Trial) -> list[slice]:
     jump = 20.0
     for name in AXES:
         velocity = trial[name]
-        changes = np.abs(np.diff(velocity))
+        moves = np.diff(velocity)
+        changes = np.abs(moves)
         usual = float(np.median(changes))
         fastest = float(np.abs(velocity).max())
         rounding = 1e-9 * fastest

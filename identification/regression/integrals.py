@@ -63,7 +63,12 @@ def spline_integrals(
     Both break where the rudder has corners.
     """
     rule = _quadrature(t, rudder.corners)
-    at_nodes = _interpolated(t, channels, rudder, rule.nodes.ravel())
+    at_nodes = _interpolated(
+        t,
+        channels=channels,
+        rudder=rudder,
+        times=rule.nodes.ravel(),
+    )
     moment_weights = rule.weights * rule.to_end
     found = Integrals({}, {})
     for equation, values in terms(at_nodes).items():

@@ -94,7 +94,13 @@ def pose(trials: Sequence[Trial], options: Options) -> Problem:
     return Problem(
         trials=tuple(everything),
         used=tuple(used),
-        blank=_blank(options, table, ship, shaft, used),
+        blank=_blank(
+            options,
+            table=table,
+            ship=ship,
+            shaft=shaft,
+            used=used,
+        ),
         table=table,
         samples=samples,
         similarity=similarity,

@@ -186,13 +186,18 @@ def _changing_orders(
     orders = gear.orders(t, delta)
     continues = goes_on(orders, delta).tolist()
     follows = [True, *continues, True]  # each interval the one before it
-    found = _Orders(orders.copy(), orders.copy(), np.diff(t))
+    found = _Orders(
+        before=orders.copy(),
+        after=orders.copy(),
+        switch=np.diff(t),
+    )
     corners: list[_Corner] = []
     for k, is_continued in enumerate(follows[:-1]):
         if is_continued:
             continue
         time = float(t[k])
-        if follows[k + 1] and not np.isinf(orders[k]):
+        follows_on = follows[k + 1]
+        if follows_on and not np.isinf(orders[k]):
             corners.append(_Corner(time, 0))  # the order changed on the sample
             continue
         if k > 1 and not follows[k - 1]:

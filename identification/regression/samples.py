@@ -167,13 +167,15 @@ def _stacked(parts: Sequence[Samples], equations: Iterable[str]) -> Samples:
     for q in equations:
         features[q] = np.concatenate([part.features[q] for part in parts])
         targets[q] = np.concatenate([part.targets[q] for part in parts])
+
+    longest = max(part.window for part in parts)
     return Samples(
         features=features,
         targets=targets,
         start=np.concatenate([part.start for part in parts]),
         duration=np.concatenate([part.duration for part in parts]),
         trial=np.concatenate([part.trial for part in parts]),
-        window=max(part.window for part in parts),
+        window=longest,
     )
 
 
@@ -243,7 +245,11 @@ class _Regression:
         terms, moments = self._integrals(trial, channels)
         if "q" in terms:
             of_memory = terms.pop("q")
-            memory = twice_integrated(trial.t, of_memory, moments["q"])
+            memory = twice_integrated(
+                trial.t,
+                integrals=of_memory,
+                moments=moments["q"],
+            )
             terms["r"] = np.hstack([terms["r"], memory])
         return terms
 

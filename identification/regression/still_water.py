@@ -36,7 +36,8 @@ def in_still_water(
     """
     check_current(current)
     is_usual_wind = isinstance(wind, str) and wind in ("auto", "none", "constant")
-    in_still = is_usual_wind and not any(_feels_sea(trial) for trial in trials)
+    feels_sea = any(_feels_sea(trial) for trial in trials)
+    in_still = is_usual_wind and not feels_sea
     if particulars is None or in_still:
         return list(trials), {}
 
@@ -80,7 +81,13 @@ def _take_current_out(
         return {}
     from identification.regression.trial_currents import without_current
 
-    return without_current(trials, ship.length, speed, option, remarks)
+    return without_current(
+        trials,
+        length=ship.length,
+        speed=speed,
+        option=option,
+        remarks=remarks,
+    )
 
 
 def _feels_sea(trial: Trial) -> bool:

@@ -68,7 +68,12 @@ def without_current(
     """
     trials = list(found.values())
     one_heading = _keep_to_one_heading(trials)
-    currents = currents_of(trials, length, speed, option)
+    currents = currents_of(
+        trials,
+        length=length,
+        speed=speed,
+        option=option,
+    )
     rows: dict[str, Any] = {}
     doubtful: dict[str, list[str]] = {}
     for name, current in currents.items():
@@ -188,7 +193,13 @@ def currents_of(
             )
         elif _shows_current(trial) and trial.duration > shortest:
             unknown.append(trial)
-    return found | _estimated_currents(unknown, length, speed, option)
+    estimated = _estimated_currents(
+        unknown,
+        length=length,
+        speed=speed,
+        option=option,
+    )
+    return found | estimated
 
 
 def _shows_current(trial: Trial) -> bool:
@@ -206,7 +217,12 @@ def _estimated_currents(
     if not fitted:
         return {}
     shared = option != "trial"
-    estimate = estimate_current(fitted, length, speed, shared)
+    estimate = estimate_current(
+        fitted,
+        length=length,
+        speed=speed,
+        shared=shared,
+    )
     if option == "auto" and len(fitted) > 1:
         each = estimate_current(
             fitted,

@@ -129,7 +129,8 @@ def _updated(
 
     # Joseph's form keeps the matrix symmetric and positive
     left = np.eye(len(x)) - np.outer(gain, h)
-    P = left @ P @ left.T + variance * np.outer(gain, gain)
+    of_noise = variance * np.outer(gain, gain)
+    P = left @ P @ left.T + of_noise
     misfit = innovation * innovation / innovation_variance
     log_density = -0.5 * (np.log(innovation_variance) + misfit)
     return x, P, float(log_density)

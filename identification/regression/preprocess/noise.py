@@ -27,14 +27,16 @@ def noise_level(t: ArrayLike, values: ArrayLike) -> float:
     if n_compared < 1:
         return 0.0
 
+    middle = values[2:-2]
     expected = np.zeros(n_compared)
     gain = np.ones(n_compared)  # of the variance of a difference by that of a sample
     for i in NEIGHBOURS:
+        neighbour = values[i : i + n_compared]
         weight = _lagrange_weight(t, i)
-        expected += weight * values[i : i + n_compared]
+        expected += weight * neighbour
         gain += weight**2
 
-    deviations = values[2:-2] - expected
+    deviations = middle - expected
     scaled = deviations / np.sqrt(gain)
     median = np.median(np.abs(scaled))
     quartile_of_normal = 0.6745
