@@ -356,7 +356,7 @@ class Autopilot:
 
 
 def observations(policy: Any, known: Mapping[str, Number]) -> NDArray[np.float32]:
-    """Observations of a policy, scaled and bounded, from known quantities in SI units."""
+    """Scaled, bounded observations of a policy from known quantities in SI units."""
     scales = dict(zip(policy.observation_names, policy.observation_scales, strict=True))
     bounds = observation_bounds()
     shown = []
