@@ -71,7 +71,7 @@ def main(
     known = {one.name: one for one in KINDS}
     if unknown := [name for name in kind or () if name not in known]:
         raise typer.BadParameter(
-            f"{unknown[0]!r} found, expected one of {', '.join(known)}"
+            f"kinds: expected one of {', '.join(known)}, got {unknown[0]!r}"
         )
     chosen = {name: one for name, one in known.items() if not kind or name in kind}
     work = chunks(chosen.values(), inputs)

@@ -237,7 +237,7 @@ def main() -> None:
         )
     given = parser.parse_args()
     if unknown := set(given.names) - set(TRIED):
-        parser.error(f"{', '.join(unknown)} found, expected some of {', '.join(TRIED)}")
+        parser.error(f"expected some of {', '.join(TRIED)}, got {', '.join(unknown)}")
     failed = []
     with tempfile.TemporaryDirectory() as folder:
         wheel = build(Path(folder))

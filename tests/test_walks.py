@@ -49,10 +49,13 @@ def helm(folder):
     model = load_model("mariner-tls-svm")
     LQ.from_model(model).save(folder / "lq.json")
     address = f"tcp:127.0.0.1:{free_port()}"
-    passage = simulate_ship(SimulatedShip(model), address, duration=60.0, speed_up=20.0)
+    passage = simulate_ship(
+        SimulatedShip(model), address, duration=200.0, speed_up=20.0
+    )
     ship = Thread(target=asyncio.run, args=(passage,))
     ship.start()
     options = ["--heading", 5, "--duration", 40, "--speed-up", 20]
+    options += ["--limit", "late_s=60"]  # whatever else the computer does
     run("steer", folder / "lq.json", "--nmea", address, *options)
     ship.join()
 

@@ -30,8 +30,8 @@ def write_fmu(source: Source, path: str | Path, fmi: str = "3.0") -> None:
     path = Path(path)
     if path.suffix != ".fmu":
         raise InputError(
-            f"{str(path)[:200]}: found, expected a name that ends in .fmu, as"
-            " importers do"
+            f"{str(path)[:200]}: expected a name that ends in .fmu, as importers do,"
+            f" got one that ends in {path.suffix[:20]!r}"
         )
 
     name = source.name
@@ -94,8 +94,8 @@ def _compiled(files: dict[str, str], name: str) -> bytes:
     compiler = shutil.which(os.environ.get("CC", "gcc"))
     if compiler is None or platform.system() != "Linux":
         raise InputError(
-            "no C compiler for Linux found, expected gcc, or the one that CC names: an"
-            " FMU holds a binary"
+            "compiler: expected gcc on Linux, or the compiler that CC names, got none;"
+            " an FMU holds a binary"
         )
     flags = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")
     command = [compiler, *flags, "fmu.c", f"{name}.c", "-o", "fmu.so", "-lm"]

@@ -71,6 +71,6 @@ class MeasuredShip:
 def thinned(trial: Trial, every: int, name: str, length: float) -> Trial:
     """Every n-th sample of a trial, with the channels of manoeuvring."""
     if every < 1:
-        raise InputError(f"every: {every} found, expected at least 1")
+        raise InputError(f"every: expected at least 1, got {every}")
     channels = {c: trial[c][::every] for c in CHANNELS if c in trial}
     return Trial(trial.t[::every], channels, name=name, kind=trial.kind, length=length)
