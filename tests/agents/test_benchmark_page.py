@@ -508,7 +508,7 @@ def test_a_chosen_episode_is_replayed_and_its_ship_moves(opened, result):
     opened.run("document.querySelector('[data-replay=\"current\"]').click()")
     frame = "document.getElementById('player').contentDocument"
     ships = f"{frame}?.querySelectorAll('.ship').length"
-    opened.wait(f"{ships} === 2")  # PID twice, in the hardest episode
+    opened.wait(f"{ships} === 3")  # all controllers, in the hardest episode
     assert opened.run("document.getElementById('replay-task').value") == "current"
     other = result.ranking[1] if result.ranking[1] != Lazy.name else result.ranking[0]
     opened.run(
