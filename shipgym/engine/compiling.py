@@ -7,9 +7,10 @@ existing file is always valid. A read-only cache that was filled beforehand is u
 it is.
 """
 
+import os
 import sys
 import uuid
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +29,6 @@ SEMANTICS = {"error_model": "numpy", "fastmath": {"contract"}}
 
 #: Compiled functions that loops call, by all that they depend on: loops share them.
 SHARED: dict[Any, Any] = {}
-# behind the names of compiled functions: two loops from files, made by different
-# processes, define no symbol of one name
-PROCESS = uuid.uuid4().hex
 
 
 def compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
@@ -116,7 +114,8 @@ class Compilation(Specialisation):
         tag, records = traced(function, self.hooks)
         code = function.__code__
         place = (code.co_filename, code.co_firstlineno)  # which errors name
-        key = (tag, records, inlined, checked, place)
+        process = os.getpid()  # a forked one compiles under names of its own
+        key = (process, tag, records, inlined, checked, place)
         # functions that loops call need no entries for Python and C, which take longer
         # to compile than many a function
         inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
@@ -149,9 +148,19 @@ def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
 
 def _named(copy: Any) -> Any:
     """Name a copy so that symbols of all that is compiled differ."""
-    copy.__qualname__ = f"{copy.__name__}_{PROCESS}"
+    copy.__qualname__ = f"{copy.__name__}_{_process_name(os.getpid())}"
     copy.__module__ = __name__  # imported with the machine code, as no user's file is
     return copy
+
+
+@cache
+def _process_name(process: int) -> str:
+    """Name of this process, part of the symbols that it compiles.
+
+    Loops from files of two processes, one of them forked from the other, thus define no
+    symbol of the same name; the code of one would be run in place of the other's.
+    """
+    return uuid.uuid4().hex
 
 
 def announce(what: str, folder: Path | None) -> None:

@@ -459,6 +459,7 @@ def test_what_comprehensions_name_is_in_the_fingerprint_and_compiled():
 
 
 SAME_NAMES = """
+import os
 import sys
 from typing import NamedTuple
 from shipgym.engine.compiling import compiled
@@ -477,7 +478,16 @@ def answer(one, other):
     hooks = {"begin": called(space["near_of"])}
     return compiled(space["loop"], "float64(float64)", hooks, "a loop")
 
-print(*(answer(*names.split("-"))(0.0) for names in sys.argv[1:]))
+orders = sys.argv[1:]
+if orders[0] == "fork":  # the first loop is compiled by a child of this process
+    _, first, *orders = orders
+    answer("near", "near_enough")(0.0)
+    child = os.fork()
+    if child == 0:
+        answer(*first.split("-"))(0.0)
+        os._exit(0)
+    os.waitpid(child, 0)
+print(*(answer(*names.split("-"))(0.0) for names in orders))
 """
 
 
@@ -494,6 +504,14 @@ def test_loops_from_files_call_their_own_functions_whose_names_and_types_are_ali
     assert answers("far-near") == ["2.0"]
     assert answers("near-far", "far-near") == ["1.0", "2.0"]
     assert answers("far-near", "near-far") == ["2.0", "1.0"]
+
+
+def test_loops_of_a_forked_process_and_its_parent_call_their_own_functions(tmp_path):
+    def answers(*orders):
+        return run(SAME_NAMES, *orders, SHIPGYM_CACHE=str(tmp_path)).split()
+
+    assert answers("fork", "near-far", "far-near") == ["2.0"]
+    assert answers("near-far", "far-near") == ["1.0", "2.0"]
 
 
 def test_a_loop_refuses_arguments_of_other_types(tmp_path):

@@ -11,8 +11,9 @@ import pytest
 from gymnasium.wrappers import TimeAwareObservation
 
 from shipgym import InputError, load_model
-from shipgym.envs.engine import episode_keys
+from shipgym.envs.engine import Engine, episode_keys
 from shipgym.envs.environment import rudder_orders
+from shipgym.tasks import course_keeping_task, path_following_task
 
 PATH, COURSE = "shipgym/PathFollowing-v0", "shipgym/CourseKeeping-v0"
 HOOK = [[0.0, 0.0], [1500.0, 0.0], [2900.0, 1400.0]]
@@ -193,11 +194,11 @@ def test_a_model_index_chooses_among_the_ships_that_are_drawn_from():
     env = many(COURSE, 2, **options)
     env.reset(seed=0, options={"model_index": 7})
     speeds = env.unwrapped.physical_state()["u"]
-    assert (
-        speeds[0]
-        == speeds[1]
-        == env.unwrapped._own_engine.pool[7][0].particulars["speed"]
-    )
+    env.reset(seed=1, options={"model_index": 7})
+    again = env.unwrapped.physical_state()["u"]
+    assert speeds[0] == speeds[1] == again[0] == again[1]
+    env.reset(seed=0, options={"model_index": 8})
+    assert env.unwrapped.physical_state()["u"][0] != speeds[0]
     for wrong in (-1, 256, 1.0, "first"):
         with pytest.raises(
             InputError,
@@ -234,36 +235,35 @@ def test_an_unknown_keyword_is_a_type_error_too():
             make(frameskip=1)
 
 
-def test_a_refused_action_leaves_what_was_shown():
-    env = many(COURSE, model="mariner").unwrapped
-    env.reset(seed=3)
-    sailed(env, 4)
-    engine = env._engine
-    shown = [
+def three_ships():
+    engine = Engine(load_model("mariner"), 3, course_keeping_task())
+    engine.reset([1, 2, 3])
+    return engine
+
+
+def shown_by(engine):
+    return [
         engine.observations,
         engine.info("heading_error").copy(),
         engine.outputs.outcomes[0].copy(),
     ]
-    with pytest.raises(
-        InputError,
-        match=r"^actions: expected numbers in \[-1, 1\], got inf in lane 1$",
-    ):
-        env.step(np.array([[0.0], [np.inf], [np.nan]], np.float32))
-    assert shown[2].all()  # costs
-    for before, now in zip(
-        shown,
-        [engine.observations, engine.info("heading_error"), engine.outputs.outcomes[0]],
-        strict=True,
-    ):
-        np.testing.assert_array_equal(now, before)
-    mask = np.array([True, False, True])
-    seen, _ = env.reset(options={"reset_mask": mask})
-    np.testing.assert_array_equal(seen[1], shown[0][1])
+
+
+def test_a_refused_action_leaves_what_was_shown():
+    engine = three_ships()
+    for _ in range(4):
+        engine.step(np.full((3, 1), 0.3))
+    before = shown_by(engine)
+    message = r"^actions: expected numbers in \[-1, 1\], got inf in lane 1$"
+    with pytest.raises(InputError, match=message):
+        engine.step(np.array([[0.0], [np.inf], [np.nan]]))
+    assert before[2].all()  # costs
+    for array, now in zip(before, shown_by(engine), strict=True):
+        np.testing.assert_array_equal(now, array)
 
 
 def test_the_first_reward_that_is_no_number_is_named():
-    engine = many(COURSE, model="mariner").unwrapped._engine
-    engine.reset([1, 2, 3])
+    engine = three_ships()
     engine.step(np.zeros((3, 1)))
     own = engine.task.definition.reward_source
     engine.outputs.outcomes[0, 1] = (
@@ -323,8 +323,7 @@ def test_a_state_of_another_ship_by_the_same_name_is_refused():
 
 
 def test_numbers_of_the_state_are_read_and_written_by_name():
-    engine = many(COURSE, model="mariner").unwrapped._engine
-    engine.reset([1, 2, 3])
+    engine = three_ships()
     assert engine.read("u").tolist() == [engine.model.particulars["speed"]] * 3
     assert not np.any(
         [
@@ -341,13 +340,12 @@ def test_numbers_of_the_state_are_read_and_written_by_name():
 
 
 def test_lengths_of_a_path_are_in_metres_where_there_is_one():
-    course, path = one(COURSE).unwrapped._engine, one().unwrapped._engine
+    mariner = load_model("mariner")
+    course = Engine(mariner, 1, course_keeping_task())
+    path = Engine(mariner, 1, path_following_task())
     assert path.path_metres("corridor") == pytest.approx(160.93)
     assert path.path_metres("turn_radius") == pytest.approx(4.0 * 160.93)
     assert course.path_metres("corridor") is None
-    assert course.waypoints() is None
-    plan = course.program.state_rows.n_rows
-    course._states = np.zeros((1, (plan + 4) * 64))  # a plan that is none of waypoints
     assert course.waypoints() is None
 
 
