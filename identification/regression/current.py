@@ -2,30 +2,39 @@
 
 Ground velocity is R(psi) (u, v) + (V_N, V_E). How surge and sway follow from measured
 yaw rate, rudder and shaft speed is simulated by quadratic equations of any ship, whose
-coefficients have a wide prior and are fitted with the current, in which ground velocity
-is linear (Maine & Iliff 1985, NASA RP-1138, output error with prior). So the current
-does not depend on the structure to be identified. Its covariance is that of estimates
-with each trial, or each third of one, left out (jackknife): it holds what the equations
-miss.
+coefficients (`surge_sway`) have a wide prior and are fitted with the current, in which
+ground velocity is linear (Maine & Iliff 1985, NASA RP-1138, output error with prior).
+So the current does not depend on the structure to be identified. Its covariance is that
+of estimates with each trial, or each third of one, left out (jackknife): it holds what
+the equations miss.
 
 All quantities of the simulation are in units of the ship's length and service speed.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from identification.regression.velocities import over_ground
+from identification.regression.runs_on_grid import (
+    STEP,
+    Runs,
+    trials_on_one_grid,
+    window_means,
+)
+from identification.regression.surge_sway import (
+    DEVIATION,
+    MEAN,
+    N_COEFFICIENTS,
+    Coefficients,
+    SurgeSwayInputs,
+    accelerations,
+)
 from shipgym import Trial
 from shipgym.arrays import Floats, Integers
-from shipgym.ships.simulate import wind_accelerations
 from shipgym.trials.navigation import rotate_to_body
 
-STEP = 0.2  # of the simulation, in the time to sail one ship length
-STEPS = 5  # in a window, over which velocities are averaged
 DIFFERENCE = 1e-4  # of finite differences
 
 
@@ -36,98 +45,6 @@ class CurrentEstimate(NamedTuple):
     covariance: Floats  # (m/s)^2, shape (2 n_trials, 2 n_trials)
     #: of the equations of surge and sway, in deviations of the prior, shape (18,)
     coefficients: Floats
-
-
-class Coefficients(NamedTuple):
-    """Coefficients of `accelerations`."""
-
-    X_0: Any
-    X_u: Any
-    X_uu: Any
-    X_vr: Any
-    X_vv: Any
-    X_rr: Any
-    X_dd: Any
-    X_uudd: Any
-    Y_0: Any
-    Y_uv: Any
-    Y_vv: Any
-    Y_ur: Any
-    Y_rr: Any
-    Y_vr: Any
-    Y_rv: Any
-    Y_uud: Any
-    Y_d: Any
-    wind: Any
-
-
-#: Mean and standard deviation of the coefficients before any trial.
-PRIOR = Coefficients(
-    X_0=(0.0, 0.02),
-    X_u=(-0.10, 0.2),
-    X_uu=(-0.05, 0.2),
-    X_vr=(0.9, 0.6),
-    X_vv=(-0.5, 1.5),
-    X_rr=(0.0, 0.3),
-    X_dd=(-0.03, 0.15),
-    X_uudd=(-0.03, 0.15),
-    Y_0=(0.0, 0.02),
-    Y_uv=(-0.9, 0.6),
-    Y_vv=(-3.0, 4.0),
-    Y_ur=(-0.35, 0.25),
-    Y_rr=(0.0, 0.5),
-    Y_vr=(-0.5, 1.5),
-    Y_rv=(0.0, 1.5),
-    Y_uud=(-0.06, 0.1),
-    Y_d=(-0.04, 0.1),
-    wind=(1.0, 0.25),
-)
-MEAN, DEVIATION = np.array(PRIOR).T
-N_COEFFICIENTS = len(PRIOR)
-
-
-class SurgeSwayInputs(NamedTuple):
-    """Measured quantities that move a ship in surge and sway."""
-
-    r: Any
-    delta: Any
-    n: Any  # by that at the start
-    ahead: Any  # acceleration by wind
-    aside: Any
-
-
-def accelerations(
-    u: Any, v: Any, at: SurgeSwayInputs, c: Coefficients
-) -> tuple[Any, Any]:
-    """Surge and sway acceleration by quadratic equations of any ship."""
-    return _surge_acceleration(u, v, at, c), _sway_acceleration(u, v, at, c)
-
-
-def _surge_acceleration(u: Any, v: Any, at: SurgeSwayInputs, c: Coefficients) -> Any:
-    return (
-        c.X_0
-        + c.X_u * (u - at.n)
-        + c.X_uu * (u**2 - at.n**2)
-        + c.X_vr * v * at.r
-        + c.X_vv * v**2
-        + c.X_rr * at.r**2
-        + (c.X_dd + c.X_uudd * u**2) * at.delta**2
-        + c.wind * at.ahead
-    )
-
-
-def _sway_acceleration(u: Any, v: Any, at: SurgeSwayInputs, c: Coefficients) -> Any:
-    return (
-        c.Y_0
-        + c.Y_uv * u * v
-        + c.Y_vv * v * abs(v)
-        + c.Y_ur * u * at.r
-        + c.Y_rr * at.r * abs(at.r)
-        + c.Y_vr * v * abs(at.r)
-        + c.Y_rv * at.r * abs(v)
-        + (c.Y_uud * u**2 + c.Y_d) * at.delta
-        + c.wind * at.aside
-    )
 
 
 def estimate_current(
@@ -153,7 +70,7 @@ def estimate_current(
     known : array of shape (18,), optional
         Coefficients of another estimate, which are then not fitted.
     """
-    runs = _together(trials, length, speed)
+    runs = trials_on_one_grid(trials, length, speed)
     problem = _Problem(runs, shared, known)
     fit = problem.fitted()
     n_parts = 1 if shared and len(trials) > 2 else 3
@@ -205,123 +122,6 @@ def _change_without(
     return np.asarray(np.linalg.solve(information_left, score))
 
 
-class _Record(NamedTuple):
-    """A trial in units of length and service speed, arrays of shape (n_samples,)."""
-
-    t: Floats
-    inputs: SurgeSwayInputs
-    psi: Floats
-    #: velocity north and east over ground, and ahead through the water; NaN where not
-    #: measured
-    seen: tuple[Floats, Floats, Floats]
-
-    def inputs_on(self, grid: Floats, shaft_speed: float | None) -> Floats:
-        """Inputs at the times of a grid, shaft speeds by that at the start.
-
-        Shape (n_times, 5).
-        """
-        shaft = np.ones(len(self.t))
-        if shaft_speed is not None:
-            shaft = self.inputs.n / shaft_speed
-        relative = self.inputs._replace(n=shaft)
-        return _on_grid(grid, self.t, relative)
-
-    def seen_on(self, grid: Floats) -> Floats:
-        """Velocities at the times of a grid; NaN after the end, shape (n_times, 3)."""
-        velocities = _on_grid(grid, self.t, self.seen)
-        is_after = grid > self.t[-1]
-        velocities[is_after] = np.nan
-        return velocities
-
-
-def _record(trial: Trial, travel_time: float, speed: float) -> _Record:
-    wind = wind_accelerations(trial) * travel_time / speed
-    shaft = np.zeros(len(trial))
-    if "n" in trial:
-        shaft = trial["n"]
-    psi = trial["psi"]
-    ahead, aside = over_ground(trial)
-    north, east = rotate_to_body(ahead, aside, -psi)
-    logged = np.full(len(trial), np.nan)
-    if "v" in trial.derived and "u" not in trial.derived:
-        logged = trial["u"]
-
-    inputs = SurgeSwayInputs(
-        r=trial["r"] * travel_time,
-        delta=trial["delta"],
-        n=shaft,
-        ahead=wind[:, 0],
-        aside=wind[:, 1],
-    )
-    return _Record(
-        t=(trial.t - trial.t[0]) / travel_time,
-        inputs=inputs,
-        psi=psi,
-        seen=(north / speed, east / speed, logged / speed),
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _Runs:
-    """Trials on one grid of time; a shorter one stays at its last sample."""
-
-    inputs: Floats  # as of `Inputs`, shape (n_times, 5, n_trials)
-    psi: Floats  # shape (n_times, n_trials)
-    seen: Floats  # means over windows of time, shape (n_windows, 3, n_trials)
-
-    @property
-    def n_trials(self) -> int:
-        return len(self.psi[0])
-
-
-def _together(trials: Sequence[Trial], length: float, speed: float) -> _Runs:
-    """The trials on one grid, in units of length and service speed."""
-    travel_time = length / speed
-    records = [_record(trial, travel_time, speed) for trial in trials]
-    shaft_speed = _starting_shaft_speed(trials)
-
-    longest = max(record.t[-1] for record in records)
-    window = STEP * STEPS
-    n_steps = int(longest / window) * STEPS
-    grid: Floats = np.arange(n_steps + 1, dtype=np.float64) * STEP
-
-    inputs, headings, seen = [], [], []
-    for record in records:
-        inputs.append(record.inputs_on(grid, shaft_speed))
-        headings.append(np.interp(grid, record.t, record.psi))
-        seen.append(record.seen_on(grid))
-    return _Runs(
-        inputs=np.stack(inputs, axis=-1),
-        psi=np.stack(headings, axis=-1),
-        seen=_averaged(np.stack(seen, axis=-1)),
-    )
-
-
-def _on_grid(grid: Floats, t: Floats, rows: Sequence[Floats]) -> Floats:
-    """Rows of samples at the times of the grid, shape (n_times, n_rows)."""
-    columns = [np.interp(grid, t, row) for row in rows]
-    return np.column_stack(columns)
-
-
-def _starting_shaft_speed(trials: Sequence[Trial]) -> float | None:
-    """Median shaft speed at the start, 1/s; None where not all trials turn ahead."""
-    starts = []
-    for trial in trials:
-        if "n" not in trial:
-            return None
-        start = trial["n"][0]
-        if not start > 0.0:
-            return None
-        starts.append(start)
-    return float(np.median(starts))
-
-
-def _averaged(values: Floats) -> Floats:
-    """Means over the windows of the grid, whose times are the first axis."""
-    windows = values[:-1].reshape(-1, STEPS, *values.shape[1:])
-    return np.asarray(windows.mean(axis=1))
-
-
 class _Fit(NamedTuple):
     """The most probable unknowns, and slopes and residuals there.
 
@@ -340,7 +140,7 @@ class _Problem:
     of each trial, then the current of each trial or of all.
     """
 
-    def __init__(self, runs: _Runs, shared: bool, known: Floats | None) -> None:
+    def __init__(self, runs: Runs, shared: bool, known: Floats | None) -> None:
         self.runs = runs
         n_trials = runs.n_trials
         n_currents = 1 if shared else n_trials
@@ -381,7 +181,7 @@ class _Problem:
         heading = self.runs.psi[:, None]
         north, east = rotate_to_body(ahead, aside, -heading)
         velocities = np.stack([north, east, ahead], axis=1)
-        return _averaged(velocities)
+        return window_means(velocities)
 
     def _starts_by_lane(self, x: Floats, n_lanes: int) -> tuple[Floats, Floats]:
         """Starting u and v, shape (n_lanes, n_trials), each moved in its own lane."""

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from identification import Uncertainty, identify
-from identification.regression.current import (
+from identification.regression.current import estimate_current
+from identification.regression.still_water import in_still_water
+from identification.regression.surge_sway import (
     MEAN,
     Coefficients,
     SurgeSwayInputs,
     accelerations,
-    estimate_current,
 )
-from identification.regression.still_water import in_still_water
 from identification.regression.trial_currents import currents_of, wald_probability
 from identification.regression.velocities import through_water
 from identification.regression.wind import measured_wind
