@@ -4,7 +4,7 @@ from .benchmarking.results import load_results as load_results
 from .benchmarking.run import benchmark as benchmark
 from .controllers.checker import check_controller as check_controller
 from .controllers.controller import Controller as Controller
-from .controllers.controller import Policy as Policy
+from .controllers.interface import Policy as Policy
 from .controllers.los_autopilot import AdaptiveLineOfSight as AdaptiveLineOfSight
 from .controllers.los_autopilot import IntegralLineOfSight as IntegralLineOfSight
 from .controllers.los_autopilot import LineOfSight as LineOfSight

@@ -33,8 +33,9 @@ import shipgym
 from agents.agent_file import load_agent
 from agents.benchmarking.sources import pretrained
 from agents.benchmarking.statistics import ConfidenceInterval, Draws, interval
-from agents.controllers.controller import Controller, Policy
+from agents.controllers.controller import Controller
 from agents.controllers.designs import NO_BASES, design, tuned
+from agents.controllers.interface import Policy
 from agents.rollouts.metrics import evaluate
 from agents.suites.reference import load_tuned
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, suite_file

@@ -9,7 +9,7 @@ import numpy as np
 
 from agents.benchmarking.entries import Entry
 from agents.benchmarking.sources import BEST_KNOWN, file_hash, names_code, policy_hash
-from agents.controllers.controller import Policy
+from agents.controllers.interface import Policy
 from agents.rollouts.metrics import evaluate
 from agents.suites.reference import best_costs
 from agents.suites.suite import BenchmarkTask

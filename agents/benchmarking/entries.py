@@ -34,7 +34,7 @@ from agents.benchmarking.sources import (
     names_code,
     source_files,
 )
-from agents.controllers.controller import Policy, model_hash
+from agents.controllers.interface import Policy, model_hash
 from agents.rollouts.rollout import check_fits
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import did_you_mean, quoted

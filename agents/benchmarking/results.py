@@ -33,7 +33,7 @@ from agents.benchmarking.results_format import (
 )
 from agents.benchmarking.sources import file_hash
 from agents.benchmarking.summary import summarise
-from agents.controllers.controller import model_hash
+from agents.controllers.interface import model_hash
 from agents.output import check_writable, present
 from agents.suites.suite import (
     FIRST_SEED,

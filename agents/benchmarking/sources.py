@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from agents.agent_file import PRETRAINED, load_agent
-from agents.controllers.controller import Controller, Policy
+from agents.controllers.controller import Controller
 from agents.controllers.designs import CLASSICAL, design, tuned
+from agents.controllers.interface import Policy
 from agents.controllers.registry import (
     controller_class,
     controller_kinds,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.controllers.controller import Policy, check_names, check_scales
+from agents.controllers.interface import Policy, check_names, check_scales
 from shipgym import InputError, ShipModel, load_model
 from shipgym.checks import check_whole
 from shipgym.envs.engine import Engine

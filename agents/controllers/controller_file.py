@@ -9,13 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from agents.controllers.controller import (
-    ANY_NUMBER,
-    FORMAT,
-    Bounds,
-    Controller,
-    check_names,
-)
+from agents.controllers.controller import ANY_NUMBER, FORMAT, Bounds, Controller
+from agents.controllers.interface import check_names
 from agents.controllers.margins import Margins
 from agents.controllers.registry import controller_class, controller_kinds
 from shipgym import InputError, ShipModel

@@ -7,7 +7,8 @@ from functools import lru_cache
 from typing import Any
 
 from agents.agent_file import load_agent
-from agents.controllers.controller import Controller, model_hash
+from agents.controllers.controller import Controller
+from agents.controllers.interface import model_hash
 from agents.controllers.registry import BUILT_IN, controller_class
 from agents.suites.reference import load_tuned
 from agents.suites.suite import BenchmarkTask

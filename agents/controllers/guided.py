@@ -14,13 +14,8 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.controller import (
-    ANY_NUMBER,
-    Action,
-    Bounds,
-    Controller,
-    Policy,
-)
+from agents.controllers.controller import ANY_NUMBER, Action, Bounds, Controller
+from agents.controllers.interface import Policy
 from agents.controllers.law import Number, PathSignals, Turns, gathered, wrapped
 from agents.controllers.lq import LQ
 from agents.controllers.margins import Compensator, Margins

@@ -19,7 +19,8 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import Bounds, Policy
+from agents.controllers.controller import Bounds
+from agents.controllers.interface import Policy
 from agents.controllers.law import (
     Nothing,
     Number,

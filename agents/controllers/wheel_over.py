@@ -15,8 +15,9 @@ from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import ANY_NUMBER, Bounds, Policy
+from agents.controllers.controller import ANY_NUMBER, Bounds
 from agents.controllers.guided import COURSE_ERROR, TURNS, Guided, bend
+from agents.controllers.interface import Policy
 from agents.controllers.law import (
     Law,
     Nothing,

@@ -22,13 +22,8 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.controller import (
-    FORMAT,
-    Action,
-    Controller,
-    check_names,
-    check_scales,
-)
+from agents.controllers.controller import FORMAT, Action, Controller
+from agents.controllers.interface import check_names, check_scales
 from agents.controllers.memory import (
     checked_memory,
     checked_observation,

@@ -13,7 +13,8 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.controllers.controller import Controller, model_hash
+from agents.controllers.controller import Controller
+from agents.controllers.interface import model_hash
 from agents.policies.network import Layer, Network
 from agents.policies.weights_file import as_json
 from shipgym import InputError

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.controllers.controller import FORMAT, check_names
+from agents.controllers.controller import FORMAT
 from agents.controllers.controller_file import read_controller, read_model, read_scales
+from agents.controllers.interface import check_names
 from agents.policies.network import Layer, Network
 from agents.policies.policy import LearnedPolicy
 from agents.policies.weights_file import (

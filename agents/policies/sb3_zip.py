@@ -18,7 +18,7 @@ from zipfile import ZIP_STORED, ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.controllers.controller import model_hash
+from agents.controllers.interface import model_hash
 from agents.policies.network import Network
 from agents.policies.policy import LearnedPolicy
 from agents.policies.policy_extraction import (

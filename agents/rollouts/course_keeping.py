@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.controller import Policy
+from agents.controllers.interface import Policy
 from agents.controllers.law import gathered
 from agents.controllers.memory import on_course
 from agents.rollouts.metrics import costs, mean, steering

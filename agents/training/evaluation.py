@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from agents.controllers.controller import Policy
 from agents.controllers.designs import design
+from agents.controllers.interface import Policy
 from agents.rollouts.rollout import check_fits, episode_costs
 from agents.suites.suite import BenchmarkTask
 from shipgym.errors import InputError

@@ -5,7 +5,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
-from agents.controllers.controller import model_hash
+from agents.controllers.interface import model_hash
 from agents.policies.weights_file import as_json
 from agents.suites.suite import BenchmarkTask
 from agents.training.settings import LearningSettings, make_settings, settings_of

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from agents.controllers.controller import Policy
+from agents.controllers.interface import Policy
 from agents.policies.network import Numbers
 from agents.policies.policy import NO_LIMIT, check_part, toward
 from shipgym.arrays import Flags, Integers

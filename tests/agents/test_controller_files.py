@@ -10,7 +10,7 @@ import pytest
 
 from agents import LQ, PID, load_agent
 from agents.agent_file import PRETRAINED, find_agent, list_pretrained
-from agents.controllers.controller import check_scales, model_hash
+from agents.controllers.interface import check_scales, model_hash
 from agents.controllers.registry import BUILT_IN, controller_class
 from shipgym.errors import InputError
 from shipgym.ships.mariner import mariner

@@ -1,0 +1,96 @@
+"""Interface of all that steers, and the checks that it fits an environment."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from shipgym import InputError, ShipModel
+
+
+class Policy(Protocol):
+    """Anything that steers: controllers of shipgym, of stable-baselines3, your own."""
+
+    def predict(
+        self,
+        observation: Any,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[Any, Any]:
+        """Return commands for one or many observations.
+
+        The signature is that of stable-baselines3. Raises InputError if the observation
+        has fewer entries or another number of dimensions, or the state is not one of as
+        many ships.
+
+        Parameters
+        ----------
+        observation : array-like of shape (n_observations,) or (n, n_observations)
+            Of an environment. Controllers steer by the first of them, those that they
+            were designed for: heading autopilots by the eight of course keeping, whose
+            heading error is against the line-of-sight course where a path is followed.
+        state : Any, optional
+            What the last call returned; None where episodes begin.
+        episode_start : bool or array-like of bool of shape (n,), optional
+            Where an episode begins and the state is that of the one before.
+        deterministic : bool
+            Whether to command without chance. Controllers of this package always do.
+
+        Returns
+        -------
+        action : float32 array of shape (n_commands,) or (n, n_commands)
+            Parts of the limits in [-1, 1], the first of the rudder.
+        state : Any
+            For the next call: all that is remembered is in it.
+        """
+
+
+def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> None:
+    """Refuse observations by other names or in another order.
+
+    Raises InputError, which names the first difference.
+    """
+    for i, (name, wanted) in enumerate(zip(found, expected, strict=False)):
+        if name != wanted:
+            raise InputError(
+                f"{where}: observation {i}: expected '{wanted}', got '{name}'"
+            )
+    if len(found) == len(expected):
+        return
+    missing = [name for name in expected if name not in found]
+    unknown = [name for name in found if name not in expected]
+    different = ", ".join(unknown + missing)
+    raise InputError(
+        f"{where}: expected {len(expected)} observations, got {len(found)}; in one"
+        f" and not in the other: {different}"
+    )
+
+
+def check_scales(
+    names: Sequence[str],
+    scales: Sequence[float],
+    own: Sequence[float],
+    where: str,
+    remedy: str,
+) -> None:
+    """Refuse observations in other scales than an agent's own; InputError names one."""
+    scale_tolerance = 1e-6  # relative difference of observation scales that is rounding
+    for name, scale, wanted in zip(names, scales, own, strict=False):
+        if abs(scale - wanted) > scale_tolerance * abs(wanted):
+            raise InputError(
+                f"{where}: scale of '{name}': expected {wanted:g}, got {scale:g}:"
+                f" {remedy}"
+            )
+
+
+def model_hash(model: ShipModel) -> str:
+    """SHA-256 of a model's structure, coefficients, particulars and steering gear."""
+    content = [
+        model.dynamics.to_dict(),
+        model.coefficients,
+        model.particulars.to_dict(),
+        model.steering.to_dict(),
+    ]
+    text = json.dumps(content, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
