@@ -6,6 +6,7 @@ with a base in an environment (`residual`), on every task of a suite (`suites`),
 of them (`tasks`).
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields, replace
 from pathlib import Path
@@ -45,7 +46,7 @@ def setting(
 
 
 @dataclass(frozen=True)
-class LearningSettings:
+class LearningSettings(ABC):
     """Settings of all algorithms.
 
     A decision lasts `action_repeat` control intervals.
@@ -122,13 +123,14 @@ class LearningSettings:
             )
         self._check_together()
 
+    @abstractmethod
     def _check_together(self) -> None:
         """Refuse settings that do not fit each other."""
 
     @property
+    @abstractmethod
     def rollout(self) -> int:
         """Decisions of all ships between two updates; a training has whole rollouts."""
-        raise NotImplementedError
 
     def to_dict(self) -> dict[str, Any]:
         """Return the settings by name, ready for JSON."""
