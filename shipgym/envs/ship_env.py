@@ -187,7 +187,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             self.render()
 
     def _info(self, numbers: list[float]) -> dict[str, Any]:
-        info: dict[str, Any] = dict(zip(self._names, numbers, strict=True))
+        info: dict[str, Any] = dict(zip(self._names, numbers, strict=False))
         for flag in self._flags:
             info[flag] = info[flag] > 0.0
         return info
