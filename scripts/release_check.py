@@ -84,7 +84,7 @@ BENCHMARK = (
     "--controllers",
     "pid",
     "--tasks",
-    "mariner-calm",
+    "sharp-turns",
     "--episodes",
     "2",
     "--out",

@@ -140,7 +140,7 @@ VICTIMS = {
             "--controllers",
             "pid,lq",
             "--tasks",
-            "mariner-calm,kvlcc2-noise",
+            "sharp-turns,roll-limit",
             "--episodes",
             "3",
             "--no-page",

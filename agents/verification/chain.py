@@ -173,9 +173,9 @@ def check_guest(guest: Agent, model: ShipModel, where: str) -> None:
     unknown = [name for name in guest.observation_names if name not in shown]
     if unknown:
         raise InputError(
-            f"{where}: expected an agent for course keeping, such as"
-            f" mariner-calm-ppo, got one that observes {quoted(unknown)}; for paths"
-            " there is shipgym benchmark"
+            f"{where}: expected an agent for course keeping, as shipgym train ppo"
+            f" makes, got one that observes {quoted(unknown)}; for paths there is"
+            " shipgym benchmark"
         )
     check_fits(guest, task, model, where)
 

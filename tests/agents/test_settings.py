@@ -363,11 +363,11 @@ SHAFT = {"action": "rudder-shaft"}
             "base: expected 'none' with action 'rudder-shaft', got 'lq'",
         ),
         (
-            {"task": "mariner-calm", "options": {"noise": 1.0}},
+            {"task": "sharp-turns", "options": {"noise": 1.0}},
             "--task: expected alone, got --option too",
         ),
         (
-            {"task": "mariner-calm", "model": "kvlcc2"},
+            {"task": "sharp-turns", "model": "kvlcc2"},
             "--task: expected alone, got --model too",
         ),
     ],
