@@ -9,7 +9,10 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import draw_architecture
+import gymnasium
 import pytest
+
+import shipgym  # noqa: F401 - registers its environments
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("shipgym", "identification", "agents")  # each imports those before it
@@ -177,6 +180,12 @@ def test_links_of_a_page_lead_somewhere(page):
                 for one in headings
             ]
             assert anchor in anchors, link
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_environments_of_a_page_are_registered(page):
+    named = re.findall(r"shipgym/[A-Z]\w+-v\d", page.read_text(encoding="utf-8"))
+    assert not {*named} - {*gymnasium.registry}
 
 
 def test_the_site_has_every_page():
