@@ -20,10 +20,18 @@ from agents.deployment.autopilot import (
     path_step,
     policy_observations,
 )
-from agents.deployment.c99 import Source, checked_name, comment, render
+from agents.deployment.c99 import Source, c_source, checked_name, hash_text, render
 from agents.deployment.c_expression import Translated
-from agents.deployment.c_structures import kind_of, numbers_of, record_kind
-from agents.deployment.c_syntax import Kind
+from agents.deployment.c_structures import (
+    Parameter,
+    kind_of,
+    leaf_paths,
+    numbers_of,
+    parameters_of,
+    record_kind,
+    table_paths,
+)
+from agents.deployment.c_syntax import Kind, comment
 from agents.deployment.translator import Translator
 from agents.deployment.variables import AUTOPILOT_INPUTS, AUTOPILOT_OUTPUTS
 from agents.policies.policy import ORDERS, LearnedPolicy, combined, toward
@@ -46,20 +54,24 @@ POLICY_STATE = record_kind(
         "memory": Nothing,
         "guidance": Nothing,
     },
+    noted=BridgeState,
 )
 
 
-def autopilot_source(agent: Any, name: str | None = None) -> Source:
+def autopilot_source(
+    agent: Any, name: str | None = None, real: str = "double"
+) -> Source:
     """Write a controller or a learned policy as C99.
 
-    The integral of the heading error is part of it. Raises InputError for a controller
-    that does not steer by its `law` alone, for a law of more than can be translated,
-    and for a name that C does not take.
+    The integral of the heading error is part of it; `real` is the type of its numbers,
+    double or float. Raises InputError for a controller that does not steer by its `law`
+    alone, for a law of more than can be translated, and for a name that C does not
+    take.
     """
     inputs = {name: AUTOPILOT_INPUTS[name] for name in needed_inputs(agent)}
     p = bridge_parameters(agent)
     name = checked_name(name or agent.name)
-    c = Translator({}, name)
+    c = Translator({}, name, real)
     if isinstance(agent, LearnedPolicy):
         template, data = "policy.c.j2", policy_data(c, agent, p)
     else:
@@ -68,6 +80,7 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
     title = f"Autopilot '{agent.name}' for model '{agent.model_name}'"
     data |= {
         "title": comment(title),
+        "sha256": hash_text(agent.model_sha256),
         "inputs": inputs,
         "interval": p.dt,
         "limit": p.limit,
@@ -75,42 +88,75 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
         "structures": c.structures.texts,
         "functions": c.functions,
     }
+    kind = kind_of(p)
     return Source(
         name=name,
-        header=render("autopilot.h.j2", name, **data),
-        source=render(template, name, **data),
+        header=render("autopilot.h.j2", name, real=real, **data),
+        source=c_source(template, name, real, **data),
         inputs=inputs,
         outputs=AUTOPILOT_OUTPUTS,
         step=p.dt,
         ship=False,
+        title=title,
+        parameters=tunable(c, agent, kind, p),
+        tables=tuple(table_paths(kind)),
     )
+
+
+def tunable(
+    c: Translator, agent: Any, kind: Kind, p: BridgeParameters
+) -> tuple[Parameter, ...]:
+    """Parameters that have an effect; the interval is in the design of the others."""
+    base = getattr(agent, "base", None)
+    without = {"dt"}
+    if not isinstance(base, Guided):  # of the environment of a policy
+        without |= {"task_lookahead", "path_radius"}
+    if not reads_integral(agent):
+        without.add("reach")
+
+    kept = []
+    for parameter in parameters_of(c.structures, kind, numbers_of(p)):
+        top, _, inner = parameter.path.partition(".")
+        is_interval = parameter.path.rpartition(".")[2] == "dt"
+        if not is_interval and (inner or top not in without):
+            kept.append(parameter)
+    return tuple(kept)
+
+
+def reads_integral(agent: Any) -> bool:
+    """True if an autopilot, or one in it, steers by the integral of the heading error."""
+    name = "heading_error_integral"
+    inner = getattr(agent, "autopilot", None) or getattr(agent, "base", None)
+    if inner is not None and reads_integral(inner):
+        return True
+    read = getattr(agent, "needed_signals", agent.observation_names)
+    return name in read
 
 
 def controller_data(c: Translator, agent: Any, p: BridgeParameters) -> dict[str, Any]:
     """Data of the templates for a controller."""
+    structures = c.structures
     state = state_kind(agent)
-    c.structures.declare(state, f"{c.structures.prefix}_state")
-    header, c.structures.texts = c.structures.texts, []
+    structures.declare(state, f"{structures.prefix}_own")
+    kind = parameters_kind(c, p)
+    header, structures.texts = structures.texts, []
 
-    kind = kind_of(p)
     step = steering_step(c, agent, state, kind, path_step)
     return {
         "policy": None,
         "state_structures": header,
+        "own_paths": leaf_paths(state),
         "step": step.name,
-        "step_type": c.structures.type(step.returns),
-        "constants": parameter_constant(c, kind, p),
+        "step_type": structures.type(step.returns),
+        "parameters": structures.initialiser(kind, numbers_of(p)),
     }
 
 
-def parameter_constant(
-    c: Translator, kind: Kind, p: BridgeParameters
-) -> dict[str, Any]:
-    """Type and initialiser of the constant that holds an autopilot's parameters."""
-    type_name = c.structures.type(kind)
-    numbers = numbers_of(p)
-    initialiser = c.structures.initialiser(kind, numbers)
-    return {"PARAMETERS": (type_name, initialiser)}
+def parameters_kind(c: Translator, p: BridgeParameters) -> Kind:
+    """Kind of an autopilot's parameters, declared."""
+    kind = kind_of(p)
+    c.structures.declare(kind, f"{c.structures.prefix}_parameters")
+    return kind
 
 
 def policy_data(
@@ -123,15 +169,17 @@ def policy_data(
     if policy.base is not None:
         base_state = state_kind(policy.base)
         structures.declare(base_state, f"{structures.prefix}_base")
+    kind = parameters_kind(c, p)
     header, structures.texts = structures.texts, []
 
-    kind = kind_of(p)
     observe = c.function(policy_observations, BridgeInput, POLICY_STATE, kind)
     finish = c.function(limited, float, POLICY_STATE, kind)
     data = {
         "policy": policy,
         "state_structures": header,
         "has_base": policy.base is not None,
+        "own_paths": leaf_paths(POLICY_STATE),
+        "base_paths": [] if base_state is None else leaf_paths(base_state),
         "observe": observe.name,
         "observe_type": structures.type(observe.returns),
         "own_observations_type": structures.type(OwnObservations),
@@ -140,7 +188,7 @@ def policy_data(
         "rows": observation_rows(policy),
         "activations": layer_activations(policy),
         "orders": ORDERS,
-        "constants": parameter_constant(c, kind, p),
+        "parameters": structures.initialiser(kind, numbers_of(p)),
     }
     if policy.action != "rudder-discrete":
         data["toward"] = c.function(toward, float, float, float).name
@@ -216,6 +264,7 @@ def state_kind(agent: Any) -> Kind:
             "memory": pilot.memory_record,
             "guidance": Nothing if guide is None else guide.memory_record,
         },
+        noted=BridgeState,
     )
 
 

@@ -3,6 +3,7 @@
 import ast
 import builtins
 import inspect
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import FunctionType, ModuleType
@@ -10,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.deployment.c_library import FUNCTIONS, library_call, table_entry
+from agents.deployment.c_library import function_name, library_call, table_entry
 from agents.deployment.c_structures import Structures
 from agents.deployment.c_syntax import (
     NUMBERS,
@@ -76,7 +77,7 @@ class ExpressionWriter:
         known = Constants(self.names).value(node)
         if isinstance(known, bool | int | float | np.number):
             kind = type(known)
-            text = literal(known.real)
+            text = literal(known.real, self.structures.real)
             return Expression(text, kind if kind in NUMBERS else float)
 
         match node:
@@ -123,7 +124,8 @@ class ExpressionWriter:
         if name not in kinds:
             raise self.refusal(node)
         owner = record.within(Level.ATOM)
-        return Expression(f"{owner}.{name}", kinds[name])
+        member = self.structures.label(record.kind, name).name
+        return Expression(f"{owner}.{member}", kinds[name])
 
     def _arithmetic(self, node: ast.BinOp) -> Expression:
         operator = OPERATORS.get(type(node.op))
@@ -131,11 +133,12 @@ class ExpressionWriter:
             raise self.refusal(node)
         left = self.expression(node.left)
         right = self.expression(node.right)
-        is_quotient = isinstance(node.op, ast.Div)
-        if is_quotient and left.kind is int:
-            left = Expression(f"(double)({left.text})", float)
-
         are_integers = left.kind is int and right.kind is int
+        if are_integers and isinstance(node.op, ast.Div):
+            are_integers = False
+        if not are_integers:
+            left = self._as_real(left)
+            right = self._as_real(right)
         return binary(
             left,
             operator,
@@ -143,12 +146,22 @@ class ExpressionWriter:
             kind=int if are_integers else float,
         )
 
+    def _as_real(self, number: Expression) -> Expression:
+        """An integer as a real number; other expressions as they are."""
+        if number.kind is not int:
+            return number
+        real = self.structures.real
+        if number.text.isdigit():
+            return Expression(literal(float(number.text), real), float)
+        return Expression(f"({real})({number.text})", float, Level.SIGN)
+
     def _power(self, node: ast.BinOp) -> Expression:
         base = self.expression(node.left).text
         exponent = self.expression(node.right).text
         known = Constants(self.names).value(node.right)
         is_whole = isinstance(known, int) and known > 0
-        function = "whole_power" if is_whole else "pow"
+        power = function_name(math.pow, self.structures.real)
+        function = "whole_power" if is_whole else power
         return Expression(f"{function}({base}, {exponent})", float)
 
     def _signed(self, node: ast.UnaryOp) -> Expression:
@@ -214,10 +227,12 @@ class ExpressionWriter:
         if is_record(function):
             fields = self._arguments(node, function)
             return self._structure(fields, function)
-        if isinstance(function, FunctionType) and function not in FUNCTIONS:
+        real = self.structures.real
+        in_library = function_name(function, real) is not None
+        if isinstance(function, FunctionType) and not in_library:
             return self._function_call(node, function)
 
-        call = library_call(function, self._expressions(node.args))
+        call = library_call(function, self._expressions(node.args), real)
         if call is None:
             raise self.refusal(node)
         return call

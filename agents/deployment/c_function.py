@@ -2,7 +2,6 @@
 
 import ast
 import inspect
-import re
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import FunctionType
@@ -15,6 +14,7 @@ from agents.deployment.c_syntax import (
     Kind,
     Level,
     c_name,
+    comment,
     members,
     stored_kind,
 )
@@ -99,7 +99,7 @@ class FunctionWriter:
     def _summary(self) -> str:
         """First line of the docstring, as a comment of C may have it."""
         first = self.docstring.strip().partition("\n")[0]
-        return re.sub(r"[^\w .,:;()+-]", "", first, flags=re.ASCII)
+        return comment(first)
 
     def _statements(self, body: Iterable[ast.stmt]) -> list[str]:
         lines = []
