@@ -98,6 +98,7 @@ def autopilot_source(
         step=p.dt,
         ship=False,
         title=title,
+        sha256=hash_text(agent.model_sha256),
         parameters=tunable(c, agent, kind, p),
         tables=tuple(table_paths(kind)),
     )
@@ -124,7 +125,7 @@ def tunable(
 
 
 def reads_integral(agent: Any) -> bool:
-    """True if an autopilot, or one in it, steers by the integral of the heading error."""
+    """True if an autopilot, or one in it, steers by the integral of its error."""
     name = "heading_error_integral"
     inner = getattr(agent, "autopilot", None) or getattr(agent, "base", None)
     if inner is not None and reads_integral(inner):

@@ -27,6 +27,8 @@ class Source:
         s, of an autopilot its control interval, of a ship the longest advised step.
     title : str
         What was exported, in the user's own letters.
+    sha256 : str
+        Hash of the model's numbers.
     parameters : tuple of Parameter
         Numbers that may be set while it runs.
     tables : tuple of str
@@ -43,6 +45,7 @@ class Source:
     step: float
     ship: bool
     title: str
+    sha256: str
     parameters: tuple[Parameter, ...] = ()
     tables: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

@@ -84,10 +84,10 @@ def ship_source(
 ) -> Source:
     """Write a ship model as C99, by default under the model's name.
 
-    `water_depth`: m; `real`: type of her numbers, double or float. A ship with too few particulars for wind forces is written without
-    them, as `Source.notes` says. Raises InputError for a name that C does not take,
-    shallow water that the model does not know, and equations of one's own that use more
-    than arithmetic.
+    `water_depth`: m; `real`: type of her numbers, double or float. A ship with too few
+    particulars for wind forces is written without them, as `Source.notes` says. Raises
+    InputError for a name that C does not take, shallow water that the model does not
+    know, and equations of one's own that use more than arithmetic.
     """
     name = checked_name(name or model.name)
     longest = LONGEST_STEP * model.travel_time
@@ -128,6 +128,7 @@ def ship_source(
         step=longest,
         ship=True,
         title=title,
+        sha256=model_hash(model),
         parameters=_tunable(c, model, kind, numbers),
         tables=tuple(table_paths(kind)),
         notes=(note,) if note else (),

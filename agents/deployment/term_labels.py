@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from agents.deployment.field_notes import Label
+from agents.deployment.units_text import unit_text
 from shipgym import ShipModel
 from shipgym.engine.records import Record, field_types
 from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.term_functions import speed_power
 from shipgym.ships.terms import SHAFT_SPEEDS, SPEEDS, TURN_RATES, Term
-from agents.deployment.units_text import unit_text
 
 
 def coefficient_labels(model: ShipModel) -> dict[Record, Mapping[str, Label]]:

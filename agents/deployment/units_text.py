@@ -12,8 +12,8 @@ Powers = Mapping[str, int]
 
 def unit_text(powers: Powers) -> str:
     """Write a unit by its powers of base units: `m/s^2`, `1/m`, `1`."""
-    above = []
-    below = []
+    above: list[str] = []
+    below: list[str] = []
     for base, power in powers.items():
         exponent = "" if abs(power) == 1 else f"^{abs(power)}"
         if power:

@@ -19,7 +19,7 @@ CLANG = shutil.which("clang")
 
 
 def built(folder, name, header, source):
-    """Shared library of a header and a source; any warning of a compiler is an error."""
+    """Shared library of a header and a source; a warning of a compiler is an error."""
     (folder / f"{name}.h").write_text(header, encoding="utf-8")
     (folder / f"{name}.c").write_text(source, encoding="utf-8")
     if CLANG:

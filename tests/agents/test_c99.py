@@ -42,7 +42,6 @@ from shipgym.tasks.task import path_following_task
 from tests.agents.compiling import built
 from tests.agents.policies import MARINER, random_network, random_policy
 
-
 #: What no sensor gives.
 NO_MEASUREMENTS = (np.nan, np.inf, -np.inf, 1e30)
 NUMBERS = {
