@@ -1,5 +1,6 @@
 """Controllers and learned policies as C99: laws translated, networks as tables."""
 
+import re
 from typing import Any
 
 from agents.controllers.controller import Controller
@@ -88,50 +89,42 @@ def autopilot_source(
         "structures": c.structures.texts,
         "functions": c.functions,
     }
-    kind = kind_of(p)
+    source = c_source(template, name, real, **data)
     return Source(
         name=name,
         header=render("autopilot.h.j2", name, real=real, **data),
-        source=c_source(template, name, real, **data),
+        source=source,
         inputs=inputs,
         outputs=AUTOPILOT_OUTPUTS,
         step=p.dt,
         ship=False,
         title=title,
         sha256=hash_text(agent.model_sha256),
-        parameters=tunable(c, agent, kind, p),
-        tables=tuple(table_paths(kind)),
+        parameters=tunable(c, agent, p, source),
+        tables=tuple(table_paths(kind_of(p))),
     )
 
 
 def tunable(
-    c: Translator, agent: Any, kind: Kind, p: BridgeParameters
+    c: Translator, agent: Any, p: BridgeParameters, source: str
 ) -> tuple[Parameter, ...]:
-    """Parameters that have an effect; the interval is in the design of the others."""
+    """Parameters that have an effect in a source; its interval is part of the design.
+
+    The integral of the heading error is always formed, but not always read.
+    """
+    without = set()
     base = getattr(agent, "base", None)
-    without = {"dt"}
     if not isinstance(base, Guided):  # of the environment of a policy
         without |= {"task_lookahead", "path_radius"}
-    if not reads_integral(agent):
+    if not re.search(r"\w\.heading_error_integral\b", source):
         without.add("reach")
 
     kept = []
-    for parameter in parameters_of(c.structures, kind, numbers_of(p)):
-        top, _, inner = parameter.path.partition(".")
+    for parameter in parameters_of(c.structures, kind_of(p), numbers_of(p)):
         is_interval = parameter.path.rpartition(".")[2] == "dt"
-        if not is_interval and (inner or top not in without):
+        if not is_interval and parameter.path not in without:
             kept.append(parameter)
     return tuple(kept)
-
-
-def reads_integral(agent: Any) -> bool:
-    """True if an autopilot, or one in it, steers by the integral of its error."""
-    name = "heading_error_integral"
-    inner = getattr(agent, "autopilot", None) or getattr(agent, "base", None)
-    if inner is not None and reads_integral(inner):
-        return True
-    read = getattr(agent, "needed_signals", agent.observation_names)
-    return name in read
 
 
 def controller_data(c: Translator, agent: Any, p: BridgeParameters) -> dict[str, Any]:

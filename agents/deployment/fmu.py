@@ -146,6 +146,7 @@ def _compiled(files: dict[str, str], name: str, path: Path) -> bytes:
                 f"{compiler}: expected the FMU compiled within {compiling_s:g} s, got"
                 " no end; try again when the computer is less busy"
             ) from None
-        if done.returncode:
+        compiled = folder / library
+        if done.returncode or not compiled.is_file():
             raise InputError(f"{compiler}: cannot compile the FMU: {done.stderr[:400]}")
-        return (folder / library).read_bytes()
+        return compiled.read_bytes()
