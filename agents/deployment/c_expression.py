@@ -11,7 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.deployment.c_library import function_name, library_call, table_entry
+from agents.deployment.c_library import (
+    function_name,
+    library_call,
+    table_entry,
+    variable_name,
+)
 from agents.deployment.c_structures import Structures
 from agents.deployment.c_syntax import (
     NUMBERS,
@@ -115,7 +120,7 @@ class ExpressionWriter:
         name = node.id
         if name not in self.kinds:
             raise self.refusal(node)
-        return Expression(c_name(name), self.kinds[name])
+        return Expression(variable_name(name), self.kinds[name])
 
     def _member(self, node: ast.Attribute) -> Expression:
         record = self.expression(node.value)
@@ -137,8 +142,8 @@ class ExpressionWriter:
         if are_integers and isinstance(node.op, ast.Div):
             are_integers = False
         if not are_integers:
-            left = self._as_real(left)
-            right = self._as_real(right)
+            left = self.as_real(left)
+            right = self.as_real(right)
         return binary(
             left,
             operator,
@@ -146,7 +151,7 @@ class ExpressionWriter:
             kind=int if are_integers else float,
         )
 
-    def _as_real(self, number: Expression) -> Expression:
+    def as_real(self, number: Expression) -> Expression:
         """An integer as a real number; other expressions as they are."""
         if number.kind is not int:
             return number
@@ -185,7 +190,7 @@ class ExpressionWriter:
             left = right
         if len(pairs) == 1:
             return pairs[0]
-        text = " && ".join([pair.text for pair in pairs])
+        text = " && ".join([pair.within(Level.SIGN) for pair in pairs])
         return Expression(text, bool, Level.LOGIC)
 
     def _logic(
@@ -196,7 +201,7 @@ class ExpressionWriter:
         for operand in self._expressions(values):
             if operand.kind is not bool:
                 raise self.refusal(node)
-            texts.append(operand.within(Level.COMPARISON))
+            texts.append(operand.within(Level.SIGN))
         operator = OPERATORS[type(op)]
         text = f" {operator.sign} ".join(texts)
         return Expression(text, bool, operator.level)

@@ -8,12 +8,12 @@ from types import FunctionType
 from typing import Any
 
 from agents.deployment.c_expression import ExpressionWriter, Translated
+from agents.deployment.c_library import variable_name
 from agents.deployment.c_structures import Structures
 from agents.deployment.c_syntax import (
     Expression,
     Kind,
     Level,
-    c_name,
     comment,
     members,
     stored_kind,
@@ -88,13 +88,13 @@ class FunctionWriter:
                 lines.append(f"    {self._declaration(variable)};")
         for argument in passed:
             if argument not in self.used:
-                lines.append(f"    (void){c_name(argument)};")
+                lines.append(f"    (void){variable_name(argument)};")
         lines += [*statements, "}\n"]
         return "\n".join(lines), self.returns
 
     def _declaration(self, variable: str) -> str:
         type_name = self.expressions.structures.type(self.kinds[variable])
-        return f"{type_name} {c_name(variable)}"
+        return f"{type_name} {variable_name(variable)}"
 
     def _summary(self) -> str:
         """First line of the docstring, as a comment of C may have it."""
@@ -144,7 +144,7 @@ class FunctionWriter:
     def _for(self, name: str, end: ast.expr, body: Iterable[ast.stmt]) -> list[str]:
         """A loop over `range(end)`."""
         self.kinds[name] = int
-        i = c_name(name)
+        i = variable_name(name)
         number = self.expressions.expression(end)
         bound = number.within(Level.SUM)
         lines = [f"for ({i} = 0; {i} < {bound}; ++{i}) {{"]
@@ -196,4 +196,5 @@ class FunctionWriter:
 
     def _stored(self, name: str, value: Expression) -> str:
         self.kinds[name] = stored_kind(value.kind)
-        return f"{c_name(name)} = {value.text};"
+        stored = self.expressions.as_real(value)
+        return f"{variable_name(name)} = {stored.text};"

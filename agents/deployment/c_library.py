@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.deployment.c_syntax import NUMBERS, Expression, Level, choice
+from agents.deployment.c_syntax import NUMBERS, Expression, Level, c_name, choice
 from shipgym.engine import mathematics
 from shipgym.engine.records import is_table
 
@@ -51,19 +51,6 @@ FUNCTIONS: dict[Any, str] = {
 FUNCTIONS |= {getattr(math, name): name for name in SAME_NAME}
 FUNCTIONS |= {getattr(np, name): name for name in SAME_NAME}
 
-#: Functions of `templates/prelude.c.j2`, which have one name in any precision.
-OF_PRELUDE = frozenset(
-    [
-        "least",
-        "largest",
-        "clip",
-        "sign",
-        "radians",
-        "modulo",
-        "power_of_bits",
-    ]
-)
-
 #: Functions of the engine that count on the digits of a double, by those of C.
 IN_SINGLE: dict[Any, str] = {
     mathematics.nearest: "rintf",
@@ -74,6 +61,14 @@ IN_SINGLE: dict[Any, str] = {
 }
 
 
+def variable_name(name: str) -> str:
+    """Name of a variable in C, where those of functions are taken."""
+    of_helpers = ("whole_power", "interpolated", "within", "isfinite")
+    of_functions = {*FUNCTIONS.values(), *IN_SINGLE.values(), *of_helpers}
+    is_taken = name in of_functions or name.removesuffix("f") in of_functions
+    return f"{name}_" if is_taken else c_name(name)
+
+
 def function_name(function: Any, real: str) -> str | None:
     """Name of a function in C for numbers of the type `real`; None if it has none."""
     if not isinstance(function, Hashable):
@@ -82,8 +77,12 @@ def function_name(function: Any, real: str) -> str | None:
         return FUNCTIONS.get(function)
     if function in IN_SINGLE:
         return IN_SINGLE[function]
+    # those of `templates/prelude.c.j2` have one name in any precision
+    of_prelude = ("least", "largest", "clip", "sign", "radians", "modulo")
     name = FUNCTIONS.get(function)
-    return name if name is None or name in OF_PRELUDE else f"{name}f"
+    if name is None or name in of_prelude:
+        return name
+    return f"{name}f"
 
 
 def library_call(

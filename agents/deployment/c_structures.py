@@ -12,9 +12,6 @@ from agents.deployment.field_notes import Label, field_notes
 from agents.deployment.units_text import unit_of
 from shipgym.engine.records import field_types, is_record, is_table, table_of
 
-#: Endings of the public names, which no function or structure that is written may have.
-PUBLIC = ("init", "step", "step_with", "defaults", "state", "input", "parameters")
-
 
 @dataclass
 class Structures:
@@ -42,7 +39,16 @@ class Structures:
     taken: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        for ending in PUBLIC:
+        public = (
+            "init",
+            "step",
+            "step_with",
+            "defaults",
+            "state",
+            "input",
+            "parameters",
+        )
+        for ending in public:
             self.taken.add(f"{self.prefix}_{ending}")
 
     def type(self, kind: Kind) -> str:

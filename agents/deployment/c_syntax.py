@@ -15,7 +15,7 @@ from shipgym.engine.records import field_types, is_record
 
 #: float, int, bool, a record, a table, a tuple of kinds, or a function.
 Kind: TypeAlias = Any
-NUMBERS: dict[Kind, str] = {float: "double", int: "int", bool: "int"}
+NUMBERS: dict[Kind, str] = {float: "double", int: "int", bool: "bool"}
 
 KEYWORDS = frozenset(
     [
@@ -110,10 +110,13 @@ class Expression:
 def binary(
     left: Expression, operator: Operator, right: Expression, kind: Kind
 ) -> Expression:
-    """Two operands with an operator between them, which groups from the left."""
+    """Two operands with an operator between them, which groups from the left.
+
+    Operators of other precedence are in brackets, as MISRA C 12.1 asks for.
+    """
     level = operator.level
-    first = left.within(level)
-    second = right.within(Level(level + 1))
+    first = left.text if left.level == level else left.within(Level.SIGN)
+    second = right.within(Level.SIGN)
     text = f"{first} {operator.sign} {second}"
     return Expression(text, kind, level)
 
@@ -126,9 +129,9 @@ def prefixed(sign: str, operand: Expression, kind: Kind) -> Expression:
 def choice(test: Expression, yes: Expression, no: Expression) -> Expression:
     """One of two expressions, as a condition says."""
     kind = no.kind if yes.kind is int else yes.kind
-    condition = test.within(Level.LOGIC)
-    first = yes.within(Level.LOGIC)
-    second = no.within(Level.LOGIC)
+    condition = test.within(Level.SIGN)
+    first = yes.within(Level.SIGN)
+    second = no.within(Level.SIGN)
     text = f"{condition} ? {first} : {second}"
     return Expression(text, kind, Level.CHOICE)
 

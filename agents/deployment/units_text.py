@@ -1,11 +1,8 @@
 """Units of numbers in C and FMU: their texts, and their powers of base units."""
 
 import re
+from collections import Counter
 from collections.abc import Mapping
-
-#: Base units of FMI that ships have.
-BASE = ("kg", "m", "s", "rad")
-FACTOR = re.compile(rf"({'|'.join(BASE)})\^?(-?\d)?")
 
 Powers = Mapping[str, int]
 
@@ -28,21 +25,23 @@ def unit_powers(text: str) -> dict[str, int] | None:
 
     Units are products, quotients and `per`: `rad s/m`, `rad per rad/s`, `1/s`.
     """
-    numerator, _, denominator = text.partition(" per ")
-    powers = dict.fromkeys(BASE, 0)
-    for part, sign in ((numerator, 1), (denominator, -1)):
-        for number, product in enumerate(part.split("/")):
-            side = sign if number == 0 else -sign
-            for factor in product.split():
-                if factor == "1":
-                    continue
-                match = FACTOR.fullmatch(factor)
-                if match is None:
-                    return None
-                powers[match[1]] += side * int(match[2] or 1)
-    if not numerator:
+    above, _, below = text.partition(" per ")
+    if not above:
         return None
-    return {base: power for base, power in powers.items() if power}
+    powers: Counter[str] = Counter()
+    for part, sign in ((above, 1), (below, -1)):
+        numerator, *denominators = part.split("/")
+        factors = [(factor, sign) for factor in numerator.split()]
+        for denominator in denominators:
+            factors += [(factor, -sign) for factor in denominator.split()]
+
+        for factor, side in factors:
+            match = re.fullmatch(r"(kg|m|s|rad|1)\^?(-?\d)?", factor)
+            if match is None:
+                return None
+            base = match[1]
+            powers[base] += side * int(match[2] or 1)
+    return {base: power for base, power in powers.items() if power and base != "1"}
 
 
 def unit_of(note: str) -> str:

@@ -14,13 +14,12 @@ class Variable(NamedTuple):
     @property
     def largest(self) -> float:
         """Largest magnitude that is taken; beyond it a number is no measurement."""
-        return LARGEST[self.unit]
+        # far beyond ships, but small enough to compute with
+        by_unit = {"m": 1e8, "rad": 1e4, "m/s": 1e3, "rad/s": 1e2, "1/s": 1e4}
+        return by_unit[self.unit]
 
 
 Variables = Mapping[str, Variable]
-
-#: Largest magnitudes by unit: far beyond ships, but small enough to compute with.
-LARGEST = {"m": 1e8, "rad": 1e4, "m/s": 1e3, "rad/s": 1e2, "1/s": 1e4}
 
 #: Given to an exported ship, held over a step.
 SHIP_INPUTS: Variables = {

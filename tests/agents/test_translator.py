@@ -146,7 +146,16 @@ def by_the_engine(x):
     return 2.0 * sine + cosine + grown * mathematics.arctan(x)
 
 
+def named_as_in_c(x):
+    sign = np.sign(x)
+    exp = np.exp(-abs(x))
+    clip = np.clip(x, -exp, exp)
+    fabsf, rest = abs(sign), 3
+    return sign + exp * clip + fabsf + rest
+
+
 PLAIN = [
+    named_as_in_c,
     within,
     either,
     summed,
