@@ -1,6 +1,7 @@
 """Names and units of the coefficients of a table of terms, which are but numbered."""
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,7 +11,7 @@ from shipgym import ShipModel
 from shipgym.engine.records import Record, field_types
 from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.term_functions import speed_power
-from shipgym.ships.terms import SHAFT_SPEEDS, SPEEDS, TURN_RATES, Term
+from shipgym.ships.terms import SHAFT_SPEEDS, SPEEDS, TURN_RATES
 
 
 def coefficient_labels(model: ShipModel) -> dict[Record, Mapping[str, Label]]:
@@ -31,14 +32,19 @@ def coefficient_labels(model: ShipModel) -> dict[Record, Mapping[str, Label]]:
 
 def _term_labels(numbered: tuple[str, ...], dynamics: Any) -> dict[str, Label]:
     """Labels of the terms of a table's equations by their numbers."""
+    is_prime = dynamics.normalisation == "prime"
     labels: list[Label] = []
     taken: set[str] = set()
     for equation, terms in dynamics.equations.items():
         for term in terms:
             name = _free_name(f"{equation}dot_{_letters(term.name)}", taken)
-            product = " ".join(_factor(*power) for power in term.powers)
-            unit = _unit(equation, term, prime=dynamics.normalisation == "prime")
-            note = f"{unit}, of {product or '1'} in the rate of {equation}"
+            powers = Counter(dict(term.powers))
+            if is_prime:
+                powers["U"] += speed_power(equation, term)
+
+            product = _product(powers)
+            unit = _unit(equation, powers)
+            note = f"{unit}, of {product} in the rate of {equation}"
             labels.append(Label(name, note))
     return dict(zip(numbered, labels, strict=True))
 
@@ -57,18 +63,23 @@ def _letters(term: str) -> str:
     return re.sub(r"\W", "_", magnitudes, flags=re.ASCII).strip("_")
 
 
-def _factor(symbol: str, power: int) -> str:
-    return symbol if power == 1 else f"{symbol}^{power}"
+def _product(powers: Mapping[str, int]) -> str:
+    """Symbols with their powers, such as `U v |r|^2`."""
+    factors = []
+    for symbol, power in powers.items():
+        if power:
+            factors.append(symbol if power == 1 else f"{symbol}^{power}")
+    return " ".join(factors) or "1"
 
 
-def _unit(equation: str, term: Term, prime: bool) -> str:
-    """SI unit of a term's coefficient in an acceleration."""
-    n_speeds = term.power(*SPEEDS)
-    if prime:
-        n_speeds += speed_power(equation, term)
-    n_rates = term.power(*TURN_RATES, *SHAFT_SPEEDS)
+def _unit(equation: str, powers: Mapping[str, int]) -> str:
+    """SI unit of a coefficient of these symbols in an acceleration."""
     metres = 1 if equation in ("u", "v") else 0
-    per_seconds = 3 if equation == "q" else 2
-    return unit_text(
-        {"m": metres - n_speeds, "s": n_speeds + n_rates - per_seconds},
-    )
+    seconds = -3 if equation == "q" else -2
+    for symbol, power in powers.items():
+        if symbol in SPEEDS:
+            metres -= power
+            seconds += power
+        elif symbol in (*TURN_RATES, *SHAFT_SPEEDS):
+            seconds += power
+    return unit_text({"m": metres, "s": seconds})

@@ -2,9 +2,12 @@
 
 import ctypes
 import json
+import re
+import shutil
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import document_embedded
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -508,6 +511,49 @@ def test_texts_have_angles_speeds_and_headings_in_four_digits():
     headings = [heading(np.radians(one)) for one in angles]
     assert headings == [270.0, 12.3457, 0.0, 0.0, 0.5]
     assert single(0.1) == "1.000000000e-01f"
+
+
+def test_numbers_in_c_carry_their_names_units_and_limits():
+    agent = HEADING["lq"]
+    lq = autopilot_source(agent, "lq")
+    gain = repr(agent.parameters.gains.heading_error)
+    assert f".heading_error = {gain}, /* rad/rad */" in lq.source
+    assert "; /* rad/s, to starboard positive; at most 100 */" in lq.header
+    assert f'LQ_MODEL_SHA256 "{agent.model_sha256}"' in lq.header
+    assert f"LQ_RUDDER_LIMIT {bridge_limit(agent)!r} /* rad" in lq.header
+
+    ship = ship_source(MARINER, "ship")
+    assert re.search(
+        r"\.vdot_v = \(-0\..*, /\* 1/m, of v U in the rate of v \*/", ship.source
+    )
+    assert re.search(r"\.rdot_vvr = .*, /\* 1/m, of v\^2 r U\^-1 ", ship.source)
+    assert re.search(r"\.rudder_rate = 0\.087\d+, /\* rad/s \*/", ship.source)
+    assert not re.search(r"\bc\.c\d+\b", ship.source)
+    assert f'SHIP_MODEL_SHA256 "{agent.model_sha256}"' in ship.header
+    grey = ship_source(load_model("kvlcc2-rm-svm"), "ship")
+    assert not re.search(r"\bc\.c\d+\b", grey.source)
+
+
+def bridge_limit(agent):
+    return Autopilot(agent).limit
+
+
+def test_a_hash_that_is_none_does_not_become_c():
+    agent = replace(HEADING["pid"], model_sha256='"; int main(void) { /*')
+    assert 'PID_MODEL_SHA256 "unknown"' in autopilot_source(agent, "pid").header
+
+
+@pytest.mark.skipif(not shutil.which("cppcheck"), reason="cppcheck is missing")
+@pytest.mark.parametrize("name", ["turn_rate", "orders", "mariner"])
+def test_the_page_names_every_deviation_from_misra(name):
+    page = document_embedded.PAGE.read_text(encoding="utf-8")
+    named = set(re.findall(r"(?m)^\| (\d+\.\d+) \| ", page))
+    assert named == document_embedded.DEVIATIONS.keys()
+    if name == "mariner":
+        source = ship_source(MARINER, "it")
+    else:
+        source = autopilot_source((HEADING | LEARNED)[name], "it")
+    assert document_embedded.deviations(source).keys() <= named
 
 
 def test_a_ship_without_particulars_for_wind_is_written_without_it_and_says_so():
