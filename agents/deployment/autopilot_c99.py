@@ -30,7 +30,6 @@ from agents.deployment.c_structures import (
     numbers_of,
     parameters_of,
     record_kind,
-    table_paths,
 )
 from agents.deployment.c_syntax import Kind, comment
 from agents.deployment.translator import Translator
@@ -101,7 +100,7 @@ def autopilot_source(
         title=title,
         sha256=hash_text(agent.model_sha256),
         parameters=tunable(c, agent, p, source),
-        tables=tuple(table_paths(kind_of(p))),
+        tables=tuple(leaf_paths(kind_of(p), tables=True)),
     )
 
 

@@ -63,10 +63,13 @@ IN_SINGLE: dict[Any, str] = {
 
 def variable_name(name: str) -> str:
     """Name of a variable in C, where those of functions are taken."""
-    of_helpers = ("whole_power", "interpolated", "within", "isfinite")
-    of_functions = {*FUNCTIONS.values(), *IN_SINGLE.values(), *of_helpers}
-    is_taken = name in of_functions or name.removesuffix("f") in of_functions
-    return f"{name}_" if is_taken else c_name(name)
+    taken = {"whole_power", "interpolated", "within"}
+    taken.update(FUNCTIONS.values())
+    taken.update(IN_SINGLE.values())
+    in_double = name.removesuffix("f")
+    if taken & {name, in_double}:
+        return f"{name}_"
+    return c_name(name)
 
 
 def function_name(function: Any, real: str) -> str | None:

@@ -190,18 +190,6 @@ def parameters_of(
     return found
 
 
-def table_paths(kind: Kind, before: str = "") -> list[str]:
-    """Paths of the tables of a record."""
-    paths = []
-    for name, part in members(kind).items():
-        path = f"{before}{name}"
-        if is_table(part):
-            paths.append(path)
-        elif is_record(part):
-            paths += table_paths(part, f"{path}.")
-    return paths
-
-
 def kind_of(value: Any) -> Kind:
     """Kind of a record's value, with tables of the lengths that its arrays have."""
     if isinstance(value, np.ndarray):
@@ -227,15 +215,17 @@ def record_kind(name: str, kinds: Mapping[str, Kind], noted: Kind = None) -> Kin
     return record
 
 
-def leaf_paths(kind: Kind, before: str = "") -> list[str]:
-    """Paths of all numbers of a record, such as `law.gains.sway`; tables have none."""
+def leaf_paths(kind: Kind, before: str = "", tables: bool = False) -> list[str]:
+    """Paths of all numbers of a record, such as `law.gains.sway`, or of its tables."""
     paths = []
     for name, part in members(kind).items():
         path = f"{before}{name}"
-        if part in NUMBERS:
+        is_wanted = is_table(part) if tables else part in NUMBERS
+        if is_wanted:
             paths.append(path)
         elif is_record(part):
-            paths += leaf_paths(part, f"{path}.")
+            deeper = leaf_paths(part, f"{path}.", tables)
+            paths += deeper
     return paths
 
 

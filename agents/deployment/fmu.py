@@ -32,12 +32,9 @@ def write_fmu(source: Source, path: str | Path, fmi: str = "3.0") -> None:
     check_fmu_name(path)
     name = source.name
     files = _texts(source, fmi)
-    machine = platform.machine()
-    folder = f"{machine}-linux"
-    if fmi == "2.0" and machine == "x86_64":
-        folder = "linux64"
+    folder = _binary_folder(fmi)
+    binary = ZipInfo(f"binaries/{folder}/{name}.so")
     with atomic_path(path) as draft:
-        binary = ZipInfo(f"binaries/{folder}/{name}.so")
         compiled = _compiled(files, name, path)
         with ZipFile(draft, "w", ZIP_DEFLATED) as archive:
             archive.writestr(binary, compiled, ZIP_DEFLATED)
@@ -60,6 +57,14 @@ def check_fmu_name(path: Path) -> None:
             f"{shown}: expected a name that ends in .fmu, as importers do, got"
             f" {path.name[:100]!r}; call it {better}.fmu"
         )
+
+
+def _binary_folder(fmi: str) -> str:
+    """Folder of the binary for this computer, as the version of the standard has it."""
+    machine = platform.machine()
+    if fmi == "2.0" and machine == "x86_64":
+        return "linux64"
+    return f"{machine}-linux"
 
 
 def _texts(source: Source, fmi: str) -> dict[str, str]:

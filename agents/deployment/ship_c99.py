@@ -12,7 +12,6 @@ from agents.deployment.c_structures import (
     leaf_paths,
     parameters_of,
     record_kind,
-    table_paths,
 )
 from agents.deployment.c_syntax import comment
 from agents.deployment.term_labels import coefficient_labels
@@ -130,7 +129,7 @@ def ship_source(
         title=title,
         sha256=model_hash(model),
         parameters=_tunable(c, model, kind, numbers),
-        tables=tuple(table_paths(kind)),
+        tables=tuple(leaf_paths(kind, tables=True)),
         notes=(note,) if note else (),
     )
 

@@ -28,20 +28,32 @@ def unit_powers(text: str) -> dict[str, int] | None:
     above, _, below = text.partition(" per ")
     if not above:
         return None
-    powers: Counter[str] = Counter()
-    for part, sign in ((above, 1), (below, -1)):
-        numerator, *denominators = part.split("/")
-        factors = [(factor, sign) for factor in numerator.split()]
-        for denominator in denominators:
-            factors += [(factor, -sign) for factor in denominator.split()]
+    dividend = _quotient_powers(above)
+    divisor = _quotient_powers(below)
+    if dividend is None or divisor is None:
+        return None
+    dividend.subtract(divisor)
 
-        for factor, side in factors:
+    powers = {}
+    for base, power in dividend.items():
+        if power and base != "1":
+            powers[base] = power
+    return powers
+
+
+def _quotient_powers(text: str) -> Counter[str] | None:
+    """Powers in a quotient such as `rad s/m`, with those of 1."""
+    powers: Counter[str] = Counter()
+    for number, product in enumerate(text.split("/")):
+        sign = -1 if number else 1
+        for factor in product.split():
             match = re.fullmatch(r"(kg|m|s|rad|1)\^?(-?\d)?", factor)
             if match is None:
                 return None
             base = match[1]
-            powers[base] += side * int(match[2] or 1)
-    return {base: power for base, power in powers.items() if power and base != "1"}
+            power = int(match[2] or 1)
+            powers[base] += sign * power
+    return powers
 
 
 def unit_of(note: str) -> str:
