@@ -119,7 +119,8 @@ def tunable(
         without.add("reach")
 
     kept = []
-    for parameter in parameters_of(c.structures, kind_of(p), numbers_of(p)):
+    numbers = numbers_of(p)
+    for parameter in parameters_of(c.structures, kind_of(p), numbers):
         is_interval = parameter.path.rpartition(".")[2] == "dt"
         if not is_interval and parameter.path not in without:
             kept.append(parameter)
@@ -132,16 +133,18 @@ def controller_data(c: Translator, agent: Any, p: BridgeParameters) -> dict[str,
     state = state_kind(agent)
     structures.declare(state, f"{structures.prefix}_own")
     kind = parameters_kind(c, p)
-    header, structures.texts = structures.texts, []
+    header = structures.texts
+    structures.texts = []
 
     step = steering_step(c, agent, state, kind, path_step)
+    numbers = numbers_of(p)
     return {
         "policy": None,
         "state_structures": header,
         "own_paths": leaf_paths(state),
         "step": step.name,
         "step_type": structures.type(step.returns),
-        "parameters": structures.initialiser(kind, numbers_of(p)),
+        "parameters": structures.initialiser(kind, numbers),
     }
 
 
@@ -159,7 +162,9 @@ def policy_data(
     structures = c.structures
     structures.declare(POLICY_STATE, f"{structures.prefix}_own")
     base_state = None
+    base_paths: list[str] = []
     if policy.base is not None:
+        base_paths = leaf_paths(state_kind(policy.base))
         base_state = state_kind(policy.base)
         structures.declare(base_state, f"{structures.prefix}_base")
     kind = parameters_kind(c, p)
@@ -172,7 +177,7 @@ def policy_data(
         "state_structures": header,
         "has_base": policy.base is not None,
         "own_paths": leaf_paths(POLICY_STATE),
-        "base_paths": [] if base_state is None else leaf_paths(base_state),
+        "base_paths": base_paths,
         "observe": observe.name,
         "observe_type": structures.type(observe.returns),
         "own_observations_type": structures.type(OwnObservations),

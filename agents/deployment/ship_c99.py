@@ -141,10 +141,14 @@ def _tunable(
     gear = {"ship.rudder_limit", "ship.rudder_rate"}
     if model.compiled.lag:
         gear.add("ship.gear_frequency")
+
     kept = []
     for parameter in parameters_of(c.structures, kind, iter(numbers)):
-        of_hull = parameter.path.startswith("coefficients.")
-        if (of_hull or parameter.path in gear) and np.isfinite(parameter.value):
+        path = parameter.path
+        of_hull = path.startswith("coefficients.")
+        has_effect = of_hull or path in gear
+        # XML has no word for an infinite number
+        if has_effect and np.isfinite(parameter.value):
             kept.append(parameter)
     return tuple(kept)
 

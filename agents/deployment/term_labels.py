@@ -37,7 +37,8 @@ def _term_labels(numbered: tuple[str, ...], dynamics: Any) -> dict[str, Label]:
     taken: set[str] = set()
     for equation, terms in dynamics.equations.items():
         for term in terms:
-            name = _free_name(f"{equation}dot_{_letters(term.name)}", taken)
+            letters = _letters(term.name)[:30]
+            name = _free_name(f"{equation}dot_{letters}", taken)
             powers = Counter(dict(term.powers))
             if is_prime:
                 powers["U"] += speed_power(equation, term)
@@ -45,7 +46,8 @@ def _term_labels(numbered: tuple[str, ...], dynamics: Any) -> dict[str, Label]:
             product = _product(powers)
             unit = _unit(equation, powers)
             note = f"{unit}, of {product} in the rate of {equation}"
-            labels.append(Label(name, note))
+            label = Label(name, note)
+            labels.append(label)
     return dict(zip(numbered, labels, strict=True))
 
 
