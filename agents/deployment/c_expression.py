@@ -138,17 +138,11 @@ class ExpressionWriter:
             raise self.refusal(node)
         left = self.expression(node.left)
         right = self.expression(node.right)
-        are_integers = left.kind is int and right.kind is int
-        if are_integers and isinstance(node.op, ast.Div):
-            are_integers = False
-        if not are_integers:
-            left = self.as_real(left)
-            right = self.as_real(right)
         return binary(
-            left,
+            self.as_real(left),
             operator,
-            right,
-            kind=int if are_integers else float,
+            self.as_real(right),
+            kind=float,
         )
 
     def as_real(self, number: Expression) -> Expression:

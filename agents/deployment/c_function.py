@@ -146,7 +146,9 @@ class FunctionWriter:
         self.kinds[name] = int
         i = variable_name(name)
         number = self.expressions.expression(end)
-        bound = number.within(Level.SUM)
+        bound = number.within(Level.SIGN)
+        if number.kind is float:  # as all sums are
+            bound = f"(int){bound}"
         lines = [f"for ({i} = 0; {i} < {bound}; ++{i}) {{"]
         lines += self._statements(body)
         lines.append("}")

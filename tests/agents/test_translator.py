@@ -72,7 +72,7 @@ def either(x):
 
 def summed(x):
     total = 0.0
-    for k in range(LIMIT):
+    for k in range(LIMIT + 1):
         total = total + x * (k + 1) / 2 - k / 2
     return total
 
