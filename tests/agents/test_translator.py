@@ -271,11 +271,16 @@ def wrap(x):
     return x
 
 
+def step(x):
+    return x
+
+
 def test_functions_of_one_name_are_numbered_from_the_second_on():
     c = Translator({}, "ship")
     functions = (mathematics.wrap, wrap, mathematics.wrap)
     names = [c.function(one, float).name for one in functions]
     assert names == ["ship_wrap", "ship_wrap2", "ship_wrap"]
+    assert c.function(step, float).name == "ship_step2"
 
 
 def test_numbers_and_names_are_those_of_c():
