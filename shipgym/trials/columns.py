@@ -7,11 +7,19 @@ from typing import Any, SupportsIndex
 import numpy as np
 import numpy.typing as npt
 
-from shipgym.checks import check_keys, check_table, check_text, quoted
+from shipgym.checks import (
+    check_keys,
+    check_number,
+    check_table,
+    check_text,
+    quoted,
+)
 from shipgym.errors import InputError
 from shipgym.trials.clock_texts import zone_seconds
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.units import QUANTITIES, check_channel, si_factor, si_unit
+
+STEERED = ("delta", "delta_command")  # channels that a steering command may stand for
 
 
 @dataclass(frozen=True)
@@ -20,8 +28,11 @@ class Column:
 
     name: str  # of the column
     unit: str = ""  # none: as the reader knows it, else the SI unit
-    date: str | None = None  # column of the date, with a time of the day
+    date: str | None = None  # column of the date or of the GPS week
     zone: str = "UTC"  # how far the clock is ahead of UTC, as "+02:00"
+    minus: str | None = None  # column that is subtracted: of the other propeller
+    neutral: float = 0.0  # number of a steering command that steers straight
+    full: float | None = None  # change of the command that counts as 35 deg of rudder
 
 
 @dataclass(frozen=True)
@@ -61,9 +72,10 @@ def parse_columns(
     """Check a table of columns by channel.
 
     Each entry is the name of a column or ``{"column": name, "unit": unit}``, of the
-    time also ``"date"``, the column of the date, and ``"zone"``. `where` begins the
-    messages. Raises InputError for an unknown channel, key or unit, and for a unit of
-    another quantity.
+    time also ``"date"``, the column of the date, and ``"zone"``, of the rudder also
+    those of a steering command, ``"full"``, ``"neutral"`` and ``"minus"``. `where`
+    begins the messages. Raises InputError for an unknown channel, key or unit, and for
+    a unit of another quantity.
     """
     check_table(columns, where)
     parsed = {}
@@ -79,6 +91,8 @@ def _parse_column(channel: str, entry: Any, where: str) -> Column:
     keys = ["column", "unit"]
     if channel == "t":
         keys += ["date", "zone"]
+    if channel in STEERED:
+        keys += ["minus", "neutral", "full"]
     check_keys(fields, keys, where)
     name = fields.pop("column", None)
     if not isinstance(name, str):
@@ -91,11 +105,36 @@ def _parse_column(channel: str, entry: Any, where: str) -> Column:
     check_text(name, where)
     if "unit" in fields:
         si_factor(channel, fields["unit"], where)
+    command = _steering_command(fields, where)
     for field in fields.values():
         check_text(field, where)
     if "zone" in fields:
         zone_seconds(fields["zone"], f"{where} zone")
-    return Column(name.strip(), **fields)
+    return Column(name.strip(), **fields, **command)
+
+
+def _steering_command(fields: dict[str, Any], where: str) -> dict[str, Any]:
+    """Take what makes a steering command out of the fields of a column, checked."""
+    command: dict[str, Any] = {}
+    for key in ("neutral", "full"):
+        if key in fields:
+            command[key] = check_number(fields.pop(key), f"{where} {key}")
+    if "minus" in fields:
+        command["minus"] = check_text(fields.pop("minus"), f"{where} minus")
+    if command and not command.get("full"):
+        raise InputError(
+            f"{where}: expected full, the change of the command that counts as 35 deg"
+            " of rudder, not zero, with neutral or minus, got none; give full, such as"
+            " 400 of a pulse width in us"
+        )
+    if command:
+        if fields.get("unit", "deg") != "deg":
+            raise InputError(
+                f"{where} unit: expected deg with full, got {fields['unit']!r}; leave"
+                " out the unit"
+            )
+        fields["unit"] = "deg"
+    return command
 
 
 def choose_columns(

@@ -1,0 +1,87 @@
+"""Numbers of a column: steering commands, and numbers that stand for "no value"."""
+
+import numpy as np
+
+from shipgym.arrays import Flags, Floats
+from shipgym.trials.columns import Column
+from shipgym.trials.readers.log_table import LogTable
+from shipgym.trials.units import LARGEST_MAGNITUDES
+
+#: Degrees that the full deflection of a steering command counts as.
+FULL_RUDDER_DEG = 35.0
+#: Numbers that AIS, J1939 and loggers write for "no value".
+_SENTINELS = {
+    "sog": (102.3,),
+    "stw": (102.3,),
+    "cog": (409.5, 360.1),
+    "psi": (511.0,),
+    "r": (-128.0, 128.0, -731.0, 731.0),
+}
+_COMMON = (-32768.0, 32767.0, 65535.0, 2147483647.0, -2147483648.0, 4294967295.0)
+
+
+def column_numbers(table: LogTable, column: Column) -> Floats:
+    """Numbers of a column, of a steering command as degrees of a nominal rudder."""
+    numbers = table.numbers(column.name, sided=True)
+    if column.full is None:
+        return numbers
+    if column.minus is not None:
+        numbers = numbers - table.numbers(column.minus)
+    deflection = (numbers - column.neutral) / column.full
+    return deflection * FULL_RUDDER_DEG
+
+
+def without_sentinels(
+    channel: str, numbers: Floats, factor: float
+) -> tuple[Floats, list[str]]:
+    """Numbers of a column without those that stand for "no value", and which they were.
+
+    Such are 9999 and the like, far beyond all others or impossible, and those that AIS
+    gives a meaning; `factor` is that to SI units.
+    """
+    known = np.abs(numbers[np.isfinite(numbers)])
+    if not known.size:
+        return numbers, []
+    largest = LARGEST_MAGNITUDES[channel] / factor
+    suspects = known[known > min(99.0, largest)]
+    if channel in ("psi", "cog", "wind_from"):
+        largest = min(largest, 2.0 * np.pi / factor + 1.0)
+    values = numbers
+    words = []
+    for size in np.unique(suspects)[::-1][:3]:
+        is_size = np.abs(numbers) == size
+        others = known[known != size]
+        beyond = others.size and size > 3.0 * np.max(others)
+        written = {float(one) for one in np.unique(numbers[is_size])}
+        is_own = bool(written & set(_SENTINELS.get(channel, ())))
+        is_common = _is_nines(size) or bool(written & set(_COMMON))
+        if (is_own and (beyond or size > largest)) or (
+            is_common and (beyond or size > largest)
+        ):
+            values = np.where(is_size, np.nan, values)
+            known = others
+            count = np.count_nonzero(is_size)
+            number = ", ".join(f"{one:g}" for one in sorted(written))
+            words.append(f'{count} values of {number} stand for "no value"')
+    return values, words
+
+
+def _is_nines(size: float) -> bool:
+    """Return whether a number is written by three nines or more alone."""
+    digits = f"{size:.10g}".replace(".", "")
+    return len(digits) >= 3 and set(digits) == {"9"}
+
+
+def no_positions(lat: Floats, lon: Floats) -> Flags:
+    """Flags of positions that stand for none: those of AIS, and zeros among others."""
+    beyond = (np.abs(lat) > 90.0) | (np.abs(lon) > 180.0)
+    written = np.isin(np.abs(lat), (91.0, 99.0, 999.0, 9999.0)) | np.isin(
+        np.abs(lon), (181.0, 999.0, 9999.0)
+    )
+    is_zero = (lat == 0.0) & (lon == 0.0)
+    known = np.isfinite(lat) & ~is_zero
+    is_far = known.any() and np.nanmin(np.abs(lat[known]) + np.abs(lon[known])) > 1.0
+    none: Flags = beyond & written
+    if is_far:
+        none |= is_zero
+    return none
