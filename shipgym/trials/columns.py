@@ -30,6 +30,7 @@ class Column:
     unit: str = ""  # none: as the reader knows it, else the SI unit
     date: str | None = None  # column of the date or of the GPS week
     zone: str = "UTC"  # how far the clock is ahead of UTC, as "+02:00"
+    nanoseconds: str | None = None  # column of what is to be added to whole seconds
     minus: str | None = None  # column that is subtracted: of the other propeller
     neutral: float = 0.0  # number of a steering command that steers straight
     full: float | None = None  # change of the command that counts as 35 deg of rudder
@@ -71,11 +72,11 @@ def parse_columns(
 ) -> dict[str, Column]:
     """Check a table of columns by channel.
 
-    Each entry is the name of a column or ``{"column": name, "unit": unit}``, of the
-    time also ``"date"``, the column of the date, and ``"zone"``, of the rudder also
-    those of a steering command, ``"full"``, ``"neutral"`` and ``"minus"``. `where`
-    begins the messages. Raises InputError for an unknown channel, key or unit, and for
-    a unit of another quantity.
+    Each entry is the name of a column or ``{"column": name, "unit": unit}``. That of
+    the time may also have ``"date"``, the column of the date, ``"nanoseconds"`` and
+    ``"zone"``, that of the rudder ``"full"``, ``"neutral"`` and ``"minus"``, which make
+    a steering command. `where` begins the messages. Raises InputError for an unknown
+    channel, key or unit, and for a unit of another quantity.
     """
     check_table(columns, where)
     parsed = {}
@@ -90,7 +91,7 @@ def _parse_column(channel: str, entry: Any, where: str) -> Column:
     fields = dict(entry) if isinstance(entry, Mapping) else {"column": entry}
     keys = ["column", "unit"]
     if channel == "t":
-        keys += ["date", "zone"]
+        keys += ["date", "zone", "nanoseconds"]
     if channel in STEERED:
         keys += ["minus", "neutral", "full"]
     check_keys(fields, keys, where)

@@ -1,5 +1,6 @@
 """Times of the rows of a table: numbers in their unit, clock times, repeated ones."""
 
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,9 @@ _EPOCHS = {
     "gps tow ms": _GPS_ZERO,
 }
 _ROLLOVER = 1024  # weeks
+_COMPACT = re.compile(
+    r"(?P<date>(?:19|20)\d\d[01]\d[0-3]\d)?(?P<time>[0-2]\d[0-5]\d[0-5]\d(?:\.\d+)?)"
+)
 
 
 class RowTimes(NamedTuple):
@@ -55,9 +59,15 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
     notes: list[str] = []
     first = next(filter(None, cells), "0")
     is_numeric = is_number(first.replace(",", "."))
+    if _are_compact(cells):
+        is_numeric = False
+        cells = [_parted(cell) for cell in cells]
+        notes.append(f"column '{column.name}' is the clock without colons, hhmmss")
     if is_numeric:
         numbers = table.numbers(column.name)
         clock = si_factor("t", column.unit) * numbers
+        if column.nanoseconds is not None:
+            clock = clock + 1e-9 * table.numbers(column.nanoseconds)
         if column.unit in ("excel days", "excel days 1904", "matlab days"):
             clock = np.round(clock, 3)  # days have some nine decimals
     else:
@@ -74,6 +84,32 @@ def read_times(table: LogTable, column: Column) -> RowTimes:
     zero = float(known[0]) if known.size else 0.0
     ahead = zone_seconds(column.zone, str(table.path))
     return RowTimes(clock - zero, unit="s", start=zero - ahead, notes=notes)
+
+
+def _are_compact(cells: list[str]) -> bool:
+    """Return whether cells are clock times without colons, with or without the date.
+
+    Numbers that only look so count beyond 59, or do not pass a minute.
+    """
+    known = [cell for cell in cells if cell]
+    matches = [_COMPACT.fullmatch(cell) for cell in known]
+    if not known or None in matches:
+        return False
+    minutes = {match["time"][:4] for match in matches if match}
+    has_date = all(match["date"] for match in matches if match)
+    return has_date or len(minutes) > 1
+
+
+def _parted(cell: str) -> str:
+    """A clock time, or date and time, with colons."""
+    match = _COMPACT.fullmatch(cell)
+    if match is None:
+        return cell
+    time = match["time"]
+    date = match["date"] or ""
+    if date:
+        date = f"{date[:4]}-{date[4:6]}-{date[6:8]} "
+    return f"{date}{time[:2]}:{time[2:4]}:{time[4:]}"
 
 
 def _day(date: str) -> str:

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from fnmatch import fnmatchcase
 from typing import NamedTuple
 
+import numpy as np
+
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.files import shipped_toml
@@ -27,11 +29,23 @@ _WITH_UNIT = "with_unit"  # not a language
 _SIGNAL_K = re.compile(r"(navigation|steering|propulsion|environment)\.", re.IGNORECASE)
 _TIME_OF_DAY = re.compile(r"\d\d?:\d\d.*")
 _DATE = re.compile(r"\d+\W+\w+\W+\d+.*|\d{6}|\d{8}")
+#: Names of numbers of rows, which are no time.
+_COUNTS = {"", "index", "row", "no", "nr", "id", "seq", "sample", "unnamed: 0"}
 #: Words in the name of what a ship should do, or of what is no measured value.
 _NO_MEASUREMENT = {
     *("set", "setpoint", "sp", "desired", "target", "command", "commanded", "cmd"),
     *("order", "ordered", "ref", "reference", "demand", "error", "err", "rate"),
-    *("std", "accuracy", "deviation", "variation", "raw", "quality", "status", "mode"),
+    *(
+        "std",
+        "accuracy",
+        "deviation",
+        "variation",
+        "raw",
+        "quality",
+        "status",
+        "mode",
+        "header",
+    ),
 }
 
 
@@ -112,6 +126,10 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
             take("sog", "speed")
         elif "stw" not in guesses:
             take("stw", "speed")
+    if "t" not in guesses:
+        even = _even_column(table, free)
+        if even is not None:
+            guesses["t"] = even
     if "t" in guesses:
         guesses["t"] = _with_date(table, guesses["t"], free, names)
     if "delta" not in guesses and "delta_command" not in guesses:
@@ -151,7 +169,8 @@ def _unit_where_fitting(table: LogTable, column: str, channel: str) -> UnitGuess
     units = split_unit(text).units
     if names_another_quantity(units, channel):
         return None
-    if channel in ("psi", "sog", "stw", "cog") and _NO_MEASUREMENT & {*text.split()}:
+    words = {*re.findall(r"[^\W\d_]+", text)}
+    if channel in ("psi", "sog", "stw", "cog") and _NO_MEASUREMENT & words:
         return None
     unit = named_unit(units, channel)
     below = table.unit_row.get(column)
@@ -203,6 +222,14 @@ def _with_date(
     first = _first_text(table, time.column)
     is_of_day = _TIME_OF_DAY.fullmatch(first) is not None
     is_of_week = _matches(_forms(time.column, "t"), ["*tow", "*timeofweek*"])
+    if is_of_week:
+        unit = "gps tow ms" if time.unit == "ms" else "gps tow"
+        reason = "seconds of the GPS week, by its name"
+        time = time._replace(unit=unit, reason=reason)
+    part = _second_of(table, time.column, free)
+    if part is not None:
+        free.remove(part)
+        return time._replace(extra=(("nanoseconds", part),))
     if not is_of_day and not is_of_week:
         return time
     for pattern in names.known["date"]:
@@ -210,19 +237,36 @@ def _with_date(
             if not _matches(_forms(column, "t"), [pattern]):
                 continue
             date = _first_text(table, column)
-            if is_of_day and _DATE.fullmatch(date):
+            if date.isdigit() if is_of_week else _DATE.fullmatch(date):
                 free.remove(column)
-                return time._replace(
-                    unit="s", reason="from its content", extra=(("date", column),)
-                )
-            if is_of_week and date.isdigit():
-                free.remove(column)
-                unit = "gps tow ms" if time.unit == "ms" else "gps tow"
-                reason = "seconds of the GPS week, by its name"
-                return time._replace(
-                    unit=unit, reason=reason, extra=(("date", column),)
-                )
+                return time._replace(extra=(("date", column),))
     return time
+
+
+def _second_of(table: LogTable, column: str, free: list[str]) -> str | None:
+    """Column of the nanoseconds beside the seconds of a stamp of ROS; None without."""
+    stem = re.sub(r"secs?$", "", column, flags=re.IGNORECASE)
+    if stem == column:
+        return None
+    others = {f"{stem}{ending}" for ending in ("nanosec", "nanosecs", "nsec", "nsecs")}
+    return next((one for one in free if one in others), None)
+
+
+def _even_column(table: LogTable, free: list[str]) -> ColumnGuess | None:
+    """A column without a known name that increases evenly, as time does."""
+    for column in free:
+        values = _numbers(table, column)
+        if values is None or values.size < 10:
+            continue
+        steps = np.diff(values)
+        is_even = np.all(steps > 0.0) and np.ptp(steps) <= 0.01 * steps.max()
+        is_count = values[0] in (0.0, 1.0) and np.all(steps == 1.0)
+        if is_even and not (is_count and column.lower() in _COUNTS):
+            free.remove(column)
+            unit = unit_by_size(values, "t")
+            reason = f"{unit.reason}; the time, as it increases evenly"
+            return ColumnGuess("t", column, unit.unit, reason)
+    return None
 
 
 def _first_text(table: LogTable, column: str) -> str:
@@ -233,7 +277,9 @@ def _forms(column: str, channel: str) -> list[str]:
     """The name of a column without blanks: whole, without its unit, its last part."""
     text = column.lower().replace("_", " ")
     bare, units = split_unit(text)
-    forms = [_plain(text), _plain(re.sub(r"[\[(].*", "", text))]
+    forms = [_plain(text)]
+    if "(:," not in column:  # of a matrix
+        forms.append(_plain(re.sub(r"[\[(].*", "", text)))
     if named_unit(units, channel) is not None:
         forms.append(_plain(bare))
     is_path = re.search(r"[^\W\d_][./:][^\W\d_]", column)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,10 +12,17 @@ from shipgym.trials.guesses.columns import ColumnGuess
 from shipgym.trials.guesses.units import BY_NAME
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.recording import read_recording
-from shipgym.trials.resampling import Signal, usual_step
+from shipgym.trials.resampling import usual_step
 
 _UNITS = {"m/s": 1.0, "knots": 1852.0 / 3600.0, "km/h": 1.0 / 3.6}
 _SPEEDS = ("sog", "stw")
+
+
+class _Known(NamedTuple):
+    """Speeds in m/s, and where they are from."""
+
+    speed: Floats
+    words: str
 
 
 def settle_speeds(
@@ -30,8 +38,14 @@ def settle_speeds(
     if not speeds:
         return settled
     by_positions = _speed_by_positions(table, settled)
-    for channel in speeds:
-        settled[channel] = _settled(table, settled[channel], by_positions)
+    known = None
+    if by_positions is not None:
+        known = _Known(by_positions, "the positions, which change by")
+    for channel in sorted(speeds, key=lambda name: not _is_known(settled[name])):
+        guess = settled[channel] = _settled(table, settled[channel], known)
+        if known is None and _is_known(guess):
+            speed = _magnitudes(table, guess) * _UNITS.get(guess.unit, 1.0)
+            known = _Known(speed, f"the column '{guess.column}', which shows")
     if "sog" in settled and "cog" not in settled:
         alone = settled.pop("sog")
         if by_positions is None and "stw" not in settled and "u" not in settled:
@@ -45,9 +59,21 @@ def settle_speeds(
     return settled
 
 
+def _is_known(guess: ColumnGuess) -> bool:
+    """Return whether the log itself names the unit of a speed."""
+    return guess.reason.startswith((BY_NAME, "from the row", "from its cells", "paths"))
+
+
+def _magnitudes(table: LogTable, guess: ColumnGuess) -> Floats:
+    """Magnitudes of a speed as the log has it, without missing and impossible ones."""
+    values = np.abs(table.numbers(guess.column))
+    known: Floats = values[np.isfinite(values) & (values < 100.0)]
+    return known
+
+
 def _speed_by_positions(
     table: LogTable, guesses: Mapping[str, ColumnGuess]
-) -> Signal | None:
+) -> Floats | None:
     """Speed at which positions change, m/s; None where there are none."""
     for pair in (("lat", "lon"), ("x", "y")):
         if not {"t", *pair} <= guesses.keys():
@@ -65,66 +91,47 @@ def _speed_by_positions(
     return None
 
 
-def _chord_speeds(t: Floats, x: Floats, y: Floats) -> Signal | None:
-    """Speed over stretches of some 10 s, at their middles."""
+def _chord_speeds(t: Floats, x: Floats, y: Floats) -> Floats:
+    """Speed over stretches of some 10 s."""
     rows = max(1, round(10.0 / usual_step(t)))
     if t.size < 3 * rows:
         rows = max(1, t.size // 3)
     dx = x[rows:] - x[:-rows]
     dy = y[rows:] - y[:-rows]
     dt = t[rows:] - t[:-rows]
-    middle = 0.5 * (t[rows:] + t[:-rows])
-    return Signal(middle, np.hypot(dx, dy) / dt)
+    speeds: Floats = np.hypot(dx, dy) / dt
+    return speeds
 
 
-def _settled(
-    table: LogTable, guess: ColumnGuess, by_positions: Signal | None
-) -> ColumnGuess:
-    """The guess with the unit in which a speed agrees best with the positions."""
-    is_named = guess.reason == BY_NAME or guess.reason.startswith("from the row")
-    if by_positions is None:
-        if is_named or guess.reason.startswith(("from its cells", "paths")):
-            return guess
-        return _guessed(table, guess)
-    ratio = _ratio(table, guess, by_positions)
-    if ratio is None:
+def _settled(table: LogTable, guess: ColumnGuess, known: _Known | None) -> ColumnGuess:
+    """The guess with the unit in which a speed agrees best with a known one."""
+    try:
+        values = _magnitudes(table, guess)
+    except InputError:
         return guess
-    number, speed = ratio
+    is_named = _is_known(guess)
+    if known is None:
+        return guess if is_named else _guessed(guess, values)
+    speed = float(np.median(known.speed)) if known.speed.size else 0.0
+    number = float(np.median(values)) if values.size else 0.0
+    if not speed > 0.0 or not number > 0.0:
+        return guess
+
     apart = {unit: abs(math.log(speed / number / one)) for unit, one in _UNITS.items()}
     nearest = min(apart, key=lambda unit: apart[unit])
+    # a name is contradicted by what fits exactly alone
     doubt = 0.05 if is_named else 0.3
     if apart[nearest] > doubt or (is_named and nearest == guess.unit):
         return guess
-    reason = (
-        f"by the positions, which change by {speed:.3g} m/s where it shows {number:.4g}"
-    )
-    if is_named and nearest != guess.unit:
-        reason += f", not {guess.unit} as {guess.reason.removeprefix('from ')} says"
+    reason = f"by {known.words} {speed:.3g} m/s where it shows {number:.4g}"
+    if is_named:
+        reason += f", not {guess.unit} as its name or row of units says"
     return guess._replace(unit=nearest, reason=reason)
 
 
-def _ratio(
-    table: LogTable, guess: ColumnGuess, by_positions: Signal
-) -> tuple[float, float] | None:
-    """Median of a column and of the positions' speed, where the ship moves."""
-    try:
-        values = np.abs(table.numbers(guess.column))
-    except InputError:
-        return None
-    known = values[np.isfinite(values) & (values < 100.0)]
-    speeds = by_positions.values
-    if not known.size or not np.median(known) > 0.0 or not np.median(speeds) > 0.0:
-        return None
-    return float(np.median(known)), float(np.median(speeds))
-
-
-def _guessed(table: LogTable, guess: ColumnGuess) -> ColumnGuess:
+def _guessed(guess: ColumnGuess, values: Floats) -> ColumnGuess:
     """The usual unit of a speed, said to be a guess."""
-    try:
-        values = np.abs(table.numbers(guess.column))
-    except InputError:
-        return guess
-    largest = float(np.nanmax(values, initial=0.0))
+    largest = float(values.max(initial=0.0))
     unit = "knots" if largest > 3.0 else "m/s"
     reason = (
         f"is a guess: there are no positions that tell, up to {largest:.4g}; knots,"

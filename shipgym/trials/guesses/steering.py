@@ -34,8 +34,8 @@ _PROPELLER = re.compile(
     r"|rev|power|duty"
 )
 _SERVO = re.compile(
-    r"(rcou|rc_?out|servo|pwm|ch|chan|channel|output|out).*\d|.*(steer|rudder|helm).*"
-    r"|.*pwm.*",
+    r"(rcou|rc_?out|servo|pwm|ch|chan|channel|output|out).*\d(_?raw)?"
+    r"|.*(steer|rudder|helm|pwm).*",
     re.IGNORECASE,
 )
 _NEUTRAL, _SPAN = 1500.0, 400.0  # us, of radio control's servos
@@ -109,15 +109,41 @@ def _side(column: str) -> tuple[str, str] | None:
 
 def _servo(numbers: dict[str, Floats]) -> SteeringGuess | None:
     """The first pulse width that a servo of radio control gets."""
+    servos = {}
     for column, values in numbers.items():
         if _SERVO.fullmatch(column) and _is_pulse_width(values):
-            reason = (
-                f"steering command: a pulse width in us, neutral at {_NEUTRAL:g}, of"
-                f" which {_SPAN:g} counts as {FULL_RUDDER_DEG:g} deg of a nominal"
-                " rudder"
-            )
-            extra = (("neutral", _NEUTRAL), ("full", _SPAN))
-            return SteeringGuess(column, "deg", reason, extra)
+            servos[column] = values
+    mirrored = _mirrored(servos)
+    if mirrored is not None:
+        left, right = mirrored
+        reason = (
+            f"steering command: '{left}' minus '{right}', two motors that mirror each"
+            f" other, of which {2.0 * _SPAN:g} us counts as {FULL_RUDDER_DEG:g} deg of"
+            " a nominal rudder"
+        )
+        extra = (("minus", right), ("full", 2.0 * _SPAN))
+        return SteeringGuess(left, "deg", reason, extra)
+    column = next(iter(servos), None)
+    if column is None:
+        return None
+    reason = (
+        f"steering command: a pulse width in us, neutral at {_NEUTRAL:g}, of which"
+        f" {_SPAN:g} counts as {FULL_RUDDER_DEG:g} deg of a nominal rudder"
+    )
+    return SteeringGuess(
+        column, "deg", reason, (("neutral", _NEUTRAL), ("full", _SPAN))
+    )
+
+
+def _mirrored(servos: dict[str, Floats]) -> tuple[str, str] | None:
+    """The first two servos of which one goes up where the other goes down."""
+    names = list(servos)
+    for number, left in enumerate(names):
+        for right in names[number + 1 :]:
+            a = servos[left]
+            b = servos[right]
+            if a.size == b.size and np.corrcoef(a, b)[0, 1] < -0.8:
+                return left, right
     return None
 
 

@@ -86,7 +86,8 @@ def _time_by_size(values: Floats) -> UnitGuess:
     step = float(np.median(forward)) if forward.size else 1.0
     unit = "s"
     for size, since_1970 in _SINCE_1970.items():
-        if known.size and known.min() > size:
+        seconds = step * UNITS["time"][since_1970]
+        if known.size and known.min() > size and seconds < 3600.0:
             unit = since_1970
     if unit != "s":
         return UnitGuess(unit, f"from its size, up to {largest:.4g}")

@@ -2,17 +2,18 @@
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from shipgym.errors import InputError
-from shipgym.trials.readers.cell_texts import is_missing
 from shipgym.trials.readers.layout import (
     Layout,
     find_layout,
     is_data,
     split,
+    title_note,
+    unit_texts,
     without_spare,
 )
 from shipgym.trials.readers.log_table import LogTable, is_number
@@ -57,11 +58,8 @@ def read_csv(path: str | Path) -> LogTable:
     if text.encoding:
         notes.append(f"the text is in {text.encoding}, by the names of its columns")
     titles = [line for line in lines[: layout.header] if line.strip()]
-    if titles:
-        notes.append(
-            f"the names of the columns are in line {header_at}: {len(titles)} lines of"
-            " title above it are left out"
-        )
+    notes += title_note(header_at, len(titles))
+    unit_rows = [split(lines[number], delimiter) for number in layout.units]
     body = _read_body(path, lines, layout, header)
     columns = zip(*body.rows.values(), strict=True) if body.rows else [()] * len(header)
     return LogTable(
@@ -70,7 +68,7 @@ def read_csv(path: str | Path) -> LogTable:
         rows=list(body.rows),
         place_words="line {line} (data row {row})",
         decimal_comma=delimiter != ",",
-        unit_row=_unit_row(lines, layout, header),
+        unit_row=unit_texts(header, unit_rows),
         notes=(*notes, *body.notes),
     )
 
@@ -109,20 +107,6 @@ def _read_body(
     return _Body(rows, notes)
 
 
-def _unit_row(
-    lines: Sequence[str], layout: Layout, header: Sequence[str]
-) -> Mapping[str, str]:
-    """Texts of the units below the names, by column."""
-    units: dict[str, str] = {}
-    for number in layout.units:
-        cells = split(lines[number], layout.delimiter)
-        for name, cell in zip(header, cells, strict=False):
-            text = cell.strip().strip("[]()").strip()
-            if not is_missing(text):
-                units.setdefault(name, text)
-    return units
-
-
 def read_lines(path: Path, what: str) -> list[str]:
     """Lines of a text file, at most a million; `what` names the file's kind."""
     text = _read(path, what)
@@ -154,8 +138,7 @@ def _first_line(path: Path, lines: Sequence[str]) -> Layout:
             continue
         unquoted = re.sub('"[^"]*"', "", line)
         delimiter = max(",;\t", key=unquoted.count)
-        n_cells = len(split(line, delimiter))
-        return Layout(delimiter, header=number, units=(), n_cells=n_cells)
+        return Layout(delimiter, header=number, units=())
     raise InputError(
         f"{path}: expected a header line with column names and rows below, got an"
         " empty file"

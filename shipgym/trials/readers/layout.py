@@ -3,7 +3,7 @@
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from shipgym.trials.readers.cell_texts import is_missing
@@ -29,7 +29,6 @@ class Layout(NamedTuple):
     delimiter: str
     header: int  # the line with the names
     units: tuple[int, ...]  # lines of units below it
-    n_cells: int  # of the line of names
 
 
 def split(line: str, delimiter: str) -> list[str]:
@@ -41,10 +40,11 @@ def split(line: str, delimiter: str) -> list[str]:
     return line.split(delimiter)
 
 
-def without_spare(cells: list[str], n_cells: int) -> list[str]:
+def without_spare(cells: Sequence[str], n_cells: int) -> list[str]:
     """Cells of a line that ends with delimiters too many, without those."""
     spare = cells[n_cells:]
-    return cells[:n_cells] if not any(cell.strip() for cell in spare) else cells
+    is_spare = not any(cell.strip() for cell in spare)
+    return list(cells[:n_cells] if is_spare else cells)
 
 
 def find_layout(lines: Sequence[str]) -> Layout | None:
@@ -78,6 +78,17 @@ def _likely_delimiters(lines: Iterable[str]) -> list[str]:
 def _with_delimiter(numbered: dict[int, str], delimiter: str) -> Layout | None:
     """Layout with a delimiter; None where names and rows are not parted by it."""
     rows = {number: split(line, delimiter) for number, line in numbered.items()}
+    layout = layout_of_rows(rows)
+    if layout is None:
+        return None
+    names = rows[layout.header]
+    if delimiter == BLANKS and _distinct(names) < len(names):
+        return None
+    return layout._replace(delimiter=delimiter)
+
+
+def layout_of_rows(rows: Mapping[int, Sequence[str]]) -> Layout | None:
+    """Layout of rows of cells by their numbers; None where no names fit the values."""
     data = [number for number, cells in rows.items() if is_data(cells)]
     widths = Counter(len(rows[number]) for number in data)
     if not widths:
@@ -87,31 +98,55 @@ def _with_delimiter(numbered: dict[int, str], delimiter: str) -> Layout | None:
         return None
 
     first = next(number for number in data if len(rows[number]) == n_cells)
+    # a comma too many at the end of each row
+    ends_blank = not rows[first][-1].strip()
     names = []
     units = []
     for number, cells in rows.items():
-        row = without_spare(cells, n_cells)
-        # a comma too many at the end of each row
-        one_fewer = len(row) == n_cells - 1 and not rows[first][-1].strip()
-        if number >= first or not (len(row) == n_cells or one_fewer):
+        n_named = len(without_spare(cells, n_cells))
+        fits = n_named == n_cells or (ends_blank and n_named == n_cells - 1)
+        if number >= first or not fits:
             continue
-        if is_unit_row(row):
+        if is_unit_row(cells):
             units.append(number)
         else:
             names.append(number)
     if not names:
         return None
 
-    def distinct(number: int) -> int:
-        named = {cell.strip() for cell in rows[number]} - {""}
-        return len(named)
-
-    most = max(distinct(number) for number in names)
-    header = max(number for number in names if distinct(number) == most)
-    if delimiter == BLANKS and most < n_cells:
-        return None
+    most = max(_distinct(rows[number]) for number in names)
+    header = max(number for number in names if _distinct(rows[number]) == most)
     below = tuple(number for number in units if number > header)
-    return Layout(delimiter, header, below, len(rows[header]))
+    return Layout("", header, below)
+
+
+def _distinct(cells: Sequence[str]) -> int:
+    """Number of different names."""
+    named = {cell.strip() for cell in cells} - {""}
+    return len(named)
+
+
+def unit_texts(
+    header: Sequence[str], unit_rows: Iterable[Sequence[str]]
+) -> dict[str, str]:
+    """Units below the names, by column, without their brackets."""
+    units: dict[str, str] = {}
+    for cells in unit_rows:
+        for name, cell in zip(header, cells, strict=False):
+            text = cell.strip().strip("[]()").strip()
+            if not is_missing(text):
+                units.setdefault(name, text)
+    return units
+
+
+def title_note(header_at: int, count: int, what: str = "line") -> list[str]:
+    """A remark that lines of title are left out, where there are some."""
+    if not count:
+        return []
+    return [
+        f"the names of the columns are in {what} {header_at}: {count} {what}s of title"
+        " above are left out"
+    ]
 
 
 def is_data(cells: Sequence[str]) -> bool:
