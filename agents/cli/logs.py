@@ -62,6 +62,7 @@ def new_ship_command(
         "no_rudder": not any(_has_rudder(one) for one in guessed),
         "conventions": conventions,
         "trial": first.trial,
+        "trial_columns": first.columns,
         "unused": first.unused_names,
         "speed": _service_speed(guessed),
         "files": [_entry(one, shared, out.parent) for one in guessed],

@@ -36,40 +36,40 @@ def without_sentinels(
 ) -> tuple[Floats, list[str]]:
     """Numbers of a column without those that stand for "no value", and which they were.
 
-    Such are 9999 and the like, far beyond all others or impossible, and those that AIS
-    gives a meaning; `factor` is that to SI units.
+    Such are 9999 and the like and those that AIS gives that meaning, where they are far
+    beyond all others or impossible; `factor` is that to SI units.
     """
-    known = np.abs(numbers[np.isfinite(numbers)])
-    if not known.size:
-        return numbers, []
     largest = LARGEST_MAGNITUDES[channel] / factor
-    suspects = known[known > min(99.0, largest)]
     if channel in ("psi", "cog", "wind_from"):
         largest = min(largest, 2.0 * np.pi / factor + 1.0)
     values = numbers
     words = []
-    for size in np.unique(suspects)[::-1][:3]:
+    for size in _suspects(channel, numbers):
         is_size = np.abs(numbers) == size
-        others = known[known != size]
-        beyond = others.size and size > 3.0 * np.max(others)
-        written = {float(one) for one in np.unique(numbers[is_size])}
-        is_own = bool(written & set(_SENTINELS.get(channel, ())))
-        is_common = _is_nines(size) or bool(written & set(_COMMON))
-        if (is_own and (beyond or size > largest)) or (
-            is_common and (beyond or size > largest)
-        ):
+        others = np.abs(values[np.isfinite(values) & ~is_size])
+        is_far = others.size and size > 3.0 * others.max()
+        if is_far or size > largest:
             values = np.where(is_size, np.nan, values)
-            known = others
             count = np.count_nonzero(is_size)
-            number = ", ".join(f"{one:g}" for one in sorted(written))
-            words.append(f'{count} values of {number} stand for "no value"')
+            words.append(f'{count} values of {size:g} stand for "no value"')
     return values, words
 
 
+def _suspects(channel: str, numbers: Floats) -> list[float]:
+    """Magnitudes in a column that may stand for "no value", the largest first."""
+    written = np.unique(numbers[np.abs(numbers) > 99.0])
+    known = {*_COMMON, *_SENTINELS.get(channel, ())}
+    sizes = set()
+    for number in (*written[:3], *written[-3:]):
+        if number in known or _is_nines(abs(number)):
+            sizes.add(float(abs(number)))
+    return sorted(sizes, reverse=True)
+
+
 def _is_nines(size: float) -> bool:
-    """Return whether a number is written by three nines or more alone."""
+    """Return whether a number is written by nines alone, three of them or more."""
     digits = f"{size:.10g}".replace(".", "")
-    return len(digits) >= 3 and set(digits) == {"9"}
+    return size >= 999.0 and set(digits) == {"9"}
 
 
 def no_positions(lat: Floats, lon: Floats) -> Flags:

@@ -2,7 +2,8 @@
 
 In windows of the log the heading follows a Nomoto ship from the window's own heading
 and yaw rate: a rudder that only answers the heading explains nothing there. The gain of
-the rudder is the same in all windows, its error that of independent windows.
+the rudder is the same in all windows, its error that of independent windows, of which a
+rudder that moves once gives too few; with the rudder laid to one side the turn decides.
 """
 
 import math
@@ -19,7 +20,7 @@ from shipgym.trials.units import DEGREE
 ERROR_RATE = 0.01
 
 _LONGEST_WINDOW = 60.0  # s
-_FEWEST_WINDOWS = 4
+_FEWEST_WINDOWS = 3
 _CERTAIN = 5.0  # standard errors
 
 
@@ -28,14 +29,18 @@ class RudderSign(NamedTuple):
 
     side: str | None
     certainty: float  # the gain in its standard errors
-    explained: float  # share of the turning in the windows that the rudder explains
+    turned: float = 0.0  # rad, with the rudder laid to starboard by its sign
 
     @property
     def reason(self) -> str:
         """The evidence, in words."""
+        rate = f"wrong in less than {ERROR_RATE:.0%} of simulated logs"
+        if self.turned:
+            turned = abs(self.turned) / DEGREE
+            return f"a turn of {turned:.0f} deg with the rudder to one side, {rate}"
         return (
             f"the turning that follows the rudder, {abs(self.certainty):.0f} standard"
-            f" errors, wrong in less than {ERROR_RATE:.0%} of simulated logs"
+            f" errors, {rate}"
         )
 
     def side_by_hint(self, *, is_turned: bool) -> str:
@@ -58,6 +63,7 @@ class _Fit(NamedTuple):
     error: float
     squares: float  # of the residual
     power: float  # of what the windows' own heading and rate leave
+    n_windows: float  # of equal weight, in which the rudder moves
 
 
 def rudder_sign(t: Floats, psi: Floats, delta: Floats) -> RudderSign:
@@ -70,9 +76,13 @@ def rudder_sign(t: Floats, psi: Floats, delta: Floats) -> RudderSign:
     psi, delta : ndarray of shape (n_samples,)
         Heading without jumps, and rudder, rad.
     """
+    turned = _turned(psi, delta)
+    if turned:
+        side = "starboard" if turned > 0.0 else "port"
+        return RudderSign(side, 0.0, turned)
     windows = _windows(t, psi, delta)
     if len(windows.t) < _FEWEST_WINDOWS or _span(delta) < 2.0 * DEGREE:
-        return RudderSign(None, 0.0, 0.0)
+        return RudderSign(None, 0.0)
     # of stable ships, and of one that is not
     relative = np.concatenate([[-1.0], np.geomspace(0.1, 10.0, 7)])
     dampings = relative / windows.t[0, -1]
@@ -83,9 +93,28 @@ def rudder_sign(t: Floats, psi: Floats, delta: Floats) -> RudderSign:
     as_good = [fit for fit in fits if fit.squares < 1.05 * best.squares]
     agree = all(fit.gain * best.gain > 0.0 for fit in as_good)
     side = None
-    if agree and abs(certainty) > _CERTAIN and explained > 0.1:
+    is_enough = explained > 0.1 and best.n_windows >= _FEWEST_WINDOWS
+    if agree and is_enough and abs(certainty) > _CERTAIN:
         side = "starboard" if certainty > 0.0 else "port"
-    return RudderSign(side, certainty, explained)
+    return RudderSign(side, certainty)
+
+
+def _turned(psi: Floats, delta: Floats) -> float:
+    """Angle turned with the rudder laid to one side, positive if to that side, rad.
+
+    Zero where it is not held there, or the ship does not go round.
+    """
+    rudder = np.median(delta)
+    side = np.sign(rudder)
+    is_held = side * delta > 0.5 * abs(rudder)
+    is_opposite = side * delta < -3.0 * DEGREE
+    is_laid = abs(rudder) > 8.0 * DEGREE and np.mean(is_opposite) < 0.05
+
+    steps = side * np.diff(psi)
+    turned = float(np.sum(steps[is_held[1:]]))
+    net = abs(float(psi[-1] - psi[0]))
+    goes_round = abs(turned) > 90.0 * DEGREE and net > 0.9 * np.ptp(psi)
+    return turned if is_laid and goes_round else 0.0
 
 
 def _span(values: Floats) -> float:
@@ -141,17 +170,19 @@ def _fit(windows: _Windows, damping: float) -> _Fit:
     whole = float(np.sum(target**2))
     power = float(np.sum(rudder**2))
     if power == 0.0:
-        return _Fit(gain=0.0, error=math.inf, squares=whole, power=whole)
+        return _Fit(0.0, math.inf, squares=whole, power=whole, n_windows=0.0)
     gain = float(np.sum(rudder * target)) / power
     residual = target - gain * rudder
     scores = np.sum(rudder * residual, axis=1)
-    n = scores.size
-    spread = math.sqrt(np.sum(scores**2) * n / (n - 2))
+    powers = np.sum(rudder**2, axis=1)
+    n = power**2 / np.sum(powers**2)
+    spread = math.sqrt(np.sum(scores**2) * n / max(n - 2.0, 0.1))
     return _Fit(
         gain=gain,
         error=spread / power,
         squares=float(np.sum(residual**2)),
         power=whole,
+        n_windows=float(n),
     )
 
 

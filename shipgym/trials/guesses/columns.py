@@ -11,6 +11,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.files import shipped_toml
+from shipgym.trials.column_values import without_sentinels
 from shipgym.trials.columns import Column
 from shipgym.trials.guesses.steering import steering_command
 from shipgym.trials.guesses.units import (
@@ -136,7 +137,31 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
         command = steering_command(table, free)
         if command is not None:
             guesses["delta"] = ColumnGuess("delta", *command)
+    _settle_rudder(table, guesses)
     return [guesses[channel] for channel in names.known if channel in guesses]
+
+
+def _settle_rudder(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
+    """Take a small rudder in degrees where the heading is and hardly changes."""
+    for channel in ("delta", "delta_command"):
+        guess = guesses.get(channel)
+        heading = guesses.get("psi")
+        if (
+            guess is None
+            or heading is None
+            or not guess.reason.startswith("from its s")
+        ):
+            continue
+        psi = _numbers(table, heading.column)
+        if guess.unit == "rad" and heading.unit == "deg" and psi is not None:
+            known = psi[np.isfinite(psi)]
+            turned = np.ptp(np.unwrap(known, period=360.0)) if known.size else 0.0
+            if turned < 10.0:
+                reason = (
+                    f"{guess.reason}, with a heading in deg that changes by"
+                    f" {turned:.3g} alone"
+                )
+                guesses[channel] = guess._replace(unit="deg", reason=reason)
 
 
 def _first_match(
@@ -185,7 +210,10 @@ def _unit_where_fitting(table: LogTable, column: str, channel: str) -> UnitGuess
         size = unit_by_size(None, channel)
         return size._replace(reason="paths of Signal K are in SI units")
     in_cells = _unit_in_cells(table, column, channel)
-    return in_cells or unit_by_size(_numbers(table, column), channel)
+    values = _numbers(table, column)
+    if values is not None and channel != "t":
+        values, _ = without_sentinels(channel, values, factor=1.0)
+    return in_cells or unit_by_size(values, channel)
 
 
 def _is_duration(table: LogTable, column: str, unit: UnitGuess) -> bool:
