@@ -117,8 +117,13 @@ def guess_trial(path: str | Path) -> TrialGuess:
             reason = "without it a log is refused"
             conventions[name] = ConventionGuess(name, value, reason)
 
-    is_turned = conventions.pop("rudder_positive", None) is not None
+    is_turned = "rudder_positive" in conventions
     side = rudder_side(table, trial, columns.get("delta"), is_turned=is_turned)
+    if side is not None and side.side == "port" and not is_turned:
+        turned = ConventionGuess("rudder_positive", "port", side.reason)
+        conventions["rudder_positive"] = turned
+        trial = _read(table, columns, conventions, decisions)
+    conventions.pop("rudder_positive", None)
     return TrialGuess(
         path=table.path,
         columns=list(columns.values()),
@@ -153,7 +158,11 @@ def _missing_columns(
     missing = []
     for channel, words in wanted.items():
         if channel not in columns:
-            choices = f"the column of the {words}, one of {quoted(free)[:1000]}"
+            unit = "s" if channel == "t" else "deg"
+            choices = (
+                f"the column of the {words}, one of {quoted(free)[:1000]}, as"
+                f' {{ column = "{free[0] if free else words}", unit = "{unit}" }}'
+            )
             missing.append(Decision("columns", channel, choices))
     return missing
 

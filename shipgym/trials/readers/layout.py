@@ -107,7 +107,7 @@ def layout_of_rows(rows: Mapping[int, Sequence[str]]) -> Layout | None:
         fits = n_named == n_cells or (ends_blank and n_named == n_cells - 1)
         if number >= first or not fits:
             continue
-        if is_unit_row(cells):
+        if is_unit_row(cells, is_below=bool(names)):
             units.append(number)
         else:
             names.append(number)
@@ -156,15 +156,20 @@ def is_data(cells: Sequence[str]) -> bool:
     return bool(values) and 2 * len(values) >= len(filled)
 
 
-def is_unit_row(cells: Sequence[str]) -> bool:
-    """Return whether most cells are units or blank, and some are."""
+def is_unit_row(cells: Sequence[str], *, is_below: bool) -> bool:
+    """Return whether most cells are units or blank, and some are.
+
+    Below the names letters such as N and T say from where a number counts.
+    """
     filled = [cell.strip() for cell in cells if cell.strip()]
-    units = [cell for cell in filled if _is_unit(cell)]
-    return bool(units) and len(units) > 0.5 * len(filled)
+    units = [cell for cell in filled if _is_unit(cell, is_below=is_below)]
+    return 2 * len(units) > len(filled)
 
 
-def _is_unit(cell: str) -> bool:
+def _is_unit(cell: str, *, is_below: bool) -> bool:
     if _UNIT_WORDS.fullmatch(cell):
+        return True
+    if is_below and len(cell) == 1:
         return True
     name, units = split_unit(cell.lower())
     return bool(units) and not name
