@@ -57,12 +57,15 @@ def without_sentinels(
 
 def _suspects(channel: str, numbers: Floats) -> list[float]:
     """Magnitudes in a column that may stand for "no value", the largest first."""
-    written = np.unique(numbers[np.abs(numbers) > 99.0])
-    known = {*_COMMON, *_SENTINELS.get(channel, ())}
+    is_large = np.abs(numbers) > 99.0
+    written = np.unique(numbers[is_large])
+    outermost = [*written[:3], *written[-3:]]
+    known = (*_COMMON, *_SENTINELS.get(channel, ()))
     sizes = set()
-    for number in (*written[:3], *written[-3:]):
-        if number in known or _is_nines(abs(number)):
-            sizes.add(float(abs(number)))
+    for number in outermost:
+        size = float(abs(number))
+        if number in known or _is_nines(size):
+            sizes.add(size)
     return sorted(sizes, reverse=True)
 
 
@@ -74,14 +77,16 @@ def _is_nines(size: float) -> bool:
 
 def no_positions(lat: Floats, lon: Floats) -> Flags:
     """Flags of positions that stand for none: those of AIS, and zeros among others."""
-    beyond = (np.abs(lat) > 90.0) | (np.abs(lon) > 180.0)
-    written = np.isin(np.abs(lat), (91.0, 99.0, 999.0, 9999.0)) | np.isin(
-        np.abs(lon), (181.0, 999.0, 9999.0)
-    )
-    is_zero = (lat == 0.0) & (lon == 0.0)
-    known = np.isfinite(lat) & ~is_zero
-    is_far = known.any() and np.nanmin(np.abs(lat[known]) + np.abs(lon[known])) > 1.0
-    none: Flags = beyond & written
-    if is_far:
-        none |= is_zero
-    return none
+    latitude = np.abs(lat)
+    longitude = np.abs(lon)
+    is_beyond = (latitude > 90.0) | (longitude > 180.0)
+    is_written = np.isin(latitude, (91.0, 99.0, 999.0, 9999.0))
+    is_written |= np.isin(longitude, (181.0, 999.0, 9999.0))
+    none: Flags = is_beyond & is_written
+
+    sum_of_both = latitude + longitude
+    is_zero = sum_of_both == 0.0
+    is_other = np.isfinite(sum_of_both) & ~is_zero
+    nearest = np.min(sum_of_both[is_other], initial=np.inf)
+    are_far = is_other.any() and nearest > 1.0
+    return none | is_zero if are_far else none

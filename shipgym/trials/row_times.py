@@ -13,8 +13,6 @@ from shipgym.trials.readers.log_table import LogTable, is_number
 from shipgym.trials.units import si_factor
 
 _WEEK = 7.0 * DAY
-#: GPS time 0, 1980-01-06, s since 1970 in UTC: less the leap seconds since 2017.
-_GPS_ZERO = 315_964_800.0 - 18.0
 #: Zero of the units that count from a date, s since 1970.
 _EPOCHS = {
     "unix": 0.0,
@@ -24,11 +22,11 @@ _EPOCHS = {
     "excel days": -25_569.0 * DAY,
     "excel days 1904": -24_107.0 * DAY,
     "matlab days": -719_529.0 * DAY,
-    "gps s": _GPS_ZERO,
-    "gps tow": _GPS_ZERO,
-    "gps tow ms": _GPS_ZERO,
+    # 1980-01-06, less the leap seconds since 2017
+    "gps s": 315_964_782.0,
+    "gps tow": 315_964_782.0,
+    "gps tow ms": 315_964_782.0,
 }
-_ROLLOVER = 1024  # weeks
 _COMPACT = re.compile(
     r"(?P<date>(?:19|20)\d\d[01]\d[0-3]\d)?(?P<time>[0-2]\d[0-5]\d[0-5]\d(?:\.\d+)?)"
 )
@@ -127,8 +125,9 @@ def _week_times(
         return np.unwrap(of_week, period=_WEEK)
     weeks = table.numbers(column.date)
     first = float(weeks[0]) if weeks.size else 0.0
-    if first < _ROLLOVER:
-        turned = 2 * _ROLLOVER  # since 2019
+    weeks_of_counter = 1024
+    if first < weeks_of_counter:
+        turned = 2 * weeks_of_counter  # since 2019
         notes.append(
             f"GPS week {first:.0f} in column '{column.date}' is counted from the last"
             f" rollover of 1024 weeks: read as week {first + turned:.0f}"

@@ -19,9 +19,7 @@ from shipgym.trials.units import DEGREE
 #: scripts/rudder_sign.py.
 ERROR_RATE = 0.01
 
-_LONGEST_WINDOW = 60.0  # s
 _FEWEST_WINDOWS = 3
-_CERTAIN = 5.0  # standard errors
 
 
 class RudderSign(NamedTuple):
@@ -65,6 +63,16 @@ class _Fit(NamedTuple):
     power: float  # of what the windows' own heading and rate leave
     n_windows: float  # of equal weight, in which the rudder moves
 
+    @property
+    def certainty(self) -> float:
+        """The gain in its standard errors."""
+        return self.gain / self.error if self.error > 0.0 else 0.0
+
+    @property
+    def is_clear(self) -> bool:
+        """True if the rudder explains a tenth of the turning, in several windows."""
+        return self.squares < 0.9 * self.power and self.n_windows >= _FEWEST_WINDOWS
+
 
 def rudder_sign(t: Floats, psi: Floats, delta: Floats) -> RudderSign:
     """Find the side to which a positive rudder steers.
@@ -78,25 +86,29 @@ def rudder_sign(t: Floats, psi: Floats, delta: Floats) -> RudderSign:
     """
     turned = _turned(psi, delta)
     if turned:
-        side = "starboard" if turned > 0.0 else "port"
-        return RudderSign(side, 0.0, turned)
+        return RudderSign(_side(turned), certainty=0.0, turned=turned)
     windows = _windows(t, psi, delta)
-    if len(windows.t) < _FEWEST_WINDOWS or _span(delta) < 2.0 * DEGREE:
-        return RudderSign(None, 0.0)
+    low, high = np.quantile(delta, [0.02, 0.98])
+    moves = high - low > 2.0 * DEGREE
+    if not moves or len(windows.t) < _FEWEST_WINDOWS:
+        return RudderSign(None, certainty=0.0)
+
     # of stable ships, and of one that is not
     relative = np.concatenate([[-1.0], np.geomspace(0.1, 10.0, 7)])
     dampings = relative / windows.t[0, -1]
     fits = [_fit(windows, damping) for damping in dampings]
     best = min(fits, key=lambda fit: fit.squares)
-    certainty = best.gain / best.error if best.error > 0.0 else 0.0
-    explained = 1.0 - best.squares / best.power if best.power > 0.0 else 0.0
     as_good = [fit for fit in fits if fit.squares < 1.05 * best.squares]
     agree = all(fit.gain * best.gain > 0.0 for fit in as_good)
-    side = None
-    is_enough = explained > 0.1 and best.n_windows >= _FEWEST_WINDOWS
-    if agree and is_enough and abs(certainty) > _CERTAIN:
-        side = "starboard" if certainty > 0.0 else "port"
-    return RudderSign(side, certainty)
+    fewest_errors = 5.0
+    is_certain = abs(best.certainty) > fewest_errors
+    is_known = agree and best.is_clear and is_certain
+    side = _side(best.gain) if is_known else None
+    return RudderSign(side, best.certainty)
+
+
+def _side(value: float) -> str:
+    return "starboard" if value > 0.0 else "port"
 
 
 def _turned(psi: Floats, delta: Floats) -> float:
@@ -104,23 +116,21 @@ def _turned(psi: Floats, delta: Floats) -> float:
 
     Zero where it is not held there, or the ship does not go round.
     """
-    rudder = np.median(delta)
-    side = np.sign(rudder)
-    is_held = side * delta > 0.5 * abs(rudder)
-    is_opposite = side * delta < -3.0 * DEGREE
-    is_laid = abs(rudder) > 8.0 * DEGREE and np.mean(is_opposite) < 0.05
+    rudder = float(np.median(delta))
+    side = math.copysign(1.0, rudder)
+    to_side = side * delta
+    is_held = to_side > 0.5 * abs(rudder)
+    is_opposite = to_side < -3.0 * DEGREE
+    is_laid = abs(rudder) > 8.0 * DEGREE
+    if not is_laid or np.mean(is_opposite) > 0.05:
+        return 0.0
 
     steps = side * np.diff(psi)
-    turned = float(np.sum(steps[is_held[1:]]))
-    net = abs(float(psi[-1] - psi[0]))
-    goes_round = abs(turned) > 90.0 * DEGREE and net > 0.9 * np.ptp(psi)
-    return turned if is_laid and goes_round else 0.0
-
-
-def _span(values: Floats) -> float:
-    """Range of values without a few extreme ones."""
-    low, high = np.quantile(values, [0.02, 0.98])
-    return float(high - low)
+    turned = float(steps[is_held[1:]].sum())
+    net = abs(float(steps.sum()))
+    goes_round = abs(turned) > 90.0 * DEGREE
+    turns_back = net < 0.9 * np.ptp(psi)
+    return turned if goes_round and not turns_back else 0.0
 
 
 class _Windows(NamedTuple):
@@ -134,17 +144,26 @@ class _Windows(NamedTuple):
 def _windows(t: Floats, psi: Floats, delta: Floats) -> _Windows:
     """Windows one after another, without those over a gap of time; not too many."""
     step = usual_step(t)
-    span = t[-1] - t[0]
-    length = min(_LONGEST_WINDOW, span / 8.0)
+    span = float(t[-1] - t[0])
+    longest_window = 60.0  # s
+    length = min(longest_window, span / 8.0)
     rows = max(6, math.ceil(length / step))
-    most = 400
+    most_windows = 400
     begins = np.arange(0, t.size - rows + 1, rows)
-    stride = max(1, begins.size // most)
-    samples = begins[::stride, np.newaxis] + np.arange(rows)
-    longest = np.diff(t[samples], axis=1).max(axis=1, initial=0.0)
-    samples = samples[longest <= 6.0 * step]
+    stride = max(1, begins.size // most_windows)
+    first = begins[::stride, np.newaxis]
+    samples = first + np.arange(rows)
+
     times = t[samples]
-    return _Windows(times - times[:, :1], psi[samples], delta[samples])
+    longest = np.diff(times, axis=1).max(axis=1, initial=0.0)
+    is_whole = longest <= 6.0 * step
+    samples = samples[is_whole]
+    times = times[is_whole]
+    return _Windows(
+        t=times - times[:, :1],
+        psi=psi[samples],
+        delta=delta[samples],
+    )
 
 
 def _fit(windows: _Windows, damping: float) -> _Fit:
@@ -190,12 +209,16 @@ def _response(t: Floats, values: Floats, damping: float) -> Floats:
     """Heading of a ship with r' = -damping r + values from rest, by trapezoids."""
     steps = np.diff(t, axis=1)
     decays = np.exp(-damping * steps)
-    means = 0.5 * (values[:, 1:] + values[:, :-1])
-    gains = means * (1.0 - decays) / damping
+    before = values[:, :-1]
+    after = values[:, 1:]
+    gains = 0.5 * (before + after) * (1.0 - decays) / damping
     r = np.zeros_like(t)
-    for k in range(steps.shape[1]):
-        r[:, k + 1] = decays[:, k] * r[:, k] + gains[:, k]
-    turned = 0.5 * steps * (r[:, 1:] + r[:, :-1])
+    last = steps.shape[1]
+    for k in range(last):
+        kept = decays[:, k] * r[:, k]
+        r[:, k + 1] = kept + gains[:, k]
+
+    mean = 0.5 * (r[:, :-1] + r[:, 1:])
     psi = np.zeros_like(t)
-    psi[:, 1:] = np.cumsum(turned, axis=1)
+    psi[:, 1:] = np.cumsum(steps * mean, axis=1)
     return psi

@@ -30,8 +30,6 @@ _WITH_UNIT = "with_unit"  # not a language
 _SIGNAL_K = re.compile(r"(navigation|steering|propulsion|environment)\.", re.IGNORECASE)
 _TIME_OF_DAY = re.compile(r"\d\d?:\d\d.*")
 _DATE = re.compile(r"\d+\W+\w+\W+\d+.*|\d{6}|\d{8}")
-#: Names of numbers of rows, which are no time.
-_COUNTS = {"", "index", "row", "no", "nr", "id", "seq", "sample", "unnamed: 0"}
 #: Words in the name of what a ship should do, or of what is no measured value.
 _NO_MEASUREMENT = {
     *("set", "setpoint", "sp", "desired", "target", "command", "commanded", "cmd"),
@@ -282,6 +280,7 @@ def _second_of(table: LogTable, column: str, free: list[str]) -> str | None:
 
 def _even_column(table: LogTable, free: list[str]) -> ColumnGuess | None:
     """A column without a known name that increases evenly, as time does."""
+    numbers_of_rows = ("", "index", "row", "no", "nr", "id", "seq", "sample")
     for column in free:
         values = _numbers(table, column)
         if values is None or values.size < 10:
@@ -289,7 +288,7 @@ def _even_column(table: LogTable, free: list[str]) -> ColumnGuess | None:
         steps = np.diff(values)
         is_even = np.all(steps > 0.0) and np.ptp(steps) <= 0.01 * steps.max()
         is_count = values[0] in (0.0, 1.0) and np.all(steps == 1.0)
-        if is_even and not (is_count and column.lower() in _COUNTS):
+        if is_even and not (is_count and column.lower() in numbers_of_rows):
             free.remove(column)
             unit = unit_by_size(values, "t")
             reason = f"{unit.reason}; the time, as it increases evenly"

@@ -96,10 +96,13 @@ def _chord_speeds(t: Floats, x: Floats, y: Floats) -> Floats:
     rows = max(1, round(10.0 / usual_step(t)))
     if t.size < 3 * rows:
         rows = max(1, t.size // 3)
-    dx = x[rows:] - x[:-rows]
-    dy = y[rows:] - y[:-rows]
-    dt = t[rows:] - t[:-rows]
-    speeds: Floats = np.hypot(dx, dy) / dt
+
+    def change(values: Floats) -> Floats:
+        later = values[rows:]
+        return later - values[:-rows]
+
+    sailed = np.hypot(change(x), change(y))
+    speeds: Floats = sailed / change(t)
     return speeds
 
 

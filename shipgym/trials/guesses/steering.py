@@ -123,9 +123,9 @@ def _servo(numbers: dict[str, Floats]) -> SteeringGuess | None:
         )
         extra = (("minus", right), ("full", 2.0 * _SPAN))
         return SteeringGuess(left, "deg", reason, extra)
-    column = next(iter(servos), None)
-    if column is None:
+    if not servos:
         return None
+    column = next(iter(servos))
     reason = (
         f"steering command: a pulse width in us, neutral at {_NEUTRAL:g}, of which"
         f" {_SPAN:g} counts as {FULL_RUDDER_DEG:g} deg of a nominal rudder"
@@ -148,6 +148,7 @@ def _mirrored(servos: dict[str, Floats]) -> tuple[str, str] | None:
 
 
 def _is_pulse_width(values: Floats) -> bool:
+    """Return whether values may be pulse widths in us."""
     return values.min() >= 700.0 and values.max() <= 2300.0 and values.max() > 1000.0
 
 

@@ -139,7 +139,8 @@ def _unused(table: LogTable, columns: Mapping[str, ColumnGuess]) -> list[str]:
     used = set()
     for guess in columns.values():
         used.add(guess.column)
-        used |= {value for _, value in guess.extra if isinstance(value, str)}
+        for _, value in guess.extra:
+            used.add(str(value))
     known = used or QUANTITIES.keys()
     return [name for name in table.header if name not in known]
 

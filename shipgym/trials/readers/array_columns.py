@@ -4,8 +4,6 @@ from typing import Any
 
 import numpy as np
 
-_MOST_COLUMNS = 100
-
 
 def array_columns(name: str, array: Any) -> dict[str, Any]:
     """Vectors by name: one of the array, or one each of its columns, ``x(:,1)``.
@@ -20,9 +18,12 @@ def array_columns(name: str, array: Any) -> dict[str, Any]:
         return {}
     if array.shape[0] < array.shape[1]:
         array = array.T
-    if array.shape[1] in (array.shape[0], 0) or array.shape[1] > _MOST_COLUMNS:
+    n_rows, n_columns = array.shape
+    most_columns = 100
+    if n_columns in (n_rows, 0) or n_columns > most_columns:
         return {}
     columns = {}
-    for number in range(array.shape[1]):
-        columns[f"{name}(:,{number + 1})"] = np.ascontiguousarray(array[:, number])
+    for number, column in enumerate(array.T, start=1):
+        key = f"{name}(:,{number})"
+        columns[key] = np.ascontiguousarray(column)
     return columns

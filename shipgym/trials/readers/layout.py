@@ -11,8 +11,6 @@ from shipgym.trials.unit_spellings import split_unit
 
 BLANKS = " "  # for a delimiter: any number of them
 
-_DELIMITERS = ",;\t|"
-_LOOKED_AT = 200  # lines, from the first one on
 _VALUE = re.compile(
     r"\W*(?:[NSEWPR]|STBD|STB|BB|PORT|STARBOARD)?\W*\d.*", re.IGNORECASE
 )
@@ -49,11 +47,12 @@ def without_spare(cells: Sequence[str], n_cells: int) -> list[str]:
 
 def find_layout(lines: Sequence[str]) -> Layout | None:
     """Layout of the table in a text; None where no line of names fits the rows."""
+    most_lines = 200  # that are looked at
     numbered = {}
     for number, line in enumerate(lines):
         if line.strip():
             numbered[number] = line
-        if len(numbered) == _LOOKED_AT:
+        if len(numbered) == most_lines:
             break
     for delimiter in _likely_delimiters(numbered.values()):
         layout = _with_delimiter(numbered, delimiter)
@@ -64,15 +63,17 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
 
 def _likely_delimiters(lines: Iterable[str]) -> list[str]:
     """Delimiters, the one that parts most lines first; a blank parts words too."""
+    delimiters = ";\t|,"  # a comma may be the decimal one
     counts = Counter[str]()
     for line in lines:
         unquoted = re.sub('"[^"]*"', "", line)
-        for delimiter in _DELIMITERS:
-            counts[delimiter] += delimiter in unquoted
-    # a comma may be the decimal one
-    likely = sorted(";\t|,", key=lambda one: -counts[one])
-    likely = [one for one in likely if counts[one]]
-    return likely if "\t" in likely else [*likely, BLANKS]
+        present = set(delimiters) & set(unquoted)
+        counts.update(present)
+    likely = [one for one in delimiters if counts[one]]
+    likely.sort(key=lambda one: -counts[one])
+    if "\t" not in likely:
+        likely.append(BLANKS)
+    return likely
 
 
 def _with_delimiter(numbered: dict[int, str], delimiter: str) -> Layout | None:
@@ -100,8 +101,8 @@ def layout_of_rows(rows: Mapping[int, Sequence[str]]) -> Layout | None:
     first = next(number for number in data if len(rows[number]) == n_cells)
     # a comma too many at the end of each row
     ends_blank = not rows[first][-1].strip()
-    names = []
-    units = []
+    names: list[int] = []
+    units: list[int] = []
     for number, cells in rows.items():
         n_named = len(without_spare(cells, n_cells))
         fits = n_named == n_cells or (ends_blank and n_named == n_cells - 1)

@@ -9,7 +9,6 @@ from shipgym.errors import InputError
 from shipgym.files import LARGEST_CSV, read_bytes, shipped_toml
 from shipgym.trials.readers.damage import LARGEST_UNPACKED, check_unpacked
 
-_GZIP = b"\x1f\x8b"
 #: Encodings of several bytes a character, and Cyrillic: none is refused by its bytes
 #: alone, so that the words decide.
 _FOREIGN = ("cp932", "gb18030", "euc_jp", "big5", "euc_kr", "cp1251")
@@ -28,7 +27,8 @@ def read_log_bytes(path: Path, what: str, largest: int = LARGEST_CSV) -> bytes:
     Raises InputError for a damaged or too large one.
     """
     content = read_bytes(path, what, largest)
-    if not content.startswith(_GZIP):
+    magic = b"\x1f\x8b"
+    if not content.startswith(magic):
         return content
     unpacker = zlib.decompressobj(wbits=31)
     try:
