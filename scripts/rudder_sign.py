@@ -28,7 +28,7 @@ class Ship(NamedTuple):
     n1: float = 1.0
 
 
-SHIPS = (
+_SHIPS = (
     Ship("boat, 7 m", K=0.4, T=2.0, rudder_rate=15.0 * DEGREE, duration=120.0),
     Ship("tug, 30 m", K=0.2, T=6.0, rudder_rate=5.0 * DEGREE, duration=400.0),
     Ship("coaster, 80 m", K=0.1, T=12.0, rudder_rate=3.0 * DEGREE, duration=600.0),
@@ -36,7 +36,7 @@ SHIPS = (
     Ship("tanker, 300 m", K=0.03, T=120.0, rudder_rate=2.3 * DEGREE, duration=1500.0),
     Ship("unstable", K=0.05, T=40.0, rudder_rate=2.5 * DEGREE, duration=900.0, n1=-0.5),
 )
-MANOEUVRES = {
+_MANOEUVRES = {
     "zigzag 20/20": 20.0,
     "zigzag 10/10": 10.0,
     "zigzag 5/5": 5.0,
@@ -46,7 +46,7 @@ MANOEUVRES = {
     "autopilot, P": 0.0,
     "straight": 0.0,
 }
-NOISES_DEG = (0.1, 0.5, 2.0)  # of the heading
+_NOISES_DEG = (0.1, 0.5, 2.0)  # of the heading
 
 
 class Log(NamedTuple):
@@ -99,7 +99,7 @@ def simulate(
     step = float(rng.choice(steps))
     within = math.ceil(step / 0.25)
     motion = Motion(ship, waves, rng)
-    angle = MANOEUVRES[manoeuvre] * DEGREE
+    angle = _MANOEUVRES[manoeuvre] * DEGREE
     n = int(ship.duration / step)
     psi = np.empty(n)
     delta = np.empty(n)
@@ -135,10 +135,10 @@ def main() -> None:
     print("| manoeuvre | noise, deg | logs | right | not told | wrong |")
     print("| --- | --- | --- | --- | --- | --- |")
     wrong = total = 0
-    for manoeuvre in MANOEUVRES:
-        for noise in NOISES_DEG:
+    for manoeuvre in _MANOEUVRES:
+        for noise in _NOISES_DEG:
             sides = []
-            for ship in SHIPS:
+            for ship in _SHIPS:
                 for _ in range(options.logs):
                     waves = float(rng.choice([0.0, 0.3, 1.0])) * DEGREE
                     log = simulate(ship, manoeuvre, noise * DEGREE, waves, rng)

@@ -26,8 +26,10 @@ def column_numbers(table: LogTable, column: Column) -> Floats:
     if column.full is None:
         return numbers
     if column.minus is not None:
-        numbers = numbers - table.numbers(column.minus)
-    deflection = (numbers - column.neutral) / column.full
+        other = table.numbers(column.minus)
+        numbers = numbers - other
+    from_neutral = numbers - column.neutral
+    deflection = from_neutral / column.full
     return deflection * FULL_RUDDER_DEG
 
 

@@ -19,8 +19,6 @@ from shipgym.trials.clock_texts import zone_seconds
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.units import QUANTITIES, check_channel, si_factor, si_unit
 
-STEERED = ("delta", "delta_command")  # channels that a steering command may stand for
-
 
 @dataclass(frozen=True)
 class Column:
@@ -92,7 +90,7 @@ def _parse_column(channel: str, entry: Any, where: str) -> Column:
     keys = ["column", "unit"]
     if channel == "t":
         keys += ["date", "zone", "nanoseconds"]
-    if channel in STEERED:
+    if channel in ("delta", "delta_command"):
         keys += ["minus", "neutral", "full"]
     check_keys(fields, keys, where)
     name = fields.pop("column", None)

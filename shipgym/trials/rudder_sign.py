@@ -17,7 +17,7 @@ from shipgym.trials.units import DEGREE
 
 #: Share of logs in which the side may be named wrongly: measured by
 #: scripts/rudder_sign.py.
-ERROR_RATE = 0.01
+_ERROR_RATE = 0.01
 
 _FEWEST_WINDOWS = 3
 
@@ -32,7 +32,7 @@ class RudderSign(NamedTuple):
     @property
     def reason(self) -> str:
         """The evidence, in words."""
-        rate = f"wrong in less than {ERROR_RATE:.0%} of simulated logs"
+        rate = f"wrong in less than {_ERROR_RATE:.0%} of simulated logs"
         if self.turned:
             turned = abs(self.turned) / DEGREE
             return f"a turn of {turned:.0f} deg with the rudder to one side, {rate}"

@@ -5,10 +5,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from shipgym.checks import quoted
 from shipgym.files import LARGEST_TOML, read_text
 
 #: Stands in a ship file for a value that its reader has to choose.
-DECIDE = "decide"
+_DECIDE = "decide"
 
 _SECTIONS = ("columns", "conventions", "sensors", "trials")
 
@@ -18,30 +19,39 @@ def take_undecided(data: dict[str, Any], path: Path) -> tuple[str, ...]:
 
     A message names the line of the file and, from its comment, the choices.
     """
-    keys = []
+    keys = set()
     for section in _SECTIONS:
         for table in _tables(data.get(section)):
-            keys += [key for key, value in table.items() if value == DECIDE]
+            keys |= _take(table)
     if not keys:
         return ()
 
-    lines = read_text(path, "ship file", LARGEST_TOML).splitlines()
     messages = []
-    for number, line in enumerate(lines, start=1):
-        match = re.match(rf'\s*([\w-]+)\s*=\s*"{DECIDE}"(?:\s*#\s*DECIDE:(.*))?', line)
-        if match and match[1] in keys:
-            choices = (match[2] or "").strip() or "a value as in docs/ship_file.md"
-            messages.append(
-                f"{path}: line {number}: {match[1]}: expected a decision, got"
-                f' "{DECIDE}"; write {choices}'
-            )
-    for section in _SECTIONS:
-        for table in _tables(data.get(section)):
-            for key in [key for key, value in table.items() if value == DECIDE]:
-                del table[key]
-    return tuple(messages) or (
-        f'{path}: expected decisions, got "{DECIDE}" for {keys}',
-    )
+    text = read_text(path, "ship file", LARGEST_TOML)
+    pattern = re.compile(rf'\s*([\w-]+)\s*=\s*"{_DECIDE}"(?:\s*#\s*DECIDE:\s*(.*))?')
+    for number, line in enumerate(text.splitlines(), start=1):
+        match = pattern.match(line)
+        if match is None:
+            continue
+        key, choices = match.groups("a value as in docs/ship_file.md")
+        where = f"{path}: line {number}: {key}"
+        messages.append(
+            f'{where}: expected a decision, got "{_DECIDE}"; write {choices.strip()}'
+        )
+    if not messages:
+        names = quoted(sorted(keys))
+        messages = [f'{path}: expected decisions, got "{_DECIDE}" for {names}']
+    return tuple(messages)
+
+
+def _take(table: dict[str, Any]) -> set[str]:
+    """Take values "decide" out of a table; their keys."""
+    keys = set()
+    for key, value in [*table.items()]:
+        if value == _DECIDE:
+            keys.add(key)
+            del table[key]
+    return keys
 
 
 def _tables(section: Any) -> Iterator[dict[str, Any]]:

@@ -23,7 +23,7 @@ from shipgym.trials.guesses.units import (
 )
 from shipgym.trials.readers.cell_texts import number_with_unit
 from shipgym.trials.readers.log_table import LogTable
-from shipgym.trials.unit_spellings import split_unit
+from shipgym.trials.unit_spellings import spelled_units, split_unit
 from shipgym.trials.units import QUANTITIES
 
 _WITH_UNIT = "with_unit"  # not a language
@@ -65,7 +65,8 @@ class ColumnGuess(NamedTuple):
     @property
     def declaration(self) -> str:
         """The column as the ship file declares it."""
-        parts = [f"column = {self.quoted}", f'unit = "{self.unit}"']
+        parts = [f"column = {self.quoted}"]
+        parts.append(f'unit = "{self.unit}"')
         for key, value in self.extra:
             written = json.dumps(value, ensure_ascii=False)
             parts.append(f"{key} = {written}")
@@ -153,7 +154,8 @@ def _settle_rudder(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
         psi = _numbers(table, heading.column)
         if guess.unit == "rad" and heading.unit == "deg" and psi is not None:
             known = psi[np.isfinite(psi)]
-            turned = np.ptp(np.unwrap(known, period=360.0)) if known.size else 0.0
+            heading_deg = np.unwrap(known, period=360.0)
+            turned = np.ptp(heading_deg) if known.size else 0.0
             if turned < 10.0:
                 reason = (
                     f"{guess.reason}, with a heading in deg that changes by"
@@ -223,21 +225,22 @@ def _is_duration(table: LogTable, column: str, unit: UnitGuess) -> bool:
     if values is None:
         return False
     by_size = unit_by_size(values, "t").unit
-    return by_size != f"unix {unit.unit}" and not (
-        unit.unit == "s" and by_size not in ("s", "ms", "us", "ns")
-    )
+    durations = ("s", "ms", "us", "ns")
+    counts_from_date = by_size == f"unix {unit.unit}"
+    if unit.unit == "s":
+        counts_from_date = by_size not in durations
+    return not counts_from_date
 
 
 def _unit_in_cells(table: LogTable, column: str, channel: str) -> UnitGuess | None:
     """Unit that stands in the first cell, as in "13.6 kn"."""
-    texts = (str(cell).strip() for cell in table.column(column))
-    first = next((text for text in texts if text), "")
+    first = _first_text(table, column)
     if table.decimal_comma:
         first = first.replace(",", ".")
     measured = number_with_unit(first)
     if measured is None:
         return None
-    units = split_unit(f"x [{measured.unit.lower()}]").units
+    units = spelled_units(measured.unit.lower())
     return named_unit(units, channel, "from its cells")
 
 

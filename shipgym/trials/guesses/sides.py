@@ -31,11 +31,14 @@ def rudder_side(
 
     None without a rudder.
     """
-    if "delta" not in trial or "psi" not in trial:
+    has_turning = "psi" in trial
+    if "delta" not in trial or not has_turning:
         return None
     if column is not None and _has_sides(table, column.column):
         return RudderSide("starboard", "by the letters S and P of its values")
-    found = rudder_sign(trial.t, trial["psi"], trial["delta"])
+    psi = trial["psi"]
+    delta = trial["delta"]
+    found = rudder_sign(trial.t, psi, delta)
     if found.side is None:
         hint = found.side_by_hint(is_turned=is_turned)
         return RudderSide(None, f"the log does not tell{hint}")
@@ -52,4 +55,5 @@ def _has_sides(table: LogTable, column: str) -> bool:
     first = next(filter(None, texts), "")
     if table.decimal_comma:
         first = first.replace(",", ".")
-    return number_with_side(first) is not None
+    sided = number_with_side(first)
+    return sided is not None

@@ -149,7 +149,9 @@ def _mirrored(servos: dict[str, Floats]) -> tuple[str, str] | None:
 
 def _is_pulse_width(values: Floats) -> bool:
     """Return whether values may be pulse widths in us."""
-    return values.min() >= 700.0 and values.max() <= 2300.0 and values.max() > 1000.0
+    least = float(values.min())
+    most = float(values.max())
+    return least >= 700.0 and 1000.0 < most <= 2300.0
 
 
 def _rounded(value: float) -> float:

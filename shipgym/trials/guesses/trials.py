@@ -62,10 +62,11 @@ class TrialGuess:
         """What each channel, and the rudder's sign, was read as, and why."""
         reading = {}
         for one in self.columns:
-            extra = "".join(f", {key} {value}" for key, value in one.extra)
-            reading[one.channel] = (
-                f"column '{one.column}' in {one.unit}{extra}, unit {one.reason}"
-            )
+            unit = one.unit
+            for key, value in one.extra:
+                unit += f", {key} {value}"
+            where = f"column '{one.column}' in {unit}"
+            reading[one.channel] = f"{where}, unit {one.reason}"
         for convention in self.conventions:
             reading[convention.name] = f"{convention.value}: {convention.reason}"
         if self.side is not None:
@@ -150,7 +151,8 @@ def _missing_columns(
 ) -> list[Decision]:
     """Decisions on columns without which a log shows no motion."""
     wanted = {"t": "time"}
-    if not columns.keys() & {"psi", "r", "x", "lat", "u"}:
+    of_motion = {"psi", "r", "x", "lat", "u"}
+    if not of_motion & columns.keys():
         wanted["psi"] = "heading"
         if "delta" not in columns:
             wanted["delta"] = "rudder angle"

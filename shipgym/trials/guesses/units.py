@@ -44,7 +44,9 @@ def named_unit(
 ) -> UnitGuess | None:
     """Unit of a channel among those with which a name ends; None if there is none."""
     unit = unit_of_channel(units, channel)
-    return None if unit is None else UnitGuess(unit, reason)
+    if unit is None:
+        return None
+    return UnitGuess(unit, reason)
 
 
 def names_another_quantity(units: list[str], channel: str) -> bool:

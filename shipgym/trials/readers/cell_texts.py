@@ -37,9 +37,11 @@ _SIDED = [
 def is_missing(text: str) -> bool:
     """Return whether a cell stands for "no value": blank, signs alone, or a word."""
     bare = text.strip()
-    if not any(letter.isalnum() for letter in bare):
+    has_letters = any(letter.isalnum() for letter in bare)
+    if not has_letters:
         return True
-    return _MISSING_WORDS.fullmatch(bare) is not None
+    match = _MISSING_WORDS.fullmatch(bare)
+    return match is not None
 
 
 def number_with_side(text: str) -> float | None:
@@ -50,7 +52,8 @@ def number_with_side(text: str) -> float | None:
     for sign, pattern in _SIDED:
         match = pattern.fullmatch(text)
         if match:
-            return sign * float(match["a"] or match["b"])
+            number = match["a"] or match["b"]
+            return sign * float(number)
     return None
 
 
@@ -64,6 +67,11 @@ class Measured(NamedTuple):
 def number_with_unit(text: str) -> Measured | None:
     """Number and unit of a text such as "13.6 kn"; None for others."""
     match = _UNIT_AFTER.fullmatch(text)
-    if match is None or not spelled_units(match["unit"].lower()):
+    if match is None:
         return None
-    return Measured(float(match["number"]), match["unit"])
+    unit = match["unit"]
+    known = spelled_units(unit.lower())
+    if not known:
+        return None
+    number = float(match["number"])
+    return Measured(number, unit)

@@ -62,19 +62,22 @@ def read_excel(path: Path) -> LogTable:
 
 def _layout(frame: Any) -> Layout:
     """Rows of names and of units in a frame, the first row where none fits."""
-    beginning = frame.iloc[:100]
     rows = {}
-    for number in range(len(beginning)):
-        rows[number] = _texts(beginning.iloc[number])
-    return layout_of_rows(rows) or Layout("", header=0, units=())
+    most_rows = min(100, len(frame))
+    for number in range(most_rows):
+        row = frame.iloc[number]
+        rows[number] = _texts(row)
+    first_row = Layout("", header=0, units=())
+    return layout_of_rows(rows) or first_row
 
 
 def _texts(row: Any) -> list[str]:
     """Cells of a row as texts, empty where there is nothing."""
-    has_value = row.notna()
-    return [
-        str(cell) if known else "" for cell, known in zip(row, has_value, strict=True)
-    ]
+    texts = []
+    for cell, is_known in zip(row, row.notna(), strict=True):
+        text = str(cell) if is_known else ""
+        texts.append(text)
+    return texts
 
 
 def _sheet(path: Path, content: bytes, parts: zipfile.ZipFile) -> Any:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from shipgym.trials.readers.cell_texts import is_missing
 from shipgym.trials.unit_spellings import split_unit
 
-BLANKS = " "  # for a delimiter: any number of them
+_BLANKS = " "  # for a delimiter: any number of them
 
 _VALUE = re.compile(
     r"\W*(?:[NSEWPR]|STBD|STB|BB|PORT|STARBOARD)?\W*\d.*", re.IGNORECASE
@@ -31,7 +31,7 @@ class Layout(NamedTuple):
 
 def split(line: str, delimiter: str) -> list[str]:
     """Cells of a line."""
-    if delimiter == BLANKS:
+    if delimiter == _BLANKS:
         return line.split()
     if '"' in line:
         return next(csv.reader([line], delimiter=delimiter))
@@ -72,7 +72,7 @@ def _likely_delimiters(lines: Iterable[str]) -> list[str]:
     likely = [one for one in delimiters if counts[one]]
     likely.sort(key=lambda one: -counts[one])
     if "\t" not in likely:
-        likely.append(BLANKS)
+        likely.append(_BLANKS)
     return likely
 
 
@@ -83,7 +83,7 @@ def _with_delimiter(numbered: dict[int, str], delimiter: str) -> Layout | None:
     if layout is None:
         return None
     names = rows[layout.header]
-    if delimiter == BLANKS and _distinct(names) < len(names):
+    if delimiter == _BLANKS and _distinct(names) < len(names):
         return None
     return layout._replace(delimiter=delimiter)
 
@@ -134,9 +134,9 @@ def unit_texts(
     units: dict[str, str] = {}
     for cells in unit_rows:
         for name, cell in zip(header, cells, strict=False):
-            text = cell.strip().strip("[]()").strip()
-            if not is_missing(text):
-                units.setdefault(name, text)
+            bare = cell.strip("[]() \t")
+            if not is_missing(bare):
+                units.setdefault(name, bare)
     return units
 
 

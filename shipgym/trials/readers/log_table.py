@@ -80,7 +80,9 @@ class LogTable:
         texts = []
         for cell in self.column(name):
             text = str(cell).strip()
-            texts.append("" if is_missing(text) else text)
+            if is_missing(text):
+                text = ""
+            texts.append(text)
         return texts
 
     def numbers(self, name: str, *, sided: bool = False) -> Floats:

@@ -44,17 +44,25 @@ def _table(path: Path, arrays: Mapping[str, Any]) -> LogTable:
             columns |= {field: array[field] for field in array.dtype.names}
         else:
             columns |= array_columns(name, array)
-    usual = {}
+    lengths = []
     for name, values in columns.items():
-        if values.dtype.kind == "M":
-            values = values.astype("datetime64[ns]").astype(np.int64)
-        usual[name] = values
-    lengths = [values.size for values in usual.values()]
+        lengths.append(values.size)
+        is_clock = values.dtype.kind == "M"
+        if is_clock:
+            since_1970 = values.astype("datetime64[ns]")
+            columns[name] = since_1970.astype(np.int64)
     length = max(lengths, key=lengths.count, default=0)
     if not length:
         raise InputError(
             f"{path}: expected a structured array or arrays of one length, got none;"
             " save the table by pandas: frame.to_csv('log.csv')"
         )
-    cells = {name: values for name, values in usual.items() if values.size == length}
-    return LogTable(path=path, cells=cells, rows=range(1, length + 1))
+    cells = {}
+    for name, values in columns.items():
+        if values.size == length:
+            cells[name] = values
+    return LogTable(
+        path=path,
+        cells=cells,
+        rows=range(1, length + 1),
+    )

@@ -118,9 +118,11 @@ def _foreign_words() -> set[str]:
 
 
 def _no_text(path: Path, what: str, content: bytes, start: int) -> InputError:
-    line = content.count(b"\n", 0, start) + 1
+    before = content[:start]
+    line = before.count(b"\n") + 1
     byte = content[start]
+    expected = f"expected a {what} in UTF-8"
+    found = f"byte 0x{byte:02x} (binary content)"
     return InputError(
-        f"{path}: line {line}: expected a {what} in UTF-8, got byte 0x{byte:02x}"
-        " (binary content); save it as text in UTF-8"
+        f"{path}: line {line}: {expected}, got {found}; save it as text in UTF-8"
     )
