@@ -36,9 +36,10 @@ class RudderSign(NamedTuple):
         if self.turned:
             turned = abs(self.turned) / DEGREE
             return f"a turn of {turned:.0f} deg with the rudder to one side, {rate}"
+        certainty = abs(self.certainty)
         return (
-            f"the turning that follows the rudder, {abs(self.certainty):.0f} standard"
-            f" errors, {rate}"
+            f"the turning that follows the rudder, {certainty:.0f} standard errors,"
+            f" {rate}"
         )
 
     def side_by_hint(self, *, is_turned: bool) -> str:

@@ -56,7 +56,9 @@ def _take(table: dict[str, Any]) -> set[str]:
 
 def _tables(section: Any) -> Iterator[dict[str, Any]]:
     """A table, or each of several."""
-    tables = section if isinstance(section, list) else [section]
+    tables = [section]
+    if isinstance(section, list):
+        tables = section
     for table in tables:
         if isinstance(table, dict):
             yield table

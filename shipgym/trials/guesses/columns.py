@@ -15,7 +15,6 @@ from shipgym.trials.column_values import without_sentinels
 from shipgym.trials.columns import Column
 from shipgym.trials.guesses.steering import steering_command
 from shipgym.trials.guesses.units import (
-    BY_NAME,
     UnitGuess,
     named_unit,
     names_another_quantity,
@@ -56,6 +55,11 @@ class ColumnGuess(NamedTuple):
     unit: str
     reason: str
     extra: tuple[tuple[str, str | float], ...] = ()  # other keys of the declaration
+
+    @property
+    def is_named(self) -> bool:
+        """True if the column's name ends with the unit."""
+        return UnitGuess(self.unit, self.reason).is_named
 
     @property
     def quoted(self) -> str:
@@ -109,7 +113,13 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
     guesses: dict[str, ColumnGuess] = {}
 
     def take(channel: str, patterns: str) -> None:
-        found = _first_match(table, free, channel, names, patterns)
+        found = _first_match(
+            table,
+            free,
+            channel,
+            names,
+            patterns,
+        )
         if found is not None:
             guesses[channel] = found
             free.remove(found.column)
@@ -183,7 +193,7 @@ def _first_match(
                 return ColumnGuess(channel, column, *unit)
     for column, unit in fitting.items():
         of_unit = names.with_unit.get(channel, [])
-        if unit.reason == BY_NAME and _matches(_forms(column, channel), of_unit):
+        if unit.is_named and _matches(_forms(column, channel), of_unit):
             return ColumnGuess(channel, column, *unit)
     return None
 

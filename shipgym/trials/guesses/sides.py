@@ -52,7 +52,8 @@ def rudder_side(
 def _has_sides(table: LogTable, column: str) -> bool:
     """Return whether the values name their sides."""
     texts = table.texts(column)
-    first = next(filter(None, texts), "")
+    known = filter(None, texts)
+    first = next(known, "")
     if table.decimal_comma:
         first = first.replace(",", ".")
     sided = number_with_side(first)

@@ -9,7 +9,6 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.trials.guesses.columns import ColumnGuess
-from shipgym.trials.guesses.units import BY_NAME
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.recording import read_recording
 from shipgym.trials.resampling import usual_step
@@ -61,7 +60,8 @@ def settle_speeds(
 
 def _is_known(guess: ColumnGuess) -> bool:
     """Return whether the log itself names the unit of a speed."""
-    return guess.reason.startswith((BY_NAME, "from the row", "from its cells", "paths"))
+    elsewhere = ("from the row", "from its cells", "paths")
+    return guess.is_named or guess.reason.startswith(elsewhere)
 
 
 def _magnitudes(table: LogTable, guess: ColumnGuess) -> Floats:

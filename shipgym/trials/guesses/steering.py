@@ -125,6 +125,7 @@ def _servo(numbers: dict[str, Floats]) -> SteeringGuess | None:
         return SteeringGuess(left, "deg", reason, extra)
     if not servos:
         return None
+
     column = next(iter(servos))
     reason = (
         f"steering command: a pulse width in us, neutral at {_NEUTRAL:g}, of which"

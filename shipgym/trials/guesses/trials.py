@@ -11,7 +11,6 @@ from shipgym.trials.conventions import Conventions
 from shipgym.trials.guesses.columns import ColumnGuess, guess_columns
 from shipgym.trials.guesses.sides import RudderSide, rudder_side
 from shipgym.trials.guesses.speeds import settle_speeds
-from shipgym.trials.guesses.units import BY_NAME
 from shipgym.trials.installation import Installation
 from shipgym.trials.plausibility.refusal import Proposal
 from shipgym.trials.readers.kinds import read_log
@@ -228,7 +227,7 @@ def _next_proposal(
         proposal = Proposal(name, value)
         may_be_tried = name not in QUANTITIES  # a convention
         if name in columns:
-            may_be_tried = columns[name].reason != BY_NAME
+            may_be_tried = not columns[name].is_named
         if may_be_tried and proposal not in tried:
             return proposal
     return None

@@ -29,18 +29,21 @@ _SINCE_1970 = {
 #: Days from 1954 to 2119 in spreadsheets, from 1916 in MATLAB.
 _DAYS = {"excel days": (20_000.0, 80_000.0), "matlab days": (7e5, 8e5)}
 
-BY_NAME = "from its name"
-
 
 class UnitGuess(NamedTuple):
     """A unit, and why."""
 
     unit: str
-    reason: str
+    reason: str = "from its name"
+
+    @property
+    def is_named(self) -> bool:
+        """True if the column's name ends with the unit."""
+        return self.reason == "from its name"
 
 
 def named_unit(
-    units: list[str], channel: str, reason: str = BY_NAME
+    units: list[str], channel: str, reason: str = "from its name"
 ) -> UnitGuess | None:
     """Unit of a channel among those with which a name ends; None if there is none."""
     unit = unit_of_channel(units, channel)

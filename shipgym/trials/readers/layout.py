@@ -135,8 +135,9 @@ def unit_texts(
     for cells in unit_rows:
         for name, cell in zip(header, cells, strict=False):
             bare = cell.strip("[]() \t")
-            if not is_missing(bare):
-                units.setdefault(name, bare)
+            is_first = name not in units
+            if is_first and not is_missing(bare):
+                units[name] = bare
     return units
 
 
