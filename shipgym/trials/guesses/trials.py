@@ -52,6 +52,11 @@ class TrialGuess:
     decisions: list[Decision] = field(default_factory=list)
 
     @property
+    def column_names(self) -> list[str]:
+        """Names and units of the columns that are used."""
+        return [one.declaration for one in self.columns]
+
+    @property
     def unused_names(self) -> str:
         """Names of the columns that are not used."""
         return ", ".join(shown(name) for name in self.unused)
