@@ -53,7 +53,8 @@ def without_sentinels(
         if is_far or size > largest:
             values = np.where(is_size, np.nan, values)
             count = np.count_nonzero(is_size)
-            words.append(f'{count} values of {size:g} stand for "no value"')
+            written, *_ = numbers[is_size]
+            words.append(f'{count} values of {written:g} stand for "no value"')
     return values, words
 
 
