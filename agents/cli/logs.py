@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Argument, Option
 
 if TYPE_CHECKING:
-    from shipgym.trials.guesses import TrialGuess
+    from shipgym.trials.guesses import ColumnGuess, Decision, RudderSide, TrialGuess
 
 
 def new_ship_command(
@@ -37,7 +37,6 @@ def new_ship_command(
     Guesses columns, units and signs, and reports the guesses.
     """
     from agents.cli.terminal import answer, say, warn
-    from shipgym.checks import shown
     from shipgym.errors import InputError
     from shipgym.files import write_text
     from shipgym.pages import render
@@ -48,30 +47,41 @@ def new_ship_command(
         )
     guessed = _guess_trials(logs)
     conventions = _conventions(guessed)
-    rudder_side = conventions.pop("rudder_positive", "starboard")
+    side = _rudder_side(guessed)
     first, *_ = guessed
+    shared = _shared_columns(guessed)
+    decisions = _decisions(guessed)
     facts: dict[str, Any] = {
         "out": out,
         "length": length,
-        "guesses": first.columns,
-        "side": rudder_side,
+        "guessed": guessed,
+        "shared": shared,
+        "decisions": decisions,
+        "to_decide": _to_decide(guessed, side),
+        "side": side,
+        "no_rudder": not any(_has_rudder(one) for one in guessed),
         "conventions": conventions,
         "trial": first.trial,
-        "unused": ", ".join(shown(column) for column in first.unused),
+        "trial_columns": first.columns,
+        "unused": first.unused_names,
         "speed": _service_speed(guessed),
-        "files": [_toml_path(log, out.parent) for log in logs],
+        "files": [_entry(one, shared, out.parent) for one in guessed],
     }
     ship_file = render("shipgym.pages/ship.toml.jinja", **facts)
     write_text(ship_file, out)
 
-    notes = first.trial.notes
+    notes = []
+    for one in guessed:
+        if one.trial is not None:
+            notes += [note for note in one.trial.notes if note not in notes]
     answer(
         {
             "written": str(out),
             "columns": _columns(first),
             "unused": first.unused,
-            "rudder_positive": rudder_side,
+            "rudder_positive": side.side if side else None,
             **conventions,
+            "to_decide": facts["to_decide"],
             "notes": [*notes],
         }
     )
@@ -94,6 +104,84 @@ def _conventions(guessed: list[TrialGuess]) -> dict[str, str]:
     return conventions
 
 
+def _rudder_side(guessed: list[TrialGuess]) -> RudderSide | None:
+    """Side to which a positive rudder steers, by the logs that tell it.
+
+    None without a rudder.
+    """
+    from shipgym.trials.guesses import RudderSide
+
+    sides = [one.side for one in guessed if one.side is not None]
+    known = [side for side in sides if side.side is not None]
+    named = {side.side for side in known}
+    if len(named) > 1:
+        return RudderSide(None, "the logs contradict each other")
+    if known:
+        return known[0]
+    return sides[0] if sides else None
+
+
+def _has_rudder(guess: TrialGuess) -> bool:
+    """Return whether a log has, or may have, a rudder angle."""
+    steering = {"delta", "delta_command"}
+    named = {one.channel for one in guess.columns}
+    asked = {one.key for one in guess.decisions}
+    in_trial = guess.trial is not None and "delta" in guess.trial
+    return in_trial or bool(steering & (named | asked))
+
+
+def _shared_columns(guessed: list[TrialGuess]) -> list[ColumnGuess]:
+    """Columns that are the same in all logs."""
+    first, *others = guessed
+    shared = []
+    for one in first.columns:
+        declaration = (one.channel, one.declaration)
+        if all(declaration in _declarations(other) for other in others):
+            shared.append(one)
+    return shared
+
+
+def _declarations(guess: TrialGuess) -> set[tuple[str, str]]:
+    return {(one.channel, one.declaration) for one in guess.columns}
+
+
+def _decisions(guessed: list[TrialGuess]) -> dict[str, list[Decision]]:
+    """What is left to decide in the tables that all logs share, each key once."""
+    decisions: dict[str, list[Decision]] = {"columns": [], "sensors": []}
+    keys = set()
+    for one in guessed:
+        for decision in one.decisions:
+            if decision.section in decisions and decision.key not in keys:
+                decisions[decision.section].append(decision)
+                keys.add(decision.key)
+    return decisions
+
+
+def _to_decide(guessed: list[TrialGuess], side: RudderSide | None) -> list[str]:
+    """Every decision as a line of the summary."""
+    lines = []
+    for one in guessed:
+        lines += [f"{decision.key}: {decision.choices}" for decision in one.decisions]
+    if side is not None and side.side is None:
+        lines.append(f"rudder_positive: {side.choices}")
+    return lines
+
+
+def _entry(
+    guess: TrialGuess, shared: list[ColumnGuess], folder: Path
+) -> dict[str, Any]:
+    """A log for the template of the ship file."""
+    own = [one for one in guess.columns if one not in shared]
+    of_trial = [one.choices for one in guess.decisions if one.section == "trials"]
+    known = {(one.channel, one.declaration) for one in shared}
+    own = [one for one in own if (one.channel, one.declaration) not in known]
+    return {
+        "file": _toml_path(guess.path, folder),
+        "columns": own,
+        "decision": next(iter(of_trial), None),
+    }
+
+
 def _columns(guessed: TrialGuess) -> dict[str, Any]:
     """Column and unit of each channel."""
     columns = {}
@@ -103,28 +191,17 @@ def _columns(guessed: TrialGuess) -> dict[str, Any]:
 
 
 def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
-    """Logs read with guessed columns; only the first has to be readable."""
+    """Logs read with guessed columns; the first has to be readable."""
     from agents.cli.terminal import warn
     from shipgym.errors import InputError
     from shipgym.trials.guesses import guess_trial
 
-    try:
-        guessed = [guess_trial(logs[0])]
-    except InputError as error:
-        message = str(error)
-        remedies = ("[columns]", "[conventions]", "[sensors]", "declare ")
-        if any(remedy in message for remedy in remedies):
-            message += (
-                "; new-ship has written no ship file in which to do so: write one as in"
-                " docs/ship_file.md"
-            )
-        raise InputError(message) from None
-
+    guessed = [guess_trial(logs[0])]
     for log in logs[1:]:
         try:
             guessed.append(guess_trial(log))
         except InputError as error:
-            warn(str(error))
+            warn(f"{error}; left out of the ship file")
     return guessed
 
 
@@ -136,7 +213,7 @@ def _service_speed(guessed: list[TrialGuess]) -> float | None:
     for one in guessed:
         trial = one.trial
         for channel in ("u", "stw", "sog"):
-            if channel in trial.channels:
+            if trial is not None and channel in trial.channels:
                 speeds.append(float(np.quantile(trial[channel], 0.9)))
                 break
     return max(speeds, default=None)
@@ -162,35 +239,56 @@ def look_command(
     """
     from agents.cli.terminal import answer, say, warn
     from agents.output import check_page
+    from shipgym.errors import InputError
     from shipgym.files import write_text
-    from shipgym.pages.look import look_page
+    from shipgym.pages.look import declared_reading, look_page
     from shipgym.trials.guesses import guess_trial
     from shipgym.trials.ship_file import ShipFile
 
     check_page(out, plots=True)
+    readings: list[dict[str, str]] = []
     if log.suffix == ".toml":
-        trials = ShipFile.load(log).trials()
+        ship_file = ShipFile.load(log)
+        trials = ship_file.trials(decided=False)
+        readings = [declared_reading(ship_file, trial) for trial in trials]
+        remarks = [*ship_file.undecided]
     else:
-        trials = [guess_trial(log).trial]
+        guess = guess_trial(log)
+        if guess.trial is None:
+            raise InputError(
+                f"{log}: "
+                + "; ".join(
+                    f"{one.key}: expected {one.choices}" for one in guess.decisions
+                )
+                + f"; shipgym new-ship {log} writes a ship file in which to say so"
+            )
+        trials = [guess.trial]
+        readings = [guess.reading]
+        remarks = [one.choices for one in guess.decisions]
 
-    write_text(look_page(log.name, trials), out)
+    write_text(look_page(log.name, trials, readings, remarks), out)
     fields = []
-    for trial in trials:
+    for trial, reading in zip(trials, readings, strict=True):
         about = {
             "name": trial.name,
             "samples": len(trial),
             "duration_s": trial.duration,
             "channels": [*trial.channels],
+            "read_as": reading,
             "notes": [*trial.notes],
         }
         fields.append(about)
-    answer({"written": str(out), "trials": fields})
-    for trial in trials:
+    answer({"written": str(out), "trials": fields, "to_decide": remarks})
+    for trial, reading in zip(trials, readings, strict=True):
         channels = ", ".join(trial.channels)
         say(
             f"{trial.name}: {len(trial)} samples over {trial.duration:.5g} s:"
             f" {channels}"
         )
+        for channel, words in reading.items():
+            say(f"  {channel}: {words}")
         for note in trial.notes:
             warn(f"{trial.name}: {note}")
+    for remark in remarks:
+        warn(remark)
     say(f"written: {out}")

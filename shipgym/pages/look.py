@@ -1,11 +1,12 @@
 """Page of recorded trials as they were read: facts, remarks, track and channels."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from shipgym.pages.templates import render
 from shipgym.plots.style import Figure
 from shipgym.plots.trials import history_figure, path_figure
+from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
 
 _CHANNELS = ("psi", "r", "delta", "u", "v", "n", "phi", "wind_speed")
@@ -16,23 +17,53 @@ class _Record(NamedTuple):
 
     name: str
     facts: dict[str, str]
+    reading: Mapping[str, str]  # what each channel was read as, and why
     notes: tuple[str, ...]
     track: Figure | None
     history: Figure
 
 
-def look_page(name: str, trials: Sequence[Trial]) -> str:
-    """The page, as text, of the trials in a file of that name."""
-    records = [_record(trial) for trial in trials]
-    return render("shipgym.pages/look.html", name=name, records=records)
+def look_page(
+    name: str,
+    trials: Sequence[Trial],
+    readings: Sequence[Mapping[str, str]] = (),
+    to_decide: Sequence[str] = (),
+) -> str:
+    """The page, as text, of the trials in a file of that name.
+
+    `readings` say of each trial what its channels were read as, and why; `to_decide`
+    are the decisions that the log leaves to its reader.
+    """
+    nothing_said: list[Mapping[str, str]] = [{}] * len(trials)
+    records = []
+    for trial, reading in zip(trials, readings or nothing_said, strict=True):
+        records.append(_record(trial, reading))
+    return render(
+        "shipgym.pages/look.html", name=name, records=records, to_decide=to_decide
+    )
 
 
-def _record(trial: Trial) -> _Record:
+def declared_reading(ship_file: ShipFile, trial: Trial) -> dict[str, str]:
+    """What the channels of a trial are in its log, as its ship file declares."""
+    reading = {}
+    for entry in ship_file.entries:
+        if trial.name != entry.file and not trial.name.startswith(f"{entry.file} "):
+            continue
+        for channel, column in (entry.columns or {}).items():
+            unit = column.unit or "the SI unit"
+            reading[channel] = f"column '{column.name}' in {unit}, as declared"
+        side = entry.conventions.rudder_positive
+        reading["rudder positive to"] = f"{side}, as declared"
+    return reading
+
+
+def _record(trial: Trial, reading: Mapping[str, str]) -> _Record:
     measured = {"measured": trial}
     has_position = "x" in trial and "y" in trial
     return _Record(
         name=trial.name,
         facts=_facts(trial),
+        reading=reading,
         notes=trial.notes,
         track=path_figure(measured) if has_position else None,
         history=history_figure(measured, _CHANNELS),

@@ -7,7 +7,13 @@ from typing import Any, SupportsIndex
 import numpy as np
 import numpy.typing as npt
 
-from shipgym.checks import check_keys, check_table, check_text, quoted
+from shipgym.checks import (
+    check_keys,
+    check_number,
+    check_table,
+    check_text,
+    quoted,
+)
 from shipgym.errors import InputError
 from shipgym.trials.clock_texts import zone_seconds
 from shipgym.trials.readers.log_table import LogTable
@@ -20,8 +26,12 @@ class Column:
 
     name: str  # of the column
     unit: str = ""  # none: as the reader knows it, else the SI unit
-    date: str | None = None  # column of the date, with a time of the day
+    date: str | None = None  # column of the date or of the GPS week
     zone: str = "UTC"  # how far the clock is ahead of UTC, as "+02:00"
+    nanoseconds: str | None = None  # column of what is to be added to whole seconds
+    minus: str | None = None  # column that is subtracted: of the other propeller
+    neutral: float = 0.0  # number of a steering command that steers straight
+    full: float | None = None  # change of the command that counts as 35 deg of rudder
 
 
 @dataclass(frozen=True)
@@ -60,10 +70,11 @@ def parse_columns(
 ) -> dict[str, Column]:
     """Check a table of columns by channel.
 
-    Each entry is the name of a column or ``{"column": name, "unit": unit}``, of the
-    time also ``"date"``, the column of the date, and ``"zone"``. `where` begins the
-    messages. Raises InputError for an unknown channel, key or unit, and for a unit of
-    another quantity.
+    Each entry is the name of a column or ``{"column": name, "unit": unit}``. That of
+    the time may also have ``"date"``, the column of the date, ``"nanoseconds"`` and
+    ``"zone"``, that of the rudder ``"full"``, ``"neutral"`` and ``"minus"``, which make
+    a steering command. `where` begins the messages. Raises InputError for an unknown
+    channel, key or unit, and for a unit of another quantity.
     """
     check_table(columns, where)
     parsed = {}
@@ -78,7 +89,9 @@ def _parse_column(channel: str, entry: Any, where: str) -> Column:
     fields = dict(entry) if isinstance(entry, Mapping) else {"column": entry}
     keys = ["column", "unit"]
     if channel == "t":
-        keys += ["date", "zone"]
+        keys += ["date", "zone", "nanoseconds"]
+    if channel in ("delta", "delta_command"):
+        keys += ["minus", "neutral", "full"]
     check_keys(fields, keys, where)
     name = fields.pop("column", None)
     if not isinstance(name, str):
@@ -91,11 +104,36 @@ def _parse_column(channel: str, entry: Any, where: str) -> Column:
     check_text(name, where)
     if "unit" in fields:
         si_factor(channel, fields["unit"], where)
+    command = _steering_command(fields, where)
     for field in fields.values():
         check_text(field, where)
     if "zone" in fields:
         zone_seconds(fields["zone"], f"{where} zone")
-    return Column(name.strip(), **fields)
+    return Column(name.strip(), **fields, **command)
+
+
+def _steering_command(fields: dict[str, Any], where: str) -> dict[str, Any]:
+    """Take what makes a steering command out of the fields of a column, checked."""
+    command: dict[str, Any] = {}
+    for key in ("neutral", "full"):
+        if key in fields:
+            command[key] = check_number(fields.pop(key), f"{where} {key}")
+    if "minus" in fields:
+        command["minus"] = check_text(fields.pop("minus"), f"{where} minus")
+    if command and not command.get("full"):
+        raise InputError(
+            f"{where}: expected full, the change of the command that counts as 35 deg"
+            " of rudder, not zero, with neutral or minus, got none; give full, such as"
+            " 400 of a pulse width in us"
+        )
+    if command:
+        if fields.get("unit", "deg") != "deg":
+            raise InputError(
+                f"{where} unit: expected deg with full, got {fields['unit']!r}; leave"
+                " out the unit"
+            )
+        fields["unit"] = "deg"
+    return command
 
 
 def choose_columns(

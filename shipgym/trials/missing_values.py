@@ -44,14 +44,17 @@ def _refuse_time(t: Floats, row: int, locator: Locator) -> None:
     after = t[row]
     earlier = locator.in_file("t", before, digits=10)
     later = locator.in_file("t", after, digits=10)
+    remedy = "sort the rows, remove the repeated ones"
     if after < before:
         change = f"goes back from {earlier} to {later}"
+        if 1700.0 < before - after < 3700.0:
+            remedy = "where a clock was set back, as at the end of summer, log UTC"
     else:
         change = f"stands still at {later}"
     place = locator.place(row, "t")
     raise InputError(
         f"{place}: expected time to increase from row to row, got one that {change};"
-        " sort the rows, remove the repeated ones, or split the file into one per run"
+        f" {remedy}, or split the file into one per run"
     )
 
 

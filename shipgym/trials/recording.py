@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +10,11 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.trials.angle_texts import read_angles
-from shipgym.trials.clock_texts import read_clock, zone_seconds
+from shipgym.trials.column_values import (
+    column_numbers,
+    no_positions,
+    without_sentinels,
+)
 from shipgym.trials.columns import Column, Locator, choose_columns
 from shipgym.trials.missing_values import check_time, fill_missing
 from shipgym.trials.navigation import local_metres
@@ -28,6 +32,7 @@ from shipgym.trials.resampling import (
     Signals,
     have_own_clocks,
 )
+from shipgym.trials.row_times import read_times
 from shipgym.trials.units import si_factor
 
 _PAIRS = {"lat": "lon", "lon": "lat", "sog": "cog", "cog": "sog"}  # of no use alone
@@ -48,20 +53,15 @@ class Recording:
     start : float or None
         Clock at t = 0 in UTC, s since 1970 or of the day; None where the time is no
         clock's.
+    notes : list of str
+        What was assumed of the values.
     """
 
     signals: Signals
     locator: Locator
     filled: Mapping[str, int]
     start: float | None
-
-
-class _Times(NamedTuple):
-    """Times of the rows of a table."""
-
-    t: Floats  # s
-    unit: str  # in which messages name them
-    start: float | None  # as in `Recording`
+    notes: list[str] = field(default_factory=list)
 
 
 class _Track(NamedTuple):
@@ -87,7 +87,7 @@ def read_recording(
     chosen = choose_columns(table, columns, part=part)
     if _PAIRS.keys() & chosen.keys():
         _check_pairs(table, chosen)
-    times = _read_times(table, chosen["t"])
+    times = read_times(table, chosen["t"])
     chosen["t"] = replace(chosen["t"], unit=times.unit)
     locator = Locator(
         table=table,
@@ -95,10 +95,11 @@ def read_recording(
         rows=np.arange(times.t.size),
     )
 
-    channels = _read_numbers(locator)
+    notes = list(times.notes)
+    channels = _read_numbers(locator, notes)
     outliers = 0
     if "lat" in chosen:
-        track = _local_track(locator, times.t, repair)
+        track = _local_track(locator, times.t, repair, notes)
         outliers = track.outliers
         channels["x"] = track.north
         channels["y"] = track.east
@@ -115,6 +116,7 @@ def read_recording(
         locator=locator,
         filled=filled,
         start=times.start,
+        notes=notes,
     )
 
 
@@ -129,16 +131,20 @@ def _check_pairs(table: LogTable, chosen: Mapping[str, Column]) -> None:
             )
 
 
-def _read_numbers(locator: Locator) -> dict[str, Floats]:
-    """Channels that are numbers in the file, in SI units."""
-    table = locator.table
+def _read_numbers(locator: Locator, notes: list[str]) -> dict[str, Floats]:
+    """Channels that are numbers in the file, in SI units, nan where there is none.
+
+    Notes numbers that stand for "no value".
+    """
     channels = {}
     for channel, column in locator.columns.items():
         if channel in ("t", "lat", "lon"):
             continue
-        numbers = table.numbers(column.name)
+        numbers = column_numbers(locator.table, column)
         factor = si_factor(channel, column.unit)
-        channels[channel] = factor * numbers
+        values, words = without_sentinels(channel, numbers, factor)
+        notes += [f"column '{column.name}': {word}" for word in words]
+        channels[channel] = factor * values
     return channels
 
 
@@ -192,48 +198,6 @@ def _continuous(
     return values
 
 
-def _read_times(table: LogTable, column: Column) -> _Times:
-    """Times of the rows: numbers in their unit, or clock times, which begin at zero."""
-    cells = table.texts(column.name)
-    if column.date is not None:
-        dates = table.texts(column.date)
-        for row, date in enumerate(dates):
-            moment = f"{date} {cells[row]}"
-            cells[row] = moment.strip()
-
-    first = next(filter(None, cells), "0")
-    is_numeric = is_number(first.replace(",", "."))
-    if is_numeric:
-        numbers = table.numbers(column.name)
-        factor = si_factor("t", column.unit)
-        clock = factor * numbers
-    else:
-        clock = _read_clock_cells(table, column, cells)
-    if is_numeric and not column.unit.startswith("unix"):
-        return _Times(clock, column.unit, start=None)
-
-    known = clock[np.isfinite(clock)]
-    zero = float(known[0]) if known.size else 0.0
-    ahead = zone_seconds(column.zone, str(table.path))
-    return _Times(clock - zero, unit="s", start=zero - ahead)
-
-
-def _read_clock_cells(table: LogTable, column: Column, cells: list[str]) -> Floats:
-    """Seconds since 1970 or of the day; InputError for the first invalid cell."""
-    try:
-        return read_clock(cells).seconds
-    except ValueError as error:
-        wrong = str(error)
-    row = cells.index(wrong) if wrong in cells else 0
-    place = table.cell(row, column.name)
-    beginning = cells[row][:40]
-    raise InputError(
-        f"{place}: expected a number, ISO 8601"
-        " (2024-05-31T09:30:00), or a time of day with its date in another column:"
-        f' t = {{ column = "{column.name}", date = "..." }}, got {beginning!r}'
-    )
-
-
 def _read_position(locator: Locator, channel: str) -> Floats:
     """Degrees of latitude or longitude in any of their forms."""
     table = locator.table
@@ -254,13 +218,23 @@ def _read_position(locator: Locator, channel: str) -> Floats:
     )
 
 
-def _local_track(locator: Locator, t: Floats, repair: str | None) -> _Track:
+def _local_track(
+    locator: Locator, t: Floats, repair: str | None, notes: list[str]
+) -> _Track:
     """Positions by north and east of the first one.
 
     Outliers are refused unless they are to be filled.
     """
     lat = _read_position(locator, "lat")
     lon = _read_position(locator, "lon")
+    is_none = no_positions(lat, lon)
+    if is_none.any():
+        lat[is_none] = lon[is_none] = np.nan
+        count = np.count_nonzero(is_none)
+        notes.append(
+            f"{count} positions that are none (91 and 181 deg, 0 and 0) are taken as"
+            " missing"
+        )
     check_ranges({"lat": lat, "lon": lon}, locator)
     north = np.full_like(t, np.nan)
     east = np.full_like(t, np.nan)

@@ -17,6 +17,7 @@ from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import USES, Trial, cut_trials, trial_of
 from shipgym.trials.trial_entries import TrialEntry, read_entries
 from shipgym.trials.trial_import import import_tables
+from shipgym.trials.undecided import take_undecided
 
 _SECTIONS = (
     "ship",
@@ -50,6 +51,9 @@ class ShipFile:
         The trials, not read yet.
     structure : Structure or None
         The table of terms in ``[structure]``.
+    undecided : tuple of str
+        A message for each value ``"decide"``, which `shipgym new-ship` writes where a
+        log does not tell; the usual value stands in its place.
     """
 
     path: Path
@@ -58,6 +62,7 @@ class ShipFile:
     identify: dict[str, Any]
     entries: tuple[TrialEntry, ...]
     structure: Structure | None = None
+    undecided: tuple[str, ...] = ()
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -70,6 +75,7 @@ class ShipFile:
         """
         path = Path(path)
         data = read_toml(path, "ship file")
+        undecided = take_undecided(data, path)
         check_keys(data, _SECTIONS, str(path))
         particulars = _read_particulars(path, data)
         steering = structure = None
@@ -85,6 +91,7 @@ class ShipFile:
             identify=_read_options(path, data),
             entries=read_entries(path, data, particulars),
             structure=structure,
+            undecided=undecided,
         )
 
     def completed_particulars(self) -> Particulars:
@@ -92,11 +99,14 @@ class ShipFile:
         with placed(str(self.path)):
             return self.particulars.completed()
 
-    def trials(self, use: str | None = None) -> list[Trial]:
+    def trials(self, use: str | None = None, *, decided: bool = True) -> list[Trial]:
         """Read the trials of a use, by default all but those to skip.
 
-        In the order of the file. Raises InputError for anything wrong with a log.
+        In the order of the file. Raises InputError for anything wrong with a log and,
+        if `decided`, for the first line that is not decided.
         """
+        if decided and self.undecided:
+            raise InputError(self.undecided[0])
         if use is not None:
             check_choice(use, USES, f"{self.path}: trials(use)")
         wanted = [use]

@@ -52,7 +52,7 @@ def import_tables(
     for table in tables:
         recording = read_recording(table, columns, conventions.repair, part=is_part)
         recordings.append(recording)
-        remarks += table.notes
+        remarks += [*table.notes, *recording.notes]
 
     first, *others = recordings
     signals = dict(first.signals)

@@ -1,11 +1,19 @@
 """Columns, units, signs and frames of a log, guessed, each with its reason."""
 
 from shipgym.trials.guesses.columns import ColumnGuess, guess_columns
-from shipgym.trials.guesses.trials import ConventionGuess, TrialGuess, guess_trial
+from shipgym.trials.guesses.sides import RudderSide
+from shipgym.trials.guesses.trials import (
+    ConventionGuess,
+    Decision,
+    TrialGuess,
+    guess_trial,
+)
 
 __all__ = [
     "ColumnGuess",
     "ConventionGuess",
+    "Decision",
+    "RudderSide",
     "TrialGuess",
     "guess_columns",
     "guess_trial",

@@ -6,19 +6,45 @@ from collections.abc import Iterable
 from fnmatch import fnmatchcase
 from typing import NamedTuple
 
+import numpy as np
+
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.files import shipped_toml
+from shipgym.trials.column_values import without_sentinels
+from shipgym.trials.columns import Column
+from shipgym.trials.guesses.steering import steering_command
 from shipgym.trials.guesses.units import (
     UnitGuess,
     named_unit,
     names_another_quantity,
-    split_unit,
     unit_by_size,
 )
+from shipgym.trials.readers.cell_texts import number_with_unit
 from shipgym.trials.readers.log_table import LogTable
+from shipgym.trials.unit_spellings import spelled_units, split_unit
+from shipgym.trials.units import QUANTITIES
 
 _WITH_UNIT = "with_unit"  # not a language
+_SIGNAL_K = re.compile(r"(navigation|steering|propulsion|environment)\.", re.IGNORECASE)
+_TIME_OF_DAY = re.compile(r"\d\d?:\d\d.*")
+_DATE = re.compile(r"\d+\W+\w+\W+\d+.*|\d{6}|\d{8}")
+#: Words in the name of what a ship should do, or of what is no measured value.
+_NO_MEASUREMENT = {
+    *("set", "setpoint", "sp", "desired", "target", "command", "commanded", "cmd"),
+    *("order", "ordered", "ref", "reference", "demand", "error", "err", "rate"),
+    *(
+        "std",
+        "accuracy",
+        "deviation",
+        "variation",
+        "raw",
+        "quality",
+        "status",
+        "mode",
+        "header",
+    ),
+}
 
 
 class ColumnGuess(NamedTuple):
@@ -28,11 +54,34 @@ class ColumnGuess(NamedTuple):
     column: str
     unit: str
     reason: str
+    extra: tuple[tuple[str, str | float], ...] = ()  # other keys of the declaration
+
+    @property
+    def is_named(self) -> bool:
+        """True if the column's name ends with the unit."""
+        return UnitGuess(self.unit, self.reason).is_named
 
     @property
     def quoted(self) -> str:
         """The name of the column as TOML has it."""
         return json.dumps(self.column, ensure_ascii=False)
+
+    @property
+    def declaration(self) -> str:
+        """The column as the ship file declares it."""
+        parts = [f"column = {self.quoted}"]
+        parts.append(f'unit = "{self.unit}"')
+        for key, value in self.extra:
+            written = json.dumps(value, ensure_ascii=False)
+            parts.append(f"{key} = {written}")
+        joined = ", ".join(parts)
+        return f"{{ {joined} }}"
+
+    @property
+    def as_column(self) -> Column:
+        """The column for the reader."""
+        keys = dict[str, object](self.extra)
+        return Column(self.column, self.unit, **keys)  # type: ignore[arg-type]
 
 
 class _Names(NamedTuple):
@@ -61,42 +110,233 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
     """
     names = _column_names()
     free = list(table.header)
-    guesses = []
+    guesses: dict[str, ColumnGuess] = {}
+
+    def take(channel: str, patterns: str) -> None:
+        found = _first_match(
+            table,
+            free,
+            channel,
+            names,
+            patterns,
+        )
+        if found is not None:
+            guesses[channel] = found
+            free.remove(found.column)
+
     for channel in names.known:
-        for column in free:
-            unit = _unit_where_fitting(table, column, channel, names)
-            if unit is not None:
-                guesses.append(ColumnGuess(channel, column, *unit))
-                free.remove(column)
-                break
-    return guesses
+        if channel in QUANTITIES:
+            take(channel, channel)
+    if "psi" not in guesses:
+        take("psi", "course")
+    elif "cog" not in guesses:
+        take("cog", "course")
+    if "sog" not in guesses and "u" not in guesses:
+        if "cog" in guesses:
+            take("sog", "speed")
+        elif "stw" not in guesses:
+            take("stw", "speed")
+    if "t" not in guesses:
+        even = _even_column(table, free)
+        if even is not None:
+            guesses["t"] = even
+    if "t" in guesses:
+        guesses["t"] = _with_date(table, guesses["t"], free, names)
+    if "delta" not in guesses and "delta_command" not in guesses:
+        command = steering_command(table, free)
+        if command is not None:
+            guesses["delta"] = ColumnGuess("delta", *command)
+    _settle_rudder(table, guesses)
+    return [guesses[channel] for channel in names.known if channel in guesses]
 
 
-def _unit_where_fitting(
-    table: LogTable, column: str, channel: str, names: _Names
-) -> UnitGuess | None:
-    """The unit of a column where its name is one of a channel; None where it is not."""
-    text = column.lower().replace("_", " ")
-    bare, units = split_unit(text)
-    if names_another_quantity(units, channel):
-        return None
-    unit = named_unit(units, channel)
+def _settle_rudder(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
+    """Take a small rudder in degrees where the heading is and hardly changes."""
+    for channel in ("delta", "delta_command"):
+        guess = guesses.get(channel)
+        heading = guesses.get("psi")
+        if (
+            guess is None
+            or heading is None
+            or not guess.reason.startswith("from its s")
+        ):
+            continue
+        psi = _numbers(table, heading.column)
+        if guess.unit == "rad" and heading.unit == "deg" and psi is not None:
+            known = psi[np.isfinite(psi)]
+            heading_deg = np.unwrap(known, period=360.0)
+            turned = np.ptp(heading_deg) if known.size else 0.0
+            if turned < 10.0:
+                reason = (
+                    f"{guess.reason}, with a heading in deg that changes by"
+                    f" {turned:.3g} alone"
+                )
+                guesses[channel] = guess._replace(unit="deg", reason=reason)
 
-    without_brackets = re.sub(r"[\[(].*", "", text)
-    forms = [_plain(text), _plain(without_brackets)]
-    if unit is not None:
-        forms.append(_plain(bare))
-    if _matches(forms, names.known[channel]):
+
+def _first_match(
+    table: LogTable,
+    free: list[str],
+    channel: str,
+    names: _Names,
+    patterns: str,
+) -> ColumnGuess | None:
+    """Guess of a channel by the first of its patterns that a column has."""
+    fitting = {}
+    for column in free:
+        unit = _unit_where_fitting(table, column, channel)
         if unit is not None:
-            return unit
-        return unit_by_size(_numbers(table, column), channel)
-    if _matches(forms, names.with_unit.get(channel, [])):
-        return unit
+            fitting[column] = unit
+    for pattern in names.known[patterns]:
+        for column, unit in fitting.items():
+            if _matches(_forms(column, channel), [pattern]):
+                return ColumnGuess(channel, column, *unit)
+    for column, unit in fitting.items():
+        of_unit = names.with_unit.get(channel, [])
+        if unit.is_named and _matches(_forms(column, channel), of_unit):
+            return ColumnGuess(channel, column, *unit)
     return None
 
 
+def _unit_where_fitting(table: LogTable, column: str, channel: str) -> UnitGuess | None:
+    """Unit of a column, were it a channel's; None where it is of another quantity."""
+    text = _spaced(column)
+    units = split_unit(text).units
+    if names_another_quantity(units, channel):
+        return None
+    words = {*re.findall(r"[^\W\d_]+", text)}
+    if channel in ("psi", "sog", "stw", "cog") and _NO_MEASUREMENT & words:
+        return None
+    unit = named_unit(units, channel)
+    below = table.unit_row.get(column)
+    if below is not None:
+        row_unit = split_unit(f"x [{_spaced(below)}]").units
+        if names_another_quantity(row_unit, channel):
+            return None
+        unit = named_unit(row_unit, channel, "from the row of units") or unit
+    if unit is not None and (channel != "t" or _is_duration(table, column, unit)):
+        return unit
+    if _SIGNAL_K.match(column) and channel not in ("t", "lat", "lon"):
+        size = unit_by_size(None, channel)
+        return size._replace(reason="paths of Signal K are in SI units")
+    in_cells = _unit_in_cells(table, column, channel)
+    values = _numbers(table, column)
+    if values is not None and channel != "t":
+        values, _ = without_sentinels(channel, values, factor=1.0)
+    return in_cells or unit_by_size(values, channel)
+
+
+def _is_duration(table: LogTable, column: str, unit: UnitGuess) -> bool:
+    """Return whether times may be in the unit of their name, and do not need another.
+
+    Seconds of 1.7e9 count from 1970.
+    """
+    values = _numbers(table, column)
+    if values is None:
+        return False
+    by_size = unit_by_size(values, "t").unit
+    durations = ("s", "ms", "us", "ns")
+    counts_from_date = by_size == f"unix {unit.unit}"
+    if unit.unit == "s":
+        counts_from_date = by_size not in durations
+    return not counts_from_date
+
+
+def _unit_in_cells(table: LogTable, column: str, channel: str) -> UnitGuess | None:
+    """Unit that stands in the first cell, as in "13.6 kn"."""
+    first = _first_text(table, column)
+    if table.decimal_comma:
+        first = first.replace(",", ".")
+    measured = number_with_unit(first)
+    if measured is None:
+        return None
+    units = spelled_units(measured.unit.lower())
+    return named_unit(units, channel, "from its cells")
+
+
+def _with_date(
+    table: LogTable, time: ColumnGuess, free: list[str], names: _Names
+) -> ColumnGuess:
+    """The time with the column of its date or of the GPS week, where there is one."""
+    first = _first_text(table, time.column)
+    is_of_day = _TIME_OF_DAY.fullmatch(first) is not None
+    is_of_week = _matches(_forms(time.column, "t"), ["*tow", "*timeofweek*"])
+    if is_of_week:
+        unit = "gps tow ms" if time.unit == "ms" else "gps tow"
+        reason = "seconds of the GPS week, by its name"
+        time = time._replace(unit=unit, reason=reason)
+    part = _second_of(table, time.column, free)
+    if part is not None:
+        free.remove(part)
+        return time._replace(extra=(("nanoseconds", part),))
+    if not is_of_day and not is_of_week:
+        return time
+    for pattern in names.known["date"]:
+        for column in free:
+            if not _matches(_forms(column, "t"), [pattern]):
+                continue
+            date = _first_text(table, column)
+            if date.isdigit() if is_of_week else _DATE.fullmatch(date):
+                free.remove(column)
+                return time._replace(extra=(("date", column),))
+    return time
+
+
+def _second_of(table: LogTable, column: str, free: list[str]) -> str | None:
+    """Column of the nanoseconds beside the seconds of a stamp of ROS; None without."""
+    stem = re.sub(r"secs?$", "", column, flags=re.IGNORECASE)
+    if stem == column:
+        return None
+    others = {f"{stem}{ending}" for ending in ("nanosec", "nanosecs", "nsec", "nsecs")}
+    return next((one for one in free if one in others), None)
+
+
+def _even_column(table: LogTable, free: list[str]) -> ColumnGuess | None:
+    """A column without a known name that increases evenly, as time does."""
+    numbers_of_rows = ("", "index", "row", "no", "nr", "id", "seq", "sample")
+    for column in free:
+        values = _numbers(table, column)
+        if values is None or values.size < 10:
+            continue
+        steps = np.diff(values)
+        is_even = np.all(steps > 0.0) and np.ptp(steps) <= 0.01 * steps.max()
+        is_count = values[0] in (0.0, 1.0) and np.all(steps == 1.0)
+        if is_even and not (is_count and column.lower() in numbers_of_rows):
+            free.remove(column)
+            unit = unit_by_size(values, "t")
+            reason = f"{unit.reason}; the time, as it increases evenly"
+            return ColumnGuess("t", column, unit.unit, reason)
+    return None
+
+
+def _first_text(table: LogTable, column: str) -> str:
+    return next(filter(None, table.texts(column)), "")
+
+
+def _forms(column: str, channel: str) -> list[str]:
+    """The name of a column without blanks: whole, without its unit, its last part."""
+    text = column.lower().replace("_", " ")
+    bare, units = split_unit(text)
+    forms = [_plain(text)]
+    if "(:," not in column:  # of a matrix
+        forms.append(_plain(re.sub(r"[\[(].*", "", text)))
+    if named_unit(units, channel) is not None:
+        forms.append(_plain(bare))
+    is_path = re.search(r"[^\W\d_][./:][^\W\d_]", column)
+    if is_path and " " not in column:
+        last = re.split(r"[./:]", text)[-1]
+        forms.append(_plain(last))
+    return forms
+
+
+def _spaced(name: str) -> str:
+    """A name in lower case with blanks for underscores and before its capitals."""
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", " ", name)
+    return apart.replace("_", " ").lower()
+
+
 def _plain(name: str) -> str:
-    return re.sub(r"[ ._()\[\]-]", "", name)
+    return re.sub(r"[ ._()\[\]#%:/'\"-]", "", name)
 
 
 def _matches(forms: Iterable[str], patterns: Iterable[str]) -> bool:
@@ -106,6 +346,6 @@ def _matches(forms: Iterable[str], patterns: Iterable[str]) -> bool:
 def _numbers(table: LogTable, column: str) -> Floats | None:
     """Numbers of a column; None of clock times, degrees and minutes."""
     try:
-        return table.numbers(column)
+        return table.numbers(column, sided=True)
     except InputError:
         return None

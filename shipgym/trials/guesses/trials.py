@@ -1,20 +1,26 @@
 """Logs read with guessed columns and conventions, corrected by what checks propose."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from shipgym.checks import quoted, shown
 from shipgym.errors import InputError
-from shipgym.trials.columns import Column
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.guesses.columns import ColumnGuess, guess_columns
+from shipgym.trials.guesses.sides import RudderSide, rudder_side
+from shipgym.trials.guesses.speeds import settle_speeds
+from shipgym.trials.installation import Installation
 from shipgym.trials.plausibility.refusal import Proposal
 from shipgym.trials.readers.kinds import read_log
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.trial import Trial, trial_of
 from shipgym.trials.trial_import import import_tables
 from shipgym.trials.units import QUANTITIES
+
+#: What a message names that is cured by a line of the ship file.
+_CURABLE = ("[columns]", "[conventions]", "[sensors]", "declare ", "column = ")
 
 
 class ConventionGuess(NamedTuple):
@@ -25,36 +31,89 @@ class ConventionGuess(NamedTuple):
     reason: str
 
 
+class Decision(NamedTuple):
+    """A line of the ship file that its reader has to complete, and the choices."""
+
+    section: str  # "columns", "conventions", "sensors" or "trials"
+    key: str
+    choices: str
+
+
 @dataclass(frozen=True)
 class TrialGuess:
     """A log, and the columns and conventions with which it could be read."""
 
+    path: Path
     columns: list[ColumnGuess]
     conventions: list[ConventionGuess]  # those that are not the usual ones
-    trial: Trial
+    trial: Trial | None  # none where a decision is needed first
     unused: list[str]  # columns of which no channel was made
+    side: RudderSide | None  # to which a positive rudder steers; none without one
+    decisions: list[Decision] = field(default_factory=list)
+
+    @property
+    def column_names(self) -> list[str]:
+        """Names and units of the columns that are used."""
+        return [one.declaration for one in self.columns]
+
+    @property
+    def unused_names(self) -> str:
+        """Names of the columns that are not used."""
+        return ", ".join(shown(name) for name in self.unused)
+
+    @property
+    def reading(self) -> dict[str, str]:
+        """What each channel, and the rudder's sign, was read as, and why."""
+        reading = {}
+        for one in self.columns:
+            unit = one.unit
+            for key, value in one.extra:
+                unit += f", {key} {value}"
+            where = f"column '{one.column}' in {unit}"
+            reading[one.channel] = f"{where}, unit {one.reason}"
+        for convention in self.conventions:
+            reading[convention.name] = f"{convention.value}: {convention.reason}"
+        if self.side is not None:
+            side = self.side.side or "not known, drawn as to starboard"
+            reading["rudder positive to"] = f"{side}: {self.side.reason}"
+        if self.unused:
+            reading["columns not used"] = self.unused_names
+        return reading
 
 
 def guess_trial(path: str | Path) -> TrialGuess:
     """Read a log with guesses; where a check proposes another setting, try that.
 
-    A unit given in a column's name is kept. Raises InputError, as the readers do, for
-    a log that cannot be read so.
+    A unit given in a column's name is kept unless the positions contradict it. What a
+    line of a ship file can cure is a decision. Raises InputError, as the readers do,
+    for other logs that cannot be read.
     """
     table = read_log(path)
     columns: dict[str, ColumnGuess] = {}
-    if not table.units:  # the reader knows none
+    knows_channels = bool(table.units) and table.cells.keys() <= QUANTITIES.keys()
+    if not knows_channels:
         columns = {guess.channel: guess for guess in guess_columns(table)}
+        columns = settle_speeds(table, columns)
+        missing = _missing_columns(table, columns)
+        if missing:
+            return _undecided(table, columns, missing)
     conventions: dict[str, ConventionGuess] = {}
+    decisions: list[Decision] = []
     tried: set[Proposal] = set()
     while True:
         try:
-            trial = _read(table, columns, conventions)
+            trial = _read(table, columns, conventions, decisions)
             break
         except InputError as error:
             proposal = _next_proposal(error, columns, tried)
             if proposal is None:
-                raise
+                decision = _decision(error, decisions)
+                if decision is None:
+                    raise
+                decisions.append(decision)
+                if decision.section == "trials":
+                    return _undecided(table, columns, decisions)
+                continue
         tried.add(proposal)
         name, value = proposal
         if name in columns:
@@ -63,27 +122,100 @@ def guess_trial(path: str | Path) -> TrialGuess:
             reason = "without it a log is refused"
             conventions[name] = ConventionGuess(name, value, reason)
 
-    used = {guess.column for guess in columns.values()} or QUANTITIES.keys()
+    is_turned = "rudder_positive" in conventions
+    side = rudder_side(table, trial, columns.get("delta"), is_turned=is_turned)
+    if side is not None and side.side == "port" and not is_turned:
+        turned = ConventionGuess("rudder_positive", "port", side.reason)
+        conventions["rudder_positive"] = turned
+        trial = _read(table, columns, conventions, decisions)
+    conventions.pop("rudder_positive", None)
     return TrialGuess(
+        path=table.path,
         columns=list(columns.values()),
         conventions=list(conventions.values()),
         trial=trial,
-        unused=[name for name in table.header if name not in used],
+        unused=_unused(table, columns),
+        side=side,
+        decisions=decisions,
     )
+
+
+def _unused(table: LogTable, columns: Mapping[str, ColumnGuess]) -> list[str]:
+    used = set()
+    for guess in columns.values():
+        used.add(guess.column)
+        for _, value in guess.extra:
+            used.add(str(value))
+    known = used or QUANTITIES.keys()
+    return [name for name in table.header if name not in known]
+
+
+def _missing_columns(
+    table: LogTable, columns: Mapping[str, ColumnGuess]
+) -> list[Decision]:
+    """Decisions on columns without which a log shows no motion."""
+    wanted = {"t": "time"}
+    of_motion = {"psi", "r", "x", "lat", "u"}
+    if not of_motion & columns.keys():
+        wanted["psi"] = "heading"
+        if "delta" not in columns:
+            wanted["delta"] = "rudder angle"
+    used = {guess.column for guess in columns.values()}
+    free = [name for name in table.header if name not in used]
+    missing = []
+    for channel, words in wanted.items():
+        if channel not in columns:
+            unit = "s" if channel == "t" else "deg"
+            choices = (
+                f"the column of the {words}, one of {quoted(free)[:1000]}, as"
+                f' {{ column = "{free[0] if free else words}", unit = "{unit}" }}'
+            )
+            missing.append(Decision("columns", channel, choices))
+    return missing
+
+
+def _undecided(
+    table: LogTable, columns: Mapping[str, ColumnGuess], decisions: list[Decision]
+) -> TrialGuess:
+    """A log that cannot be read before something is decided."""
+    return TrialGuess(
+        path=table.path,
+        columns=list(columns.values()),
+        conventions=[],
+        trial=None,
+        unused=_unused(table, columns),
+        side=None,
+        decisions=decisions,
+    )
+
+
+def _decision(error: InputError, decisions: list[Decision]) -> Decision | None:
+    """The decision that a refusal leaves to the user; None where it cannot be cured."""
+    message = str(error)
+    if "clock_offsets" in message:
+        if any(one.key == "clock_offsets" for one in decisions):
+            return None
+        return Decision("sensors", "clock_offsets", f'"correct" or "keep": {message}')
+    if any(cure in message for cure in _CURABLE):
+        return Decision(
+            "trials", "use", f'"fit" once this is settled, or "skip": {message}'
+        )
+    return None
 
 
 def _read(
     table: LogTable,
     guesses: Mapping[str, ColumnGuess],
     conventions: Mapping[str, ConventionGuess],
+    decisions: list[Decision],
 ) -> Trial:
     """Read a log with the guesses so far."""
-    columns = {}
-    for channel, guess in guesses.items():
-        columns[channel] = Column(guess.column, guess.unit)
+    columns = {channel: guess.as_column for channel, guess in guesses.items()}
     words: dict[str, Any] = {"where": f"{table.path}:"}
     for one in conventions.values():
         words[one.name] = one.value
+    if any(one.key == "clock_offsets" for one in decisions):
+        words["installation"] = Installation(clock_offsets="keep")
     log = import_tables(
         [table],
         columns or None,
@@ -100,7 +232,7 @@ def _next_proposal(
         proposal = Proposal(name, value)
         may_be_tried = name not in QUANTITIES  # a convention
         if name in columns:
-            may_be_tried = columns[name].reason != "from its name"
+            may_be_tried = not columns[name].is_named
         if may_be_tried and proposal not in tried:
             return proposal
     return None

@@ -1,22 +1,16 @@
 """Units of columns, by the ends of their names and by the size of their values."""
 
-from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.files import shipped_toml
+from shipgym.trials.unit_spellings import unit_of_channel
 from shipgym.trials.units import QUANTITIES, UNITS, si_unit
-
-_SPELLINGS: dict[str, list[str]] = shipped_toml(
-    "shipgym.trials.guesses", "unit_names.toml"
-)
 
 #: Size from which on a channel or quantity is not in SI units, and the unit that it has
 #: then.
 _BY_SIZE = {
-    "t": (1e8, "unix"),
     "delta": (1.0, "deg"),
     "delta_command": (1.0, "deg"),
     "phi": (1.0, "deg"),
@@ -24,57 +18,38 @@ _BY_SIZE = {
     "angular rate": (0.2, "deg/min"),
     "shaft speed": (10.0, "rpm"),
 }
-_MILLISECONDS = 1e11  # since 1970, and seconds of the year 5138
+#: Sizes from which on times count from 1970, in which unit: s of the year 1973, and the
+#: same moment in the others.
+_SINCE_1970 = {
+    1e8: "unix",
+    1e11: "unix ms",
+    1e14: "unix us",
+    1e17: "unix ns",
+}
+#: Days from 1954 to 2119 in spreadsheets, from 1916 in MATLAB.
+_DAYS = {"excel days": (20_000.0, 80_000.0), "matlab days": (7e5, 8e5)}
 
 
 class UnitGuess(NamedTuple):
     """A unit, and why."""
 
     unit: str
-    reason: str
+    reason: str = "from its name"
+
+    @property
+    def is_named(self) -> bool:
+        """True if the column's name ends with the unit."""
+        return self.reason == "from its name"
 
 
-class NameEnd(NamedTuple):
-    """A column's name, parted from its unit."""
-
-    name: str
-    units: list[str]  # that are spelled like its end, the longest first
-
-
-def split_unit(name: str) -> NameEnd:
-    """Part a column's name from the unit with which it ends.
-
-    The name is in lower case, with blanks for underscores.
-    """
-    text = name.replace(" per ", "/")
-    text = text.rstrip("]) ")
-    bare = text
-    units: list[str] = []
-    for start, before in enumerate(f" {text[:-1]}"):
-        if before not in "[( ":
-            continue
-        spelled = _spelled_units(text[start:])
-        if spelled and not units:
-            bare = text[:start]
-        units += spelled
-    return NameEnd(bare.rstrip("[( "), units)
-
-
-def _spelled_units(text: str) -> list[str]:
-    """Units that may be spelled so."""
-    units = []
-    for unit, spellings in _SPELLINGS.items():
-        if any(fnmatchcase(text, spelling) for spelling in spellings):
-            units.append(unit)
-    return units
-
-
-def named_unit(units: list[str], channel: str) -> UnitGuess | None:
+def named_unit(
+    units: list[str], channel: str, reason: str = "from its name"
+) -> UnitGuess | None:
     """Unit of a channel among those with which a name ends; None if there is none."""
-    for unit in units:
-        if unit in UNITS[QUANTITIES[channel]]:
-            return UnitGuess(unit, "from its name")
-    return None
+    unit = unit_of_channel(units, channel)
+    if unit is None:
+        return None
+    return UnitGuess(unit, reason)
 
 
 def names_another_quantity(units: list[str], channel: str) -> bool:
@@ -82,7 +57,7 @@ def names_another_quantity(units: list[str], channel: str) -> bool:
 
     A single letter may be no unit, as in "Heading M".
     """
-    if named_unit(units, channel) is not None:
+    if unit_of_channel(units, channel) is not None:
         return False
     return any(len(unit) > 1 for unit in units)
 
@@ -95,6 +70,8 @@ def unit_by_size(values: Floats | None, channel: str) -> UnitGuess:
     unit = si_unit(channel)
     if values is None:
         return UnitGuess(unit, "from its content")
+    if channel == "t":
+        return _time_by_size(values)
     known = values[np.isfinite(values)]
     largest = np.abs(known).max(initial=0.0)
     limit, other = _BY_SIZE.get(QUANTITIES[channel], (np.inf, ""))
@@ -102,6 +79,35 @@ def unit_by_size(values: Floats | None, channel: str) -> UnitGuess:
         limit, other = _BY_SIZE[channel]
     if largest > limit:
         unit = other
-    if unit == "unix" and largest > _MILLISECONDS:
-        unit = "unix ms"
+    return UnitGuess(unit, f"from its size, up to {largest:.4g}")
+
+
+def _time_by_size(values: Floats) -> UnitGuess:
+    """Unit of times by their size and by how far the rows are apart."""
+    known = values[np.isfinite(values)]
+    largest = float(known.max(initial=0.0))
+    steps = np.diff(known)
+    forward = steps[steps > 0.0]
+    step = float(np.median(forward)) if forward.size else 1.0
+    unit = "s"
+    for size, since_1970 in _SINCE_1970.items():
+        seconds = step * UNITS["time"][since_1970]
+        if known.size and known.min() > size and seconds < 3600.0:
+            unit = since_1970
+    if unit != "s":
+        return UnitGuess(unit, f"from its size, up to {largest:.4g}")
+
+    in_days = 2e-3  # three minutes, and far less than a row in seconds
+    by_step = f"from its rows, which are {step:.3g} apart"
+    if step < in_days:
+        for days, (least, most) in _DAYS.items():
+            if known.min() > least and largest < most:
+                return UnitGuess(days, f"{by_step}, and its size, up to {largest:.4g}")
+        is_part_of_day = step >= 1e-6 and largest < 2.0
+        if is_part_of_day:
+            return UnitGuess("days", by_step)
+    for finer in ("ms", "us", "ns"):
+        in_seconds = step * UNITS["time"][finer]
+        if step > 20.0 and 0.005 <= in_seconds <= 20.0:
+            return UnitGuess(finer, by_step)
     return UnitGuess(unit, f"from its size, up to {largest:.4g}")

@@ -16,14 +16,21 @@ from shipgym.trials.readers.damage import (
     damage_reported,
 )
 from shipgym.trials.readers.frames import MOST_CELLS, read_frame
+from shipgym.trials.readers.layout import (
+    Layout,
+    layout_of_rows,
+    title_note,
+    unit_texts,
+)
 from shipgym.trials.readers.log_table import LogTable
 
 
 def read_excel(path: Path) -> LogTable:
-    """Read the first sheet of a workbook (.xlsx), whose first row names the columns.
+    """Read the first sheet of a workbook (.xlsx), with or without rows of title.
 
-    Blank rows and columns are left out. Raises InputError for a damaged or large file,
-    for merged cells, and where a name is missing or repeated.
+    A row of units may stand below the names. Blank rows and columns are left out.
+    Raises InputError for a damaged or large file, for merged cells, and where a name is
+    missing or repeated.
     """
     content = read_bytes(path, "workbook of Excel", LARGEST_PACKED)
     remedy = "save the sheet again as .xlsx or as CSV"
@@ -35,12 +42,42 @@ def read_excel(path: Path) -> LogTable:
         frame = _sheet(path, content, parts)
         frame = frame.dropna(how="all")
         frame = frame.dropna(axis=1, how="all")
-        header = frame.iloc[0]
-        values = frame.iloc[1:]
-        values.columns = _column_names(path, header)
+        layout = _layout(frame)
+        header = frame.iloc[layout.header]
+        names = _column_names(path, header)
+        below = max(layout.header, *layout.units, 0) + 1
+        values = frame.iloc[below:]
+        values.columns = names
         rows = values.index + 1
+        units = [_texts(frame.iloc[number]) for number in layout.units]
         table = read_frame(values.reset_index(drop=True), path)
-        return replace(table, rows=rows.tolist())
+        header_at = int(header.name) + 1
+        return replace(
+            table,
+            rows=rows.tolist(),
+            unit_row=unit_texts(names, units),
+            notes=tuple(title_note(header_at, layout.header, "row")),
+        )
+
+
+def _layout(frame: Any) -> Layout:
+    """Rows of names and of units in a frame, the first row where none fits."""
+    rows = {}
+    most_rows = min(100, len(frame))
+    for number in range(most_rows):
+        row = frame.iloc[number]
+        rows[number] = _texts(row)
+    first_row = Layout("", header=0, units=())
+    return layout_of_rows(rows) or first_row
+
+
+def _texts(row: Any) -> list[str]:
+    """Cells of a row as texts, empty where there is nothing."""
+    texts = []
+    for cell, is_known in zip(row, row.notna(), strict=True):
+        text = str(cell) if is_known else ""
+        texts.append(text)
+    return texts
 
 
 def _sheet(path: Path, content: bytes, parts: zipfile.ZipFile) -> Any:

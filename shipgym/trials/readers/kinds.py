@@ -4,12 +4,14 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from shipgym.files import LARGEST_CSV, read_bytes
 from shipgym.trials.readers.csv_file import read_csv
 from shipgym.trials.readers.excel import read_excel
+from shipgym.trials.readers.foreign import kind_by_content, refuse_foreign
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.readers.matlab import read_matlab
+from shipgym.trials.readers.numpy_file import read_numpy
 from shipgym.trials.readers.parquet import read_parquet
+from shipgym.trials.readers.text_files import read_log_bytes
 
 
 def _read_nmea(path: Path) -> LogTable:
@@ -23,6 +25,7 @@ READERS: dict[str, Callable[[Path], LogTable]] = {
     "excel": read_excel,
     "matlab": read_matlab,
     "nmea": _read_nmea,
+    "numpy": read_numpy,
     "parquet": read_parquet,
 }
 _ENDINGS = {".xlsx": "excel", ".mat": "matlab", ".parquet": "parquet"}
@@ -37,12 +40,16 @@ def recognise_kind(path: Path) -> str:
     ending = path.suffix.lower()
     if ending in _ENDINGS:
         return _ENDINGS[ending]
-    content = read_bytes(path, "CSV file", LARGEST_CSV)
+    content = read_log_bytes(path, "CSV file")
+    binary = kind_by_content(content)
+    if binary is not None:
+        return binary
     beginning = content[:4096].decode("latin-1")
     beginning = beginning.replace("\r", "\n")
     sentences = _NMEA_LINE.findall(beginning)
     if len(sentences) >= 2:
         return "nmea"
+    refuse_foreign(path, content)
     return "csv"
 
 

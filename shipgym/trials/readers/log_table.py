@@ -11,10 +11,10 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
-
-#: Cells that stand for "no value".
-_MISSING_WORDS = frozenset(
-    {"", "nan", "na", "n/a", "#n/a", "null", "none", "nat", "<na>"}
+from shipgym.trials.readers.cell_texts import (
+    is_missing,
+    number_with_side,
+    number_with_unit,
 )
 
 
@@ -36,6 +36,8 @@ class LogTable:
         Whether a comma may stand for the decimal point.
     units : mapping of str to str
         Units of columns, where the reader knows them.
+    unit_row : mapping of str to str
+        Texts of a row of units below the names, by column.
     notes : tuple of str
         What the reader left out or assumed.
     """
@@ -46,6 +48,7 @@ class LogTable:
     place_words: str = "row {line}"
     decimal_comma: bool = False
     units: Mapping[str, str] = field(default_factory=dict)
+    unit_row: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     @property
@@ -77,15 +80,16 @@ class LogTable:
         texts = []
         for cell in self.column(name):
             text = str(cell).strip()
-            if text.lower() in _MISSING_WORDS:
+            if is_missing(text):
                 text = ""
             texts.append(text)
         return texts
 
-    def numbers(self, name: str) -> Floats:
+    def numbers(self, name: str, *, sided: bool = False) -> Floats:
         """A column as numbers, nan where there is no value.
 
-        Raises InputError for other text.
+        With `sided`, "S10.0" and "10 PORT" are 10 to starboard, which is positive, and
+        to port. Raises InputError for other text.
         """
         cells = self.column(name)
         kind = cells.dtype.kind if isinstance(cells, np.ndarray) else None
@@ -94,9 +98,9 @@ class LogTable:
         try:
             return plain_numbers(cells)
         except (ValueError, TypeError):
-            return self._numbers_of_texts(name)
+            return self._numbers_of_texts(name, sided=sided)
 
-    def _numbers_of_texts(self, name: str) -> Floats:
+    def _numbers_of_texts(self, name: str, *, sided: bool) -> Floats:
         """Numbers of texts with decimal commas and words for "no value".
 
         Raises InputError for the first other text.
@@ -104,19 +108,33 @@ class LogTable:
         texts = self.texts(name)
         numbers = np.full(len(texts), np.nan)
         for row, text in enumerate(texts):
-            if not text:
-                continue
-            if self.decimal_comma and "." not in text:
-                text = text.replace(",", ".")
-            if not is_number(text):
-                place = self.cell(row, name)
-                raise InputError(
-                    f"{place}: expected a number, got '{texts[row]}';"
-                    " correct the cell, or leave it empty where the value is missing"
-                    ' and import with repair = "interpolate"'
-                )
-            numbers[row] = float(text)
+            if text:
+                number = self._number(text, sided=sided)
+                if number is None:
+                    raise self._no_number(row, name, text)
+                numbers[row] = number
         return numbers
+
+    def _number(self, text: str, *, sided: bool) -> float | None:
+        """A number, with a side or a unit or neither; None for other text."""
+        if self.decimal_comma and "." not in text:
+            text = text.replace(",", ".")
+        # a minus as typographers write it
+        text = text.replace("\u2212", "-")
+        if is_number(text):
+            return float(text)
+        with_side = number_with_side(text) if sided else None
+        if with_side is not None:
+            return with_side
+        with_unit = number_with_unit(text)
+        return with_unit.number if with_unit else None
+
+    def _no_number(self, row: int, name: str, text: str) -> InputError:
+        place = self.cell(row, name)
+        return InputError(
+            f"{place}: expected a number, got '{text}'; correct the cell, or leave it"
+            ' empty where the value is missing and import with repair = "interpolate"'
+        )
 
 
 def plain_numbers(cells: Sequence[Any]) -> Floats:

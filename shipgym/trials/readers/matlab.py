@@ -15,6 +15,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.files import read_bytes
+from shipgym.trials.readers.array_columns import array_columns
 from shipgym.trials.readers.damage import (
     LARGEST_PACKED,
     LARGEST_UNPACKED,
@@ -54,6 +55,8 @@ class Element(NamedTuple):
 def read_matlab(path: Path) -> LogTable:
     """Read the numeric vectors of the commonest length, each as a column by its name.
 
+    Those of a matrix are numbered: ``simdata(:,2)``.
+
     Raises InputError for a damaged or large file, one of version 7.3, one without
     vectors, and complex numbers.
     """
@@ -70,7 +73,7 @@ def read_matlab(path: Path) -> LogTable:
         order = "<" if header.endswith(b"IM") else ">"
         vectors: dict[str, Floats] = {}
         for matrix in _matrices(path, content[_HEADER_BYTES:], order):
-            vectors |= _vector(path, matrix, order)
+            vectors |= _vectors(path, matrix, order)
     return _table(path, vectors)
 
 
@@ -115,8 +118,8 @@ def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:
             yield element.content
 
 
-def _vector(path: Path, matrix: bytes, order: str) -> dict[str, Floats]:
-    """Numbers of a matrix by its name, where it is a numeric vector."""
+def _vectors(path: Path, matrix: bytes, order: str) -> dict[str, Floats]:
+    """Numbers of a numeric matrix by its name, of one with columns by their numbers."""
     parts = list(islice(_elements(matrix, order), 4))
     if len(parts) < 4:
         return {}
@@ -127,20 +130,22 @@ def _vector(path: Path, matrix: bytes, order: str) -> dict[str, Floats]:
     number_type = order + _NUMBER_TYPES[numbers.type]
     values = np.frombuffer(numbers.content, number_type)
     sizes = np.frombuffer(shape.content, f"{order}i4")
-    long_sizes = sizes[sizes != 1]
-    is_vector = long_sizes.tolist() == [values.size]
+    is_table = sizes.size == 2 and np.prod(sizes) == values.size
     (about,) = struct.unpack(f"{order}I", flags.content[:4])
     is_numeric = (about & _CLASS) >= _FIRST_NUMERIC
-    if not is_vector or not is_numeric:
+    if not is_table or not is_numeric:
         return {}
 
     label = name.content.decode("ascii")
+    columns = array_columns(label, values.reshape(sizes, order="F"))
+    if not columns:
+        return {}
     if about & _COMPLEX:
         raise InputError(
             f"{path}: variable {label!r}: expected real numbers, got complex ones; save"
             " real(...)"
         )
-    return {label: values.astype(np.float64)}
+    return {key: vector.astype(np.float64) for key, vector in columns.items()}
 
 
 def _elements(content: bytes, order: str) -> Iterator[Element]:

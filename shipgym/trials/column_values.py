@@ -1,0 +1,95 @@
+"""Numbers of a column: steering commands, and numbers that stand for "no value"."""
+
+import numpy as np
+
+from shipgym.arrays import Flags, Floats
+from shipgym.trials.columns import Column
+from shipgym.trials.readers.log_table import LogTable
+from shipgym.trials.units import LARGEST_MAGNITUDES
+
+#: Degrees that the full deflection of a steering command counts as.
+FULL_RUDDER_DEG = 35.0
+#: Numbers that AIS, J1939 and loggers write for "no value".
+_SENTINELS = {
+    "sog": (102.3,),
+    "stw": (102.3,),
+    "cog": (409.5, 360.1),
+    "psi": (511.0,),
+    "r": (-128.0, 128.0, -731.0, 731.0),
+}
+_COMMON = (-32768.0, 32767.0, 65535.0, 2147483647.0, -2147483648.0, 4294967295.0)
+
+
+def column_numbers(table: LogTable, column: Column) -> Floats:
+    """Numbers of a column, of a steering command as degrees of a nominal rudder."""
+    numbers = table.numbers(column.name, sided=True)
+    if column.full is None:
+        return numbers
+    if column.minus is not None:
+        other = table.numbers(column.minus)
+        numbers = numbers - other
+    from_neutral = numbers - column.neutral
+    deflection = from_neutral / column.full
+    return deflection * FULL_RUDDER_DEG
+
+
+def without_sentinels(
+    channel: str, numbers: Floats, factor: float
+) -> tuple[Floats, list[str]]:
+    """Numbers of a column without those that stand for "no value", and which they were.
+
+    Such are 9999 and the like and those that AIS gives that meaning, where they are far
+    beyond all others or impossible; `factor` is that to SI units.
+    """
+    largest = LARGEST_MAGNITUDES[channel] / factor
+    if channel in ("psi", "cog", "wind_from"):
+        largest = min(largest, 2.0 * np.pi / factor + 1.0)
+    values = numbers
+    words = []
+    for size in _suspects(channel, numbers):
+        is_size = np.abs(numbers) == size
+        others = np.abs(values[np.isfinite(values) & ~is_size])
+        is_far = others.size and size > 3.0 * others.max()
+        if is_far or size > largest:
+            values = np.where(is_size, np.nan, values)
+            count = np.count_nonzero(is_size)
+            written, *_ = numbers[is_size]
+            words.append(f'{count} values of {written:g} stand for "no value"')
+    return values, words
+
+
+def _suspects(channel: str, numbers: Floats) -> list[float]:
+    """Magnitudes in a column that may stand for "no value", the largest first."""
+    is_large = np.abs(numbers) > 99.0
+    written = np.unique(numbers[is_large])
+    outermost = [*written[:3], *written[-3:]]
+    known = (*_COMMON, *_SENTINELS.get(channel, ()))
+    sizes = set()
+    for number in outermost:
+        size = float(abs(number))
+        if number in known or _is_nines(size):
+            sizes.add(size)
+    return sorted(sizes, reverse=True)
+
+
+def _is_nines(size: float) -> bool:
+    """Return whether a number is written by nines alone, three of them or more."""
+    digits = f"{size:.10g}".replace(".", "")
+    return size >= 999.0 and set(digits) == {"9"}
+
+
+def no_positions(lat: Floats, lon: Floats) -> Flags:
+    """Flags of positions that stand for none: those of AIS, and zeros among others."""
+    latitude = np.abs(lat)
+    longitude = np.abs(lon)
+    is_beyond = (latitude > 90.0) | (longitude > 180.0)
+    is_written = np.isin(latitude, (91.0, 99.0, 999.0, 9999.0))
+    is_written |= np.isin(longitude, (181.0, 999.0, 9999.0))
+    none: Flags = is_beyond & is_written
+
+    sum_of_both = latitude + longitude
+    is_zero = sum_of_both == 0.0
+    is_other = np.isfinite(sum_of_both) & ~is_zero
+    nearest = np.min(sum_of_both[is_other], initial=np.inf)
+    are_far = is_other.any() and nearest > 1.0
+    return none | is_zero if are_far else none

@@ -1,0 +1,177 @@
+"""Layout of a table in a text: its delimiter, lines of title, names and units."""
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from shipgym.trials.readers.cell_texts import is_missing
+from shipgym.trials.unit_spellings import split_unit
+
+_BLANKS = " "  # for a delimiter: any number of them
+
+_VALUE = re.compile(
+    r"\W*(?:[NSEWPR]|STBD|STB|BB|PORT|STARBOARD)?\W*\d.*", re.IGNORECASE
+)
+_UNIT_WORDS = re.compile(
+    r"\W*|[\[(].*[\])]|utc|gmt|local|(?:[ymdhsf]+\W*){2,}|string|text|float|double|int"
+    r"|datetime|%|pct|°t|deg\.? ?t|true|bool|unitless|none|n\.?a\.?",
+    re.IGNORECASE,
+)
+
+
+class Layout(NamedTuple):
+    """Places of a table in a text; lines are counted from 0."""
+
+    delimiter: str
+    header: int  # the line with the names
+    units: tuple[int, ...]  # lines of units below it
+
+
+def split(line: str, delimiter: str) -> list[str]:
+    """Cells of a line."""
+    if delimiter == _BLANKS:
+        return line.split()
+    if '"' in line:
+        return next(csv.reader([line], delimiter=delimiter))
+    return line.split(delimiter)
+
+
+def without_spare(cells: Sequence[str], n_cells: int) -> list[str]:
+    """Cells of a line that ends with delimiters too many, without those."""
+    spare = cells[n_cells:]
+    is_spare = not any(cell.strip() for cell in spare)
+    return list(cells[:n_cells] if is_spare else cells)
+
+
+def find_layout(lines: Sequence[str]) -> Layout | None:
+    """Layout of the table in a text; None where no line of names fits the rows."""
+    most_lines = 200  # that are looked at
+    numbered = {}
+    for number, line in enumerate(lines):
+        if line.strip():
+            numbered[number] = line
+        if len(numbered) == most_lines:
+            break
+    for delimiter in _likely_delimiters(numbered.values()):
+        layout = _with_delimiter(numbered, delimiter)
+        if layout is not None:
+            return layout
+    return None
+
+
+def _likely_delimiters(lines: Iterable[str]) -> list[str]:
+    """Delimiters, the one that parts most lines first; a blank parts words too."""
+    delimiters = ";\t|,"  # a comma may be the decimal one
+    counts = Counter[str]()
+    for line in lines:
+        unquoted = re.sub('"[^"]*"', "", line)
+        present = set(delimiters) & set(unquoted)
+        counts.update(present)
+    likely = [one for one in delimiters if counts[one]]
+    likely.sort(key=lambda one: -counts[one])
+    if "\t" not in likely:
+        likely.append(_BLANKS)
+    return likely
+
+
+def _with_delimiter(numbered: dict[int, str], delimiter: str) -> Layout | None:
+    """Layout with a delimiter; None where names and rows are not parted by it."""
+    rows = {number: split(line, delimiter) for number, line in numbered.items()}
+    layout = layout_of_rows(rows)
+    if layout is None:
+        return None
+    names = rows[layout.header]
+    if delimiter == _BLANKS and _distinct(names) < len(names):
+        return None
+    return layout._replace(delimiter=delimiter)
+
+
+def layout_of_rows(rows: Mapping[int, Sequence[str]]) -> Layout | None:
+    """Layout of rows of cells by their numbers; None where no names fit the values."""
+    data = [number for number, cells in rows.items() if is_data(cells)]
+    widths = Counter(len(rows[number]) for number in data)
+    if not widths:
+        return None
+    (n_cells, count), *_ = widths.most_common(1)
+    if n_cells < 2 or count < len(data) // 2:
+        return None
+
+    first = next(number for number in data if len(rows[number]) == n_cells)
+    # a comma too many at the end of each row
+    ends_blank = not rows[first][-1].strip()
+    names: list[int] = []
+    units: list[int] = []
+    for number, cells in rows.items():
+        n_named = len(without_spare(cells, n_cells))
+        fits = n_named == n_cells or (ends_blank and n_named == n_cells - 1)
+        if number >= first or not fits:
+            continue
+        if is_unit_row(cells, is_below=bool(names)):
+            units.append(number)
+        else:
+            names.append(number)
+    if not names:
+        return None
+
+    most = max(_distinct(rows[number]) for number in names)
+    header = max(number for number in names if _distinct(rows[number]) == most)
+    below = tuple(number for number in units if number > header)
+    return Layout("", header, below)
+
+
+def _distinct(cells: Sequence[str]) -> int:
+    """Number of different names."""
+    named = {cell.strip() for cell in cells} - {""}
+    return len(named)
+
+
+def unit_texts(
+    header: Sequence[str], unit_rows: Iterable[Sequence[str]]
+) -> dict[str, str]:
+    """Units below the names, by column, without their brackets."""
+    units: dict[str, str] = {}
+    for cells in unit_rows:
+        for name, cell in zip(header, cells, strict=False):
+            bare = cell.strip("[]() \t")
+            is_first = name not in units
+            if is_first and not is_missing(bare):
+                units[name] = bare
+    return units
+
+
+def title_note(header_at: int, count: int, what: str = "line") -> list[str]:
+    """A remark that lines of title are left out, where there are some."""
+    if not count:
+        return []
+    return [
+        f"the names of the columns are in {what} {header_at}: {count} {what}s of title"
+        " above are left out"
+    ]
+
+
+def is_data(cells: Sequence[str]) -> bool:
+    """Return whether at least half of the cells with something are values."""
+    filled = [cell for cell in cells if not is_missing(cell)]
+    values = [cell for cell in filled if _VALUE.fullmatch(cell.strip())]
+    return bool(values) and 2 * len(values) >= len(filled)
+
+
+def is_unit_row(cells: Sequence[str], *, is_below: bool) -> bool:
+    """Return whether most cells are units or blank, and some are.
+
+    Below the names letters such as N and T say from where a number counts.
+    """
+    filled = [cell.strip() for cell in cells if cell.strip()]
+    units = [cell for cell in filled if _is_unit(cell, is_below=is_below)]
+    return 2 * len(units) > len(filled)
+
+
+def _is_unit(cell: str, *, is_below: bool) -> bool:
+    if _UNIT_WORDS.fullmatch(cell):
+        return True
+    if is_below and len(cell) == 1:
+        return True
+    name, units = split_unit(cell.lower())
+    return bool(units) and not name

@@ -1,0 +1,345 @@
+"""Tables as recorders of many kinds write them, each read as what it is."""
+
+import gzip
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipgym.errors import InputError
+from shipgym.trials.guesses import guess_trial
+from shipgym.trials.rudder_sign import rudder_sign
+from shipgym.trials.trial import Trial
+
+CASES = Path(__file__).parents[3] / "shared" / "cases" / "logs"
+N = 240
+BEGIN = datetime(2021, 5, 3, 9, 59, 50)
+EPOCH = 1_620_035_990
+NAMES = ["Time", "Lat", "Lon", "SOG", "COG", "Heading", "Rudder"]
+
+
+def sail():
+    """A first-order ship of 7 m/s in a zigzag, in the columns of `NAMES`, degrees."""
+    t = np.arange(float(N))
+    r = delta = 0.0
+    psi, north, east = 40.0, 0.0, 0.0
+    order = 20.0
+    rows = []
+    for k in range(N):
+        lat = 57.7 + north / 111_387.0
+        lon = 11.8 + east / 59_640.0
+        rows.append([lat, lon, 7.0 * 3600.0 / 1852.0, psi, psi, delta])
+        if k > 20:
+            if np.sign(order) * (psi - 40.0) > 20.0:
+                order = -order
+            delta += np.clip(order - delta, -2.5, 2.5)
+        r += (0.08 * delta - r) / 25.0
+        psi += r
+        north += 7.0 * np.cos(np.radians(psi))
+        east += 7.0 * np.sin(np.radians(psi))
+    # from a gyro that does not only copy the course
+    table = np.array(rows)
+    table[:, 4] += np.where(t > 20.0, 0.5 * np.sin(t), 0.0)
+    return table
+
+
+SAILED = sail()
+CELLS = [
+    [
+        (BEGIN + timedelta(seconds=k)).isoformat(sep=" "),
+        f"{row[0]:.7f}",
+        f"{row[1]:.7f}",
+        *(f"{value:.2f}" for value in row[2:]),
+    ]
+    for k, row in enumerate(SAILED)
+]
+
+
+def as_is(k, row):
+    return row
+
+
+def clock(layout):
+    return lambda k, row: [(BEGIN + timedelta(seconds=k)).strftime(layout), *row[1:]]
+
+
+def number(value):
+    return lambda k, row: [value(k), *row[1:]]
+
+
+def speed(factor):
+    return lambda k, row: [*row[:3], f"{float(row[3]) * factor:.3f}", *row[4:]]
+
+
+def rudder(text):
+    return lambda k, row: [*row[:6], text(float(row[6]))]
+
+
+def missing(word):
+    def edit(k, row):
+        heading = word if k % 40 == 5 else row[5]
+        return [*row[:5], heading, row[6]]
+
+    return edit
+
+
+def written(path, edit=as_is, names=NAMES, *, above=(), below=(), delimiter=","):
+    """Write the sailed log to a file, its rows changed; the text too."""
+    rows = [delimiter.join(edit(k, list(row))) for k, row in enumerate(CELLS)]
+    text = "\n".join([*above, delimiter.join(names), *below, *rows]) + "\n"
+    path.write_text(text, encoding="utf-8")
+    return text
+
+
+def check(guess, *, positive="starboard", speeds=True):
+    """The log is the one that was sailed."""
+    trial = guess.trial
+    assert (len(trial), trial.duration) == (N, pytest.approx(N - 1.0, abs=0.5))
+    heading = np.degrees(trial["psi"])
+    assert np.abs(heading - SAILED[:, 4]).max() < 0.5
+    assert np.abs(np.degrees(trial["delta"]) - SAILED[:, 5]).max() < 0.6
+    assert guess.side.side == positive
+    if speeds:
+        assert np.median(np.hypot(trial["u"], trial["v"])) == pytest.approx(
+            7.0, abs=0.2
+        )
+
+
+READ = {
+    "knots": (as_is, {}, "sog: in knots"),
+    "m/s": (speed(1852 / 3600), {}, "sog: in m/s"),
+    "km/h": (speed(1.852), {}, "sog: in km/h"),
+    "titles": (as_is, {"above": ["Trial, of A, B, C, D, E, F", "", "x", "# y"]}, ""),
+    "units": (
+        speed(1852 / 3600),
+        {"below": ["[-],[deg],[deg],[m/s],[deg],[deg],[deg]", "-,N,E,,T,T,(S+)"]},
+        "sog: in m/s, unit from the row of units",
+    ),
+    "---": (missing("---"), {}, "filled 6"),
+    "n/a": (missing("n/a"), {}, "filled 6"),
+    "9999": (missing("9999"), {}, 'filled 6; 6 values of 9999 stand for "no value"'),
+    "511": (missing("511"), {}, "filled 6"),
+    "S10.0": (rudder(lambda x: f"{'SP'[x < 0]}{abs(x):.1f}"), {}, "letters"),
+    "10 PORT": (
+        rudder(lambda x: f"{abs(x):.1f} {'STBD' if x >= 0 else 'PORT'}"),
+        {},
+        "",
+    ),
+    "P 5": (rudder(lambda x: f"{'SP'[x < 0]} {abs(x):.0f}"), {}, "letters"),
+    "to port": (rudder(lambda x: f"{-x:.2f}"), {}, "side port"),
+    "ns": (number(lambda k: f"{EPOCH + k}000000000"), {}, "t: in unix ns"),
+    "us": (number(lambda k: f"{EPOCH + k}000000"), {}, "t: in unix us"),
+    "ms": (number(lambda k: f"{1000 * k}"), {}, "t: in ms"),
+    "days": (
+        number(lambda k: f"{44319.416551 + k / 86400:.9f}"),
+        {},
+        "t: in excel days",
+    ),
+    "datenum": (number(lambda k: f"{738279.4166 + k / 86400:.9f}"), {}, "t: in matlab"),
+    "hhmmss": (clock("%H%M%S"), {}, "without colons"),
+    "compact": (clock("%Y%m%d%H%M%S"), {}, "without colons"),
+    "am": (clock("%m/%d/%Y %I:%M:%S %p"), {}, ""),
+    "dmy": (clock("%d.%m.%Y %H:%M:%S"), {}, ""),
+    "zone": (clock("%Y-%m-%d %H:%M:%S+0200"), {}, ""),
+    "repeated": (
+        lambda k, row: clock("%H:%M:%S")(k - k % 2, row),
+        {},
+        "120 of 240 times again",
+    ),
+    "week": (
+        lambda k, row: ["108", str(122390 + k), *row[1:]],
+        {"names": ["Week", "TOW", *NAMES[1:]]},
+        "read as week 2156",
+    ),
+    "ROS 2": (
+        lambda k, row: [str(EPOCH + k), "500000000", *row[1:]],
+        {"names": ["header.stamp.sec", "header.stamp.nanosec", *NAMES[1:]]},
+        "nanoseconds header.stamp.nanosec",
+    ),
+    "date": (
+        lambda k, row: ["03.05.2021", clock("%I:%M:%S %p")(k, row)[0], *row[1:]],
+        {"names": ["Date", *NAMES]},
+        "date Date",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", READ)
+def test_a_table_is_read_as_what_it_is_and_says_why(tmp_path, kind):
+    edit, layout, words = READ[kind]
+    written(tmp_path / "log.csv", edit, **layout)
+    guess = guess_trial(tmp_path / "log.csv")
+    check(guess, positive="port" if words == "side port" else "starboard")
+    reading = [
+        f"{key}: in {text.partition(' in ')[2]}" for key, text in guess.reading.items()
+    ]
+    filled = f"filled {guess.trial.repaired.get('psi')}"
+    said = " ".join([*reading, *guess.reading.values(), filled, *guess.trial.notes])
+    said += f"side {guess.side.side}"
+    for part in words.split("; "):
+        assert part in said
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "Zeit,Breite,Länge,Fahrt,Kurs über Grund,Kurs,Ruder",
+        "Heure,Latitude,Longitude,Vitesse,Route fond,Cap,Barre",
+        "Hora,Latitud,Longitud,Velocidad,Rumbo sobre fondo,Rumbo,Timón",
+        "Tid,Bredde,Lengde,Fart,Kurs over grunn,Kurs,Ror",
+        "Tijd,Breedte,Lengte,Vaart,Grondkoers,Koers,Roer",
+        "時刻,緯度,経度,速力,針路,船首方位,舵角",
+        "时间,纬度,经度,航速,航向,艏向,舵角",
+        "Время,Широта,Долгота,Скорость,ПУ,Гирокурс,Руль",
+        "ts,gps.lat,gps.lon,gps.sog,gps.cog,gyro.heading,steering.rudder_angle",
+    ],
+)
+def test_names_of_many_languages_are_known(tmp_path, names):
+    written(tmp_path / "log.csv", names=names.split(","))
+    guess = guess_trial(tmp_path / "log.csv")
+    check(guess)
+    assert not guess.unused
+
+
+@pytest.mark.parametrize(
+    ("encoding", "names"),
+    [
+        ("utf-16", NAMES),
+        ("utf-8-sig", NAMES),
+        ("latin-1", ["Zeit", "Breite", "Länge", "FüG", "KüG", "Steuerkurs", "Ruder"]),
+        ("cp932", ["時刻", "緯度", "経度", "速力", "針路", "船首方位", "舵角"]),
+        ("gbk", ["时间", "纬度", "经度", "航速", "航向", "艏向", "舵角"]),
+    ],
+)
+def test_encodings_and_gzip(tmp_path, encoding, names):
+    text = written(tmp_path / "log.csv", names=names, delimiter=";").replace(".", ",")
+    (tmp_path / "log.csv.gz").write_bytes(gzip.compress(text.encode(encoding)))
+    check(guess_trial(tmp_path / "log.csv.gz"))
+
+
+def test_without_positions_the_unit_of_a_speed_is_said_to_be_a_guess(tmp_path):
+    names = ["Time", "SOG", "Heading", "Rudder"]
+    edit = lambda k, row: [row[0], row[3], *row[5:]]  # noqa: E731
+    written(tmp_path / "log.csv", edit, names)
+    guess = guess_trial(tmp_path / "log.csv")
+    assert "in knots, unit is a guess" in guess.reading["stw"]
+
+
+@pytest.mark.parametrize(
+    ("names", "edit"),
+    [
+        (["left_nps", "right_nps"], lambda x: [f"{60 + x:.2f}", f"{60 - x:.2f}"]),
+        (["throttleLeft", "throttleRight"], lambda x: [f"{1 + x}", f"{1 - x}"]),
+        (["RCOU.C1", "RCOU.C3"], lambda x: [f"{1500 + 10 * x:.0f}", "1700"]),
+        (
+            ["servo1", "servo3"],
+            lambda x: [f"{1600 + 5 * x:.0f}", f"{1600 - 5 * x:.0f}"],
+        ),
+    ],
+)
+def test_a_steering_command_stands_for_the_rudder(tmp_path, names, edit):
+    written(
+        tmp_path / "log.csv",
+        lambda k, row: [*row[:6], *edit(float(row[6]))],
+        [*NAMES[:6], *names],
+    )
+    guess = guess_trial(tmp_path / "log.csv")
+    assert np.corrcoef(guess.trial["delta"], SAILED[:, 5])[0, 1] > 0.999
+    assert "steering command" in guess.reading["delta"]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"#ROSBAG V2.0\n", "a bag of ROS 1; write its topic as CSV: rostopic echo"),
+        (b"\x89MCAP0\r\n", "an MCAP file"),
+        (b"\xa3\x95\x80\x80", "of ArduPilot; write its messages as CSV: mavlogdump.py"),
+        (b"ULog\x01\x12\x35", "a ULog of PX4; write its topics as CSV: ulog2csv"),
+        (b"%PDF-1.4", "a PDF; export the record"),
+        (b"<!DOCTYPE html>", "a web page; download the file itself"),
+        (b'{"a": [1]}', "a JSON file"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "(.xls); save it as .xlsx"),
+    ],
+)
+def test_a_foreign_file_is_named_with_what_reads_it(tmp_path, content, words):
+    (tmp_path / "log.dat").write_bytes(content)
+    with pytest.raises(InputError, match="expected a log, got") as refused:
+        guess_trial(tmp_path / "log.dat")
+    assert words in str(refused.value)
+
+
+def test_arrays_of_numpy_and_matlab_are_columns_or_ask_for_names(tmp_path):
+    io = pytest.importorskip("scipy.io")
+    matrix = np.column_stack([np.arange(float(N)), SAILED[:, 4:]])
+    names = [(name, float) for name in ("t", "psi", "delta")]
+    np.save(tmp_path / "log.npy", np.array([tuple(row) for row in matrix], names))
+    check(guess_trial(tmp_path / "log.npy"), speeds=False)
+    np.save(tmp_path / "plain.npy", matrix)
+    io.savemat(tmp_path / "simdata.mat", {"simdata": matrix})
+    for file, column in {"plain.npy": "array", "simdata.mat": "simdata"}.items():
+        heading, rudder = guess_trial(tmp_path / file).decisions
+        assert (heading.key, rudder.key) == ("psi", "delta")
+        assert f"the column of the heading, one of '{column}(:,2)'" in heading.choices
+    columns = {"t": "simdata(:,1)"}
+    for number, channel in enumerate(("psi", "delta"), start=2):
+        columns[channel] = {"column": f"simdata(:,{number})", "unit": "deg"}
+    assert len(Trial.from_csv(tmp_path / "simdata.mat", columns)) == N
+
+
+def test_a_sheet_may_have_titles_and_a_row_of_units(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("openpyxl")
+    units = ["-", "deg", "deg", "kn", "deg", "deg", "deg"]
+    rows = [[row[0], *map(float, row[1:])] for row in CELLS]
+    frame = pandas.DataFrame([["Trial"] + 6 * [None], NAMES, units, *rows])
+    frame.to_excel(tmp_path / "log.xlsx", index=False, header=False)
+    guess = guess_trial(tmp_path / "log.xlsx")
+    check(guess)
+    assert "unit from the row of units" in guess.reading["sog"]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.5])
+def test_the_side_of_the_rudder_is_told_by_a_zigzag_alone(noise):
+    rng = np.random.default_rng(1)
+    t = np.arange(float(N))
+    psi = np.radians(SAILED[:, 4] + noise * rng.normal(size=N))
+    delta = np.radians(SAILED[:, 5])
+    assert rudder_sign(t, psi, delta).side == "starboard"
+    assert rudder_sign(t, psi, -delta).side == "port"
+    # an autopilot that answers noise alone shows nothing
+    assert rudder_sign(t, noise * psi, rng.normal(size=N) * 0.1).side is None
+
+
+#: What cannot be read, and what stands for a rudder: by the README of the cases.
+NOT_READ = {"csv_dst": "line 303", "ais_marinecadastre": None}
+
+
+@pytest.mark.skipif(not CASES.exists(), reason="the cases are not here")
+@pytest.mark.parametrize(
+    "name", sorted(path.stem for path in CASES.glob("*.csv") if "_" in path.stem)
+)
+def test_the_cases_are_read_as_their_readme_says(name):
+    path = CASES / f"{name}.csv"
+    if name.startswith("opencpn"):
+        pytest.skip("sentences")
+    if NOT_READ.get(name):
+        with pytest.raises(InputError, match=NOT_READ[name]):
+            guess_trial(path)
+        return
+    guess = guess_trial(path)
+    trial = guess.trial
+    if name in NOT_READ:
+        assert (len(trial), guess.columns[3].unit) == (100, "knots")
+        assert "without rudder nothing can be identified" in trial.notes[0]
+        return
+    truth = np.genfromtxt(CASES / "truth.csv", delimiter=",", skip_header=1)
+    heading, delta, u = truth[:, [1, 3, 4]].T
+    apart = (np.degrees(trial["psi"]) - heading + 180.0) % 360.0 - 180.0
+    assert (len(trial), np.sqrt(np.mean(apart**2)) < 0.5) == (600, True)
+    assert np.abs(trial["u"] - u).max() < 0.2
+    assert np.corrcoef(trial["delta"], delta)[0, 1] > 0.9999
+    if not name.startswith("usv"):
+        assert np.std(np.degrees(trial["delta"]) - delta) < 0.1
+    if "dash" in name:
+        assert dict(trial.repaired) == {"psi": 17, "delta": 12}
