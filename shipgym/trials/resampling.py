@@ -189,7 +189,9 @@ def _inside(t: Floats, clock: Floats, is_hole: Flags) -> Flags:
     is_before = t < clock[after]
     in_hole = is_hole[before] & is_after & is_before
 
-    has_begun = t >= clock[0]
-    has_ended = t > clock[-1]
+    # sentences of one moment are logged one after the other
+    tolerance = 0.1 * usual_step(t) if t.size > 1 else 0.0
+    has_begun = t >= clock[0] - tolerance
+    has_ended = t > clock[-1] + tolerance
     inside: Flags = has_begun & ~has_ended & ~in_hole
     return inside
