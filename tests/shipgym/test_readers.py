@@ -392,7 +392,8 @@ def test_deviation_and_variation_to_the_east_are_added_to_a_compass(
 
 
 def rmc(k, sog="10.0", cog="20.0"):
-    return f"GPRMC,00000{k}.00,A,5741.0000,N,01144.0000,E,{sog},{cog},310524,,,A"
+    clock = f"00{k // 60:02d}{k % 60:02d}.00"
+    return f"GPRMC,{clock},A,5741.0000,N,01144.0000,E,{sog},{cog},310524,,,A"
 
 
 @pytest.mark.parametrize(
@@ -453,7 +454,7 @@ def test_times_with_dates_go_before_many_without(tmp_path):
 
 
 def test_a_tenth_of_the_sentences_may_be_damaged(tmp_path):
-    lines = [sentence(text) for k in range(100) for text in (rmc(k % 9), "HEHDT,1.0,T")]
+    lines = [sentence(text) for k in range(100) for text in (rmc(k), "HEHDT,1.0,T")]
     path = tmp_path / "log.nmea"
     for count in (20, 21):
         whole = len(lines) - count
@@ -469,7 +470,7 @@ def test_a_tenth_of_the_sentences_may_be_damaged(tmp_path):
 
 
 def test_a_number_that_is_infinite_is_damage(tmp_path):
-    texts = [rmc(k) for k in range(9)] * 3
+    texts = [rmc(k) for k in range(27)]
     table = read_log(nmea_log(tmp_path / "log.nmea", "GPVTG,inf,T,,M,5.0,N,,K", *texts))
     assert [note.partition(" of ")[0] for note in table.notes] == ["1"]
 

@@ -1,11 +1,15 @@
 """The clock of a log of messages: what satellites say, and stamps before the lines."""
 
+from collections import Counter, defaultdict
 from datetime import UTC, datetime
+from operator import itemgetter
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from shipgym.arrays import Floats
+from shipgym.errors import InputError
 from shipgym.trials.clock_texts import DAY, clock_text
 from shipgym.trials.readers.line_stamps import read_stamps
 from shipgym.trials.readers.messages import BySource, Heard, Value
@@ -20,15 +24,28 @@ class Clock(NamedTuple):
     lines: Floats
     source: str  # of the times, for a note
     later: float = 0.0  # s to add to the times that messages give
+    in_bursts: bool = False  # messages of one moment follow each other
+    is_first: bool = False  # no time may have been lost before the first one
 
 
-def log_clock(heard: Heard, notes: list[str]) -> Clock | None:
+def log_clock(path: Path, heard: Heard, notes: list[str]) -> Clock | None:
     """The clock of a log; None where nothing in it tells the time.
 
     Stamps of lines are preferred, as they are there for every message; by the times of
-    satellites they are put right.
+    satellites they are put right. Raises InputError for a clock that was set back.
     """
-    own = _own_clock(heard.times)
+    clock = _agreed_clock(path, heard, notes)
+    if clock is None:
+        return None
+    heard.order.sort(key=itemgetter(0))
+    return clock._replace(
+        in_bursts=_come_in_bursts(clock, heard.order),
+        is_first=min(heard.damaged, default=np.inf) > clock.lines[0],
+    )
+
+
+def _agreed_clock(path: Path, heard: Heard, notes: list[str]) -> Clock | None:
+    own = _own_clock(path, heard.times)
     stamps = _stamp_clock(heard)
     if stamps is None:
         return _noted(own, notes)
@@ -45,7 +62,7 @@ def log_clock(heard: Heard, notes: list[str]) -> Clock | None:
     return _agreed(stamps, float(np.median(ahead)), own, notes)
 
 
-def _own_clock(times: BySource) -> Clock | None:
+def _own_clock(path: Path, times: BySource) -> Clock | None:
     """Times of the source that gives a date, of those the busiest one."""
     if not times:
         return None
@@ -59,6 +76,15 @@ def _own_clock(times: BySource) -> Clock | None:
     lines, t, _ = np.array(times[best]).T
     if not _is_dated(t[0]):
         t = np.unwrap(t, period=DAY)
+    goes_back = np.flatnonzero(np.diff(t) < -5.0)
+    if goes_back.size:
+        k = goes_back[0]
+        before, after = clock_text(t[k]), clock_text(t[k + 1])
+        line = int(lines[k + 1])
+        raise InputError(
+            f"{path}: line {line}: expected time to go on, got {after} after {before};"
+            " the clock was set back, or two logs are joined: cut the log there"
+        )
     return _increasing(t, lines, best)
 
 
@@ -157,6 +183,7 @@ def times_of(values: list[Value], clock: Clock) -> Floats:
     repeated = np.mean(np.diff(known) == 0.0) if known.size > 1 else 0.0
     if repeated > 0.4:  # whole seconds of a faster source
         own_clock = _increasing(known, lines[is_known], clock.source)
+        own_clock = own_clock._replace(in_bursts=True)
         t[is_known] = _spread(lines[is_known], own_clock)
     return np.where(is_known, t, by_line)
 
@@ -164,29 +191,43 @@ def times_of(values: list[Value], clock: Clock) -> Floats:
 def _spread(lines: Floats, clock: Clock) -> Floats:
     """Times of lines between those with a time.
 
-    A source that says the same number of times something from each of the clock's
-    moments to the next does so evenly, and first at that moment; so does one that is
-    heard before the first moment, and always before. Any other one by its lines.
+    Where the same messages come at every moment, they are of that moment; of a source
+    that speaks several times the first one is, and the others follow evenly. A source
+    that is heard as often before the first moment always speaks before. In other logs
+    messages come one by one, and the time goes on from line to line.
     """
-    leads = lines[0] < clock.lines[0]
-    if leads:
-        moment = np.searchsorted(clock.lines, lines, side="left")
-    else:
-        moment = np.searchsorted(clock.lines, lines, side="right") - 1
-    moments, first, counts = np.unique(moment, return_index=True, return_counts=True)
-    usual = float(np.median(counts))
-    if np.mean(counts == usual) < 0.9:
+    if not clock.in_bursts or clock.t.size < 2:
         return np.interp(lines, clock.lines, clock.t)
+    moment = np.searchsorted(clock.lines, lines, side="right") - 1
+    _, first, counts = np.unique(moment, return_index=True, return_counts=True)
+    usual = max(1, round(float(np.median(counts))))
+    if moment[0] < 0 and counts[0] >= usual and clock.is_first:
+        moment = np.searchsorted(clock.lines, lines, side="left")
+        _, first, counts = np.unique(moment, return_index=True, return_counts=True)
 
-    step = float(np.median(np.diff(clock.t))) if clock.t.size > 1 else 0.0
-    begins = np.append(clock.t, clock.t[-1] + step)
-    ends = np.append(begins[1:], begins[-1] + step)
+    step = float(np.median(np.diff(clock.t)))
+    before, after = clock.t[0] - step, clock.t[-1] + step
+    begins = np.concatenate([[before], clock.t, [after]])
+    ends = np.append(begins[1:], after + step)
+    place = np.arange(lines.size) - np.repeat(first, counts)
+    count = np.repeat(counts, counts)
+    if moment[0] < 0:  # the last ones before the first moment
+        place[: counts[0]] += usual - counts[0]
+    count = np.maximum(count, usual)
     # after a pause the clock goes on later than the source's last value
-    longest = step * np.ceil(counts / usual)
-    pause = np.minimum(ends[moments] - begins[moments], longest)
-    number = np.arange(lines.size) - np.repeat(first, counts)
-    share = number / np.repeat(counts, counts)
-    spread: Floats = np.repeat(begins[moments], counts) + share * np.repeat(
-        pause, counts
-    )
+    pause = ends[moment + 1] - begins[moment + 1]
+    pause = np.minimum(pause, step * np.ceil(count / usual))
+    spread: Floats = begins[moment + 1] + pause * place / count
     return spread
+
+
+def _come_in_bursts(clock: Clock, order: list[tuple[int, str]]) -> bool:
+    """Return whether the same messages follow each other at most of the moments."""
+    of_moment: dict[int, list[str]] = defaultdict(list)
+    lines = np.array([line for line, _ in order])
+    moments = np.searchsorted(clock.lines, lines, side="right")
+    for moment, (_, source) in zip(moments.tolist(), order, strict=True):
+        of_moment[moment].append(source)
+    patterns = Counter(tuple(sources) for sources in of_moment.values())
+    ((_, most),) = patterns.most_common(1)
+    return most > 0.6 * len(of_moment)

@@ -39,7 +39,7 @@ def read_messages(path: Path, *, strict: bool = False) -> LogTable:
             " their rudders; expected the own ship's sentences (RMC, HDT, RSA), got"
             " none; log these too"
         )
-    clock = log_clock(heard, notes)
+    clock = log_clock(path, heard, notes)
     if clock is None:
         raise InputError(
             f"{path}: expected sentences with a time (RMC, GGA, GLL or ZDA) or a time"

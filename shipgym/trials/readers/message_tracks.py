@@ -1,5 +1,6 @@
 """Of several sources of a channel the one to read, and a log's channels over time."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -8,6 +9,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.trials.readers.message_clock import Clock, times_of
 from shipgym.trials.readers.messages import PORT, BySource, Heard, Value
+from shipgym.trials.resampling import FEWEST_SAMPLES
 from shipgym.trials.units import DEGREE
 
 #: Preferred kinds of sentences: true headings, and of speeds through the water the log
@@ -47,8 +49,10 @@ def choose_tracks(heard: Heard, clock: Clock) -> Tracks:
     notes: list[str] = []
     tracks = {}
     chosen = {}
+    longest = 0.0
     for channel, sources in heard.channels.items():
         of_source = _tracks_of(sources, clock)
+        longest = max(longest, *map(_covered, of_source.values()))
         if channel == "delta":
             tracks[channel], chosen[channel] = _rudder(of_source, sources, notes)
             continue
@@ -62,7 +66,24 @@ def choose_tracks(heard: Heard, clock: Clock) -> Tracks:
         tracks |= _at_common_times(tracks["sog"], tracks["cog"])
     is_magnetic = _true_heading(tracks, chosen, notes)
     tracks.pop("variation", None)
+    notes += _leave_out_rare(tracks, chosen, longest)
     return Tracks(tracks, notes, magnetic=is_magnetic)
+
+
+def _leave_out_rare(
+    tracks: dict[str, Track], chosen: Mapping[str, str], longest: float
+) -> list[str]:
+    """Leave out channels with hardly any values; notes of them."""
+    notes = []
+    for channel, track in list(tracks.items()):
+        is_rare = _covered(track) < 0.1 * longest and channel not in ("psi", "delta")
+        if is_rare or track.t.size < FEWEST_SAMPLES:
+            del tracks[channel]
+            count = track.t.size
+            notes.append(
+                f"{channel} of {chosen[channel]} left out: only {count} values"
+            )
+    return notes
 
 
 def _at_common_times(sog: Track, cog: Track) -> dict[str, Track]:

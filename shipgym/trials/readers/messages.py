@@ -45,6 +45,8 @@ class Heard:
         ``variation``.
     stamps : dict of int to str
         Time before a line, by line.
+    order : list of tuple
+        Line and source of each message.
     count : int
         Messages of known kinds.
     damaged : list of int
@@ -58,6 +60,7 @@ class Heard:
         default_factory=lambda: defaultdict(_by_source)
     )
     stamps: dict[int, str] = field(default_factory=dict)
+    order: list[tuple[int, str]] = field(default_factory=list)
     count: int = 0
     damaged: list[int] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -71,6 +74,7 @@ class Heard:
     ) -> None:
         """Add what a source said in a line, with the time that it gave, if any."""
         self.count += 1
+        self.order.append((line, source))
         if np.isfinite(time):
             self.times[source].append(Value(line, time, time))
         for channel, value in values.items():
