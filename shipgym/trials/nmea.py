@@ -8,7 +8,7 @@ checksum: the exclusive or of all characters between.
 import re
 from collections import ChainMap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from math import copysign, isfinite
 from operator import xor
@@ -91,7 +91,13 @@ def _with_letters(entry: Mapping[str, Any]) -> dict[str, Any]:
 def _sentence_kind(entry: Mapping[str, Any]) -> SentenceKind:
     kind = _with_letters(entry)
     kind["fields"] = _number_fields(entry.get("fields", {}))
-    kind["log_fields"] = kind["fields"] | _number_fields(entry.get("log_fields", {}))
+    log_fields = kind["fields"] | _number_fields(entry.get("log_fields", {}))
+    kind["log_fields"] = {}
+    for quantity, place in log_fields.items():
+        valid = dict(place.valid or kind.get("valid", {}))
+        for at, letters in kind.get("degraded", {}).items():
+            valid[at] |= letters
+        kind["log_fields"][quantity] = replace(place, valid=valid)
     return SentenceKind(**kind)
 
 
@@ -190,7 +196,7 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
     numbers = {}
     for quantity, place in kind.log_fields.items():
         needed = dict(place.only_if)
-        optional = {**_statuses(kind, place), **place.letters}
+        optional = {**place.valid, **place.letters}
         for at, letters in optional.items():
             if fields[at]:
                 needed[at] = letters
@@ -207,24 +213,15 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
 
 def lacks_status(sentence: Sentence, quantity: str) -> bool:
     """Return whether the status of a number in a log is empty or not there."""
-    kind = NMEA_SENTENCES[sentence.kind]
-    fields = _padded(sentence)
-    place = kind.log_fields[quantity]
-    return any(not fields[at] for at in _statuses(kind, place))
+    place = NMEA_SENTENCES[sentence.kind].log_fields[quantity]
+    count = len(sentence.fields)
+    return any(at >= count or not sentence.fields[at] for at in place.valid)
 
 
 def _padded(sentence: Sentence) -> list[str]:
     """Fields of a sentence; those at the end may be missing."""
     absent = [""] * 20
     return [*sentence.fields, *absent]
-
-
-def _statuses(kind: SentenceKind, place: NumberField) -> dict[int, frozenset[str]]:
-    """Letters of status with which a number counts in a log, by their place."""
-    valid = dict(place.valid or kind.valid)
-    for at, letters in kind.degraded.items():
-        valid[at] |= letters
-    return valid
 
 
 def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float | None:

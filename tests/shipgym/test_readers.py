@@ -449,7 +449,8 @@ def test_of_several_sources_the_better_one_is_read(channel, sources, best, tmp_p
 def test_times_with_dates_go_before_many_without(tmp_path):
     texts = [rmc(k) for k in range(6)] + [fix(f"00000{k}") for k in range(9)]
     table = read_log(nmea_log(tmp_path / "log.nmea", *texts))
-    assert "is from GPRMC (6 values); GPGGA (9 values) left out" in table.notes[0]
+    left_out = "lat is from GPRMC (6 values); GPGGA (9 values) left out"
+    assert left_out in table.notes
     assert table.numbers("t")[0] == 1717113600.0
 
 
@@ -472,7 +473,7 @@ def test_a_tenth_of_the_sentences_may_be_damaged(tmp_path):
 def test_a_number_that_is_infinite_is_damage(tmp_path):
     texts = [rmc(k) for k in range(27)]
     table = read_log(nmea_log(tmp_path / "log.nmea", "GPVTG,inf,T,,M,5.0,N,,K", *texts))
-    assert [note.partition(" of ")[0] for note in table.notes] == ["1"]
+    assert table.notes[0].startswith("1 of 28 sentences")
 
 
 @pytest.mark.parametrize(

@@ -100,7 +100,7 @@ def _stamp_clock(heard: Heard) -> Clock | None:
     t = t[is_known]
     if np.unique(t).size < 3 or np.mean(np.diff(t) < 0.0) > 0.01:
         return None
-    return _increasing(t, lines[is_known], "the times before the lines")
+    return _increasing(t, lines[is_known], "stamps of the lines")
 
 
 def _increasing(t: Floats, lines: Floats, source: str) -> Clock:

@@ -47,7 +47,7 @@ class Tracks:
 def choose_tracks(heard: Heard, clock: Clock) -> Tracks:
     """Channels of a log, each of its best source, on the clock of the log."""
     notes: list[str] = []
-    tracks = {}
+    tracks: dict[str, Track] = {}
     chosen = {}
     longest = 0.0
     for channel, sources in heard.channels.items():
@@ -67,7 +67,24 @@ def choose_tracks(heard: Heard, clock: Clock) -> Tracks:
     is_magnetic = _true_heading(tracks, chosen, notes)
     tracks.pop("variation", None)
     notes += _leave_out_rare(tracks, chosen, longest)
-    return Tracks(tracks, notes, magnetic=is_magnetic)
+    read = _read_from(tracks, chosen)
+    return Tracks(
+        by_channel=tracks,
+        notes=[f"{read}; time from {clock.source}", *notes],
+        magnetic=is_magnetic,
+    )
+
+
+def _read_from(tracks: Mapping[str, Track], chosen: Mapping[str, str]) -> str:
+    """Channels by their source: ``psi from HEHDT, delta from AGRSA``."""
+    by_source: dict[str, list[str]] = {}
+    for channel in tracks:
+        by_source.setdefault(chosen[channel], []).append(channel)
+    phrases = []
+    for source, channels in by_source.items():
+        names = " and ".join(", ".join(channels).rsplit(", ", 1))
+        phrases.append(f"{names} from {source}")
+    return "; ".join(phrases)
 
 
 def _leave_out_rare(
@@ -205,6 +222,7 @@ def _true_heading(
 
     if true is not None:
         notes.append(_heading_note(source, compass, chosen["psi"], true))
+    chosen["psi"] = source
     variation = tracks.get("variation")
     if variation is None:
         tracks["psi"] = compass
