@@ -140,9 +140,10 @@ def _agreed(stamps: Clock, ahead: float, own: Clock, notes: list[str]) -> Clock:
     if abs(ahead) <= 1.0:  # a message takes part of a second
         return stamps
     if _is_dated(stamps.t[0]):
+        size = f"{ahead / DAY:.3g} days" if abs(ahead) > DAY else f"{ahead:.6g} s"
         notes.append(
-            f"the times before the lines are {ahead:.6g} s ahead of those of"
-            f" {own.source}, which are taken"
+            f"the times before the lines are {size} ahead of those of {own.source},"
+            " which are taken"
         )
     return stamps._replace(t=stamps.t - ahead)
 

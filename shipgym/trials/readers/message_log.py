@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from shipgym.arrays import Floats
+from shipgym.checks import placed
 from shipgym.errors import InputError
 from shipgym.trials.readers.csv_file import read_lines
 from shipgym.trials.readers.log_table import LogTable
@@ -30,7 +31,8 @@ def read_messages(path: Path, *, strict: bool = False) -> LogTable:
     lines = read_lines(path, "log of messages")
     heard = Heard()
     hear_sentences(lines, heard, strict=strict)
-    hear_pgns(lines, heard)
+    with placed(str(path)):
+        hear_pgns(lines, heard)
     hear_deltas(lines, heard)
     notes = _check_damage(path, heard) + heard.notes
     if not heard.count and any("!AIVD" in line for line in lines):

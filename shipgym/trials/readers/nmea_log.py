@@ -30,7 +30,10 @@ for _kind, _sentence in NMEA_SENTENCES.items():
     _has_channel = any(quantity.channel for quantity in _quantities)
     if _has_channel or _sentence.time is not None:
         SENTENCE_KINDS.append(_kind)
-_SENTENCE = re.compile(rf"\$[A-Z][A-Z0-9](?:{'|'.join(SENTENCE_KINDS)}),[^$!\\\"\r\n]*")
+_SENTENCE = re.compile(
+    rf"\$[A-Z][A-Z0-9](?:{'|'.join(SENTENCE_KINDS)}),[^$!\\\"\r\n*]*"
+    r"(?:\*[^,;\s\"$!\\]{0,2})?"
+)
 _TIME = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d(?:\.\d*)?)")
 #: Names of transducers that show a rudder, and that of the port one.
 _RUDDER = re.compile(r"RUD|RSA|HELM", re.IGNORECASE)
@@ -103,13 +106,13 @@ def _find(lines: Sequence[str], heard: Heard) -> list[_Found]:
     for number, line in enumerate(lines, start=1):
         if "$" not in line:
             continue
-        begin = None
-        for match in _SENTENCE.finditer(line):
-            begin = match.start() if begin is None else begin
+        matches = list(_SENTENCE.finditer(line))
+        for match in matches:
             text = match[0].rstrip()
             found.append(_Found(number, text[1:6], text))
-        if begin:
-            heard.stamp(number, line[:begin])
+        if matches:
+            before, after = line[: matches[0].start()], line[matches[-1].end() :]
+            heard.stamp(number, before or after)
     return found
 
 
