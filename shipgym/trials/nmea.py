@@ -93,9 +93,11 @@ def _sentence_kind(entry: Mapping[str, Any]) -> SentenceKind:
     kind["fields"] = _number_fields(entry.get("fields", {}))
     log_fields = kind["fields"] | _number_fields(entry.get("log_fields", {}))
     kind["log_fields"] = {}
+    degraded = kind.get("degraded", {})
     for quantity, place in log_fields.items():
-        valid = dict(place.valid or kind.get("valid", {}))
-        for at, letters in kind.get("degraded", {}).items():
+        valid = place.valid or kind.get("valid", {})
+        valid = dict(valid)
+        for at, letters in degraded.items():
             valid[at] |= letters
         kind["log_fields"][quantity] = replace(place, valid=valid)
     return SentenceKind(**kind)
@@ -214,8 +216,8 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
 def lacks_status(sentence: Sentence, quantity: str) -> bool:
     """Return whether the status of a number in a log is empty or not there."""
     place = NMEA_SENTENCES[sentence.kind].log_fields[quantity]
-    count = len(sentence.fields)
-    return any(at >= count or not sentence.fields[at] for at in place.valid)
+    fields = _padded(sentence)
+    return any(not fields[at] for at in place.valid)
 
 
 def _padded(sentence: Sentence) -> list[str]:

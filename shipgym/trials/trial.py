@@ -314,8 +314,8 @@ class Trial:
         Parameters
         ----------
         path : str or Path
-            CSV with one header line, NMEA 0183, Excel (.xlsx), Parquet or MATLAB
-            (.mat).
+            CSV with one header line, NMEA 0183 or 2000, Signal K, Excel (.xlsx),
+            Parquet or MATLAB (.mat).
         columns : mapping of str to str or mapping, optional
             For each channel (``t`` included) its column, or ``{"column": name, "unit":
             unit}``. By default every column that is named like a channel, in SI units.

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
@@ -92,13 +93,16 @@ def _stamp_clock(heard: Heard) -> Clock | None:
     """Times before the lines; None where few lines have one or they go back."""
     if len(heard.stamps) < 0.5 * heard.count:
         return None
-    lines = np.array(list(heard.stamps), dtype=np.float64)
-    order = np.argsort(lines)
-    lines = lines[order]
-    t = read_stamps(list(heard.stamps.values()))[order]
+    stamps = sorted(heard.stamps.items())
+    texts = [text for _, text in stamps]
+    t = read_stamps(texts)
     is_known = np.isfinite(t)
+    lines = np.array([line for line, _ in stamps], dtype=np.float64)
+
     t = t[is_known]
-    if np.unique(t).size < 3 or np.mean(np.diff(t) < 0.0) > 0.01:
+    moments = np.unique(t).size
+    goes_back = np.diff(t) < 0.0
+    if moments < 3 or goes_back.mean() > 0.01:
         return None
     return _increasing(t, lines[is_known], "stamps of the lines")
 
@@ -116,8 +120,9 @@ def _is_dated(time: float) -> bool:
 def _ahead(stamps: Clock, values: list[Value]) -> Floats:
     """Seconds that stamps are ahead of times that messages give, day or no day."""
     lines, t, _ = np.array(values).T
-    at = np.searchsorted(stamps.lines, lines, side="right") - 1
-    ahead: Floats = stamps.t[np.maximum(at, 0)] - t
+    after = np.searchsorted(stamps.lines, lines, side="right")
+    at = np.maximum(after - 1, 0)
+    ahead: Floats = stamps.t[at] - t
     if _is_dated(t[0]):  # stamps of the day take the day of the messages
         return ahead
     of_day: Floats = np.unwrap(ahead, period=DAY)
@@ -181,11 +186,12 @@ def times_of(values: list[Value], clock: Clock) -> Floats:
     # a time of the day is that of the day on which its line stands
     t = t + DAY * np.round((by_line - t) / DAY)
     known = t[is_known]
-    repeated = np.mean(np.diff(known) == 0.0) if known.size > 1 else 0.0
-    if repeated > 0.4:  # whole seconds of a faster source
-        own_clock = _increasing(known, lines[is_known], clock.source)
+    of_known = lines[is_known]
+    distinct = np.unique(known).size
+    if distinct < 0.6 * known.size:  # whole seconds of a faster source
+        own_clock = _increasing(known, of_known, clock.source)
         own_clock = own_clock._replace(in_bursts=True)
-        t[is_known] = _spread(lines[is_known], own_clock)
+        t[is_known] = _spread(of_known, own_clock)
     return np.where(is_known, t, by_line)
 
 
@@ -199,36 +205,46 @@ def _spread(lines: Floats, clock: Clock) -> Floats:
     """
     if not clock.in_bursts or clock.t.size < 2:
         return np.interp(lines, clock.lines, clock.t)
-    moment = np.searchsorted(clock.lines, lines, side="right") - 1
-    _, first, counts = np.unique(moment, return_index=True, return_counts=True)
+    moments = np.searchsorted(clock.lines, lines, side="right")
+    _, counts = np.unique(moments, return_counts=True)
     usual = max(1, round(float(np.median(counts))))
-    if moment[0] < 0 and counts[0] >= usual and clock.is_first:
-        moment = np.searchsorted(clock.lines, lines, side="left")
-        _, first, counts = np.unique(moment, return_index=True, return_counts=True)
+    begins_before = moments[0] == 0 and counts[0] >= usual
+    if begins_before and clock.is_first:
+        moments = 1 + np.searchsorted(clock.lines, lines, side="left")
+    return _evenly(moments, usual, clock.t)
 
-    step = float(np.median(np.diff(clock.t)))
-    before, after = clock.t[0] - step, clock.t[-1] + step
-    begins = np.concatenate([[before], clock.t, [after]])
-    ends = np.append(begins[1:], after + step)
-    place = np.arange(lines.size) - np.repeat(first, counts)
-    count = np.repeat(counts, counts)
-    if moment[0] < 0:  # the last ones before the first moment
+
+def _evenly(moments: npt.NDArray[np.intp], usual: int, t: Floats) -> Floats:
+    """Times of values from moment to moment, evenly from each one on.
+
+    The moments count from 1, 0 being before the first one; values are `usual` at each,
+    or more where the clock paused.
+    """
+    step = float(np.median(np.diff(t)))
+    before = t[0] - step
+    after = t[-1] + step
+    begins = np.concatenate([[before], t, [after]])
+    pauses = np.append(np.diff(begins), step)
+
+    _, first, counts = np.unique(moments, return_index=True, return_counts=True)
+    place = np.arange(moments.size) - np.repeat(first, counts)
+    if moments[0] == 0:  # the last ones before the first moment
         place[: counts[0]] += usual - counts[0]
-    count = np.maximum(count, usual)
-    # after a pause the clock goes on later than the source's last value
-    pause = ends[moment + 1] - begins[moment + 1]
-    pause = np.minimum(pause, step * np.ceil(count / usual))
-    spread: Floats = begins[moment + 1] + pause * place / count
-    return spread
+    count = np.maximum(np.repeat(counts, counts), usual)
+    # the clock goes on later after a pause of the recorder
+    longest = step * np.ceil(count / usual)
+    pause = np.minimum(pauses[moments], longest)
+    times: Floats = begins[moments] + pause * place / count
+    return times
 
 
 def _come_in_bursts(clock: Clock, order: list[tuple[int, str]]) -> bool:
     """Return whether the same messages follow each other at most of the moments."""
-    of_moment: dict[int, list[str]] = defaultdict(list)
-    lines = np.array([line for line, _ in order])
+    lines = [line for line, _ in order]
     moments = np.searchsorted(clock.lines, lines, side="right")
+    of_moment: dict[int, str] = defaultdict(str)
     for moment, (_, source) in zip(moments.tolist(), order, strict=True):
-        of_moment[moment].append(source)
-    patterns = Counter(tuple(sources) for sources in of_moment.values())
-    ((_, most),) = patterns.most_common(1)
+        of_moment[moment] += f"{source} "
+    patterns = Counter(of_moment.values())
+    most = max(patterns.values())
     return most > 0.6 * len(of_moment)

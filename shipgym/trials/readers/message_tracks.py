@@ -8,7 +8,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.trials.readers.message_clock import Clock, times_of
-from shipgym.trials.readers.messages import PORT, BySource, Heard, Value
+from shipgym.trials.readers.messages import BySource, Heard, Value, port_source
 from shipgym.trials.resampling import FEWEST_SAMPLES
 from shipgym.trials.units import DEGREE
 
@@ -82,7 +82,7 @@ def _read_from(tracks: Mapping[str, Track], chosen: Mapping[str, str]) -> str:
         by_source.setdefault(chosen[channel], []).append(channel)
     phrases = []
     for source, channels in by_source.items():
-        names = " and ".join(", ".join(channels).rsplit(", ", 1))
+        names = ", ".join(channels)
         phrases.append(f"{names} from {source}")
     return "; ".join(phrases)
 
@@ -105,11 +105,12 @@ def _leave_out_rare(
 
 def _at_common_times(sog: Track, cog: Track) -> dict[str, Track]:
     """Speed and course over ground where both are there: at rest there is no course."""
-    _, of_sog, of_cog = np.intersect1d(sog.t, cog.t, return_indices=True)
-    common = {}
-    for name, track, rows in (("sog", sog, of_sog), ("cog", cog, of_cog)):
-        common[name] = Track(track.t[rows], track.lines[rows], track.values[rows])
-    return common
+    t, of_sog, of_cog = np.intersect1d(sog.t, cog.t, return_indices=True)
+    lines = sog.lines[of_sog]
+    return {
+        "sog": Track(t, lines, sog.values[of_sog]),
+        "cog": Track(t, lines, cog.values[of_cog]),
+    }
 
 
 def _tracks_of(sources: BySource, clock: Clock) -> dict[str, Track]:
@@ -126,7 +127,7 @@ def _tracks_of(sources: BySource, clock: Clock) -> dict[str, Track]:
 
 
 def _best_source(tracks: dict[str, Track], sources: BySource) -> str:
-    covered = {source: _covered(track) for source, track in tracks.items()}
+    covered = {source: _covered(tracks[source]) for source in sources}
     most = max(covered.values())
 
     def rank(source: str) -> _Rank:
@@ -138,7 +139,7 @@ def _best_source(tracks: dict[str, Track], sources: BySource) -> str:
             moments=tracks[source].t.size,
         )
 
-    return max(tracks, key=rank)
+    return max(sorted(sources), key=rank)
 
 
 def _covered(track: Track) -> float:
@@ -151,11 +152,13 @@ def _covered(track: Track) -> float:
 def _note_others(channel: str, best: str, sources: BySource) -> list[str]:
     others = []
     for source in sorted(sources.keys() - {best}):
-        others.append(f"{source} ({_count(sources[source])})")
+        count = _count(sources[source])
+        others.append(f"{source} ({count})")
     if not others:
         return []
     left_out = ", ".join(others)
-    return [f"{channel} is from {best} ({_count(sources[best])}); {left_out} left out"]
+    count = _count(sources[best])
+    return [f"{channel} is from {best} ({count}); {left_out} left out"]
 
 
 def _count(values: list[Value]) -> str:
@@ -167,26 +170,28 @@ def _rudder(
     tracks: dict[str, Track], sources: BySource, notes: list[str]
 ) -> tuple[Track, str]:
     """The rudder, of two the mean, unless one of them stands still."""
+    seconds = {port_source(source) for source in tracks}
     singles = {}
-    for source, track in tracks.items():
-        if not source.endswith(PORT) or source.removesuffix(PORT) not in tracks:
-            singles[source] = track
-    best = _best_source(singles, sources)
+    for source in tracks.keys() - seconds:
+        singles[source] = sources[source]
+    best = _best_source(tracks, singles)
+    notes += _note_others("delta", best, singles)
     track = tracks[best]
-    port = tracks.get(best + PORT)
-    notes += _note_others("delta", best, {name: sources[name] for name in singles})
-    if best.endswith(PORT):
-        notes.append(f"delta is the rudder in the port field of {best[: -len(PORT)]}")
+    second = port_source(best)
+    port = tracks.get(second)
+    if best == port_source(best.split()[0]):
+        notes.append(f"delta is the rudder in the port field of {best.split()[0]}")
     if port is None:
         return track, best
 
-    moves, port_moves = _moves(track), _moves(port)
+    moves = _moves(track)
+    port_moves = _moves(port)
     if moves and not port_moves:
         notes.append(f"delta is the starboard rudder of {best}: the port one is still")
         return track, best
     if port_moves and not moves:
         notes.append(f"delta is the port rudder of {best}: the starboard one is still")
-        return port, best + PORT
+        return port, second
 
     of_port = np.interp(track.t, port.t, port.values)
     apart_deg = np.mean(track.values - of_port) / DEGREE

@@ -12,9 +12,6 @@ from shipgym.trials.readers.line_stamps import stamp_text
 #: Winds from the bow, which are no channels before the heading is added.
 WINDS = ("wind_angle", "wind_speed", "apparent_wind_angle", "apparent_wind_speed")
 
-#: End of the name of a source that is the port one of two rudders.
-PORT = " port"
-
 
 class Value(NamedTuple):
     """One value of a channel, or one time."""
@@ -22,6 +19,11 @@ class Value(NamedTuple):
     line: int
     time: float  # s since 1970 or of the day; nan where the message has none
     value: float
+
+
+def port_source(source: str) -> str:
+    """Name of the port one of two rudders that a source shows."""
+    return f"{source} port"
 
 
 BySource = dict[str, list[Value]]  # by sender and kind, such as HEHDT

@@ -14,7 +14,7 @@ import numpy as np
 from shipgym.extras import library
 from shipgym.files import shipped_toml
 from shipgym.trials.readers.line_stamps import read_stamps, stamp_text
-from shipgym.trials.readers.messages import PORT, Heard
+from shipgym.trials.readers.messages import Heard, port_source
 from shipgym.trials.units import DEGREE, KNOT
 
 _PGNS: dict[str, dict[str, str]] = shipped_toml("shipgym.trials", "nmea2000.toml")
@@ -157,12 +157,16 @@ def _fields_of_text(text: str) -> dict[str, _Field]:
 
 def _address(found: Mapping[str, str]) -> tuple[str, str]:
     """PGN and sender of a raw frame."""
+    if "pgn" in found:
+        return found["pgn"], found["sender"]
     if "can_id" in found:
         can_id = int(found["can_id"], 16)
-        return str(can_id >> 8 & 0x3FFFF), str(can_id & 0xFF)
-    if "hex_pgn" in found:
-        return str(int(found["hex_pgn"], 16)), str(int(found["hex_sender"], 16))
-    return found["pgn"], found["sender"]
+        pgn = can_id >> 8 & 0x3FFFF
+        sender = can_id & 0xFF
+    else:
+        pgn = int(found["hex_pgn"], 16)
+        sender = int(found["hex_sender"], 16)
+    return str(pgn), str(sender)
 
 
 def _decoded(pgn: str, sender: str, data: str, decode: _Decode) -> dict[str, _Field]:
@@ -209,7 +213,7 @@ def _hear(messages: Sequence[_Message], heard: Heard) -> None:
         instance = message.fields.get("instance")
         is_second = instance is not None and _number(instance.value) == 1.0
         if message.pgn == "127245" and is_second:
-            source += PORT
+            source = port_source(source)
         heard.hear(message.line, source, values, _time(message))
 
 
@@ -226,12 +230,22 @@ def _angle_unit(messages: Iterable[_Message]) -> str:
 
 def _si_value(field: _Field | None, channel: str, angle_unit: str) -> float | None:
     """A field in SI units, a position in degrees; None where it has no value."""
-    value = None if field is None else _number(field.value)
-    if field is None or value is None or channel in ("lat", "lon"):
+    if field is None:
+        return None
+    value = _number(field.value)
+    if value is None or channel in ("lat", "lon"):
         return value
-    speeds = ("sog", "stw", "speed")
-    unit = field.unit or ("m/s" if channel in speeds else angle_unit)
-    factors = {"deg": DEGREE, "deg/s": DEGREE, "kn": KNOT, "kts": KNOT, "km/h": 1 / 3.6}
+    usual_unit = angle_unit
+    if channel in ("sog", "stw", "speed"):
+        usual_unit = "m/s"
+    factors = {
+        "deg": DEGREE,
+        "deg/s": DEGREE,
+        "kn": KNOT,
+        "kts": KNOT,
+        "km/h": 1.0 / 3.6,
+    }
+    unit = field.unit or usual_unit
     return value * factors.get(unit, 1.0)
 
 
@@ -239,7 +253,8 @@ def _channel_values(message: _Message, numbers: dict[str, float]) -> dict[str, f
     """Channels of a message: headings and winds by the reference that it names."""
     values = dict(numbers)
     fields = message.fields
-    reference = str(fields.get("reference", _Field("", "")).value)
+    none = _Field("", unit="")
+    reference = fields.get("reference", none).value
     heading = values.pop("heading", None)
     deviation = values.pop("deviation", 0.0)
     if heading is not None and reference == "True":
@@ -247,15 +262,18 @@ def _channel_values(message: _Message, numbers: dict[str, float]) -> dict[str, f
     elif heading is not None:
         values["psi_magnetic"] = heading + deviation
 
-    course_reference = str(fields.get("cogreference", _Field("", "")).value)
+    course_reference = fields.get("cogreference", none).value
     if course_reference == "Magnetic":
         values.pop("cog", None)
         values.pop("sog", None)
-    angle, speed = values.pop("angle", None), values.pop("speed", None)
-    wind = {"Apparent": "apparent_wind", "True (boat referenced)": "wind"}
-    if angle is not None and speed is not None and reference in wind:
-        values[f"{wind[reference]}_angle"] = angle
-        values[f"{wind[reference]}_speed"] = speed
+
+    angle = values.pop("angle", None)
+    speed = values.pop("speed", None)
+    winds = {"Apparent": "apparent_wind", "True (boat referenced)": "wind"}
+    wind = winds.get(reference)
+    if angle is not None and speed is not None and wind:
+        values[f"{wind}_angle"] = angle
+        values[f"{wind}_speed"] = speed
     return values
 
 

@@ -20,18 +20,18 @@ from shipgym.trials.nmea import (
     logged_numbers,
     parse_sentence,
 )
-from shipgym.trials.readers.messages import PORT, WINDS, Heard, Value
+from shipgym.trials.readers.messages import WINDS, Heard, Value, port_source
 from shipgym.trials.units import DEGREE
 
 #: Kinds of sentences that hold a time or a channel; XDR holds what its names say.
-SENTENCE_KINDS = ["XDR"]
+_KINDS = ["XDR"]
 for _kind, _sentence in NMEA_SENTENCES.items():
     _quantities = [NMEA_QUANTITIES[quantity] for quantity in _sentence.log_fields]
     _has_channel = any(quantity.channel for quantity in _quantities)
     if _has_channel or _sentence.time is not None:
-        SENTENCE_KINDS.append(_kind)
+        _KINDS.append(_kind)
 _SENTENCE = re.compile(
-    rf"\$[A-Z][A-Z0-9](?:{'|'.join(SENTENCE_KINDS)}),[^$!\\\"\r\n*]*"
+    rf"\$[A-Z][A-Z0-9](?:{'|'.join(_KINDS)}),[^$!\\\"\r\n*]*"
     r"(?:\*[^,;\s\"$!\\]{0,2})?"
 )
 _TIME = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d(?:\.\d*)?)")
@@ -90,7 +90,7 @@ def hear_sentences(lines: Sequence[str], heard: Heard, *, strict: bool) -> None:
         port = said.values.pop("port", None)
         heard.hear(one.line, one.source, said.values, said.time)
         if port is not None:
-            heard.channels["delta"][one.source + PORT].append(
+            heard.channels["delta"][port_source(one.source)].append(
                 Value(one.line, said.time, port)
             )
         if lacks:
@@ -156,10 +156,15 @@ def _said(sentence: Sentence) -> _Said:
     Raises ValueError where a number is broken.
     """
     if sentence.kind == "XDR":
-        return _Said(np.nan, _transducer_values(sentence.fields), lacks_status=False)
+        values = _transducer_values(sentence.fields)
+        return _Said(time=np.nan, values=values, lacks_status=False)
     numbers = logged_numbers(sentence)
     lacks = any(lacks_status(sentence, quantity) for quantity in numbers)
-    return _Said(_time(sentence), _channel_values(numbers), lacks_status=lacks)
+    return _Said(
+        time=_time(sentence),
+        values=_channel_values(numbers),
+        lacks_status=lacks,
+    )
 
 
 def _transducer_values(fields: Sequence[str]) -> dict[str, float]:
@@ -168,12 +173,15 @@ def _transducer_values(fields: Sequence[str]) -> dict[str, float]:
     Each has four fields: type (A: an angle), value, unit (D: degrees) and name.
     """
     values = {}
-    for at in range(0, len(fields) - 3, 4):
+    last = len(fields) - 3
+    for at in range(0, last, 4):
         kind, value, unit, name = fields[at : at + 4]
-        is_rudder = kind == "A" and unit in ("D", "") and _RUDDER.search(name)
-        if not is_rudder or not value:
+        is_angle = kind == "A" and unit in ("D", "")
+        if not is_angle or not value or not _RUDDER.search(name):
             continue
-        channel = "port" if _PORT_RUDDER.search(name) else "delta"
+        channel = "delta"
+        if _PORT_RUDDER.search(name):
+            channel = "port"
         values[channel] = DEGREE * float(value)
     return values
 
