@@ -61,7 +61,8 @@ class Installation:
         if clocks is not None:
             check_choice(clocks, ("correct", "keep"), f"{where} clock_offsets")
         checksums = table.get("checksums", "optional")
-        check_choice(checksums, ("required", "optional"), f"{where} checksums")
+        choices = ("required", "optional")
+        check_choice(checksums, choices, f"{where} checksums")
         place = f"{where} gnss_antenna"
         antenna = table.get("gnss_antenna", {})
         check_table(antenna, place, ("forward", "starboard"))

@@ -90,23 +90,27 @@ def _with_letters(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 def _sentence_kind(entry: Mapping[str, Any]) -> SentenceKind:
     kind = _with_letters(entry)
-    kind["fields"] = _number_fields(entry.get("fields", {}))
-    log_fields = kind["fields"] | _number_fields(entry.get("log_fields", {}))
-    kind["log_fields"] = {}
+    fields = _number_fields(entry.get("fields", {}))
+    of_logs = _number_fields(entry.get("log_fields", {}))
+    valid = kind.get("valid", {})
     degraded = kind.get("degraded", {})
-    for quantity, place in log_fields.items():
-        valid = place.valid or kind.get("valid", {})
-        valid = dict(valid)
+
+    log_fields = {}
+    for quantity, place in (fields | of_logs).items():
+        statuses = dict(place.valid or valid)
         for at, letters in degraded.items():
-            valid[at] |= letters
-        kind["log_fields"][quantity] = replace(place, valid=valid)
+            statuses[at] |= letters
+        log_fields[quantity] = replace(place, valid=statuses)
+    kind["fields"] = fields
+    kind["log_fields"] = log_fields
     return SentenceKind(**kind)
 
 
 def _number_fields(entries: Mapping[str, Any]) -> dict[str, NumberField]:
+    """Numbers of a sentence by quantity."""
     numbers = {}
-    for quantity, place in entries.items():
-        place = _with_letters(place)
+    for quantity, entry in entries.items():
+        place = _with_letters(entry)
         numbers[quantity] = NumberField(**place)
     return numbers
 
@@ -195,6 +199,7 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
     """
     kind = NMEA_SENTENCES[sentence.kind]
     fields = _padded(sentence)
+    sides = frozenset(_SIGNS)
     numbers = {}
     for quantity, place in kind.log_fields.items():
         needed = dict(place.only_if)
@@ -203,7 +208,7 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
             if fields[at]:
                 needed[at] = letters
         if place.side is not None:
-            needed[place.side] = frozenset(_SIGNS)
+            needed[place.side] = sides
         value = _number(place, fields, needed)
         if value is None:
             continue

@@ -73,4 +73,5 @@ def read_log(path: str | Path | LogTable, *, checksums: str = "optional") -> Log
     kind = recognise_kind(path)
     if kind == "messages":
         return _read_messages(path, checksums)
-    return READERS[kind](path)
+    read = READERS[kind]
+    return read(path)

@@ -74,8 +74,9 @@ def read_stamps(texts: Sequence[str]) -> Floats:
 
 
 def _seconds(numbers: Floats) -> Floats:
-    size = float(np.median(numbers))
-    for smallest, factor in ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3)):
+    fractions = {1e17: 1e-9, 1e14: 1e-6, 1e11: 1e-3}
+    size = np.median(numbers)
+    for smallest, seconds in fractions.items():
         if size >= smallest:
-            return numbers * factor
+            return numbers * seconds
     return numbers

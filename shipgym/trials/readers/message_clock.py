@@ -55,7 +55,8 @@ def _agreed_clock(path: Path, heard: Heard, notes: list[str]) -> Clock | None:
 
     values = heard.times[own.source]
     ahead = _ahead(stamps, values)
-    if np.ptp(np.quantile(ahead, [0.1, 0.9])) > 2.0:
+    least, most = np.quantile(ahead, [0.1, 0.9])
+    if most - least > 2.0:
         notes.append(
             f"times before the lines do not run with those of {own.source}: left out"
         )
@@ -69,19 +70,21 @@ def _own_clock(path: Path, times: BySource) -> Clock | None:
         return None
 
     def rank(source: str) -> tuple[bool, int]:
-        values = times[source]
-        moments = {value.time for value in values}
-        return _is_dated(values[0].time), len(moments)
+        moments = {value.time for value in times[source]}
+        earliest = min(moments)
+        return is_dated(earliest), len(moments)
 
     best = max(sorted(times), key=rank)
     lines, t, _ = np.array(times[best]).T
-    if not _is_dated(t[0]):
+    if not is_dated(t[0]):
         t = np.unwrap(t, period=DAY)
     goes_back = np.flatnonzero(np.diff(t) < -5.0)
     if goes_back.size:
-        k = goes_back[0]
-        before, after = clock_text(t[k]), clock_text(t[k + 1])
-        line = int(lines[k + 1])
+        last = goes_back[0]
+        back = last + 1
+        before = clock_text(t[last])
+        after = clock_text(t[back])
+        line = int(lines[back])
         raise InputError(
             f"{path}: line {line}: expected time to go on, got {after} after {before};"
             " the clock was set back, or two logs are joined: cut the log there"
@@ -113,7 +116,8 @@ def _increasing(t: Floats, lines: Floats, source: str) -> Clock:
     return Clock(t, lines[first], source)
 
 
-def _is_dated(time: float) -> bool:
+def is_dated(time: float) -> bool:
+    """Return whether a time counts from 1970, not from midnight."""
     return bool(time > 2.0 * DAY)
 
 
@@ -123,7 +127,7 @@ def _ahead(stamps: Clock, values: list[Value]) -> Floats:
     after = np.searchsorted(stamps.lines, lines, side="right")
     at = np.maximum(after - 1, 0)
     ahead: Floats = stamps.t[at] - t
-    if _is_dated(t[0]):  # stamps of the day take the day of the messages
+    if is_dated(t[0]):  # stamps of the day take the day of the messages
         return ahead
     of_day: Floats = np.unwrap(ahead, period=DAY)
     days = np.round(np.median(of_day) / DAY)
@@ -134,7 +138,7 @@ def _agreed(stamps: Clock, ahead: float, own: Clock, notes: list[str]) -> Clock:
     """Stamps put right by the clock of satellites, unless its weeks are too few."""
     rollovers = round(ahead / _ROLLOVER)
     rest = ahead - rollovers * _ROLLOVER
-    if _is_dated(own.t[0]) and rollovers >= 1 and abs(rest) < DAY:
+    if is_dated(own.t[0]) and rollovers >= 1 and abs(rest) < DAY:
         notes.append(
             f"the date of {own.source} is {1024 * rollovers} weeks back"
             f" ({_day(own.t[0])}), a rollover of the weeks of GPS: that before the"
@@ -144,7 +148,7 @@ def _agreed(stamps: Clock, ahead: float, own: Clock, notes: list[str]) -> Clock:
 
     if abs(ahead) <= 1.0:  # a message takes part of a second
         return stamps
-    if _is_dated(stamps.t[0]):
+    if is_dated(stamps.t[0]):
         size = f"{ahead / DAY:.3g} days" if abs(ahead) > DAY else f"{ahead:.6g} s"
         notes.append(
             f"the times before the lines are {size} ahead of those of {own.source},"
@@ -155,13 +159,13 @@ def _agreed(stamps: Clock, ahead: float, own: Clock, notes: list[str]) -> Clock:
 
 def _noted(own: Clock | None, notes: list[str]) -> Clock | None:
     """The clock of satellites; a note where its date may be weeks back."""
-    if own is None or not _is_dated(own.t[0]):
+    if own is None or not is_dated(own.t[0]):
         return own
     begin = float(own.t[0])
-    since = datetime(1980, 1, 1, tzinfo=UTC).timestamp()
-    latest = datetime.now(UTC).timestamp() - _ROLLOVER
-    if since <= begin <= latest:
-        later = begin + _ROLLOVER
+    later = begin + _ROLLOVER
+    earliest = datetime(1980, 1, 1, tzinfo=UTC)
+    now = datetime.now(UTC)
+    if begin >= earliest.timestamp() and later <= now.timestamp():
         notes.append(
             f"the date of {own.source} is {_day(begin)}: if it should be {_day(later)},"
             " the receiver is 1024 weeks back, a rollover of the weeks of GPS; only the"

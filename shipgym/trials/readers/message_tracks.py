@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.trials.readers.message_clock import Clock, times_of
+from shipgym.trials.readers.message_clock import Clock, is_dated, times_of
 from shipgym.trials.readers.messages import BySource, Heard, Value, port_source
 from shipgym.trials.resampling import FEWEST_SAMPLES
 from shipgym.trials.units import DEGREE
@@ -57,7 +57,8 @@ def choose_tracks(heard: Heard, clock: Clock) -> Tracks:
             tracks[channel], chosen[channel] = _rudder(of_source, sources, notes)
             continue
         best = _best_source(of_source, sources)
-        tracks[channel], chosen[channel] = of_source[best], best
+        tracks[channel] = of_source[best]
+        chosen[channel] = best
         if channel != "variation":
             name = channel.removesuffix("_magnetic")
             notes += _note_others(name, best, sources)
@@ -131,10 +132,12 @@ def _best_source(tracks: dict[str, Track], sources: BySource) -> str:
     most = max(covered.values())
 
     def rank(source: str) -> _Rank:
+        kind = source[2:5]
+        first, *_ = sources[source]
         return _Rank(
             has_data=covered[source] >= 0.5 * most,
-            preference=_PREFERENCE.get(source[2:5], 0),
-            is_dated=sources[source][0].time > 2e5,
+            preference=_PREFERENCE.get(kind, 0),
+            is_dated=is_dated(first.time),
             is_original=not source.startswith("II"),
             moments=tracks[source].t.size,
         )
@@ -245,7 +248,9 @@ def _true_heading(
 
 
 def _heading_note(best: str, track: Track, other: str, left_out: Track) -> str:
+    count = track.t.size
+    count_left_out = left_out.t.size
     return (
-        f"psi is from {best} ({track.t.size} values); {other} ({left_out.t.size}"
-        " values) left out"
+        f"psi is from {best} ({count} values); {other} ({count_left_out} values) left"
+        " out"
     )

@@ -5,9 +5,10 @@ depth, satellites) are passed over.
 """
 
 import re
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from statistics import mode
 from typing import NamedTuple
 
 import numpy as np
@@ -77,7 +78,8 @@ def hear_sentences(lines: Sequence[str], heard: Heard, *, strict: bool) -> None:
         expected = usual[one.source]
         may_lack = not strict and not expected.has_checksum
         lacks = "*" not in one.text
-        is_whole = one.text.count(",") == expected.commas
+        commas = one.text.count(",")
+        is_whole = commas == expected.commas
         try:
             if lacks and not (may_lack and is_whole):
                 raise ValueError("expected a checksum, or as many fields as usual")
@@ -87,17 +89,25 @@ def hear_sentences(lines: Sequence[str], heard: Heard, *, strict: bool) -> None:
             heard.damaged.append(one.line)
             continue
 
-        port = said.values.pop("port", None)
-        heard.hear(one.line, one.source, said.values, said.time)
-        if port is not None:
-            heard.channels["delta"][port_source(one.source)].append(
-                Value(one.line, said.time, port)
-            )
+        _hear(one, said, heard)
         if lacks:
             without_checksum.append(one.source)
         if said.lacks_status:
             without_status.append(one.source)
-    _note_lacks(heard, len(found), without_checksum, without_status)
+    count = len(found)
+    _note_lacks(heard, count, without_checksum, without_status)
+
+
+def _hear(one: _Found, said: _Said, heard: Heard) -> None:
+    """Add what a sentence said, a port rudder as a source of its own."""
+    port = said.values.pop("port", None)
+    heard.hear(one.line, one.source, said.values, said.time)
+    if port is None:
+        return
+    sources = heard.channels["delta"]
+    second = port_source(one.source)
+    value = Value(one.line, said.time, port)
+    sources[second].append(value)
 
 
 def _find(lines: Sequence[str], heard: Heard) -> list[_Found]:
@@ -124,11 +134,11 @@ def _usual(found: Sequence[_Found]) -> dict[str, _Usual]:
     usual = {}
     for source, of_source in texts.items():
         with_checksum = sum("*" in text for text in of_source)
-        commas = Counter(text.count(",") for text in of_source)
-        ((most, _),) = commas.most_common(1)
+        counts = [text.count(",") for text in of_source]
+        half = 0.5 * len(of_source)
         usual[source] = _Usual(
-            has_checksum=with_checksum > 0.5 * len(of_source),
-            commas=most,
+            has_checksum=with_checksum > half,
+            commas=mode(counts),
         )
     return usual
 
@@ -223,13 +233,14 @@ def _channel_values(numbers: dict[str, float]) -> dict[str, float]:
         elif quantity == "port_rudder":
             values["port"] = number
         elif quantity == "compass_heading":
-            by_compass = number + numbers.get("deviation", 0.0)
-            if "variation" in numbers:
-                values.setdefault("psi", by_compass + numbers["variation"])
-            else:
-                values["psi_magnetic"] = by_compass
+            magnetic = number + numbers.get("deviation", 0.0)
+            values["psi_magnetic"] = magnetic
         elif channel in ("lat", "lon"):
             values[channel] = float(np.degrees(number))
         elif channel is not None:
             values[channel] = number
+
+    if {"psi_magnetic", "variation"} <= values.keys():
+        magnetic = values.pop("psi_magnetic")
+        values.setdefault("psi", magnetic + values["variation"])
     return values
