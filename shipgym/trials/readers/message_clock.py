@@ -26,7 +26,7 @@ class Clock(NamedTuple):
     source: str  # of the times, for a note
     later: float = 0.0  # s to add to the times that messages give
     in_bursts: bool = False  # messages of one moment follow each other
-    is_first: bool = False  # no time may have been lost before the first one
+    leads: bool = False  # what is heard before the first moment is of that one
 
 
 def log_clock(path: Path, heard: Heard, notes: list[str]) -> Clock | None:
@@ -39,10 +39,7 @@ def log_clock(path: Path, heard: Heard, notes: list[str]) -> Clock | None:
     if clock is None:
         return None
     heard.order.sort(key=itemgetter(0))
-    return clock._replace(
-        in_bursts=_come_in_bursts(clock, heard.order),
-        is_first=min(heard.damaged, default=np.inf) > clock.lines[0],
-    )
+    return _with_bursts(clock, heard.order)
 
 
 def _agreed_clock(path: Path, heard: Heard, notes: list[str]) -> Clock | None:
@@ -203,17 +200,15 @@ def _spread(lines: Floats, clock: Clock) -> Floats:
     """Times of lines between those with a time.
 
     Where the same messages come at every moment, they are of that moment; of a source
-    that speaks several times the first one is, and the others follow evenly. A source
-    that is heard as often before the first moment always speaks before. In other logs
-    messages come one by one, and the time goes on from line to line.
+    that speaks several times the first one is, and the others follow evenly. In other
+    logs messages come one by one, and the time goes on from line to line.
     """
     if not clock.in_bursts or clock.t.size < 2:
         return np.interp(lines, clock.lines, clock.t)
     moments = np.searchsorted(clock.lines, lines, side="right")
     _, counts = np.unique(moments, return_counts=True)
     usual = max(1, round(float(np.median(counts))))
-    begins_before = moments[0] == 0 and counts[0] >= usual
-    if begins_before and clock.is_first:
+    if moments[0] == 0 and counts[0] >= usual and clock.leads:
         moments = 1 + np.searchsorted(clock.lines, lines, side="left")
     return _evenly(moments, usual, clock.t)
 
@@ -242,13 +237,23 @@ def _evenly(moments: npt.NDArray[np.intp], usual: int, t: Floats) -> Floats:
     return times
 
 
-def _come_in_bursts(clock: Clock, order: list[tuple[int, str]]) -> bool:
-    """Return whether the same messages follow each other at most of the moments."""
+def _with_bursts(clock: Clock, order: list[tuple[int, str]]) -> Clock:
+    """The clock, and whether the same messages follow each other at most moments.
+
+    A log of whole bursts begins with those that precede the time: they are missing
+    after its last time.
+    """
     lines = [line for line, _ in order]
     moments = np.searchsorted(clock.lines, lines, side="right")
-    of_moment: dict[int, str] = defaultdict(str)
+    bursts: dict[int, str] = defaultdict(str)
     for moment, (_, source) in zip(moments.tolist(), order, strict=True):
-        of_moment[moment] += f"{source} "
-    patterns = Counter(of_moment.values())
-    most = max(patterns.values())
-    return most > 0.6 * len(of_moment)
+        bursts[moment] += f"{source} "
+
+    counts = Counter(bursts.values())
+    ((usual, most),) = counts.most_common(1)
+    last = clock.lines.size
+    is_whole = bursts[last] + bursts[0] == usual
+    return clock._replace(
+        in_bursts=most > 0.6 * len(bursts),
+        leads=is_whole,
+    )
