@@ -4,6 +4,7 @@ import gzip
 import json
 import math
 import struct
+import sys
 from datetime import UTC, datetime
 from functools import cache, reduce
 from pathlib import Path
@@ -325,6 +326,20 @@ def test_a_pause_of_the_recorder_is_a_hole(tmp_path):
     assert np.diff(trial.t).max() == pytest.approx(21.0)
 
 
+@pytest.mark.parametrize("part", [slice(1, None), slice(2, None), slice(2, -2)])
+def test_a_log_that_was_cut_within_a_second_keeps_its_times(part, tmp_path):
+    trial = read(tmp_path, plain(rmc, hdt, rsa)[part])
+    truth = sailed()
+    psi = np.interp(trial.t, [one.t for one in truth], [one.psi for one in truth])
+    assert np.abs(trial["psi"] / DEGREE - psi).max() < 0.05
+
+
+def test_a_clock_that_is_set_back_is_named(tmp_path):
+    lines = plain(rmc, hdt, rsa)
+    with pytest.raises(InputError, match="line 451: expected time to go on, got 2021"):
+        read(tmp_path, lines[:450] + lines[300:])
+
+
 def test_weeks_of_satellites_that_began_again_are_named(tmp_path):
     old = BEGIN - 1024 * 7 * 86400.0
     lines = plain(lambda one: rmc(one, begin=old), hdt, rsa)
@@ -463,6 +478,15 @@ def test_raw_frames_of_nmea_2000_are_decoded(form, magnetic, tmp_path):
     assert "r" not in trial.derived
     if magnetic:
         said(trial, "with the variation of PGN 127258 of 35 added, 16.0 deg E")
+
+
+def test_raw_frames_without_their_package_are_one_message(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "nmea2000.decoder", None)
+    lines = [candump(0.0, 127245, bytes(8))] * 3
+    with pytest.raises(
+        InputError, match=r"log.nmea.*pip install 'shipgym\[nmea2000\]'"
+    ):
+        read(tmp_path, lines)
 
 
 def analyzed(one, unit="deg"):

@@ -34,7 +34,7 @@ def read_messages(path: Path, *, strict: bool = False) -> LogTable:
     with placed(str(path)):
         hear_pgns(lines, heard)
     hear_deltas(lines, heard)
-    notes = _check_damage(path, heard) + heard.notes
+    notes = _check_damage(path, heard, strict=strict) + heard.notes
     if not heard.count and any("!AIVD" in line for line in lines):
         raise InputError(
             f"{path}: this looks like a log of AIS: positions of other ships, without"
@@ -66,14 +66,17 @@ def read_messages(path: Path, *, strict: bool = False) -> LogTable:
     return _table(path, tracks, notes, magnetic=chosen.magnetic)
 
 
-def _check_damage(path: Path, heard: Heard) -> list[str]:
+def _check_damage(path: Path, heard: Heard, *, strict: bool) -> list[str]:
     """Refuse a log of many damaged messages; a note of few."""
     damaged = len(heard.damaged)
+    remedy = "the log was damaged on the way: take the original"
+    if strict:
+        remedy = 'write checksums = "optional" if their damage is no concern'
     if damaged > 0.1 * heard.count:
         raise InputError(
             f"{path}: line {heard.damaged[0]}: expected hardly any damaged sentences,"
             f" got {damaged} of {heard.count} with a wrong or no checksum or broken"
-            " fields, this the first; the log was damaged on the way: take the original"
+            f" fields, this the first; {remedy}"
         )
     if damaged:
         return [
