@@ -2,8 +2,10 @@
 
     python scripts/bridge_logs.py [--seeds 8] [--models 2] [--ships kcs,tanker]
     python scripts/bridge_logs.py --wind
+    python scripts/bridge_logs.py --parts [--seeds 8]
 
-prints the tables of docs/logs.md; the second needs the data of docs/real_ships.md.
+prints the tables of docs/logs.md; the second needs the data of docs/real_ships.md, the
+third has logs of single trials, with a current and with none.
 
 Every reference ship, and two ships by the MMG standard method (tests/ships/mmg.py),
 sails zigzags 10/10 and 20/20, a 35 degree turn to starboard and a 25 degree turn to
@@ -331,6 +333,77 @@ def model_table(names: Sequence[str], seeds: range, recipes: Sequence[str]) -> s
     return table(head, rows)
 
 
+#: Trials of a log, by their places in `sailed`.
+PARTS = {
+    "zigzag 10/10": [0],
+    "zigzag 20/20": [1],
+    "both zigzags": [0, 1],
+    "35 deg turn": [2],
+    "all three": [0, 1, 2],
+}
+
+
+def parts_table(names: Sequence[str], seeds: range) -> str:
+    """How often a current is removed from logs of few trials, in calm weather."""
+    rows = []
+    for speed in (0.0, 0.6):
+        cases: dict[str, list[tuple[float, bool]]] = {name: [] for name in PARTS}
+        n_logs = 0
+        for name in names:
+            ship = ship_of(name)
+            for seed in seeds:
+                n_logs += 1
+                logs, truth = calm_logs(ship, speed, seed)
+                for part, places in PARTS.items():
+                    chosen = [logs[place] for place in places]
+                    cases[part] += removed_current(chosen, ship, truth)
+        for part, found in cases.items():
+            errors = [error for error, _ in found]
+            inside = sum(is_inside for _, is_inside in found)
+            rows.append(
+                [
+                    f"{speed:g} m/s",
+                    part,
+                    f"{len(found)} of {n_logs}",
+                    f"{max(errors):.3f}" if errors else "-",
+                    f"{inside} of {len(found)}" if found else "-",
+                ]
+            )
+    head = ["current", "log", "removed", "largest error, m/s", "inside 95 %"]
+    return table(head, rows)
+
+
+def calm_logs(
+    ship: ShipModel, speed: float, seed: int
+) -> tuple[list[Trial], np.ndarray]:
+    """Logs without wind, and the current to north and east, m/s."""
+    towards = np.random.default_rng(seed).uniform(0.0, 360.0)
+    logs = []
+    for k, run in enumerate(sailed(ship, speed, towards, 0.0, 0.0, 100 * seed)):
+        log = logged(run, 1000 * seed + k)
+        if "n" not in log:
+            log = log.with_channels({"n": np.ones(len(log))})
+        logs.append(log)
+    angle = np.radians(towards)
+    return logs, speed * np.array([np.cos(angle), np.sin(angle)])
+
+
+def removed_current(
+    logs: list[Trial], ship: ShipModel, truth: np.ndarray
+) -> list[tuple[float, bool]]:
+    """Error of a removed current, m/s, and whether its 95 % intervals hold the truth.
+
+    Nothing if none is removed.
+    """
+    _, found = in_still_water(logs, ship.particulars)
+    row = found.get("currents", {}).get(logs[0].name)
+    if row is None or not row["taken_out"]:
+        return []
+    error = np.array([row["north"], row["east"]]) - truth
+    is_inside = np.abs(error) < 1.96 * np.array(row["standard_errors"])
+    return [(float(np.hypot(*error)), bool(is_inside.all()))]
+
+
 def wind_table(recipes: Sequence[str]) -> str:
     """Esso Osaka's zigzags, each predicted from the five others, with wind or not."""
     ship = ShipFile.load(ROOT / "tests/ships/esso_osaka_3m.toml")
@@ -413,6 +486,7 @@ def main() -> None:
     parser.add_argument("--ships", default=",".join(SHIPS))
     parser.add_argument("--recipes", help="with semicolons between; by default all")
     parser.add_argument("--wind", action="store_true", help="Esso Osaka only")
+    parser.add_argument("--parts", action="store_true", help="logs of few trials")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
     every = ESSO_OSAKA if given.wind else RECIPES
@@ -421,6 +495,9 @@ def main() -> None:
         print(wind_table(recipes))
         return
     names = given.ships.split(",")
+    if given.parts:
+        print(parts_table(names, range(given.first, given.first + given.seeds)))
+        return
     if given.seeds:
         print(
             current_table(names, range(given.first, given.first + given.seeds)),

@@ -27,7 +27,7 @@ from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
-from shipgym.tasks.steering import RUDDER_WEIGHT
+from shipgym.tasks.scales import RUDDER_WEIGHT
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from shipgym.tasks.steering import INTEGRAL_ZONE
+from shipgym.tasks.scales import INTEGRAL_ZONE
 
 #: A float, or an array of shape (n,) with one for each of many ships.
 Number: TypeAlias = Any

@@ -22,8 +22,7 @@ from shipgym.ships.linear import (
     nomoto_of,
     straight_running,
 )
-from shipgym.tasks.scales import control_interval
-from shipgym.tasks.steering import RATE_WEIGHT
+from shipgym.tasks.scales import RATE_WEIGHT, control_interval
 
 SIGNALS = Gains._fields
 SWAY, YAW_RATE, ERROR, RUDDER, INTEGRAL = range(len(SIGNALS))

@@ -25,7 +25,7 @@ from agents.controllers.linear_loop import (
 from shipgym import ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
-from shipgym.tasks.steering import RUDDER_WEIGHT
+from shipgym.tasks.scales import RUDDER_WEIGHT
 
 
 class SteeringCost(NamedTuple):

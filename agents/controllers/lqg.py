@@ -23,7 +23,7 @@ from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.engine.records import Record
-from shipgym.tasks.steering import RUDDER_WEIGHT
+from shipgym.tasks.scales import RUDDER_WEIGHT
 
 # least jump of the heading error that is a new course, rad, and the same in standard
 # deviations of what noise explains

@@ -16,7 +16,7 @@ from agents.controllers.linear_loop import checked_interval, rate_weight, sample
 from shipgym import ShipModel
 from shipgym.checks import check_number
 from shipgym.ships.linear import Nomoto, linearise, nomoto_of
-from shipgym.tasks.steering import RUDDER_WEIGHT
+from shipgym.tasks.scales import RUDDER_WEIGHT
 
 
 @dataclass(frozen=True, eq=False)

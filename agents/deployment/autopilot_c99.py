@@ -1,5 +1,6 @@
 """Controllers and learned policies as C99: laws translated, networks as tables."""
 
+import re
 from typing import Any
 
 from agents.controllers.controller import Controller
@@ -20,10 +21,17 @@ from agents.deployment.autopilot import (
     path_step,
     policy_observations,
 )
-from agents.deployment.c99 import Source, checked_name, comment, render
+from agents.deployment.c99 import Source, c_source, checked_name, hash_text, render
 from agents.deployment.c_expression import Translated
-from agents.deployment.c_structures import kind_of, numbers_of, record_kind
-from agents.deployment.c_syntax import Kind
+from agents.deployment.c_structures import (
+    Parameter,
+    kind_of,
+    leaf_paths,
+    numbers_of,
+    parameters_of,
+    record_kind,
+)
+from agents.deployment.c_syntax import Kind, comment
 from agents.deployment.translator import Translator
 from agents.deployment.variables import AUTOPILOT_INPUTS, AUTOPILOT_OUTPUTS
 from agents.policies.policy import ORDERS, LearnedPolicy, combined, toward
@@ -46,20 +54,24 @@ POLICY_STATE = record_kind(
         "memory": Nothing,
         "guidance": Nothing,
     },
+    noted=BridgeState,
 )
 
 
-def autopilot_source(agent: Any, name: str | None = None) -> Source:
+def autopilot_source(
+    agent: Any, name: str | None = None, real: str = "double"
+) -> Source:
     """Write a controller or a learned policy as C99.
 
-    The integral of the heading error is part of it. Raises InputError for a controller
-    that does not steer by its `law` alone, for a law of more than can be translated,
-    and for a name that C does not take.
+    The integral of the heading error is part of it; `real` is the type of its numbers,
+    double or float. Raises InputError for a controller that does not steer by its `law`
+    alone, for a law of more than can be translated, and for a name that C does not
+    take.
     """
     inputs = {name: AUTOPILOT_INPUTS[name] for name in needed_inputs(agent)}
     p = bridge_parameters(agent)
     name = checked_name(name or agent.name)
-    c = Translator({}, name)
+    c = Translator({}, name, real)
     if isinstance(agent, LearnedPolicy):
         template, data = "policy.c.j2", policy_data(c, agent, p)
     else:
@@ -68,6 +80,7 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
     title = f"Autopilot '{agent.name}' for model '{agent.model_name}'"
     data |= {
         "title": comment(title),
+        "sha256": hash_text(agent.model_sha256),
         "inputs": inputs,
         "interval": p.dt,
         "limit": p.limit,
@@ -75,42 +88,71 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
         "structures": c.structures.texts,
         "functions": c.functions,
     }
+    source = c_source(template, name, real, **data)
     return Source(
         name=name,
-        header=render("autopilot.h.j2", name, **data),
-        source=render(template, name, **data),
+        header=render("autopilot.h.j2", name, real=real, **data),
+        source=source,
         inputs=inputs,
         outputs=AUTOPILOT_OUTPUTS,
         step=p.dt,
         ship=False,
+        title=title,
+        sha256=hash_text(agent.model_sha256),
+        parameters=tunable(c, agent, p, source),
+        tables=tuple(leaf_paths(kind_of(p), tables=True)),
     )
+
+
+def tunable(
+    c: Translator, agent: Any, p: BridgeParameters, source: str
+) -> tuple[Parameter, ...]:
+    """Parameters that have an effect in a source; its interval is part of the design.
+
+    The integral of the heading error is always formed, but not always read.
+    """
+    without = set()
+    base = getattr(agent, "base", None)
+    if not isinstance(base, Guided):  # of the environment of a policy
+        without |= {"task_lookahead", "path_radius"}
+    if not re.search(r"\w\.heading_error_integral\b", source):
+        without.add("reach")
+
+    kept = []
+    numbers = numbers_of(p)
+    for parameter in parameters_of(c.structures, kind_of(p), numbers):
+        is_interval = parameter.path.rpartition(".")[2] == "dt"
+        if not is_interval and parameter.path not in without:
+            kept.append(parameter)
+    return tuple(kept)
 
 
 def controller_data(c: Translator, agent: Any, p: BridgeParameters) -> dict[str, Any]:
     """Data of the templates for a controller."""
+    structures = c.structures
     state = state_kind(agent)
-    c.structures.declare(state, f"{c.structures.prefix}_state")
-    header, c.structures.texts = c.structures.texts, []
+    structures.declare(state, f"{structures.prefix}_own")
+    kind = parameters_kind(c, p)
+    header = structures.texts
+    structures.texts = []
 
-    kind = kind_of(p)
     step = steering_step(c, agent, state, kind, path_step)
+    numbers = numbers_of(p)
     return {
         "policy": None,
         "state_structures": header,
+        "own_paths": leaf_paths(state),
         "step": step.name,
-        "step_type": c.structures.type(step.returns),
-        "constants": parameter_constant(c, kind, p),
+        "step_type": structures.type(step.returns),
+        "parameters": structures.initialiser(kind, numbers),
     }
 
 
-def parameter_constant(
-    c: Translator, kind: Kind, p: BridgeParameters
-) -> dict[str, Any]:
-    """Type and initialiser of the constant that holds an autopilot's parameters."""
-    type_name = c.structures.type(kind)
-    numbers = numbers_of(p)
-    initialiser = c.structures.initialiser(kind, numbers)
-    return {"PARAMETERS": (type_name, initialiser)}
+def parameters_kind(c: Translator, p: BridgeParameters) -> Kind:
+    """Kind of an autopilot's parameters, declared."""
+    kind = kind_of(p)
+    c.structures.declare(kind, f"{c.structures.prefix}_parameters")
+    return kind
 
 
 def policy_data(
@@ -120,18 +162,22 @@ def policy_data(
     structures = c.structures
     structures.declare(POLICY_STATE, f"{structures.prefix}_own")
     base_state = None
+    base_paths: list[str] = []
     if policy.base is not None:
+        base_paths = leaf_paths(state_kind(policy.base))
         base_state = state_kind(policy.base)
         structures.declare(base_state, f"{structures.prefix}_base")
+    kind = parameters_kind(c, p)
     header, structures.texts = structures.texts, []
 
-    kind = kind_of(p)
     observe = c.function(policy_observations, BridgeInput, POLICY_STATE, kind)
     finish = c.function(limited, float, POLICY_STATE, kind)
     data = {
         "policy": policy,
         "state_structures": header,
         "has_base": policy.base is not None,
+        "own_paths": leaf_paths(POLICY_STATE),
+        "base_paths": base_paths,
         "observe": observe.name,
         "observe_type": structures.type(observe.returns),
         "own_observations_type": structures.type(OwnObservations),
@@ -140,7 +186,7 @@ def policy_data(
         "rows": observation_rows(policy),
         "activations": layer_activations(policy),
         "orders": ORDERS,
-        "constants": parameter_constant(c, kind, p),
+        "parameters": structures.initialiser(kind, numbers_of(p)),
     }
     if policy.action != "rudder-discrete":
         data["toward"] = c.function(toward, float, float, float).name
@@ -216,6 +262,7 @@ def state_kind(agent: Any) -> Kind:
             "memory": pilot.memory_record,
             "guidance": Nothing if guide is None else guide.memory_record,
         },
+        noted=BridgeState,
     )
 
 

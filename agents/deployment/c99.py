@@ -10,7 +10,8 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 import shipgym
-from agents.deployment.c_syntax import KEYWORDS, literal
+from agents.deployment.c_structures import Parameter
+from agents.deployment.c_syntax import KEYWORDS, comment, literal
 from agents.deployment.variables import Variables
 from shipgym import InputError
 from shipgym.trials.units import UNITS
@@ -24,6 +25,14 @@ class Source:
     ----------
     step : float
         s, of an autopilot its control interval, of a ship the longest advised step.
+    title : str
+        What was exported, in the user's own letters.
+    sha256 : str
+        Hash of the model's numbers.
+    parameters : tuple of Parameter
+        Numbers that may be set while it runs.
+    tables : tuple of str
+        Paths of the tables among the parameters.
     notes : tuple of str
         What was left out, and why.
     """
@@ -35,6 +44,10 @@ class Source:
     outputs: Variables
     step: float
     ship: bool
+    title: str
+    sha256: str
+    parameters: tuple[Parameter, ...] = ()
+    tables: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -57,12 +70,6 @@ def checked_name(name: str) -> str:
     return allowed
 
 
-def comment(text: str) -> str:
-    """A text as a comment of C may hold it."""
-    longest_title = 120
-    return re.sub(r"[^\w .,()+-]", "_", text, flags=re.ASCII)[:longest_title]
-
-
 def render(template: str, name: str = "", **data: Any) -> str:
     """A text made from one of the templates."""
     return (
@@ -75,6 +82,28 @@ def render(template: str, name: str = "", **data: Any) -> str:
             version=shipgym.__version__,
         )
     )
+
+
+def c_source(template: str, name: str, real: str = "double", **data: Any) -> str:
+    """Source in C made from a template, after the functions that it calls."""
+    body = render(template, name, real=real, **data)
+    return with_prelude(name, body, real)
+
+
+def with_prelude(name: str, body: str, real: str = "double") -> str:
+    """Text of a source after the header and the functions of the prelude it calls."""
+    return render("prelude.c.j2", name, real=real, body=body)
+
+
+def hash_text(sha256: str) -> str:
+    """A hash as it may stand in a string of C; another text is no hash."""
+    is_hash = re.fullmatch("[0-9a-f]{64}", sha256)
+    return sha256 if is_hash else "unknown"
+
+
+def _calls(text: str, function: str) -> bool:
+    """True if a text of C calls a function."""
+    return re.search(rf"\b{function}\(", text) is not None
 
 
 def single(number: float) -> str:
@@ -118,9 +147,11 @@ def _environment() -> Environment:
     )
     environment.filters |= {
         "c": literal,
+        "comment": comment,
         "floats": array,
         "deg": degrees,
         "knots": knots,
         "heading": heading,
     }
+    environment.tests["calling"] = _calls
     return environment

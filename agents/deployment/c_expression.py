@@ -3,6 +3,7 @@
 import ast
 import builtins
 import inspect
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import FunctionType, ModuleType
@@ -10,7 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.deployment.c_library import FUNCTIONS, library_call, table_entry
+from agents.deployment.c_library import (
+    function_name,
+    library_call,
+    table_entry,
+    variable_name,
+)
 from agents.deployment.c_structures import Structures
 from agents.deployment.c_syntax import (
     NUMBERS,
@@ -76,7 +82,7 @@ class ExpressionWriter:
         known = Constants(self.names).value(node)
         if isinstance(known, bool | int | float | np.number):
             kind = type(known)
-            text = literal(known.real)
+            text = literal(known.real, self.structures.real)
             return Expression(text, kind if kind in NUMBERS else float)
 
         match node:
@@ -114,7 +120,7 @@ class ExpressionWriter:
         name = node.id
         if name not in self.kinds:
             raise self.refusal(node)
-        return Expression(c_name(name), self.kinds[name])
+        return Expression(variable_name(name), self.kinds[name])
 
     def _member(self, node: ast.Attribute) -> Expression:
         record = self.expression(node.value)
@@ -123,7 +129,8 @@ class ExpressionWriter:
         if name not in kinds:
             raise self.refusal(node)
         owner = record.within(Level.ATOM)
-        return Expression(f"{owner}.{name}", kinds[name])
+        member = self.structures.label(record.kind, name).name
+        return Expression(f"{owner}.{member}", kinds[name])
 
     def _arithmetic(self, node: ast.BinOp) -> Expression:
         operator = OPERATORS.get(type(node.op))
@@ -131,24 +138,29 @@ class ExpressionWriter:
             raise self.refusal(node)
         left = self.expression(node.left)
         right = self.expression(node.right)
-        is_quotient = isinstance(node.op, ast.Div)
-        if is_quotient and left.kind is int:
-            left = Expression(f"(double)({left.text})", float)
-
-        are_integers = left.kind is int and right.kind is int
         return binary(
-            left,
+            self.as_real(left),
             operator,
-            right,
-            kind=int if are_integers else float,
+            self.as_real(right),
+            kind=float,
         )
+
+    def as_real(self, number: Expression) -> Expression:
+        """An integer as a real number; other expressions as they are."""
+        if number.kind is not int:
+            return number
+        real = self.structures.real
+        if number.text.isdigit():
+            return Expression(literal(float(number.text), real), float)
+        return Expression(f"({real})({number.text})", float, Level.SIGN)
 
     def _power(self, node: ast.BinOp) -> Expression:
         base = self.expression(node.left).text
         exponent = self.expression(node.right).text
         known = Constants(self.names).value(node.right)
         is_whole = isinstance(known, int) and known > 0
-        function = "whole_power" if is_whole else "pow"
+        power = function_name(math.pow, self.structures.real)
+        function = "whole_power" if is_whole else power
         return Expression(f"{function}({base}, {exponent})", float)
 
     def _signed(self, node: ast.UnaryOp) -> Expression:
@@ -172,7 +184,7 @@ class ExpressionWriter:
             left = right
         if len(pairs) == 1:
             return pairs[0]
-        text = " && ".join([pair.text for pair in pairs])
+        text = " && ".join([pair.within(Level.SIGN) for pair in pairs])
         return Expression(text, bool, Level.LOGIC)
 
     def _logic(
@@ -183,7 +195,7 @@ class ExpressionWriter:
         for operand in self._expressions(values):
             if operand.kind is not bool:
                 raise self.refusal(node)
-            texts.append(operand.within(Level.COMPARISON))
+            texts.append(operand.within(Level.SIGN))
         operator = OPERATORS[type(op)]
         text = f" {operator.sign} ".join(texts)
         return Expression(text, bool, operator.level)
@@ -214,10 +226,12 @@ class ExpressionWriter:
         if is_record(function):
             fields = self._arguments(node, function)
             return self._structure(fields, function)
-        if isinstance(function, FunctionType) and function not in FUNCTIONS:
+        real = self.structures.real
+        in_library = function_name(function, real) is not None
+        if isinstance(function, FunctionType) and not in_library:
             return self._function_call(node, function)
 
-        call = library_call(function, self._expressions(node.args))
+        call = library_call(function, self._expressions(node.args), real)
         if call is None:
             raise self.refusal(node)
         return call

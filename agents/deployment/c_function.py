@@ -2,19 +2,19 @@
 
 import ast
 import inspect
-import re
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import FunctionType
 from typing import Any
 
 from agents.deployment.c_expression import ExpressionWriter, Translated
+from agents.deployment.c_library import variable_name
 from agents.deployment.c_structures import Structures
 from agents.deployment.c_syntax import (
     Expression,
     Kind,
     Level,
-    c_name,
+    comment,
     members,
     stored_kind,
 )
@@ -88,18 +88,18 @@ class FunctionWriter:
                 lines.append(f"    {self._declaration(variable)};")
         for argument in passed:
             if argument not in self.used:
-                lines.append(f"    (void){c_name(argument)};")
+                lines.append(f"    (void){variable_name(argument)};")
         lines += [*statements, "}\n"]
         return "\n".join(lines), self.returns
 
     def _declaration(self, variable: str) -> str:
         type_name = self.expressions.structures.type(self.kinds[variable])
-        return f"{type_name} {c_name(variable)}"
+        return f"{type_name} {variable_name(variable)}"
 
     def _summary(self) -> str:
         """First line of the docstring, as a comment of C may have it."""
         first = self.docstring.strip().partition("\n")[0]
-        return re.sub(r"[^\w .,:;()+-]", "", first, flags=re.ASCII)
+        return comment(first)
 
     def _statements(self, body: Iterable[ast.stmt]) -> list[str]:
         lines = []
@@ -144,9 +144,11 @@ class FunctionWriter:
     def _for(self, name: str, end: ast.expr, body: Iterable[ast.stmt]) -> list[str]:
         """A loop over `range(end)`."""
         self.kinds[name] = int
-        i = c_name(name)
+        i = variable_name(name)
         number = self.expressions.expression(end)
-        bound = number.within(Level.SUM)
+        bound = number.within(Level.SIGN)
+        if number.kind is float:  # as all sums are
+            bound = f"(int){bound}"
         lines = [f"for ({i} = 0; {i} < {bound}; ++{i}) {{"]
         lines += self._statements(body)
         lines.append("}")
@@ -196,4 +198,5 @@ class FunctionWriter:
 
     def _stored(self, name: str, value: Expression) -> str:
         self.kinds[name] = stored_kind(value.kind)
-        return f"{c_name(name)} = {value.text};"
+        stored = self.expressions.as_real(value)
+        return f"{variable_name(name)} = {stored.text};"

@@ -2,16 +2,20 @@
 
 import ast
 import math
+import re
+import unicodedata
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
 
 from shipgym import InputError
 from shipgym.engine.records import field_types, is_record
 
 #: float, int, bool, a record, a table, a tuple of kinds, or a function.
 Kind: TypeAlias = Any
-NUMBERS: dict[Kind, str] = {float: "double", int: "int", bool: "int"}
+NUMBERS: dict[Kind, str] = {float: "double", int: "int", bool: "bool"}
 
 KEYWORDS = frozenset(
     [
@@ -106,10 +110,13 @@ class Expression:
 def binary(
     left: Expression, operator: Operator, right: Expression, kind: Kind
 ) -> Expression:
-    """Two operands with an operator between them, which groups from the left."""
+    """Two operands with an operator between them, which groups from the left.
+
+    Operators of other precedence are in brackets, as MISRA C 12.1 asks for.
+    """
     level = operator.level
-    first = left.within(level)
-    second = right.within(Level(level + 1))
+    first = left.text if left.level == level else left.within(Level.SIGN)
+    second = right.within(Level.SIGN)
     text = f"{first} {operator.sign} {second}"
     return Expression(text, kind, level)
 
@@ -122,9 +129,9 @@ def prefixed(sign: str, operand: Expression, kind: Kind) -> Expression:
 def choice(test: Expression, yes: Expression, no: Expression) -> Expression:
     """One of two expressions, as a condition says."""
     kind = no.kind if yes.kind is int else yes.kind
-    condition = test.within(Level.LOGIC)
-    first = yes.within(Level.LOGIC)
-    second = no.within(Level.LOGIC)
+    condition = test.within(Level.SIGN)
+    first = yes.within(Level.SIGN)
+    second = no.within(Level.SIGN)
     text = f"{condition} ? {first} : {second}"
     return Expression(text, kind, Level.CHOICE)
 
@@ -134,15 +141,45 @@ def stored_kind(kind: Kind) -> Kind:
     return float if kind is int else kind
 
 
-def literal(value: float) -> str:
-    """A number as C writes it, with all its digits."""
+def literal(value: float, real: str = "double") -> str:
+    """A number as C writes it, with all digits of its type `real`, double or float."""
+    if isinstance(value, bool | int):
+        text = repr(int(value))
+    elif real == "double":
+        text = _real_literal(value, "HUGE_VAL")
+    else:
+        with np.errstate(over="ignore"):
+            nearest = np.float32(value)
+        text = _real_literal(nearest, "HUGE_VALF", suffix="f")
+    return f"({text})" if text.startswith("-") else text
+
+
+def _real_literal(value: float | np.float32, infinite: str, suffix: str = "") -> str:
+    """A number that is no integer, with its sign."""
     if math.isnan(value):
         return "NAN"
     if math.isinf(value):
-        return "HUGE_VAL" if value > 0 else "(-HUGE_VAL)"
-    exact = int(value) if isinstance(value, bool | int) else float(value)
-    text = repr(exact)
-    return f"({text})" if text.startswith("-") else text
+        return infinite if value > 0 else f"-{infinite}"
+    shortest = str(value)  # digits that give the same number
+    return f"{shortest}{suffix}"
+
+
+def comment(text: str, longest: int = 120) -> str:
+    """A text as a comment of C may hold it, in the writer's own letters.
+
+    What would end or begin a comment, or stand for another character, is parted by a
+    space; characters that are not seen are named.
+    """
+    shown = "".join([_seen(character) for character in text])
+    if len(shown) > longest:
+        shown = f"{shown[:longest]}..."
+    return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", shown)
+
+
+def _seen(character: str) -> str:
+    """A character, or the name of one that is not seen, such as an end of line."""
+    hidden = unicodedata.category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp")
+    return f"<U+{ord(character):04X}>" if hidden else character
 
 
 def c_name(name: str) -> str:

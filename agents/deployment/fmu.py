@@ -4,7 +4,6 @@ import os
 import platform
 import shutil
 import subprocess
-import tempfile
 import uuid
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,9 +11,11 @@ from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from agents.deployment.c99 import Source, render
+from agents.deployment.c_syntax import comment
+from agents.deployment.fmu_variables import fmu_variables, unit_definitions
 from shipgym import InputError
 from shipgym.checks import check_choice
-from shipgym.drafts import atomic_path
+from shipgym.drafts import atomic_path, draft_folder
 
 
 def write_fmu(source: Source, path: str | Path, fmi: str = "3.0") -> None:
@@ -28,25 +29,42 @@ def write_fmu(source: Source, path: str | Path, fmi: str = "3.0") -> None:
     versions = ("2.0", "3.0")
     check_choice(fmi, versions, "fmi")
     path = Path(path)
-    if path.suffix != ".fmu":
-        raise InputError(
-            f"{str(path)[:200]}: expected a name that ends in .fmu, as importers do,"
-            f" got one that ends in {path.suffix[:20]!r}"
-        )
-
+    check_fmu_name(path)
     name = source.name
     files = _texts(source, fmi)
-    machine = platform.machine()
-    folder = f"{machine}-linux"
-    if fmi == "2.0" and machine == "x86_64":
-        folder = "linux64"
+    folder = _binary_folder(fmi)
+    binary = ZipInfo(f"binaries/{folder}/{name}.so")
     with atomic_path(path) as draft:
-        binary = ZipInfo(f"binaries/{folder}/{name}.so")
-        compiled = _compiled(files, name)
+        compiled = _compiled(files, name, path)
         with ZipFile(draft, "w", ZIP_DEFLATED) as archive:
             archive.writestr(binary, compiled, ZIP_DEFLATED)
             for file, text in files.items():
                 archive.writestr(ZipInfo(file), text, ZIP_DEFLATED)
+
+
+def check_fmu_name(path: Path) -> None:
+    """Refuse a file whose name importers would not take; InputError gives another."""
+    shown = str(path)[:200]
+    if path.is_dir():
+        raise InputError(
+            f"{shown}: expected a file to write to, got a folder; give a name in it,"
+            " such as ship.fmu"
+        )
+    if path.suffix != ".fmu":
+        other = path.stem if path.suffix.lower() == ".fmu" else path.name
+        better = "ship" if path.name.startswith(".") else other[:100]
+        raise InputError(
+            f"{shown}: expected a name that ends in .fmu, as importers do, got"
+            f" {path.name[:100]!r}; call it {better}.fmu"
+        )
+
+
+def _binary_folder(fmi: str) -> str:
+    """Folder of the binary for this computer, as the version of the standard has it."""
+    machine = platform.machine()
+    if fmi == "2.0" and machine == "x86_64":
+        return "linux64"
+    return f"{machine}-linux"
 
 
 def _texts(source: Source, fmi: str) -> dict[str, str]:
@@ -55,21 +73,31 @@ def _texts(source: Source, fmi: str) -> dict[str, str]:
     name = source.name
     content = source.header + source.source + fmi
     token = uuid.uuid5(uuid.NAMESPACE_URL, content)
-    title = f"Ship {name}" if source.ship else f"Autopilot {name}"
+    variables = fmu_variables(source)
+    wrapper = f"{name}_fmi.c"
     data: dict[str, Any] = {
         **vars(source),
         "fmi": version,
         "token": str(token),
-        "title": title,
+        "title": comment(source.title),
+        "wrapper": wrapper,
+        "variables": variables,
+        "units": unit_definitions(variables),
     }
     texts = {}
     for header in _headers(version):
         texts[f"sources/{header.name}"] = header.read_text(encoding="utf-8")
+    if f"sources/{name}.h" in texts:
+        raise InputError(
+            f"name: expected another than that of a header of FMI, got {name!r}; give"
+            " another with --name"
+        )
     texts |= {
         f"sources/{name}.h": source.header,
         f"sources/{name}.c": source.source,
-        "sources/fmu.c": render("fmu.c.j2", **data),
+        f"sources/{wrapper}": render("fmu.c.j2", **data),
         "modelDescription.xml": render("modelDescription.xml.j2", **data),
+        "documentation/index.html": render("documentation.html.j2", **data),
     }
     if version == 3:
         build = render("buildDescription.xml.j2", **data)
@@ -89,8 +117,11 @@ def _headers(version: int) -> list[Path]:
     return sorted(folder.glob(f"fmi{version}*.h"))
 
 
-def _compiled(files: dict[str, str], name: str) -> bytes:
-    """The shared library of the sources."""
+def _compiled(files: dict[str, str], name: str, path: Path) -> bytes:
+    """The shared library of the sources, compiled in a folder that stands by a path.
+
+    What a killed process leaves of it the next export to this place removes.
+    """
     compiler = shutil.which(os.environ.get("CC", "gcc"))
     if compiler is None or platform.system() != "Linux":
         raise InputError(
@@ -98,20 +129,29 @@ def _compiled(files: dict[str, str], name: str) -> bytes:
             " an FMU holds a binary"
         )
     flags = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")
-    command = [compiler, *flags, "fmu.c", f"{name}.c", "-o", "fmu.so", "-lm"]
+    sources = [f"{name}_fmi.c", f"{name}.c"]
+    library = f"{name}.so"
+    command = [compiler, *flags, *sources, "-o", library, "-lm"]
     compiling_s = 120.0
-    with tempfile.TemporaryDirectory() as folder:
+    with draft_folder(path.with_suffix(".build")) as folder:
         for file, text in files.items():
-            path = Path(folder, Path(file).name)
-            path.write_text(text, encoding="utf-8")
-        done = subprocess.run(
-            command,
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            timeout=compiling_s,
-            check=False,
-        )
-        if done.returncode:
+            if file.startswith("sources/"):
+                (folder / Path(file).name).write_text(text, encoding="utf-8")
+        try:
+            done = subprocess.run(
+                command,
+                cwd=folder,
+                capture_output=True,
+                text=True,
+                timeout=compiling_s,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            raise InputError(
+                f"{compiler}: expected the FMU compiled within {compiling_s:g} s, got"
+                " no end; try again when the computer is less busy"
+            ) from None
+        compiled = folder / library
+        if done.returncode or not compiled.is_file():
             raise InputError(f"{compiler}: cannot compile the FMU: {done.stderr[:400]}")
-        return Path(folder, "fmu.so").read_bytes()
+        return compiled.read_bytes()

@@ -5,7 +5,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.deployment.c99 import Source, checked_name, comment, render
+from agents.controllers.interface import model_hash
+from agents.deployment.c99 import Source, c_source, checked_name, render
+from agents.deployment.c_structures import (
+    Parameter,
+    leaf_paths,
+    parameters_of,
+    record_kind,
+)
+from agents.deployment.c_syntax import comment
+from agents.deployment.term_labels import coefficient_labels
 from agents.deployment.translator import Translator
 from agents.deployment.variables import SHIP_INPUTS, SHIP_STATES, Variables
 from shipgym import InputError, ShipModel, Weather, Wind
@@ -67,14 +76,17 @@ def steady_sea(given: ShipInput) -> Sea:
 
 
 def ship_source(
-    model: ShipModel, name: str | None = None, water_depth: float = np.inf
+    model: ShipModel,
+    name: str | None = None,
+    water_depth: float = np.inf,
+    real: str = "double",
 ) -> Source:
     """Write a ship model as C99, by default under the model's name.
 
-    `water_depth`: m. A ship with too few particulars for wind forces is written without
-    them, as `Source.notes` says. Raises InputError for a name that C does not take,
-    shallow water that the model does not know, and equations of one's own that use more
-    than arithmetic.
+    `water_depth`: m; `real`: type of her numbers, double or float. A ship with too few
+    particulars for wind forces is written without them, as `Source.notes` says. Raises
+    InputError for a name that C does not take, shallow water that the model does not
+    know, and equations of one's own that use more than arithmetic.
     """
     name = checked_name(name or model.name)
     longest = LONGEST_STEP * model.travel_time
@@ -82,8 +94,20 @@ def ship_source(
     numbers = [*model.ship_numbers(water_depth, longest), *weather]
     inputs = _inputs(model, windy=not note)
     outputs = _outputs(model)
+    c = Translator({**model.compiled.hooks(), **sea_functions(True)}, name, real)
+    c.structures.labels |= coefficient_labels(model)
+    kind = record_kind(
+        "Parameters",
+        {
+            "ship": Ship,
+            "coefficients": model.compiled.coefficients,
+            "sea": SeaParameters,
+        },
+    )
+    title = f"Ship model '{model.name}'"
     data = {
-        "title": comment(f"Ship model '{model.name}'"),
+        "title": comment(title),
+        "sha256": model_hash(model),
         "inputs": inputs,
         "outputs": outputs,
         "all_inputs": SHIP_INPUTS,
@@ -92,39 +116,58 @@ def ship_source(
         "speed": model.particulars["speed"],
         "shaft": _start(model)["shaft"],
         "limit": model.steering.limit,
-        **_translated(model, name, numbers),
+        **_translated(c, model, kind, numbers),
     }
     return Source(
         name=name,
-        header=render("ship.h.j2", name, **data),
-        source=render("ship.c.j2", name, **data),
+        header=render("ship.h.j2", name, real=real, **data),
+        source=c_source("ship.c.j2", name, real, **data),
         inputs=inputs,
         outputs=outputs,
         step=longest,
         ship=True,
+        title=title,
+        sha256=model_hash(model),
+        parameters=_tunable(c, model, kind, numbers),
+        tables=tuple(leaf_paths(kind, tables=True)),
         notes=(note,) if note else (),
     )
 
 
+def _tunable(
+    c: Translator, model: ShipModel, kind: Any, numbers: Sequence[float]
+) -> tuple[Parameter, ...]:
+    """Parameters of her steering gear and her coefficients."""
+    gear = {"ship.rudder_limit", "ship.rudder_rate"}
+    if model.compiled.lag:
+        gear.add("ship.gear_frequency")
+
+    kept = []
+    for parameter in parameters_of(c.structures, kind, iter(numbers)):
+        path = parameter.path
+        of_hull = path.startswith("coefficients.")
+        has_effect = of_hull or path in gear
+        # XML has no word for an infinite number
+        if has_effect and np.isfinite(parameter.value):
+            kept.append(parameter)
+    return tuple(kept)
+
+
 def _translated(
-    model: ShipModel, name: str, numbers: Sequence[float]
+    c: Translator, model: ShipModel, kind: Any, numbers: Sequence[float]
 ) -> dict[str, Any]:
-    """Functions, structures and constants of a ship in C, for the templates.
+    """Functions and structures of a ship in C, for the templates.
 
     `numbers`: those of the ship, her coefficients and her sea, in order.
     """
-    c = Translator({**model.compiled.hooks(), **sea_functions(True)}, name)
     structures = c.structures
-    structures.types |= {Motion: f"{name}_state", ShipInput: f"{name}_input"}
+    prefix = structures.prefix
+    structures.types |= {Motion: f"{prefix}_state", ShipInput: f"{prefix}_input"}
+    structures.declare(kind, f"{prefix}_parameters")
+    header, structures.texts = structures.texts, []
+    parameters = structures.initialiser(kind, iter(numbers))
 
     coefficients = model.compiled.coefficients
-    kinds = {"SHIP": Ship, "COEFFICIENTS": coefficients, "SEA": SeaParameters}
-    left = iter(numbers)
-    constants = {}
-    for constant, kind in kinds.items():
-        type_name = structures.type(kind)
-        constants[constant] = (type_name, structures.initialiser(kind, left))
-
     step = c.function(
         advance,
         Motion,
@@ -140,7 +183,9 @@ def _translated(
     at_start = [start.get(state, 0.0) for state in Motion._fields]
     return {
         "begin": structures.initialiser(Motion, iter(at_start)),
-        "constants": constants,
+        "parameters": parameters,
+        "parameter_structures": header,
+        "state_paths": leaf_paths(Motion),
         "structures": structures.texts,
         "functions": c.functions,
         "advance": step.name,

@@ -23,6 +23,8 @@ class Translator:
         What takes the place of globals of the engine's functions.
     prefix : str
         Beginning of every name in C.
+    real : str
+        Type of C for numbers, double or float.
 
     Attributes
     ----------
@@ -31,9 +33,11 @@ class Translator:
         Definitions in an order in which C can read them.
     """
 
-    def __init__(self, hooks: Mapping[str, Any], prefix: str) -> None:
+    def __init__(
+        self, hooks: Mapping[str, Any], prefix: str, real: str = "double"
+    ) -> None:
         self.hooks = hooks
-        self.structures = Structures(prefix)
+        self.structures = Structures(prefix, real)
         self.functions: list[str] = []
         # None while a function is being written
         self._translated: dict[Any, Translated | None] = {}

@@ -11,9 +11,15 @@ class Variable(NamedTuple):
     meaning: str
     start: float = 0.0  # value at the beginning
 
+    @property
+    def largest(self) -> float:
+        """Largest magnitude that is taken; beyond it a number is no measurement."""
+        # far beyond ships, but small enough to compute with
+        by_unit = {"m": 1e8, "rad": 1e4, "m/s": 1e3, "rad/s": 1e2, "1/s": 1e4}
+        return by_unit[self.unit]
+
 
 Variables = Mapping[str, Variable]
-
 
 #: Given to an exported ship, held over a step.
 SHIP_INPUTS: Variables = {

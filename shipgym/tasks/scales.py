@@ -1,29 +1,38 @@
 """Control interval, and scales in which every autopilot observes a ship.
 
-Both follow from the ship alone, so that a design needs no task.
+All follow from the ship alone, so that a design reads no task. The tasks of steering
+take theirs from here.
 """
 
-from typing import NamedTuple
+from math import radians
 
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.engine.records import field_types
-from shipgym.ships.manoeuvring_model import ship_of
 from shipgym.ships.ship_model import ShipModel
-from shipgym.tasks.contract import ObservationSpec
-from shipgym.tasks.steering import SteeringSignals, Weights
 
 #: Control intervals in the time to travel one ship length, about.
 STEPS_PER_LENGTH = 20.0
+#: Weights of the steering cost: of a rudder angle as large as the heading error, and of
+#: a rudder rate of that angle per ship length sailed.
+RUDDER_WEIGHT = 0.1
+RATE_WEIGHT = 0.01
+#: Largest heading error that is integrated, degrees and rad.
+INTEGRAL_ZONE_DEG = 10.0
+INTEGRAL_ZONE = radians(INTEGRAL_ZONE_DEG)
+#: Bound of that integral: the zone, over the time to travel so many ship lengths.
+INTEGRAL_LENGTHS = 10.0
 #: Names of the observations of every autopilot, in order.
-OBSERVATION_NAMES: tuple[str, ...] = SteeringSignals._fields
-
-
-class _Settings(NamedTuple):
-    """Default settings on which the scales depend, besides the ship."""
-
-    weights: Weights = Weights()
+OBSERVATION_NAMES = (
+    "heading_error_sin",
+    "heading_error_cos",
+    "yaw_rate",
+    "sway",
+    "surge",
+    "rudder",
+    "last_command",
+    "heading_error_integral",
+)
 
 
 def observation_scales(model: ShipModel) -> Floats:
@@ -34,16 +43,21 @@ def observation_scales(model: ShipModel) -> Floats:
     array of shape (8,)
         SI units.
     """
-    ship = ship_of(model)
-    settings = _Settings()
-    scales = []
-    for annotation in field_types(SteeringSignals, notes=True).values():
-        spec: ObservationSpec = annotation.__metadata__[0]
-        scale = spec.scale
-        if callable(scale):
-            scale = scale(ship, settings)
-        scales.append(scale)
-    return np.array(scales)
+    length = model.particulars["length"]
+    speed = model.particulars["speed"]
+    largest_integral = INTEGRAL_ZONE * INTEGRAL_LENGTHS * length / speed
+    rudder_limit = model.steering.limit
+    scales = {
+        "heading_error_sin": 1.0,
+        "heading_error_cos": 1.0,
+        "yaw_rate": speed / length,
+        "sway": speed,
+        "surge": speed,
+        "rudder": rudder_limit,
+        "last_command": rudder_limit,
+        "heading_error_integral": largest_integral,
+    }
+    return np.array([scales[name] for name in OBSERVATION_NAMES])
 
 
 def control_interval(model: ShipModel) -> float:

@@ -11,6 +11,12 @@ from typing import Annotated, Any, NamedTuple
 from shipgym.engine.mathematics import clip, pick, sin_cos
 from shipgym.engine.motion import Motion, Ship
 from shipgym.tasks.contract import Interval, ObservationSpec, Readings, Setting
+from shipgym.tasks.scales import (
+    INTEGRAL_LENGTHS,
+    INTEGRAL_ZONE_DEG,
+    RATE_WEIGHT,
+    RUDDER_WEIGHT,
+)
 
 
 class Weights(NamedTuple):
@@ -25,14 +31,14 @@ class Weights(NamedTuple):
     ] = 30.0
     rudder_weight: Annotated[
         float, Setting("Cost of a rudder angle of one heading scale.", at_least=0.0)
-    ] = 0.1
+    ] = RUDDER_WEIGHT
     rudder_rate_weight: Annotated[
         float,
         Setting(
             "Cost of a rudder rate of one heading scale per ship length sailed.",
             at_least=0.0,
         ),
-    ] = 0.01
+    ] = RATE_WEIGHT
     roll_weight: Annotated[
         float, Setting("Cost of a step with a heel of one roll scale.", at_least=0.0)
     ] = 0.0
@@ -44,22 +50,19 @@ class Weights(NamedTuple):
     ] = 0.0
     integral_zone_deg: Annotated[
         float, Setting("Largest heading error that is integrated, degrees.", above=0.0)
-    ] = 10.0
+    ] = INTEGRAL_ZONE_DEG
     integral_lengths: Annotated[
         float,
         Setting(
             "Scale and bound of that integral: the zone times this many ship lengths.",
             above=0.0,
         ),
-    ] = 10.0
+    ] = INTEGRAL_LENGTHS
 
 
 DEFAULTS = Weights()
 HEADING_SCALE = radians(DEFAULTS.heading_scale_deg)
 ROLL_SCALE = radians(DEFAULTS.roll_scale_deg)
-INTEGRAL_ZONE = radians(DEFAULTS.integral_zone_deg)
-RUDDER_WEIGHT = DEFAULTS.rudder_weight
-RATE_WEIGHT = DEFAULTS.rudder_rate_weight
 
 
 class SteeringReward(NamedTuple):

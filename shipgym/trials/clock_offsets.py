@@ -230,13 +230,32 @@ def reverses(values: Floats, least: float = 0.0) -> bool:
 
     A single step shows no delay.
     """
-    low, high = np.quantile(values, [0.02, 0.98])
-    span = high - low
-    if span <= least:
+    low, high = _usual_range(values)
+    if high - low <= least:
         return False
-    middle = 0.5 * (low + high)
-    from_middle = values - middle
-    is_far = np.abs(from_middle) > 0.25 * span
-    sides = np.sign(from_middle[is_far])
-    changes = np.diff(sides)
+    sides = _sides(values)
+    changes = np.diff(sides[sides != 0.0])
     return bool(np.count_nonzero(changes) >= 3)
+
+
+def cycle_time(t: Floats, values: Floats) -> float:
+    """Usual time from there and back to there of a channel that reverses, s."""
+    sides = _sides(values)
+    is_far = sides != 0.0
+    has_changed = np.diff(sides[is_far]) != 0.0
+    changes = t[is_far][1:][has_changed]
+    return 2.0 * float(np.median(np.diff(changes)))
+
+
+def _usual_range(values: Floats) -> tuple[float, float]:
+    """Least and largest value, without a few that are out of the usual."""
+    low, high = np.quantile(values, [0.02, 0.98])
+    return float(low), float(high)
+
+
+def _sides(values: Floats) -> Floats:
+    """Side of the middle on which values are: 1, -1, or 0 near the middle."""
+    low, high = _usual_range(values)
+    from_middle = values - 0.5 * (low + high)
+    is_far = np.abs(from_middle) > 0.25 * (high - low)
+    return np.where(is_far, np.sign(from_middle), 0.0)

@@ -1,24 +1,27 @@
 """Late yaw rate and rudder in a log, and a rudder of the wrong sign."""
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
 from shipgym.trials.clock_offsets import (
+    LONGEST_DELAY_S,
     ClockOffset,
     clock_offset,
+    cycle_time,
     reverses,
     rudder_clock_offset,
 )
-from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.plausibility.refusal import Proposal, implausible
 from shipgym.trials.resampling import Log
 from shipgym.trials.units import DEGREE
 
-CERTAIN = 5.0  # standard errors by which a channel must explain the other
+CERTAIN = 6.0  # standard errors by which a channel must explain the other
+CERTAIN_DERIVED = 10.0  # where the yaw rate is the derivative of a heading with noise
 
 
 class _Comparison(NamedTuple):
@@ -26,13 +29,12 @@ class _Comparison(NamedTuple):
 
     name: str
     target: str
-    dynamics_s: float  # by which ships of other dynamics seem late: a standard error
-    refused_s: float  # delay on one clock that is refused
+    refused_s: float  # delay on one clock, less its error, that is refused
 
 
 _COMPARISONS = {
-    "r": _Comparison("the yaw rate", "the heading", 0.25, 1.0),
-    "delta": _Comparison("the rudder", "the yaw acceleration", 1.0, 2.0),
+    "r": _Comparison("the yaw rate", "the heading", 1.0),
+    "delta": _Comparison("the rudder", "the yaw acceleration", 1.5),
 }
 
 
@@ -58,7 +60,7 @@ class LateChannel(NamedTuple):
     def is_small(self) -> bool:
         """True if the delay is left uncorrected on one clock by default."""
         comparison = _COMPARISONS[self.channel]
-        return abs(self.delay) <= comparison.refused_s
+        return abs(self.delay) - self.error <= comparison.refused_s
 
 
 def find_late_channels(log: Log) -> list[LateChannel]:
@@ -67,18 +69,100 @@ def find_late_channels(log: Log) -> list[LateChannel]:
     Raises InputError for a rudder of the wrong sign, which is judged by a yaw rate only
     where this does not contradict the heading.
     """
-    significant = 2.5  # standard errors
+    found = _suspects(log)
+    if not found:
+        return []
+    believed = []
+    for suspect in found:
+        delays = _delays_with_more_noise(log, suspect.channel)
+        if _holds(suspect, delays):
+            believed.append(suspect)
+    return believed
+
+
+def _suspects(log: Log) -> list[LateChannel]:
+    """Channels that one log, as it stands, shows late by more than its errors."""
     rate = _rate_offset(log)
     rudder = _rudder_offset(log, rate)
     late = []
-    for channel, offset in {"r": rate, "delta": rudder}.items():
-        if offset is None or offset.certainty < CERTAIN:
-            continue
-        comparison = _COMPARISONS[channel]
-        error = math.hypot(offset.error, comparison.dynamics_s)
-        if abs(offset.late) >= significant * error:
-            late.append(LateChannel(channel, offset.late, error))
-    return late
+    if rate is not None and rate.certainty >= CERTAIN:
+        late.append(_late("r", rate, dynamics_s=0.25))
+
+    needed = CERTAIN if log.has("r") else CERTAIN_DERIVED
+    if rudder is not None and rudder.certainty >= needed:
+        # by which slow ships of other dynamics seem late
+        cycle = cycle_time(log.t, log.channels["delta"])
+        suspect = _late("delta", rudder, dynamics_s=max(1.0, cycle / 300.0))
+        # an early rudder looks like that of a ship which answers slowly
+        longest = cycle / 18.0 if suspect.delay > 0.0 else cycle / 30.0
+        if abs(suspect.delay) <= min(longest, 0.9 * LONGEST_DELAY_S):
+            late.append(suspect)
+
+    significant = 2.5  # standard errors
+    return [one for one in late if abs(one.delay) >= significant * one.error]
+
+
+def _late(channel: str, offset: ClockOffset, dynamics_s: float) -> LateChannel:
+    """Delay of a channel; `dynamics_s` is a standard error by the ship's dynamics."""
+    error = math.hypot(offset.error, dynamics_s)
+    return LateChannel(channel, offset.late, error)
+
+
+def _holds(suspect: LateChannel, delays: Floats) -> bool:
+    """Return whether the delay is still there with more noise, and none of its making.
+
+    What noise does to a delay it does again when as much is added (simulation
+    extrapolation: Cook & Stefanski 1994), so the delay without noise is the first one
+    less the change.
+    """
+    found = delays[np.isfinite(delays)]
+    if found.size < 0.75 * delays.size:
+        return False
+    middle = float(np.median(found))
+    change = middle - suspect.delay
+    spread = float(np.std(found))
+    return math.hypot(change, spread) < 0.4 * abs(suspect.delay)
+
+
+def _delays_with_more_noise(log: Log, channel: str) -> Floats:
+    """Delays of a channel in copies of a log with its own noise added once more, s.
+
+    NaN where a copy shows none.
+    """
+    n_copies = 8
+    random = np.random.default_rng(0)
+    names = [name for name in ("psi", "r", "delta") if log.has(name)]
+    delays = np.full(n_copies, np.nan)
+    for copy in range(n_copies):
+        channels = dict(log.channels)
+        for name in names:
+            values = log.channels[name]
+            noise = white_noise(values) * random.standard_normal(values.size)
+            channels[name] = values + noise
+        noisy = replace(log, channels=channels)
+        offset = _offset_of(noisy, channel)
+        if offset is not None:
+            delays[copy] = offset.late
+    return delays
+
+
+def _offset_of(log: Log, channel: str) -> ClockOffset | None:
+    """Delay of one channel; None too where the rudder seems to have the wrong sign."""
+    rate = _rate_offset(log)
+    if channel == "r":
+        return rate
+    try:
+        return _rudder_offset(log, rate)
+    except InputError:
+        return None
+
+
+def white_noise(values: Floats) -> float:
+    """Standard deviation of white noise on a smooth signal, by fourth differences."""
+    of_one = 1.4826  # standard deviation of a normal number by its median magnitude
+    gain = math.sqrt(1.0 + 16.0 + 36.0 + 16.0 + 1.0)
+    differences = np.diff(values, n=4)
+    return of_one * float(np.median(np.abs(differences))) / gain
 
 
 def is_corrected(
@@ -127,7 +211,12 @@ def _rudder_offset(log: Log, rate: ClockOffset | None) -> ClockOffset | None:
         check_circle(log)
         return None
 
-    r = _rate_on_heading_clock(log, rate)
+    if log.has("r"):
+        r = _rate_on_heading_clock(log, rate)
+    else:
+        # the same mean for both, so that one follows the other as before
+        r = _window_mean(log.t, log.channels["psi"])
+        delta = _window_mean(log.t, integral(log.t, delta))
     rudder = rudder_clock_offset(log.t, r, delta)
     if _is_against(rudder) and not _is_against(rate):
         without_history = clock_offset(log.t, r, delta, {"r": r})
@@ -136,11 +225,17 @@ def _rudder_offset(log: Log, rate: ClockOffset | None) -> ClockOffset | None:
     return rudder
 
 
+def _window_mean(t: Floats, total: Floats) -> Floats:
+    """Mean over windows of 5 s of what adds up to a total, about each sample."""
+    half = 2.5  # s
+    before = np.interp(t - half, t, total)
+    after = np.interp(t + half, t, total)
+    mean: Floats = (after - before) / (2.0 * half)
+    return mean
+
+
 def _rate_on_heading_clock(log: Log, rate: ClockOffset | None) -> Floats:
     """Yaw rate with its own delay taken out, rad/s."""
-    if not log.has("r"):
-        psi = log.channels["psi"]
-        return time_derivative(log.t, psi)
     r = log.channels["r"]
     if rate is None:
         return r

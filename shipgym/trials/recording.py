@@ -1,5 +1,6 @@
 """Conversion of a table's columns to channels in SI units, each on its clock."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -13,7 +14,7 @@ from shipgym.trials.clock_texts import read_clock, zone_seconds
 from shipgym.trials.columns import Column, Locator, choose_columns
 from shipgym.trials.missing_values import check_time, fill_missing
 from shipgym.trials.navigation import local_metres
-from shipgym.trials.plausibility.headings import check_heading
+from shipgym.trials.plausibility.headings import check_heading, without_spikes
 from shipgym.trials.plausibility.positions import (
     check_outliers,
     check_track,
@@ -150,6 +151,10 @@ def _signals(
     """
     filled: dict[str, int] = {}
     signals: Signals = {}
+    if "psi" in channels:
+        channels["psi"], spikes = without_spikes(channels["psi"])
+        if spikes:
+            filled["psi"] = spikes
     table = {"t": t, **channels}
     columns = np.array(list(table.values()))
     is_whole = bool(np.isfinite(columns).all())
@@ -163,7 +168,8 @@ def _signals(
     if is_whole:
         check_time(t, locator)
     else:
-        t, channels, locator, filled = fill_missing(t, channels, locator, repair)
+        t, channels, locator, missing = fill_missing(t, channels, locator, repair)
+        filled = dict(Counter(filled) + Counter(missing))
     check_ranges({"t": t, **channels}, locator)
     for channel, values in channels.items():
         continuous = _continuous(channel, t, values, locator)

@@ -1,11 +1,22 @@
 """FMUs are valid for FMPy and simulate as the library does."""
 
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
 from zipfile import ZipFile
 
 import fmpy
 import numpy as np
 import pytest
-from fmpy import validation
+from fmpy import fmi2, fmi3, validation
 
 from agents import LQ, TurnRate, WheelOver
 from agents.deployment import fmu
@@ -13,6 +24,7 @@ from agents.deployment.autopilot import Autopilot
 from agents.deployment.autopilot_c99 import autopilot_source
 from agents.deployment.fmu import write_fmu
 from agents.deployment.ship_c99 import ship_source
+from agents.deployment.units_text import unit_powers
 from shipgym.errors import InputError
 from shipgym.sea import Current, Weather, Wind
 from shipgym.tasks.task import Task
@@ -101,7 +113,7 @@ def test_what_is_in_the_way_and_what_is_missing_is_said(tmp_path, monkeypatch):
     source = autopilot_source(LQ.from_model(MARINER), "lq")
     (tmp_path / "lq.fmu").mkdir()
     with pytest.raises(
-        InputError, match=r"lq\.fmu: is not a file; choose another name"
+        InputError, match=r"lq\.fmu: expected a file to write to, got a folder"
     ):
         write_fmu(source, tmp_path / "lq.fmu")
     with pytest.raises(InputError, match=r"fmi: expected one of '2\.0', '3\.0'"):
@@ -139,7 +151,7 @@ def test_a_binary_stands_where_the_standard_has_it_beside_its_sources(
 ):
     """Written twice it is the same to the byte; of FMI 3.0 it says how it was built."""
     monkeypatch.setattr(fmu.platform, "machine", lambda: machine)
-    monkeypatch.setattr(fmu, "_compiled", lambda files, name: b"binary")
+    monkeypatch.setattr(fmu, "_compiled", lambda *_: b"binary")
     source = autopilot_source(PILOTS["lq"], "lq")
     for name in ("one.fmu", "two.fmu"):
         write_fmu(source, tmp_path / name, version)
@@ -149,5 +161,253 @@ def test_a_binary_stands_where_the_standard_has_it_beside_its_sources(
         names = set(archive.namelist())
         assert archive.read("sources/lq.c").decode() == source.source
     assert ("sources/buildDescription.xml" in names) == (version == "3.0")
-    assert {"modelDescription.xml", "sources/fmu.c", "sources/lq.h"} < names
+    assert {"modelDescription.xml", "sources/lq_fmi.c", "sources/lq.h"} < names
     assert any(name.endswith("FunctionTypes.h") for name in names)
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_parameters_take_effect(version, tmp_path):
+    path = tmp_path / "lq.fmu"
+    lq = PILOTS["lq"]
+    source = autopilot_source(lq, "lq")
+    write_fmu(source, path, version)
+    given = {one: BY_A_BRIDGE[one] for one in source.inputs}
+    tuned = {"law.gains.heading_error": 2.5, "law.neutral_rudder": 0.01}
+    found = run(path, given, given.values(), start_values={**tuned, "limit": 0.2})
+    gains = {**lq.gains, "heading_error": 2.5}
+    bridge = Autopilot(replace(lq, gains=gains, neutral_rudder=0.01))
+    bridge.largest = 0.2
+    orders = np.repeat([bridge.step(given) for _ in range(STEPS // 2)], 2)
+    np.testing.assert_allclose(found["order"][1:], orders, rtol=0.0, atol=1e-12)
+    assert np.abs(orders).max() == 0.2
+
+    path = tmp_path / "ship.fmu"
+    write_fmu(ship_source(MARINER, "ship"), path, version)
+    turning = {"rudder": RUDDER}
+    slow = run(path, turning, turning.values(), start_values={"ship.rudder_rate": 0.01})
+    assert slow["delta"][20] == pytest.approx(0.01 * 20 * DT)
+    held = run(path, turning, turning.values(), start_values={"ship.rudder_limit": 0.1})
+    assert held["delta"].max() == pytest.approx(0.1, rel=1e-6)
+    hull = [one for one in known(path) if one.startswith("coefficients.rdot_")]
+    assert len(hull) > 10
+    straight = run(
+        path,
+        turning,
+        turning.values(),
+        start_values=dict.fromkeys(hull, 0.0),
+    )
+    assert np.ptp(straight["psi"]) == 0.0
+
+
+def known(path):
+    """Variables of an FMU by name."""
+    description = fmpy.read_model_description(str(path))
+    return {one.name: one for one in description.modelVariables}
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_the_description_has_base_units_and_the_documentation_the_users_letters(
+    version, tmp_path
+):
+    path = tmp_path / "pilot.fmu"
+    name = "Elise <\"&'> Großsegler \x00 ]]>"
+    write_fmu(autopilot_source(replace(PILOTS["lq"], model_name=name)), path, version)
+    assert validation.validate_fmu(str(path)) == []
+    description = fmpy.read_model_description(str(path))
+    bases = {one.name: one.baseUnit for one in description.unitDefinitions}
+    powers = {unit: (base.m, base.s, base.rad) for unit, base in bases.items()}
+    assert powers["rad/s"] == (0, -1, 1)
+    assert powers["rad s/m"] == (-1, 1, 1)
+    assert powers["rad s"] == (0, 1, 1)
+    units = {one.unit for one in description.modelVariables} - {None}
+    assert units <= powers.keys()
+    with ZipFile(path) as archive:
+        page = archive.read("documentation/index.html").decode()
+    assert "Elise &lt;&#34;&amp;&#39;&gt; Großsegler &lt;U+0000&gt; ]]&gt;" in page
+    assert all(f"<td>{one}</td>" in page for one in known(path) if one != "time")
+
+
+def test_units_are_powers_of_base_units():
+    assert unit_powers("rad per rad/s") == {"s": 1}
+    assert unit_powers("rad s/m") == {"rad": 1, "s": 1, "m": -1}
+    assert unit_powers("kg m^2/s2") == {"kg": 1, "m": 2, "s": -2}
+    assert unit_powers("1/s") == {"s": -1}
+    for text in ("share of the way", "", "rad, of heel", "knots"):
+        assert unit_powers(text) is None
+
+
+@pytest.fixture(scope="module", params=["2.0", "3.0"])
+def logged(request, tmp_path_factory):
+    """An instance of a ship of each version, and the messages that it logs."""
+    path = tmp_path_factory.mktemp("logged") / "ship.fmu"
+    write_fmu(ship_source(MARINER, "ship"), path, request.param)
+    messages = []
+
+    def write(*arguments):
+        status, category, message = arguments[-3:]
+        messages.append((status, category.decode(), message.decode()))
+
+    description = fmpy.read_model_description(str(path))
+    kind = {"2.0": fmi2.FMU2Slave, "3.0": fmi3.FMU3Slave}[request.param]
+    given = {
+        "guid": description.guid,
+        "modelIdentifier": "ship",
+        "unzipDirectory": fmpy.extract(str(path)),
+    }
+    unit = kind(**given)
+    if request.param == "2.0":
+        functions = fmi2.fmi2CallbackFunctions()
+        functions.logger = fmi2.fmi2CallbackLoggerTYPE(write)
+        how = {"callbacks": functions}
+        unit.real, unit.keep = unit.setReal, unit.getFMUstate
+        unit.begin, unit.read = unit.setupExperiment, unit.deSerializeFMUstate
+        unit.integer = unit.getInteger
+    else:
+        how = {"logMessage": write}
+        unit.real, unit.keep = unit.setFloat64, unit.getFMUState
+        unit.begin, unit.read = unit.enterInitializationMode, unit.deserializeFMUState
+        unit.integer = unit.getInt32
+    unit.instantiate(**how)
+    unit.begin()
+    unit.refused = lambda: kind(**(given | {"guid": "another"})).instantiate(**how)
+    yield unit, known(path), messages
+    unit.freeInstance()
+
+
+WRONG = {
+    "unknown variable": (lambda u, k: u.real([999], [0.0]), "expected 0 to .*got 999"),
+    "no number": (
+        lambda u, k: u.real([k["rudder"].valueReference], [np.nan]),
+        "rudder: expected a finite number, got",
+    ),
+    "negative limit": (
+        lambda u, k: u.real([k["ship.rudder_limit"].valueReference], [-0.5]),
+        "ship.rudder_limit: expected 0 or more, got -0.5",
+    ),
+    "time": (lambda u, k: u.real([0], [1.0]), "time: expected to be set by the steps"),
+    "backwards": (lambda u, k: u.doStep(0.0, -1.0), "expected a finite time.*got 0 s"),
+    "integer": (lambda u, k: u.integer([1]), "floating-point.*got 1 of type Int"),
+    "foreign state": (lambda u, k: u.read(b"12"), "state: expected .* bytes, got 2"),
+    "another": (lambda u, k: u.refused(), "token: expected .*got another; the model"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_why_a_function_of_an_fmu_fails_is_logged(name, logged):
+    unit, variables, messages = logged
+    call, reason = WRONG[name]
+    messages.clear()
+    with pytest.raises(Exception):  # noqa: B017, PT011 - FMPy's, of several kinds
+        call(unit, variables)
+    ((status, category, message),) = messages
+    assert (status, category) == (3, "logStatusError")
+    assert re.search(reason, message)
+
+
+def test_a_ship_that_runs_away_says_so(logged):
+    unit, variables, messages = logged
+    messages.clear()
+    unit.real([variables["u"].valueReference], [900.0])
+    with pytest.raises(Exception):  # noqa: B017, PT011 - FMPy's, of several kinds
+        unit.doStep(0.0, 1.0)
+    assert "the ship has run away or capsized" in messages[-1][2]
+
+
+OSP = Path(__file__).parents[2] / "examples" / "osp" / "OspSystemStructure.xml"
+
+
+@pytest.fixture
+def osp(tmp_path):
+    """Folder of the example of the Open Simulation Platform with its FMUs."""
+    pilot = autopilot_source(LQ.from_model(MARINER), "pilot")
+    write_fmu(ship_source(MARINER, "ship"), tmp_path / "ship.fmu", "2.0")
+    write_fmu(pilot, tmp_path / "pilot.fmu", "2.0")
+    shutil.copy(OSP, tmp_path)
+    return tmp_path
+
+
+def test_the_osp_example_names_variables_that_there_are(osp):
+    space = {"": "http://opensimulationplatform.com/MSMI/OSPSystemStructure"}
+    structure = ElementTree.parse(osp / OSP.name)
+    variables = {}
+    for one in structure.iterfind(".//Simulator", space):
+        variables[one.get("name")] = known(osp / one.get("source"))
+        for value in one.iterfind(".//InitialValue", space):
+            assert value.get("variable") in variables[one.get("name")]
+    connected = list(structure.iterfind(".//VariableConnection", space))
+    for output, given in connected:
+        units = set()
+        for end, causality in ((output, "output"), (given, "input")):
+            variable = variables[end.get("simulator")][end.get("name")]
+            assert variable.causality == causality
+            units.add(variable.unit)
+        assert len(units) == 1
+    assert {one.get("name") for _, one in connected} == {
+        *(name for name in ("heading", "yaw_rate", "sway", "rudder"))
+    }
+
+
+def test_libcosim_runs_the_osp_example(osp):
+    execution_module = pytest.importorskip("libcosimpy.CosimExecution")
+    observer_module = pytest.importorskip("libcosimpy.CosimObserver")
+    execution = execution_module.CosimExecution.from_osp_config_file(str(osp))
+    observer = observer_module.CosimObserver.create_last_value()
+    execution.add_observer(observer)
+    assert execution.simulate_until(300 * 10**9)
+    ship = execution.slave_index_from_instance_name("ship")
+    names = {
+        one.name.decode(): one.reference for one in execution.slave_variables(ship)
+    }
+    references = [names[one] for one in ("psi", "ship.rudder_rate")]
+    heading, rate = observer.last_real_values(ship, references)
+    assert heading == pytest.approx(0.5, abs=0.02)
+    assert rate == 0.05
+
+
+@pytest.mark.parametrize("name", [signal.SIGTERM, signal.SIGKILL])
+def test_a_killed_export_leaves_nothing_half_written(name, tmp_path):
+    compiler = tmp_path / "slow"
+    compiler.write_text("#!/bin/sh\nsleep 20\n")
+    compiler.chmod(0o700)
+    out = tmp_path / "out"
+    out.mkdir()
+    command = ["export", "mariner", "--fmu", f"{out}/ship.fmu", "--name", "ship"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "agents.cli", *command],
+        env={**os.environ, "CC": str(compiler)},
+        start_new_session=True,
+    )
+    while not list(out.glob(".*/ship.c")):
+        assert process.poll() is None
+        time.sleep(0.05)
+    process.send_signal(name)
+    code = process.wait()
+    left = list(out.iterdir())
+    if name == signal.SIGTERM:
+        assert (code, left) == (128 + name, [])
+    else:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, name)  # its compiler
+        assert all(one.name.endswith(".draft") for one in left)
+    write_fmu(ship_source(MARINER, "ship"), out / "ship.fmu")
+    assert [one.name for one in out.iterdir()] == ["ship.fmu"]
+
+
+@pytest.mark.parametrize(
+    ("name", "better"),
+    [("fmu", "fmu.fmu"), (".fmu", "ship.fmu"), ("a.FMU", "a.fmu"), ("b.c", "b.c.fmu")],
+)
+def test_an_fmu_of_another_ending_is_refused_with_a_better_name(name, better, tmp_path):
+    with pytest.raises(InputError, match=f"ends in .fmu.*; call it {better}$"):
+        write_fmu(autopilot_source(PILOTS["lq"], "lq"), tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_names_of_c_that_an_fmu_has_itself(tmp_path):
+    pilot = autopilot_source(PILOTS["lq"], "fmu")
+    write_fmu(pilot, tmp_path / "fmu.fmu")
+    assert validation.validate_fmu(str(tmp_path / "fmu.fmu")) == []
+    with pytest.raises(
+        InputError, match="name: expected another than that of a header"
+    ):
+        write_fmu(autopilot_source(PILOTS["lq"], "fmi3Functions"), tmp_path / "a.fmu")

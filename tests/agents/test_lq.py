@@ -14,8 +14,7 @@ from agents.controllers.lq import SteeringCost, lq_gain
 from shipgym.errors import InputError
 from shipgym.ships.conversions import nomoto, nomoto2_ship
 from shipgym.ships.steering import SteeringGear
-from shipgym.tasks.scales import control_interval
-from shipgym.tasks.steering import RUDDER_WEIGHT
+from shipgym.tasks.scales import RUDDER_WEIGHT, control_interval
 from tests.agents.mariners import (
     HARD_TO_STEER,
     LENGTH_TIME,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from agents.deployment.c99 import render
+from agents.deployment.c99 import with_prelude
 from agents.deployment.c_structures import kind_of, numbers_of
 from agents.deployment.c_syntax import c_name, literal
 from agents.deployment.translator import Translator
@@ -18,20 +18,22 @@ from tests.agents.compiling import built
 LIMIT, EXACT = 3, True
 
 
-def compiled(folder, functions):
+def compiled(folder, functions, real="double"):
     """Functions of one number, written as C and compiled."""
-    c = Translator({}, "it")
+    c = Translator({}, "it", real)
     lines = []
     for k, function in enumerate(functions):
         name = c.function(function, float).name
-        head = f"double f{k}(double x)"
+        head = f"{real} f{k}({real} x)"
         lines += [f"{head};", f"{head} {{ return {name}(x); }}"]
-    text = [render("prelude.c.j2", "it"), *c.structures.texts, *c.functions, *lines]
-    library = built(folder, "it", "", "\n".join(text))
+    body = [*c.structures.texts, *c.functions, *lines]
+    text = with_prelude("it", "\n".join(body), real)
+    library = built(folder, "it", "", text)
     found = []
     for k in range(len(functions)):
         in_c = getattr(library, f"f{k}")
-        in_c.restype, in_c.argtypes = ctypes.c_double, [ctypes.c_double]
+        number = ctypes.c_double if real == "double" else ctypes.c_float
+        in_c.restype, in_c.argtypes = number, [number]
         found.append(in_c)
     return found
 
@@ -70,7 +72,7 @@ def either(x):
 
 def summed(x):
     total = 0.0
-    for k in range(LIMIT):
+    for k in range(LIMIT + 1):
         total = total + x * (k + 1) / 2 - k / 2
     return total
 
@@ -138,7 +140,22 @@ def applied(x, function):
     return function(x + 0.3)
 
 
+def by_the_engine(x):
+    sine, cosine = mathematics.sin_cos(mathematics.wrap(3.0 * x))
+    grown = mathematics.exponential(x) + mathematics.two_to(-x * x)
+    return 2.0 * sine + cosine + grown * mathematics.arctan(x)
+
+
+def named_as_in_c(x):
+    sign = np.sign(x)
+    exp = np.exp(-abs(x))
+    clip = np.clip(x, -exp, exp)
+    fabsf, rest = abs(sign), 3
+    return sign + exp * clip + fabsf + rest
+
+
 PLAIN = [
+    named_as_in_c,
     within,
     either,
     summed,
@@ -158,6 +175,15 @@ def test_each_construct_of_python_is_the_same_in_c(tmp_path):
     for in_c, plain in zip(compiled(tmp_path, PLAIN), PLAIN, strict=True):
         for x in (-3.0, -1.3, -1.0, -0.4, 0.0, 0.3, 0.7, 1.0, 1.9, 2.0, 2.6):
             expected = pytest.approx(plain(x), rel=1e-15, abs=1e-15)
+            assert in_c(x) == expected, (plain.__name__, x)
+
+
+def test_in_single_precision_they_are_the_same_within_it(tmp_path):
+    functions = [*PLAIN, by_the_engine]
+    found = compiled(tmp_path, functions, "float")
+    for in_c, plain in zip(found, functions, strict=True):
+        for x in (-2.9, -1.25, -0.35, 0.25, 0.65, 1.85, 2.55):
+            expected = pytest.approx(plain(x), rel=3e-6, abs=3e-6)
             assert in_c(x) == expected, (plain.__name__, x)
 
 
@@ -182,14 +208,9 @@ def test_tables_are_interpolated_as_numpy_does(tmp_path):
     constant = f"static const {type_name} CURVE = {value};"
     head = "double f(double x)"
     public = [f"{head};", f"{head} {{ return {name}(x, CURVE); }}"]
-    text = [
-        render("prelude.c.j2", "it"),
-        *c.structures.texts,
-        constant,
-        *c.functions,
-        *public,
-    ]
-    in_c = built(tmp_path, "it", "", "\n".join(text)).f
+    body = [*c.structures.texts, constant, *c.functions, *public]
+    text = with_prelude("it", "\n".join(body))
+    in_c = built(tmp_path, "it", "", text).f
     in_c.restype, in_c.argtypes = ctypes.c_double, [ctypes.c_double]
     for x in np.linspace(-2.0, 2.0, 41).tolist():
         assert in_c(x) == on_a_curve(x, curve)
@@ -250,11 +271,16 @@ def wrap(x):
     return x
 
 
+def step(x):
+    return x
+
+
 def test_functions_of_one_name_are_numbered_from_the_second_on():
     c = Translator({}, "ship")
     functions = (mathematics.wrap, wrap, mathematics.wrap)
     names = [c.function(one, float).name for one in functions]
     assert names == ["ship_wrap", "ship_wrap2", "ship_wrap"]
+    assert c.function(step, float).name == "ship_step2"
 
 
 def test_numbers_and_names_are_those_of_c():

@@ -189,6 +189,39 @@ def test_a_circle_has_its_rudder_on_one_side_for_nine_tenths_of_the_time(
     assert not is_refused(-psi, delta)
 
 
+# --- no delay where there is none
+
+
+def zigzag_of_first_order(K, T, noise_deg, step, seed):
+    """Log of a 20/20 zigzag with T rdot + r = K delta and a noisy gyro compass."""
+    dt, rate = 0.1, 2.5 * DEGREE
+    random = np.random.default_rng(seed)
+    n = int(50.0 * T / dt)
+    psi, r, delta = np.zeros(n), np.zeros(n), np.zeros(n)
+    order = 20.0 * DEGREE
+    for k in range(n - 1):
+        if order * psi[k] > 0.0 and abs(psi[k]) >= abs(order):
+            order = -order
+        move = np.clip(order - delta[k], -rate * dt, rate * dt)
+        delta[k + 1] = delta[k] + move
+        r[k + 1] = r[k] + dt * (K * delta[k] - r[k]) / T
+        psi[k + 1] = psi[k] + dt * r[k + 1]
+    every = round(step / dt)
+    noise = noise_deg * DEGREE * random.standard_normal(psi[::every].size)
+    channels = {"psi": psi[::every] + noise, "delta": delta[::every]}
+    return Log(np.arange(noise.size) * step, channels, "log.csv", [])
+
+
+@pytest.mark.parametrize("noise_deg", [0.1, 0.2, 0.5])
+@pytest.mark.parametrize("step", [0.5, 1.0, 2.0])
+def test_a_noisy_compass_makes_no_rudder_late(noise_deg, step):
+    """`python scripts/clock_offsets.py` counts it on nine ships."""
+    for seed, (K, T) in enumerate([(0.15, 8.0), (0.05, 12.0), (0.08, 25.0)]):
+        log = zigzag_of_first_order(K, T, noise_deg, step, seed)
+        refused = [one for one in find_late_channels(log) if not one.is_small]
+        assert refused == []
+
+
 # --- parts
 
 

@@ -212,16 +212,32 @@ def courses(apart_deg, turned_deg, mirrored=False, known=False):
         ({"apart_deg": 0.31, "turned_deg": 30.0}, None),
         ({"apart_deg": 0.0, "turned_deg": 19.0}, None),
         ({"apart_deg": 0.0, "turned_deg": 21.0}, "less than 0.3 deg of difference"),
-        ({"apart_deg": 24.9, "turned_deg": 30.0}, None),
-        ({"apart_deg": 25.1, "turned_deg": 30.0}, "heading_offset_deg = -25"),
-        ({"apart_deg": -25.1, "turned_deg": 30.0}, "over ground by 25 deg"),
-        ({"apart_deg": 30.0, "turned_deg": 40.0, "known": True}, None),
+        # in a turn to one side all of it may be drift
+        ({"apart_deg": 59.9, "turned_deg": 300.0}, None),
+        ({"apart_deg": 60.1, "turned_deg": 30.0}, "heading_offset_deg = -60"),
+        ({"apart_deg": -60.1, "turned_deg": 30.0}, "over ground by 60 deg"),
+        ({"apart_deg": 70.0, "turned_deg": 40.0, "known": True}, None),
+        ({"apart_deg": 24.9, "turned_deg": 0.0}, None),
+        ({"apart_deg": 25.1, "turned_deg": 0.0}, "heading_offset_deg = -25"),
         ({"apart_deg": 6.0, "turned_deg": 40.0, "mirrored": True}, "the other way"),
     ],
 )
 def test_a_heading_beside_the_course_over_ground(case, message):
     assert [message in one for one in courses(**case)][:1] == [True] * (
         message is not None
+    )
+
+
+@pytest.mark.parametrize("offset_deg", [0.0, 40.0])
+@pytest.mark.parametrize("drift_deg", [5.0, 35.0])
+def test_drift_that_goes_with_the_turn_is_no_offset(drift_deg, offset_deg):
+    """A boat that slides in zigzags, or an antenna aft of her."""
+    t = np.linspace(0.0, 6.0 * np.pi, 400)
+    psi = 0.5 * np.sin(t)
+    drift = -drift_deg * np.cos(t) - offset_deg
+    texts = said(check_course, psi, psi + drift * DEGREE, locator())
+    assert ["heading_offset_deg = 40" in one for one in texts] == (
+        [True] if offset_deg else []
     )
 
 

@@ -688,8 +688,17 @@ def test_degrees_read_as_radians_are_noticed_in_the_heading(tmp_path):
     assert 'unit = "deg"' in refusal(write(tmp_path / "b.csv", {"t": T, "psi": slow}))
 
 
-def test_one_wrong_heading_is_refused_by_its_line(tmp_path):
-    message = refusal(edited(tmp_path, 100, {3: "2.5"}))
+def test_one_wrong_heading_is_filled_in_and_counted(tmp_path):
+    trial = Trial.from_csv(edited(tmp_path, 100, {3: "2.5"}))
+    channels, _ = manoeuvre()
+    np.testing.assert_allclose(trial["psi"], channels["psi"], atol=1e-3)
+    assert trial.repaired == {"psi": 1}
+
+
+def test_a_heading_that_jumps_and_stays_is_refused_by_its_line(tmp_path):
+    channels, _ = manoeuvre()
+    psi = channels["psi"] + 2.0 * (np.arange(T.size) >= 98)
+    message = refusal(write(tmp_path / "run.csv", {"t": T, "psi": psi}))
     assert "line 100 (data row 99), column 'psi'" in message
     assert 'repair = "interpolate"' in message
 

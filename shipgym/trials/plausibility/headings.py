@@ -14,6 +14,42 @@ _LARGEST_JUMP = 30.0 * DEGREE  # of a single outlier that passes
 _TURN_AND_JUMP = 2.0 * math.pi + _LARGEST_JUMP
 
 
+def without_spikes(psi: Floats) -> tuple[Floats, int]:
+    """Heading whose single outliers are filled in, and their number.
+
+    An outlier is more than 30 degrees from both neighbours, which agree to 30 degrees.
+    Where more than one in a hundred are, the sensor is at fault, and none is filled.
+
+    Parameters
+    ----------
+    psi : array of shape (n_samples,)
+        As logged, rad; it may jump at north.
+    """
+    if psi.size < 3:
+        return psi, 0
+    before = psi[:-2]
+    inside = psi[1:-1]
+    after = psi[2:]
+    from_before = np.abs(_wrapped(inside - before))
+    to_after = np.abs(_wrapped(after - inside))
+    across = _wrapped(after - before)
+    is_outlier = np.minimum(from_before, to_after) > _LARGEST_JUMP
+    is_outlier &= np.abs(across) < _LARGEST_JUMP
+
+    count = int(np.count_nonzero(is_outlier))
+    if not count or count > 0.01 * psi.size:
+        return psi, 0
+    filled = psi.copy()
+    rows = 1 + np.flatnonzero(is_outlier)
+    filled[rows] = (before + 0.5 * across)[is_outlier]
+    return filled, count
+
+
+def _wrapped(angle: Floats) -> Floats:
+    """Angle in [-pi, pi), rad."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
 def check_heading(t: Floats, psi: Floats, logged: Floats, locator: Locator) -> None:
     """Refuse a heading that turns faster than any ship.
 

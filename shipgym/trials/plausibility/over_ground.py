@@ -86,9 +86,16 @@ def check_course(
             " course over ground: it turns the other way",
             "change the sign of its column",
         )
-    offset_deg = -math.degrees(np.angle(mean))
-    is_far = abs(offset_deg) > 25.0 and agreement > 0.7
-    if is_far and not offset_is_known:
+    if offset_is_known:
+        return
+    drift = np.angle(mean) + np.angle(apart / mean)
+    offset = constant_offset(psi, drift)
+    largest_deg = 25.0
+    if offset is None:
+        offset = -float(np.angle(mean))
+        largest_deg = 60.0  # to which ships may drift in a turn
+    if abs(offset) > largest_deg * DEGREE and agreement > 0.7:
+        offset_deg = math.degrees(offset)
         raise implausible(
             locator.path,
             "expected a heading clockwise from north, got one that contradicts the"
@@ -96,6 +103,32 @@ def check_course(
             f"name the right column, or write heading_offset_deg = {offset_deg:.0f} in"
             " [sensors]",
         )
+
+
+def constant_offset(psi: Floats, drift: Floats) -> float | None:
+    """Part of the heading's difference from the course that does not turn, rad.
+
+    A ship drifts outwards in a turn, and an antenna aft of midship more so: what goes
+    with the rate of turning is no error of the heading. None where she turns all the
+    time to one side, so that nobody can tell.
+
+    Parameters
+    ----------
+    psi, drift : array of shape (n_samples,)
+        Heading and course over ground less heading, rad, without jumps.
+    """
+    turning = np.gradient(psi)
+    fastest = np.quantile(np.abs(turning), 0.95)
+    is_straight = np.abs(turning) <= 0.2 * fastest
+    to_starboard = np.mean(turning > 0.2 * fastest)
+    to_port = np.mean(turning < -0.2 * fastest)
+    turns_both_ways = min(to_starboard, to_port) > 0.1
+    if fastest == 0.0 or is_straight.mean() > 0.1:
+        return -float(np.median(drift[is_straight]))
+    if not turns_both_ways:
+        return None
+    _, offset = np.polyfit(turning, drift, deg=1)
+    return -float(offset)
 
 
 def check_compass(log: Log, locator: Locator) -> list[str]:
