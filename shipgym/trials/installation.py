@@ -59,7 +59,8 @@ class Installation:
         check_table(table, where, _KEYS)
         clocks = table.get("clock_offsets")
         if clocks is not None:
-            check_choice(clocks, ("correct", "keep"), f"{where} clock_offsets")
+            choices = ("correct", "keep")
+            check_choice(clocks, choices, f"{where} clock_offsets")
         checksums = table.get("checksums", "optional")
         choices = ("required", "optional")
         check_choice(checksums, choices, f"{where} checksums")

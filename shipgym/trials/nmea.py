@@ -111,7 +111,8 @@ def _number_fields(entries: Mapping[str, Any]) -> dict[str, NumberField]:
     numbers = {}
     for quantity, entry in entries.items():
         place = _with_letters(entry)
-        numbers[quantity] = NumberField(**place)
+        number = NumberField(**place)
+        numbers[quantity] = number
     return numbers
 
 

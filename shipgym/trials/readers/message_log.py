@@ -15,7 +15,7 @@ from shipgym.trials.readers.csv_file import read_lines
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.readers.message_clock import log_clock
 from shipgym.trials.readers.message_tracks import Track, choose_tracks
-from shipgym.trials.readers.messages import WINDS, Heard
+from shipgym.trials.readers.messages import Heard, is_wind
 from shipgym.trials.readers.nmea2000 import hear_pgns
 from shipgym.trials.readers.nmea_log import hear_sentences
 from shipgym.trials.readers.signalk import hear_deltas
@@ -47,7 +47,8 @@ def read_messages(path: Path, *, strict: bool = False) -> LogTable:
             f"{path}: expected sentences with a time (RMC, GGA, GLL or ZDA) or a time"
             " before each line, got none; log these too"
         )
-    if not heard.channels.keys() - {*WINDS, "variation"}:
+    of_motion = [name for name in heard.channels if not is_wind(name)]
+    if not set(of_motion) - {"variation"}:
         raise InputError(
             f"{path}: expected sentences of a ship's motion (RMC, HDT, HDG, ROT, RSA"
             " and others), got none; log these too"
@@ -57,8 +58,8 @@ def read_messages(path: Path, *, strict: bool = False) -> LogTable:
     notes += chosen.notes
     tracks = dict(chosen.by_channel)
     winds = {}
-    for name in WINDS:
-        if name in tracks:
+    for name in chosen.by_channel:
+        if is_wind(name):
             winds[name] = tracks.pop(name)
     if winds and "psi" in tracks:
         tracks |= _wind_over_ground(winds, tracks)

@@ -52,7 +52,8 @@ def choose_tracks(heard: Heard, clock: Clock) -> Tracks:
     longest = 0.0
     for channel, sources in heard.channels.items():
         of_source = _tracks_of(sources, clock)
-        longest = max(longest, *map(_covered, of_source.values()))
+        for track in of_source.values():
+            longest = max(longest, _covered(track))
         if channel == "delta":
             tracks[channel], chosen[channel] = _rudder(of_source, sources, notes)
             continue

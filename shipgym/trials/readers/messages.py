@@ -9,9 +9,6 @@ import numpy as np
 
 from shipgym.trials.readers.line_stamps import stamp_text
 
-#: Winds from the bow, which are no channels before the heading is added.
-WINDS = ("wind_angle", "wind_speed", "apparent_wind_angle", "apparent_wind_speed")
-
 
 class Value(NamedTuple):
     """One value of a channel, or one time."""
@@ -19,6 +16,11 @@ class Value(NamedTuple):
     line: int
     time: float  # s since 1970 or of the day; nan where the message has none
     value: float
+
+
+def is_wind(quantity: str) -> bool:
+    """Return whether it is of a wind from the bow, no channel without the heading."""
+    return quantity.endswith(("wind_angle", "wind_speed"))
 
 
 def port_source(source: str) -> str:
@@ -43,7 +45,7 @@ class Heard:
         Times that messages give, by source.
     channels : dict
         Values by channel and source, in SI units, positions in degrees. Channels of
-        their own are `WINDS`, ``psi_magnetic`` (a heading by compass) and
+        their own are winds (`is_wind`), ``psi_magnetic`` (a heading by compass) and
         ``variation``.
     stamps : dict of int to str
         Time before a line, by line.

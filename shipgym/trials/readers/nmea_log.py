@@ -21,7 +21,7 @@ from shipgym.trials.nmea import (
     logged_numbers,
     parse_sentence,
 )
-from shipgym.trials.readers.messages import WINDS, Heard, Value, port_source
+from shipgym.trials.readers.messages import Heard, Value, is_wind, port_source
 from shipgym.trials.units import DEGREE
 
 #: Kinds of sentences that hold a time or a channel; XDR holds what its names say.
@@ -133,12 +133,11 @@ def _usual(found: Sequence[_Found]) -> dict[str, _Usual]:
         texts[one.source].append(one.text)
     usual = {}
     for source, of_source in texts.items():
-        with_checksum = sum("*" in text for text in of_source)
-        counts = [text.count(",") for text in of_source]
-        half = 0.5 * len(of_source)
+        has_checksum = ["*" in text for text in of_source]
+        commas = [text.count(",") for text in of_source]
         usual[source] = _Usual(
-            has_checksum=with_checksum > half,
-            commas=mode(counts),
+            has_checksum=mode(has_checksum),
+            commas=mode(commas),
         )
     return usual
 
@@ -228,7 +227,7 @@ def _channel_values(numbers: dict[str, float]) -> dict[str, float]:
     values = {}
     for quantity, number in numbers.items():
         channel = NMEA_QUANTITIES[quantity].channel
-        if quantity in WINDS or quantity == "variation":
+        if is_wind(quantity) or quantity == "variation":
             values[quantity] = number
         elif quantity == "port_rudder":
             values["port"] = number
