@@ -17,7 +17,8 @@ def new_ship_command(
     logs: Annotated[
         list[Path],
         Argument(
-            metavar="LOG...", help="Logs: CSV, NMEA 0183, Excel, Parquet or MATLAB."
+            metavar="LOG...",
+            help="Logs: CSV, NMEA 0183 or 2000, Signal K, Excel, Parquet or MATLAB.",
         ),
     ],
     out: Annotated[Path, Option(metavar="FILE", help="The ship file to write.")] = Path(
@@ -31,6 +32,10 @@ def new_ship_command(
             help="Length between perpendiculars, m; or fill it in later.",
         ),
     ] = None,
+    strict: Annotated[
+        bool,
+        Option("--strict", help="Refuse sentences of NMEA 0183 without a checksum."),
+    ] = False,
 ) -> None:
     """Write a ship file for recorded trials.
 
@@ -45,7 +50,8 @@ def new_ship_command(
         raise InputError(
             f"{out}: exists already; choose another name with --out, or remove it"
         )
-    guessed = _guess_trials(logs)
+    checksums = "required" if strict else "optional"
+    guessed = _guess_trials(logs, checksums)
     conventions = _conventions(guessed)
     side = _rudder_side(guessed)
     first, *_ = guessed
@@ -54,6 +60,7 @@ def new_ship_command(
     facts: dict[str, Any] = {
         "out": out,
         "length": length,
+        "checksums": checksums,
         "guessed": guessed,
         "shared": shared,
         "decisions": decisions,
@@ -190,16 +197,16 @@ def _columns(guessed: TrialGuess) -> dict[str, Any]:
     return columns
 
 
-def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
+def _guess_trials(logs: list[Path], checksums: str) -> list[TrialGuess]:
     """Logs read with guessed columns; the first has to be readable."""
     from agents.cli.terminal import warn
     from shipgym.errors import InputError
     from shipgym.trials.guesses import guess_trial
 
-    guessed = [guess_trial(logs[0])]
+    guessed = [guess_trial(logs[0], checksums=checksums)]
     for log in logs[1:]:
         try:
-            guessed.append(guess_trial(log))
+            guessed.append(guess_trial(log, checksums=checksums))
         except InputError as error:
             warn(f"{error}; left out of the ship file")
     return guessed
@@ -232,6 +239,10 @@ def look_command(
     out: Annotated[Path, Option(metavar="FILE", help="The page to write.")] = Path(
         "look.html"
     ),
+    strict: Annotated[
+        bool,
+        Option("--strict", help="Refuse sentences of NMEA 0183 without a checksum."),
+    ] = False,
 ) -> None:
     """Draw the trials of a ship file, or a log.
 
@@ -253,7 +264,8 @@ def look_command(
         readings = [declared_reading(ship_file, trial) for trial in trials]
         remarks = [*ship_file.undecided]
     else:
-        guess = guess_trial(log)
+        checksums = "required" if strict else "optional"
+        guess = guess_trial(log, checksums=checksums)
         if guess.trial is None:
             raise InputError(
                 f"{log}: "

@@ -8,7 +8,7 @@ checksum: the exclusive or of all characters between.
 import re
 from collections import ChainMap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from math import copysign, isfinite
 from operator import xor
@@ -20,7 +20,7 @@ from shipgym.trials.units import UNITS
 _SENTENCE = re.compile(
     r"\s*\$?"
     r"(?P<text>(?P<talker>P|\w{1,2})(?P<kind>\w*),(?P<fields>[^*]*))"
-    r"\*(?P<checksum>[0-9A-Fa-f]{2})\s*"
+    r"(\*(?P<checksum>[0-9A-Fa-f]{2}))?\s*"
 )
 _QUANTITIES_IN_SI = ("length", "angle", "angular rate", "speed", "shaft speed")
 _SPEED_UNITS = {"N": "knots", "K": "km/h", "M": "m/s"}
@@ -49,6 +49,7 @@ class NumberField:
     side: int | None = None
     letters: Letters = field(default_factory=dict)
     only_if: Letters = field(default_factory=dict)
+    valid: Letters = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -56,10 +57,12 @@ class SentenceKind:
     """Contents of a kind of sentence; `nmea.toml` explains the names."""
 
     fields: Mapping[str, NumberField]  # by quantity
+    log_fields: Mapping[str, NumberField]  # of logs: the same, and more
     valid: Letters = field(default_factory=dict)
     degraded: Letters = field(default_factory=dict)
     time: int | None = None
     date: int | None = None
+    day: int | None = None
     log_only: bool = False
 
 
@@ -86,13 +89,31 @@ def _with_letters(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _sentence_kind(entry: Mapping[str, Any]) -> SentenceKind:
-    numbers = {}
-    for quantity, place in entry["fields"].items():
-        place = _with_letters(place)
-        numbers[quantity] = NumberField(**place)
     kind = _with_letters(entry)
-    kind["fields"] = numbers
+    fields = _number_fields(entry.get("fields", {}))
+    of_logs = _number_fields(entry.get("log_fields", {}))
+    valid = kind.get("valid", {})
+    degraded = kind.get("degraded", {})
+
+    log_fields = {}
+    for quantity, place in (fields | of_logs).items():
+        statuses = dict(place.valid or valid)
+        for at, letters in degraded.items():
+            statuses[at] |= letters
+        log_fields[quantity] = replace(place, valid=statuses)
+    kind["fields"] = fields
+    kind["log_fields"] = log_fields
     return SentenceKind(**kind)
+
+
+def _number_fields(entries: Mapping[str, Any]) -> dict[str, NumberField]:
+    """Numbers of a sentence by quantity."""
+    numbers = {}
+    for quantity, entry in entries.items():
+        place = _with_letters(entry)
+        number = NumberField(**place)
+        numbers[quantity] = number
+    return numbers
 
 
 def _quantity(entry: Mapping[str, Any]) -> NmeaQuantity:
@@ -124,18 +145,20 @@ def checksum(text: str) -> str:
     return f"{reduce(xor, map(ord, text), 0):02X}"
 
 
-def parse_sentence(line: str) -> Sentence:
+def parse_sentence(line: str, *, needs_checksum: bool = True) -> Sentence:
     """Cut a line into talker, kind and fields.
 
     A proprietary sentence has the talker P. Raises ValueError where the line is no
-    sentence, or its checksum is wrong or missing.
+    sentence, or its checksum is wrong or, if it is needed, missing.
     """
     match = _SENTENCE.fullmatch(line)
     if match is None:
         raise ValueError(f"expected a sentence with a checksum, got {line!r}")
-    expected = checksum(match["text"])
     found = match["checksum"]
-    if expected != found.upper():
+    if found is None and needs_checksum:
+        raise ValueError(f"expected a sentence with a checksum, got {line!r}")
+    expected = checksum(match["text"])
+    if found is not None and expected != found.upper():
         raise ValueError(f"expected the checksum {expected}, got {found}")
 
     fields = match["fields"]
@@ -172,24 +195,21 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
     """Numbers of a sentence in a log, in SI units and radians, by quantity.
 
     More lenient than :func:`steering_numbers`: estimated and simulated values count,
-    letters that the standard puts next to a number may be missing, and no number is too
-    large. Raises ValueError where one is broken.
+    letters that the standard puts next to a number may be missing, a status may be
+    empty, and no number is too large. Raises ValueError where one is broken.
     """
     kind = NMEA_SENTENCES[sentence.kind]
-    absent = [""] * 20  # those at the end may be missing
-    fields = [*sentence.fields, *absent]
-    valid = dict(kind.valid)
-    for at, letters in kind.degraded.items():
-        valid[at] |= letters
-
+    fields = _padded(sentence)
+    sides = frozenset(_SIGNS)
     numbers = {}
-    for quantity, place in kind.fields.items():
-        needed = {**valid, **place.only_if}
-        for at, letters in place.letters.items():
+    for quantity, place in kind.log_fields.items():
+        needed = dict(place.only_if)
+        optional = {**place.valid, **place.letters}
+        for at, letters in optional.items():
             if fields[at]:
                 needed[at] = letters
         if place.side is not None:
-            needed[place.side] = frozenset(_SIGNS)
+            needed[place.side] = sides
         value = _number(place, fields, needed)
         if value is None:
             continue
@@ -197,6 +217,19 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
             raise ValueError(f"expected a finite number, got {value}")
         numbers[quantity] = value
     return numbers
+
+
+def lacks_status(sentence: Sentence, quantity: str) -> bool:
+    """Return whether the status of a number in a log is empty or not there."""
+    place = NMEA_SENTENCES[sentence.kind].log_fields[quantity]
+    fields = _padded(sentence)
+    return any(not fields[at] for at in place.valid)
+
+
+def _padded(sentence: Sentence) -> list[str]:
+    """Fields of a sentence; those at the end may be missing."""
+    absent = [""] * 20
+    return [*sentence.fields, *absent]
 
 
 def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float | None:

@@ -40,6 +40,10 @@ class LogTable:
         Texts of a row of units below the names, by column.
     notes : tuple of str
         What the reader left out or assumed.
+    own_clocks : bool
+        Whether each column has a clock of its own, so that a row may lack values.
+    magnetic : bool
+        Whether the heading counts from magnetic north.
     """
 
     path: Path
@@ -50,6 +54,8 @@ class LogTable:
     units: Mapping[str, str] = field(default_factory=dict)
     unit_row: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    own_clocks: bool = False
+    magnetic: bool = False
 
     @property
     def header(self) -> tuple[str, ...]:
