@@ -1,7 +1,7 @@
 """An autopilot between instruments and rudder, which hands over after a fault."""
 
 from dataclasses import replace
-from math import inf, radians
+from math import inf, radians, tau
 from typing import Any
 
 from agents.controllers.guided import TURNS, Guided
@@ -64,6 +64,7 @@ class Helm:
         self._check(agent)
 
         self.state = STANDBY
+        self.held = False  # in standby by the helmsman's wish
         self.alarm = ""
         self.warnings: list[str] = []
         self.silent = ["sensors"]  # what it waits for
@@ -118,9 +119,9 @@ class Helm:
                 f" route, or another without, got '{name}' {preposition} a route"
             )
 
-    def hear(self, line: str, now: float) -> None:
-        """Take in a line that was received at a time, s."""
-        heard = readings(line)
+    def hear(self, line: str, source: str, now: float) -> None:
+        """Take in a line that was received from an address at a time, s."""
+        heard = readings(line, source)
         if heard is None:
             self.counts["damaged"] += 1
             return
@@ -139,7 +140,7 @@ class Helm:
             if value is None:
                 self.silent.append(name.replace("_", " "))
 
-        if self.state == STANDBY and not self.silent:
+        if self.state == STANDBY and not self.silent and not self.held:
             self.state = STEERING
         elif self.state == STEERING and not fault:
             fault = self._fault(step, now)
@@ -158,6 +159,23 @@ class Helm:
         if not fault and self.route is not None and self.route.ended:
             fault = "the end of the route is reached"
         return fault
+
+    def stand_by(self) -> None:
+        """Give the rudder back to the helmsman until `engage`."""
+        self.held = True
+        if self.state == STEERING:
+            self.state = STANDBY
+
+    def engage(self) -> None:
+        """Steer as soon as everything that the autopilot reads is available."""
+        self.held = False
+
+    def alter_course(self, angle: float) -> bool:
+        """Turn the set-point, rad, positive to starboard; False if it is not ours."""
+        if self.heading is None:
+            return False
+        self.heading = (self.heading + angle) % tau
+        return True
 
     def steer(self, now: float) -> None:
         """One control interval."""
@@ -233,6 +251,8 @@ class Helm:
     @property
     def status(self) -> str:
         """The state, what it waits for, or why it has handed over."""
+        if self.state == STANDBY and self.held:
+            return f"{STANDBY}, by the helmsman"
         if self.state == STANDBY:
             silent = ", ".join(self.silent)
             return f"{STANDBY}, waits for {silent}"

@@ -13,12 +13,35 @@ from shipgym import InputError, extras
 from shipgym.trials.nmea import checksum, parse_sentence, steering_numbers
 
 
+class NmeaSource(NamedTuple):
+    """An instrument: who sends, in what sentence, and from where."""
+
+    talker: str  # HE, GP, ...
+    kind: str = ""  # of sentence: HDT, RMC, ...
+    address: str = ""  # HOST:PORT or a serial port
+
+    def __str__(self) -> str:
+        place = f" from {self.address}" if self.address else ""
+        return f"{self.talker}{self.kind}{place}"
+
+
 class NmeaReading(NamedTuple):
     """One number that an instrument sent."""
 
     quantity: str  # a key of `NMEA_QUANTITIES`
     value: float  # SI units and radians
-    talker: str  # who sent it: HE, GP, ...
+    talker: str
+    kind: str = ""
+    address: str = ""
+
+    @property
+    def source(self) -> NmeaSource:
+        """The instrument."""
+        return NmeaSource(self.talker, self.kind, self.address)
+
+
+#: Called with a line and the address from which it came.
+Received = Callable[[str, str], None]
 
 
 @cache
@@ -28,8 +51,8 @@ def library(name: str) -> ModuleType:
     return module
 
 
-def readings(line: str) -> list[NmeaReading] | None:
-    """Numbers of a sentence; None if it is damaged.
+def readings(line: str, address: str = "") -> list[NmeaReading] | None:
+    """Numbers of a sentence that came from an address; None if it is damaged.
 
     A sentence of another kind, or that is marked as invalid, has no numbers. One
     without a checksum counts as damaged, as one with a wrong one.
@@ -40,8 +63,9 @@ def readings(line: str) -> list[NmeaReading] | None:
     except (ValueError, IndexError, KeyError):
         return None
     found = []
+    sender = (sentence.talker, sentence.kind, address)
     for quantity, value in numbers.items():
-        found.append(NmeaReading(quantity, value, sentence.talker))
+        found.append(NmeaReading(quantity, value, *sender))
     return found
 
 
@@ -54,14 +78,15 @@ def sentences(text: str) -> str:
 class Line(asyncio.Protocol, asyncio.DatagramProtocol):
     """One end of a connection; it is a member of `ends` while it is open.
 
-    `received` is called with each line.
+    `received` is called with each line and the address from which it came.
     """
 
     longest = 512  # bytes of a line; the standard allows 82
 
-    def __init__(self, received: Callable[[str], None], ends: set[Line]) -> None:
+    def __init__(self, received: Received, ends: set[Line], source: str = "") -> None:
         self.received = received
         self.ends = ends
+        self.source = source  # of what is received
         self.rest = b""  # of a line that has not ended
         self.transport: Any = None
         self.peer: Any = None  # from whom the last datagram came
@@ -69,6 +94,7 @@ class Line(asyncio.Protocol, asyncio.DatagramProtocol):
     def connection_made(self, transport: Any) -> None:
         """Register an open stream or socket of datagrams."""
         self.transport = self.transport or transport
+        self.source = self.source or _place(transport.get_extra_info("peername"))
         self.ends.add(self)
 
     def connection_lost(self, error: Exception | None) -> None:
@@ -84,11 +110,12 @@ class Line(asyncio.Protocol, asyncio.DatagramProtocol):
         for line in lines:
             if line.strip():
                 text = line[: self.longest].decode("ascii", "replace")
-                self.received(text.strip())
+                self.received(text.strip(), self.source)
 
     def datagram_received(self, data: bytes, address: Any) -> None:
         """Take one datagram, of whole lines."""
         self.peer = address
+        self.source = _place(address)
         self.data_received(data + b"\n")
 
     def send(self, data: bytes) -> None:
@@ -100,20 +127,25 @@ class Line(asyncio.Protocol, asyncio.DatagramProtocol):
             transport.sendto(data, self.peer)
 
 
+def _place(address: Any) -> str:
+    """HOST:PORT of a socket's address; empty without one."""
+    return f"{address[0]}:{address[1]}" if isinstance(address, tuple) else ""
+
+
 class Link:
     """A connection by its address.
 
     Addresses are tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE and serial:DEVICE@BAUD.
     """
 
-    def __init__(self, received: Callable[[str], None]) -> None:
+    def __init__(self, received: Received) -> None:
         self.received = received
         self.ends: set[Line] = set()  # what is connected
         self.others: list[Any] = []  # a server, a reader of a serial line
 
-    def line(self) -> Line:
+    def line(self, source: str = "") -> Line:
         """A new end of the connection."""
-        return Line(self.received, self.ends)
+        return Line(self.received, self.ends, source)
 
     async def open(self, address: str, serve: bool = False) -> None:
         """Connect, or with `serve` wait for connections.
@@ -167,7 +199,7 @@ class Link:
             write_timeout=0,
             exclusive=True,
         )
-        line = self.line()
+        line = self.line(device)
         line.transport = port
         loop = asyncio.get_running_loop()
         reader, _ = await loop.connect_read_pipe(lambda: line, port)

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from math import cos, inf, radians, sin
 
-from agents.deployment.nmea import NmeaReading
+from agents.deployment.nmea import NmeaReading, NmeaSource
 from shipgym.checks import check_number
 from shipgym.tasks.guidance import wrapped
 from shipgym.trials.nmea import NMEA_QUANTITIES
@@ -62,7 +62,7 @@ class HelmSensors:
     limits : Limits
         When they are not to be trusted.
     newest : dict
-        Value and time, s, of the newest reading by quantity and talker.
+        Value and time, s, of the newest reading by quantity and source.
     since : dict
         When a fault was first seen, s.
     expected : float or None
@@ -70,14 +70,16 @@ class HelmSensors:
     """
 
     limits: Limits
-    newest: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict)
+    newest: dict[str, dict[NmeaSource, tuple[float, float]]] = field(
+        default_factory=dict
+    )
     since: dict[str, float] = field(default_factory=dict)
     expected: float | None = None
 
     def take(self, reading: NmeaReading, now: float) -> None:
-        """Keep a reading; the first talker of a quantity is steered by."""
-        talkers = self.newest.setdefault(reading.quantity, {})
-        talkers[reading.talker] = (reading.value, now)
+        """Keep a reading; the first source of a quantity is steered by."""
+        sources = self.newest.setdefault(reading.quantity, {})
+        sources[reading.source] = (reading.value, now)
 
     def value(self, quantity: str, now: float) -> float | None:
         """Newest value of the first talker of a quantity; None if it is too old."""
@@ -116,7 +118,7 @@ class HelmSensors:
         """Describe two talkers of one quantity that differ."""
         angles = ("heading", "course", "leg", "to_steer", "rudder", "waypoint_bearing")
         for quantity in self.newest:
-            fresh = self._fresh(quantity, now)
+            fresh = self.fresh(quantity, now)
             if not fresh:
                 continue
             first = next(iter(fresh))
@@ -132,12 +134,12 @@ class HelmSensors:
                     return f"{name} of {first} and {talker} disagree"
         return ""
 
-    def _fresh(self, quantity: str, now: float) -> dict[str, float]:
-        """Newest values of a quantity by talker, without those that are too old."""
+    def fresh(self, quantity: str, now: float) -> dict[NmeaSource, float]:
+        """Newest values of a quantity by source, without those that are too old."""
         fresh = {}
-        for talker, (value, time) in self.newest[quantity].items():
+        for source, (value, time) in self.newest.get(quantity, {}).items():
             if self._is_fresh(time, now):
-                fresh[talker] = value
+                fresh[source] = value
         return fresh
 
     def _rudder_fault(self, order: float, step: float, now: float) -> str:

@@ -56,7 +56,7 @@ class SimulatedShip:
         self.passage = Passage(model, Conditions(weather=weather, seed=seed), step)
         self.states = self.passage.states(model.service_state, 1)
 
-    def hear(self, line: str) -> None:
+    def hear(self, line: str, source: str = "") -> None:
         """Take a rudder order; an invalid one lets the rudder go amidships."""
         for reading in readings(line) or ():
             if reading.quantity == "order":

@@ -1,7 +1,7 @@
 """`shipgym steer`: an autopilot live on NMEA 0183."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing, suppress
 from math import ceil, inf
 from typing import Any
@@ -12,6 +12,26 @@ from agents.deployment.route import Route
 from agents.deployment.sensors import Limits
 from shipgym import InputError
 from shipgym.checks import check_number
+
+
+class HelmObserver:
+    """What watches the helm: a display, a page or a log; it sees and may ask."""
+
+    def heard(self, line: str, source: str, time: float) -> None:
+        """A line was received from an address, at a time, s."""
+
+    def sent(self, text: str, time: float) -> None:
+        """Sentences were sent, each ending in a line break, at a time, s."""
+
+    def update(self, helm: Helm, now: float) -> None:
+        """The helm has been on watch for one more tick."""
+
+    def commands(self) -> Iterable[Callable[[Helm], object]]:
+        """Calls such as `Helm.stand_by` that the helmsman asked for since the last."""
+        return ()
+
+    def close(self) -> None:
+        """The helm has ended."""
 
 
 class Connection:
@@ -65,6 +85,7 @@ async def steer(
     log: Callable[[str], None] = print,
     route: Route | None = None,
     rate: float | None = None,
+    observers: Sequence[HelmObserver] = (),
 ) -> Helm:
     """Steer a ship over NMEA 0183; the helm as it was at the end.
 
@@ -85,6 +106,8 @@ async def steer(
         Seconds of a simulated ship that pass in one.
     log : callable
         Called with a line for each change of state.
+    observers : sequence of HelmObserver
+        A display, a page, a log.
     """
     check_number(speed_up, "speed_up")
     check_number(heading or 0.0, "heading")
@@ -95,8 +118,11 @@ async def steer(
     def ship_time() -> float:
         return loop.time() * speed_up
 
-    def hear(line: str) -> None:
-        helm.hear(line, ship_time())
+    def hear(line: str, source: str) -> None:
+        now = ship_time()
+        helm.hear(line, source, now)
+        for observer in observers:
+            observer.heard(line, source, now)
 
     link = Link(hear)
     connection = Connection(link, address)
@@ -113,11 +139,18 @@ async def steer(
             pause = (due - ship_time()) / speed_up
             await asyncio.sleep(max(0.0, pause))
             now = ship_time()
+            for observer in observers:
+                for command in observer.commands():
+                    command(helm)
             late_s = (now - due) / speed_up
             helm.watch(tick, now, _fault(helm, connection, late_s))
             if number % ticks_per_step == 0:
                 helm.steer(now)
-            link.send(helm.sentences())
+            orders = helm.sentences()
+            link.send(orders)
+            for observer in observers:
+                observer.sent(orders, now)
+                observer.update(helm, now)
 
             status_before = status
             status = _status(helm, connection)

@@ -38,7 +38,7 @@ def tell(found, now, heading=0.4, rudder=0.0, talker="HE"):
 
 def test_it_waits_for_all_that_it_reads():
     found = Helm(PID_MARINER, 0.5, Limits())
-    found.hear(sentence("HEHDT", 20.0, "T"), 0.0)
+    found.hear(sentence("HEHDT", 20.0, "T"), "", 0.0)
     found.watch(1.0, 0.0)
     found.steer(0.0)
     assert (found.state, found.order) == (STANDBY, 0.0)

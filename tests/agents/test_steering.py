@@ -34,7 +34,7 @@ ROUTE = "latitude,longitude\n54.0,7.5\n54.02,7.5\n54.03,7.52\n"
 class HearingShip(SimulatedShip):
     """She keeps what she hears."""
 
-    def hear(self, line):
+    def hear(self, line, source=""):
         self.heard = [*getattr(self, "heard", []), line]
         super().hear(line)
 
