@@ -100,8 +100,12 @@ def _kind(name: str) -> AlertKind:
         "off heading": AlertKind(2, "W", "OFF HEADING"),
         "off track": AlertKind(3, "W", "OFF TRACK"),
         "course change ahead": AlertKind(4, "C", "COURSE CHANGE"),
+        "next leg waits to be confirmed": AlertKind(5, "W", "NEXT LEG"),
+        "log cannot be written": AlertKind(6, "C", "LOG"),
     }
-    return kinds.get(name) or AlertKind(9, "W", _plain(name, longest=16))
+    title = _plain(name, longest=16)
+    other = AlertKind(9, "W", title)
+    return kinds.get(name, other)
 
 
 class Alerts:
@@ -136,11 +140,13 @@ class Alerts:
         if line[3:6] not in ("ACN", "ACK"):
             return
         sentence = parse_sentence(line)
-        fields = sentence.fields
         if sentence.kind == "ACK":
-            self._command(10000 + int(fields[0]), "A", now)
-        elif fields[5] == "C" and fields[2].isdecimal():
-            self._command(int(fields[2]), fields[4], now)
+            number = int(sentence.fields[0])
+            self._command(10000 + number, "A", now)
+            return
+        _, _, identifier, _, command, flag = sentence.fields
+        if flag == "C":
+            self._command(int(identifier), command, now)
 
     def _command(self, identifier: int, command: str, now: float) -> None:
         """Acknowledge, silence or repeat an alert; refuse anything else."""
@@ -160,8 +166,9 @@ class Alerts:
     def sentences(self, now: float) -> str:
         """ALF of what has changed, ALR once a second, the list ALC twice a minute."""
         repeat_s, list_s = 0.99, 30.0
-        changed = [alert for alert in self.given.values() if alert.is_new]
-        active = [alert for alert in self.given.values() if alert.state != "N"]
+        alerts = self.given.values()
+        changed = [alert for alert in alerts if alert.is_new]
+        active = [alert for alert in alerts if alert.state != "N"]
         text = self.answers
         self.answers = ""
         for alert in changed:
@@ -182,7 +189,10 @@ class Alerts:
 
 def _listed(alerts: list[Alert]) -> str:
     """Alerts as ALC."""
-    fields = ["AGALC", "01", "01", "00", str(len(alerts))]
+    count = str(len(alerts))
+    fields = ["AGALC", "01", "01", "00", count]
     for alert in alerts:
-        fields += ["", str(alert.identifier), "1", str(alert.revision)]
+        identifier = str(alert.identifier)
+        revision = str(alert.revision)
+        fields += ["", identifier, "1", revision]
     return _line(fields)

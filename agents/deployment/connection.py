@@ -52,10 +52,13 @@ class Connection:
     @property
     def problem(self) -> str:
         """Why nothing can come or go; empty where it can, as far as is known."""
+        reason = self.link.error
+        if self.is_open and self.sends and reason:
+            return f"{self.address}: nobody receives orders"
         if self.is_open:
-            nobody = self.sends and self.link.error
-            return f"{self.address}: nobody receives orders" if nobody else ""
-        return self.error or f"{self.address}: closed ({self.link.error})"
+            return ""
+        closed = f"{self.address}: closed ({reason})"
+        return self.error or closed
 
     def retry(self) -> None:
         """Begin to open the link again if it is closed, at most once a second."""
@@ -94,17 +97,20 @@ def connections(
 
 def check_apart(data: Connection, gear: Connection) -> None:
     """Refuse a gear whose address is that at which data are received."""
-    are_datagrams = all(one.address.startswith("udp:") for one in (data, gear))
-    if data is gear or not are_datagrams:
+    datagrams = "udp:"
+    if data is gear or not data.address.startswith(datagrams):
+        return
+    if not gear.address.startswith(datagrams):
         return
     heard_at = data.link.address("sockname")
     sent_to = gear.link.address("peername")
     sent_from = gear.link.address("sockname")
-    is_everywhere = heard_at.startswith(("0.0.0.0:", ":::"))
     host, _, port = sent_to.rpartition(":")
-    is_here = host.startswith("127.") or sent_from.startswith(f"{host}:")
-    is_same_port = is_everywhere and is_here and heard_at.endswith(f":{port}")
-    if sent_to == heard_at or is_same_port:
+    is_own_host = host.startswith("127.") or sent_from.startswith(f"{host}:")
+    own = [sent_to]
+    if is_own_host:
+        own += [f"0.0.0.0:{port}", f":::{port}"]
+    if heard_at in own:
         raise InputError(
             f"--gear: expected another address than that of the data, got"
             f" {gear.address} with --nmea {data.address}; rudder orders would come"

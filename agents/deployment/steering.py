@@ -203,10 +203,10 @@ class Bridge:
 
     def tell_status(self) -> None:
         """Tell the state of the helm when it or that of a connection changes."""
-        parts = [self.helm.status]
+        parts = {self.helm.status: True}  # in order, and each once
         for connection in (self.data, self.gear):
-            if connection.problem and connection.problem not in parts:
-                parts.append(connection.problem)
+            if connection.problem:
+                parts[connection.problem] = True
         status = "; ".join(parts)
         if status != self.status:
             self.log(f"{self.seconds:.1f} s: {status}")
