@@ -8,6 +8,7 @@ from agents.controllers.guided import TURNS, Guided
 from agents.controllers.turn_rate import TurnRate
 from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import render
+from agents.deployment.heading_belief import HeadingBelief
 from agents.deployment.nmea import readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.sensors import HelmSensors, Limits
@@ -56,6 +57,7 @@ class Helm:
         self.pilot.largest = min(self.pilot.largest, radians(limits.order_deg))
         self.limits = limits
         self.sensors = HelmSensors(limits)
+        self.belief = HeadingBelief(agent, limits)
         self.heading = heading
         self.route = route
         self.rate = rate
@@ -127,6 +129,9 @@ class Helm:
         self.counts["sentences"] += 1
         for reading in heard:
             self.sensors.take(reading, now)
+            is_steered_by = self.sensors.value(reading.quantity, now) == reading.value
+            if is_steered_by:
+                self.belief.take(reading, now)
 
     def watch(self, step: float, now: float, fault: str | None = None) -> None:
         """Begin when all sensors are there; hand over for good at a fault.
@@ -140,7 +145,7 @@ class Helm:
                 self.silent.append(name.replace("_", " "))
 
         if self.state == STANDBY and not self.silent:
-            self.state = STEERING
+            self._engage(inputs["rudder"] or 0.0)
         elif self.state == STEERING and not fault:
             fault = self._fault(step, now)
         self.warnings = []
@@ -150,11 +155,20 @@ class Helm:
         elif self.state == STEERING:
             self.warnings = self.warnings_of(inputs, now)
 
+    def _engage(self, rudder: float) -> None:
+        """Begin to steer from where the rudder is, rad."""
+        self.state = STEERING
+        largest = self.pilot.largest
+        self.order = min(max(rudder, -largest), largest)
+        self.pilot.engage(rudder)
+        self.belief = HeadingBelief(self.pilot.agent, self.limits)
+
     def _fault(self, step: float, now: float) -> str:
         if self.silent:
             silent = " and no ".join(self.silent)
             return f"no {silent} for {self.limits.silence_s:g} s"
         fault = self.sensors.fault(self.order, step, now)
+        fault = fault or self.belief.doubt(self.sensors, now)
         if not fault and self.route is not None and self.route.ended:
             fault = "the end of the route is reached"
         return fault

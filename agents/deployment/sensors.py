@@ -29,6 +29,12 @@ class Limits:
         How long a disagreement may last.
     late_s : float
         How late a step may be; beyond, the computer cannot keep up.
+    heading_noise_deg : float
+        Standard deviation of the compass against the rate gyro.
+    wave_yaw_deg : float
+        Standard deviation of the heading in the roughest sea.
+    course_deg : float
+        Change of the angle between heading and course over ground.
     order_deg : float
         Largest rudder order, if it is less than the ship's limit.
     off_heading_deg, off_track_m : float
@@ -43,6 +49,9 @@ class Limits:
     rudder_rate_deg_s: float = 2.3
     persistence_s: float = 2.0
     late_s: float = 1.0
+    heading_noise_deg: float = 0.5
+    wave_yaw_deg: float = 1.0
+    course_deg: float = 10.0
     order_deg: float = 90.0
     off_heading_deg: float = 10.0
     off_track_m: float = 200.0
@@ -65,14 +74,14 @@ class HelmSensors:
         Value and time, s, of the newest reading by quantity and talker.
     since : dict
         When a fault was first seen, s.
-    expected : float or None
-        Where the rudder should be by now, if the gear is as slow as allowed, rad.
+    reachable : (float, float) or None
+        Between which angles the rudder is, if the gear is no slower than allowed, rad.
     """
 
     limits: Limits
     newest: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict)
     since: dict[str, float] = field(default_factory=dict)
-    expected: float | None = None
+    reachable: tuple[float, float] | None = None
 
     def take(self, reading: NmeaReading, now: float) -> None:
         """Keep a reading; the first talker of a quantity is steered by."""
@@ -141,16 +150,14 @@ class HelmSensors:
         return fresh
 
     def _rudder_fault(self, order: float, step: float, now: float) -> str:
-        """Compare the rudder with its order, and where a slow gear would have it."""
+        """Compare the rudder with where its orders brought it, by a slow gear or not."""
         rudder = self.value("rudder", now) or 0.0
-        if self.expected is None:
-            self.expected = rudder
+        low, high = self.reachable or (rudder, rudder)
         reach = radians(self.limits.rudder_rate_deg_s) * step
-        to_go = order - self.expected
-        self.expected += min(max(to_go, -reach), reach)
+        low = min(low + reach, order)  # where the slowest gear has brought it
+        high = max(high - reach, order)
+        self.reachable = low, high
 
-        low = min(self.expected, order)
-        high = max(self.expected, order)
         off = max(low - rudder, rudder - high)
         tolerance = radians(self.limits.rudder_deg)
         if self._lasts("order", off > tolerance, now):
