@@ -1,13 +1,16 @@
 """An autopilot between instruments and rudder, which hands over after a fault."""
 
+from contextlib import suppress
 from dataclasses import replace
-from math import inf, radians
+from math import inf, radians, tau
 from typing import Any
 
 from agents.controllers.guided import TURNS, Guided
 from agents.controllers.turn_rate import TurnRate
+from agents.deployment.alerts import Alerts
 from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import render
+from agents.deployment.compass import Compass
 from agents.deployment.heading_belief import HeadingBelief
 from agents.deployment.nmea import readings, sentences
 from agents.deployment.route import Route
@@ -16,6 +19,7 @@ from shipgym import InputError
 from shipgym.checks import check_number
 from shipgym.tasks.guidance import wrapped
 from shipgym.trials.nmea import NMEA_QUANTITIES
+from shipgym.trials.units import UNITS
 
 STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
 
@@ -41,6 +45,10 @@ class Helm:
     rate : float, optional
         Rate of turn, rad/s, of an autopilot that steers one; with a heading the
         largest.
+    variation : float, optional
+        Magnetic variation, rad, positive to the east; by default that of RMC or HDG.
+    rudder_feedback : bool
+        False: steer without a measured rudder, which then nobody watches.
     """
 
     def __init__(
@@ -50,6 +58,8 @@ class Helm:
         limits: Limits,
         route: Route | None = None,
         rate: float | None = None,
+        variation: float | None = None,
+        rudder_feedback: bool = True,
     ) -> None:
         if rate is not None and heading is not None and isinstance(agent, TurnRate):
             agent = _with_largest_rate(agent, rate)
@@ -61,15 +71,22 @@ class Helm:
         self.heading = heading
         self.route = route
         self.rate = rate
+        self.compass = Compass(variation)
+        self.rudder_feedback = rudder_feedback
         self.follows_path = isinstance(agent, Guided)
         self.needed = self._needed()
         self._check(agent)
 
         self.state = STANDBY
+        self.held = False  # in standby by the helmsman's wish
         self.alarm = ""
         self.warnings: list[str] = []
         self.silent = ["sensors"]  # what it waits for
         self.order = 0.0  # rudder, rad
+        self.commanded: float | None = None  # heading by HSC or HTC, rad
+        self.now = 0.0  # of the last watch, s
+        self.ended_by = ""  # the signal that ended it
+        self.alerts = Alerts()
         self.counts = {"sentences": 0, "damaged": 0}
 
     def _needed(self) -> list[str]:
@@ -77,6 +94,8 @@ class Helm:
         provided = {"set_point", "rate_of_turn"}
         if self.route is not None:
             provided.update(Route.GIVES)
+        if not self.rudder_feedback:
+            provided.add("rudder")
         needed = []
         for name in (*self.pilot.inputs, "rudder"):
             if name not in provided:
@@ -120,32 +139,40 @@ class Helm:
                 f" route, or another without, got '{name}' {preposition} a route"
             )
 
-    def hear(self, line: str, now: float) -> None:
-        """Take in a line that was received at a time, s."""
-        heard = readings(line)
+    def hear(self, line: str, source: str, now: float) -> None:
+        """Take in a line that was received from an address at a time, s."""
+        heard = readings(line, source)
         if heard is None:
             self.counts["damaged"] += 1
             return
         self.counts["sentences"] += 1
-        for reading in heard:
+        for reading in self.compass.true(heard, now):
             self.sensors.take(reading, now)
             is_steered_by = self.sensors.value(reading.quantity, now) == reading.value
             if is_steered_by:
                 self.belief.take(reading, now)
+            if reading.quantity == "commanded":
+                self.commanded = reading.value
+        with suppress(ValueError, IndexError):
+            self.alerts.hear(line, now)
 
     def watch(self, step: float, now: float, fault: str | None = None) -> None:
         """Begin when all sensors are there; hand over for good at a fault.
 
         `step`: time since the last call, s; `fault`: one of another part.
         """
+        self.now = now
+        if self.state != STEERING:
+            self.sensors.renew(now)
         inputs = self.inputs(now)
         self.silent = []
         for name, value in inputs.items():
             if value is None:
                 self.silent.append(name.replace("_", " "))
 
-        if self.state == STANDBY and not self.silent:
-            self._engage(inputs["rudder"] or 0.0)
+        may_begin = not (self.silent or self.held or fault)
+        if self.state == STANDBY and may_begin:
+            self._begin(inputs["rudder"] or 0.0)
         elif self.state == STEERING and not fault:
             fault = self._fault(step, now)
         self.warnings = []
@@ -154,8 +181,18 @@ class Helm:
             self.alarm = fault
         elif self.state == STEERING:
             self.warnings = self.warnings_of(inputs, now)
+        if self.state != STEERING:
+            self.order = 0.0
+        self._give_alerts(now)
 
-    def _engage(self, rudder: float) -> None:
+    def _give_alerts(self, now: float) -> None:
+        """Hand the alarm and the warnings over to alert management."""
+        texts = {warning: warning for warning in self.warnings}
+        if self.alarm:
+            texts["alarm"] = self.alarm
+        self.alerts.update(texts, now)
+
+    def _begin(self, rudder: float) -> None:
         """Begin to steer from where the rudder is, rad."""
         self.state = STEERING
         largest = self.pilot.largest
@@ -167,11 +204,28 @@ class Helm:
         if self.silent:
             silent = " and no ".join(self.silent)
             return f"no {silent} for {self.limits.silence_s:g} s"
-        fault = self.sensors.fault(self.order, step, now)
+        fault = self.sensors.fault(self.order, step, now, self.read)
         fault = fault or self.belief.doubt(self.sensors, now)
         if not fault and self.route is not None and self.route.ended:
             fault = "the end of the route is reached"
         return fault
+
+    def stand_by(self) -> None:
+        """Give the rudder back to the helmsman until `engage`."""
+        self.held = True
+        if self.state == STEERING:
+            self.state = STANDBY
+
+    def engage(self) -> None:
+        """Steer as soon as everything that the autopilot reads is available."""
+        self.held = False
+
+    def alter_course(self, angle: float) -> bool:
+        """Turn the set-point, rad, positive to starboard; False if it is not ours."""
+        if self.heading is None:
+            return False
+        self.heading = (self.heading + angle) % tau
+        return True
 
     def steer(self, now: float) -> None:
         """One control interval."""
@@ -182,6 +236,10 @@ class Helm:
     def inputs(self, now: float) -> dict[str, float | None]:
         """Inputs of the autopilot by name; None for what is not known."""
         inputs = self.sensors.numbers(self.needed, now)
+        if not self.rudder_feedback:
+            rudder = self.sensors.value("rudder", now)
+            inputs["rudder"] = self.sensors.expected if rudder is None else rudder
+            inputs["rudder"] = inputs["rudder"] or 0.0
         turns_at_rate = self.rate is not None and self.heading is None
         inputs["rate_of_turn"] = self.rate if turns_at_rate else 0.0
         if self.route is None:
@@ -200,11 +258,27 @@ class Helm:
             return self.heading
         if self.rate is not None:
             return 0.0
-        plotted = ("leg",) if self.follows_path else ("to_steer", "waypoint_bearing")
+        if self.commanded is not None and not self.follows_path:
+            return self.commanded
         for quantity in self.sensors.newest:
-            if quantity in plotted:
+            if quantity in self._plotted:
                 return self.sensors.value(quantity, now)
         return None
+
+    @property
+    def _plotted(self) -> tuple[str, ...]:
+        """Quantities of a plotter that may be the set-point."""
+        return ("leg",) if self.follows_path else ("to_steer", "waypoint_bearing")
+
+    @property
+    def read(self) -> set[str]:
+        """Quantities that it steers by."""
+        read = set(self.needed)
+        if self.heading is None and self.route is None:
+            read.update(self._plotted)
+        if (read & {"surge", "sway"}) - self.sensors.newest.keys():
+            read |= {"course", "speed", "heading"}
+        return read
 
     def warnings_of(self, inputs: dict[str, float | None], now: float) -> list[str]:
         """Warnings for the helmsman although the autopilot steers."""
@@ -247,27 +321,68 @@ class Helm:
     @property
     def status(self) -> str:
         """The state, what it waits for, or why it has handed over."""
+        if self.state == STANDBY and self.held:
+            return f"{STANDBY}, by the helmsman"
         if self.state == STANDBY:
-            silent = ", ".join(self.silent)
-            return f"{STANDBY}, waits for {silent}"
+            silent = ", ".join(self.silent or ["steering gear"])
+            return "; ".join([f"{STANDBY}, waits for {silent}", *self.hints])
         if self.alarm:
             return f"{MANUAL}: ALARM, {self.alarm}: take the wheel"
         return ", ".join([self.state, *self.warnings])
 
-    def sentences(self) -> str:
-        """Rudder order and status, and the alarm if there is one."""
-        text = render(
-            "helm.nmea.j2",
-            order=self.order,
-            valid=self.state == STEERING,
-            limit=self.pilot.largest,
-            set_point=self.heading,
-            alarm=self.alarm,
-            track=self.route is not None,
-            rate=self.rate,
-            warnings=self.warnings,
+    @property
+    def hints(self) -> list[str]:
+        """What was heard instead of that for which it waits, and what to do."""
+        hints = []
+        for name in ("heading", "to_steer", "leg"):
+            waits = name.replace("_", " ") in self.silent or (
+                name in self._plotted and "set point" in self.silent
+            )
+            if waits and self.compass.lacks(name, self.now, self.limits.silence_s):
+                hints = [
+                    "only magnetic bearings heard; no variation (RMC or HDG has one, or"
+                    " start with --variation DEG)"
+                ]
+        if self.silent == ["rudder"]:
+            hints.append("to steer without RSA start with --no-rudder-feedback")
+        return hints
+
+    def sentences(self, last: bool = False) -> str:
+        """Rudder order and status, and alerts; with `last` it steers no more."""
+        is_valid = self.state == STEERING and not last
+        report = self._report(is_valid)
+        order = self.order if is_valid else 0.0
+        text = render("helm.nmea.j2", order=order, **report)
+        return sentences(text) + self.alerts.sentences(self.now)
+
+    def _report(self, is_valid: bool) -> dict[str, Any]:
+        """Fields of HTD, and the status of ROR."""
+        set_point = self.inputs(self.now).get("set_point") if is_valid else None
+        keeps_track = self.follows_path or self.route is not None
+        mode = "S"  # by itself; H by another's command, T a track, M manual
+        if self.heading is None and self.rate is None:
+            mode = "T" if keeps_track else "H"
+
+        is_at_limit = abs(self.order) >= self.pilot.largest
+        wrong = (
+            is_at_limit,
+            "off heading" in self.warnings,
+            "off track" in self.warnings,
         )
-        return sentences(text)
+        statuses = ["V" if is_wrong or not is_valid else "A" for is_wrong in wrong]
+        off_track_miles = self.limits.off_track_m / UNITS["length"]["nm"]
+        return {
+            "status": "A" if is_valid else "V",
+            "mode": mode if is_valid else "M",
+            "limit": self.pilot.largest,
+            "off_heading_deg": self.limits.off_heading_deg,
+            "off_track": f"{off_track_miles:.3f}" if keeps_track else "",
+            "rate": self.rate,
+            "set_point": None if keeps_track else set_point,
+            "track": set_point if keeps_track else None,
+            "statuses": ",".join(statuses),
+            "heading": self.sensors.value("heading", self.now),
+        }
 
 
 def _known(inputs: dict[str, float | None]) -> dict[str, float]:

@@ -38,7 +38,7 @@ def tell(found, now, heading=0.4, rudder=0.0, talker="HE"):
 
 def test_it_waits_for_all_that_it_reads():
     found = Helm(PID_MARINER, 0.5, Limits())
-    found.hear(sentence("HEHDT", 20.0, "T"), 0.0)
+    found.hear(sentence("HEHDT", 20.0, "T"), "", 0.0)
     found.watch(1.0, 0.0)
     found.steer(0.0)
     assert (found.state, found.order) == (STANDBY, 0.0)
@@ -104,7 +104,7 @@ def test_it_hands_over_when_the_rudder_does_not_follow(rate_deg_s, state):
 
 def test_the_rudder_ordered_is_limited_and_the_helmsman_is_warned():
     found = helm(order_deg=2.0, off_heading_deg=3.0)
-    for _ in range(10):
+    for _ in range(120):  # after the transfer
         found.steer(0.0)
     assert found.order == pytest.approx(np.radians(2.0))
     assert found.status == "steering, off heading"

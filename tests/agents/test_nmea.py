@@ -97,7 +97,7 @@ def test_what_is_damaged_is_told_apart(line):
 
 def test_lines_come_in_any_portions_and_an_endless_one_is_forgotten():
     heard = []
-    line = Line(heard.append, set())
+    line = Line(lambda text, _: heard.append(text), set())
     for portion in (
         b"$HE",
         b"HDT",
@@ -125,7 +125,7 @@ class Wire:
             False,
         )
         if datagrams:
-            self.sendto = lambda data, peer: self.sent.append((data, peer))
+            self.sendto = self.sent.append
 
     def get_extra_info(self, name):
         return self.connected if name == "peername" else None
@@ -139,30 +139,26 @@ class Wire:
         self.closed = True
 
 
-def test_datagrams_go_to_whoever_was_heard_last_or_where_the_socket_is_connected():
+def test_datagrams_go_where_the_socket_is_connected_and_to_nobody_who_spoke():
     open_, connected = Wire(), Wire(connected=("host", 1))
-    lines = [Line(lambda line: None, set()) for _ in range(2)]
+    lines = [Line(lambda *_: None, set()) for _ in range(2)]
     for line, wire in zip(lines, (open_, connected), strict=True):
         line.connection_made(wire)
+        line.datagram_received(b"$HEHDT,1", ("a", 2))
         line.send(b"1")
-    assert (open_.sent, connected.sent) == ([], [(b"1", None)])
-    lines[0].datagram_received(b"$HEHDT,1", ("a", 2))
-    lines[0].send(b"2")
-    lines[0].datagram_received(b"$HEHDT,1", ("b", 3))
-    lines[0].send(b"3")
-    assert open_.sent == [(b"2", ("a", 2)), (b"3", ("b", 3))]
+    assert (open_.sent, connected.sent) == ([], [b"1"])
 
 
 def test_a_datagram_holds_whole_lines():
     heard = []
-    line = Line(heard.append, set())
+    line = Line(lambda text, _: heard.append(text), set())
     for data in (b"$A,1\r\n$B,2", b"$C,3\r\n"):
         line.datagram_received(data, ("a", 2))
     assert heard == ["$A,1", "$B,2", "$C,3"]
 
 
 def test_all_connected_ends_are_sent_to_though_one_is_broken():
-    link = Link(lambda line: None)
+    link = Link(lambda *_: None)
     wires = [Wire(datagrams=False, broken=k == 0) for k in range(3)]
     lines = [link.line() for _ in wires]
     for line, wire in zip(lines, wires, strict=True):
@@ -170,10 +166,11 @@ def test_all_connected_ends_are_sent_to_though_one_is_broken():
     link.send("order")
     assert [wire.sent for wire in wires] == [[], [b"order"], [b"order"]]
     lines[2].connection_lost(None)
-    assert link.ends == {lines[0], lines[1]}
+    assert link.ends == {lines[1]}
     link.others.append(server := Wire())
     link.close()
     assert [one.closed for one in (*wires, server)] == [True, True, False, True]
+    assert lines[0].error == "broken"
 
 
 @pytest.mark.parametrize(
@@ -196,7 +193,7 @@ def test_a_serial_line_has_the_speed_of_the_standard_unless_another_is_named(
             return reader, line
 
         asyncio.get_running_loop().connect_read_pipe = connected
-        link = Link(lambda line: None)
+        link = Link(lambda *_: None)
         await link.open(address)
         link.send("order")
         link.close()
@@ -213,11 +210,11 @@ def test_datagrams_and_a_serial_line_carry_it_too():
     port, heard = free_port(), []
 
     async def talk():
-        ends = [Link(heard.append), Link(lambda line: None)]
+        ends = [Link(lambda text, _: heard.append(text)), Link(lambda *_: None)]
         await ends[0].open(f"udp:127.0.0.1:{port}")
-        await ends[1].open(f"udp:127.0.0.1:{port}", serve=True)
+        await ends[1].open(f"udp:127.0.0.1:{port}", sends=True)
         ends[1].send(sentence("HEHDT", 1.0, "T"))
-        serial = Link(heard.append)
+        serial = Link(lambda text, _: heard.append(text))
         await serial.open(f"serial:{os.ttyname(slave)}@38400")
         os.write(master, sentence("HEHDT", 2.0, "T").encode())
         while len(heard) < 2:
@@ -246,12 +243,12 @@ def test_datagrams_and_a_serial_line_carry_it_too():
 )
 def test_an_address_that_cannot_be_opened_is_refused(address, message):
     with pytest.raises(InputError, match=message):
-        asyncio.run(Link(lambda line: None).open(address))
+        asyncio.run(Link(lambda *_: None).open(address))
 
 
 def test_a_missing_library_is_named_with_its_extra(monkeypatch):
     nmea.library.cache_clear()
     monkeypatch.setitem(sys.modules, "serial", None)
     with pytest.raises(InputError, match=r"pip install 'shipgym\[nmea\]'"):
-        asyncio.run(Link(lambda line: None).open("serial:/dev/null"))
+        asyncio.run(Link(lambda *_: None).open("serial:/dev/null"))
     nmea.library.cache_clear()
