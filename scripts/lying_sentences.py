@@ -39,7 +39,7 @@ Lie = Callable[["LyingShip", Readings, float], Readings]
 
 LONGEST_S, MOST_OFF_DEG = 10.0, 20.0
 ANGLES = ("heading", "course", "rudder")
-WARM_S = 120.0  # until a lie begins
+WARM_S = 60.0  # until a lie begins
 
 
 class LyingShip(SimulatedShip):

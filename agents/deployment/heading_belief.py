@@ -234,7 +234,6 @@ class HeadingBelief:
             turned=motion.turned - before.turned,
             rudder=motion.rudder,
             speed=motion.speed,
-            rate=motion.rate or 0.0,
             step=step,
         )
         alone = self.rudder_alone.observe(
@@ -247,6 +246,9 @@ class HeadingBelief:
         if alone > DEVIATIONS * self.noise:
             return "the heading does not move under rudder"
         if abs(residual) > DEVIATIONS * self.yaw + self.observer.doubt:
+            has_jumped = self.heard.jumps.value > 0.5
+            if has_jumped:
+                return "the heading jumps"
             return "the heading does not answer to the rudder"
         return ""
 

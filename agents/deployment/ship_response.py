@@ -66,9 +66,9 @@ class HeadingObserver:
     """Heading that the rudder explains, corrected slowly by the measured one.
 
     Its states are the heading less the measured one, the yaw rate and the acceleration
-    that wind and errors of the model add; all three poles are at `frequency`. Its
+    that wind and errors of the model add; all three poles come to `frequency`. Its
     `residual` is the measured heading less the expected one, rad; its `doubt`, rad, is
-    how far a rudder whose effect is not known within a half may have moved the ship.
+    how far a rudder whose effect is not known within six tenths may have moved the ship.
     """
 
     def __init__(self, ship: ShipResponse) -> None:
@@ -76,23 +76,19 @@ class HeadingObserver:
         self.frequency = 0.6 * ship.turning
         self.residual = 0.0
         self.rate = 0.0  # rad/s
-        self.has_begun = False
+        self.elapsed = 0.0  # s
         self.unexplained = 0.0  # rad/s^2
         self.usual = 0.0  # rudder of the last minutes, rad
         self.doubt_rate = 0.0  # rad/s
         self.doubt = 0.0
 
-    def observe(
-        self, turned: float, rudder: float, speed: float, rate: float, step: float
-    ) -> float:
+    def observe(self, turned: float, rudder: float, speed: float, step: float) -> float:
         """Take a step, s; the residual, rad.
 
         `turned`: change of the measured heading in the step, rad; `rudder`: rad;
-        `speed`: m/s; `rate`: yaw rate with which it begins, rad/s.
+        `speed`: m/s.
         """
-        if not self.has_begun:
-            self.has_begun = True
-            self.rate = rate
+        if self.elapsed == 0.0:
             self.usual = rudder
 
         modelled = self.ship.acceleration(rudder, self.rate, speed)
@@ -100,17 +96,19 @@ class HeadingObserver:
         expected = self.rate * step + 0.5 * acceleration * step**2
         innovation = self.residual + turned - expected
 
-        pole = self.frequency
+        # it begins without a rate of turn, and learns that first
+        self.elapsed += step
+        pole = max(self.frequency, 1.0 / (5.0 + self.elapsed))
         self.residual = innovation * max(1.0 - 3.0 * pole * step, 0.0)
         self.rate += acceleration * step + 3.0 * pole**2 * step * innovation
-        self.unexplained += pole**3 * step * innovation
+        self.unexplained += self.frequency**3 * step * innovation
         self._doubt(rudder, speed, step)
         return self.residual
 
     def _doubt(self, rudder: float, speed: float, step: float) -> None:
         """Let a share of the rudder's effect act, which is forgotten."""
         forgotten = 2.0 * self.frequency
-        share = 0.5
+        share = 0.6
         slow = step * 0.1 * self.frequency
         off = rudder - self.usual
         self.usual += slow * off
