@@ -68,7 +68,7 @@ class HeadingObserver:
     Its states are the heading less the measured one, the yaw rate and the acceleration
     that wind and errors of the model add; all three poles come to `frequency`. Its
     `residual` is the measured heading less the expected one, rad; its `doubt`, rad, is
-    how far a rudder whose effect is not known within six tenths may have moved the ship.
+    how far the rudder may have moved the ship if its effect is off by six tenths.
     """
 
     def __init__(self, ship: ShipResponse) -> None:
