@@ -22,6 +22,53 @@ Gear = Annotated[
         help="Where rudder orders go; needed over UDP, else the --nmea connection.",
     ),
 ]
+Heading = Annotated[
+    float | None,
+    Option(
+        metavar="DEG",
+        min=0.0,
+        max=360.0,
+        help="Heading to steer; default: commanded (HSC, HTC) or plotted (APB).",
+    ),
+]
+Rate = Annotated[
+    float | None,
+    Option(
+        "--rate-of-turn",
+        metavar="DEG",
+        help="deg/min, for turn-rate; with --heading the limit.",
+    ),
+]
+RouteFile = Annotated[
+    Path | None,
+    Option(
+        metavar="CSV",
+        help="Route for wheel-over: columns latitude, longitude, degrees.",
+    ),
+]
+LimitValues = Annotated[
+    list[str] | None,
+    Option(
+        metavar="NAME=VALUE",
+        help="When to hand over: silence_s=3, rudder_deg=5; repeatable.",
+    ),
+]
+Variation = Annotated[
+    float | None,
+    Option(
+        metavar="DEG",
+        min=-180.0,
+        max=180.0,
+        help="Magnetic variation, positive east; default: heard (RMC, HDG).",
+    ),
+]
+RudderFeedback = Annotated[
+    bool,
+    Option(
+        "--rudder-feedback/--no-rudder-feedback",
+        help="Measure the rudder (RSA); without, nobody sees if it follows.",
+    ),
+]
 Duration = Annotated[
     float, Option(min=0.0, help="Seconds after which to stop; default: never.")
 ]
@@ -40,53 +87,12 @@ def steer_command(
     ],
     nmea: Address,
     gear: Gear = None,
-    heading: Annotated[
-        float | None,
-        Option(
-            metavar="DEG",
-            min=0.0,
-            max=360.0,
-            help="Heading to steer; default: commanded (HSC, HTC) or plotted (APB).",
-        ),
-    ] = None,
-    rate: Annotated[
-        float | None,
-        Option(
-            "--rate-of-turn",
-            metavar="DEG",
-            help="deg/min, for turn-rate; with --heading the limit.",
-        ),
-    ] = None,
-    route: Annotated[
-        Path | None,
-        Option(
-            metavar="CSV",
-            help="Route for wheel-over: columns latitude, longitude, degrees.",
-        ),
-    ] = None,
-    limit: Annotated[
-        list[str] | None,
-        Option(
-            metavar="NAME=VALUE",
-            help="When to hand over: silence_s=3, rudder_deg=5; repeatable.",
-        ),
-    ] = None,
-    variation: Annotated[
-        float | None,
-        Option(
-            metavar="DEG",
-            min=-180.0,
-            max=180.0,
-            help="Magnetic variation, positive east; default: heard (RMC, HDG).",
-        ),
-    ] = None,
-    rudder_feedback: Annotated[
-        bool,
-        Option(
-            "--rudder-feedback/--no-rudder-feedback",
-            help="Measure the rudder (RSA); without, nobody sees if it follows.",
-        ),
-    ] = True,
+    heading: Heading = None,
+    rate: Rate = None,
+    route: RouteFile = None,
+    limit: LimitValues = None,
+    variation: Variation = None,
+    rudder_feedback: RudderFeedback = True,
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
 ) -> None:

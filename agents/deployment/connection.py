@@ -33,8 +33,8 @@ class Connection:
         longest_s, pause_s = 5.0, 1.0
         self.error = ""
         try:
-            opening = self.link.open(self.address, sends=self.sends)
-            await asyncio.wait_for(opening, longest_s)
+            async with asyncio.timeout(longest_s):
+                await self.link.open(self.address, sends=self.sends)
         except TimeoutError:
             self.error = f"{self.address}: no answer"
         except InputError as error:
@@ -59,10 +59,11 @@ class Connection:
 
     def retry(self) -> None:
         """Begin to open the link again if it is closed, at most once a second."""
-        is_trying = self.opening is not None and not self.opening.done()
-        now = asyncio.get_running_loop().time()
-        if not self.is_open and not is_trying and now >= self.retry_at:
-            self.opening = asyncio.create_task(self.open())
+        loop = asyncio.get_running_loop()
+        if self.is_open or loop.time() < self.retry_at:
+            return
+        if self.opening is None or self.opening.done():
+            self.opening = loop.create_task(self.open())
 
     def close(self) -> None:
         """Close the link and try no more."""

@@ -127,7 +127,12 @@ class HelmSensors:
         return tolerance
 
     def renew(self, now: float) -> None:
-        """Forget sources that are silent; true headings come before magnetic ones."""
+        """Forget sources that are silent, and where the rudder was expected.
+
+        True headings come before magnetic ones.
+        """
+        self.expected = None
+        self.since.pop("order", None)
         for quantity, sources in list(self.newest.items()):
             spoke = {}
             for source in sorted(sources, key=lambda source: source.is_magnetic):

@@ -158,8 +158,9 @@ class Bridge:
         number = 0
         while self.seconds < duration:
             due = begin + self.seconds
-            pause = (due - self.now) / self.speed_up
-            await asyncio.sleep(max(0.0, pause))
+            if number:  # the first order goes out at once
+                pause = (due - self.now) / self.speed_up
+                await asyncio.sleep(max(0.0, pause))
             now = self.now
             for observer in self.observers:
                 for command in observer.commands():
