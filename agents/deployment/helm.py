@@ -11,6 +11,7 @@ from agents.deployment.alerts import Alerts
 from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import render
 from agents.deployment.compass import Compass
+from agents.deployment.heading_belief import HeadingBelief
 from agents.deployment.nmea import readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.sensors import HelmSensors, Limits
@@ -66,6 +67,7 @@ class Helm:
         self.pilot.largest = min(self.pilot.largest, radians(limits.order_deg))
         self.limits = limits
         self.sensors = HelmSensors(limits)
+        self.belief = HeadingBelief(agent, limits)
         self.heading = heading
         self.route = route
         self.rate = rate
@@ -146,6 +148,9 @@ class Helm:
         self.counts["sentences"] += 1
         for reading in self.compass.true(heard, now):
             self.sensors.take(reading, now)
+            is_steered_by = self.sensors.value(reading.quantity, now) == reading.value
+            if is_steered_by:
+                self.belief.take(reading, now)
             if reading.quantity == "commanded":
                 self.commanded = reading.value
         with suppress(ValueError, IndexError):
@@ -167,7 +172,7 @@ class Helm:
 
         may_begin = not (self.silent or self.held or fault)
         if self.state == STANDBY and may_begin:
-            self.state = STEERING
+            self._begin(inputs["rudder"] or 0.0)
         elif self.state == STEERING and not fault:
             fault = self._fault(step, now)
         self.warnings = []
@@ -187,11 +192,20 @@ class Helm:
             texts["alarm"] = self.alarm
         self.alerts.update(texts, now)
 
+    def _begin(self, rudder: float) -> None:
+        """Begin to steer from where the rudder is, rad."""
+        self.state = STEERING
+        largest = self.pilot.largest
+        self.order = min(max(rudder, -largest), largest)
+        self.pilot.engage(rudder)
+        self.belief = HeadingBelief(self.pilot.agent, self.limits)
+
     def _fault(self, step: float, now: float) -> str:
         if self.silent:
             silent = " and no ".join(self.silent)
             return f"no {silent} for {self.limits.silence_s:g} s"
         fault = self.sensors.fault(self.order, step, now, self.read)
+        fault = fault or self.belief.doubt(self.sensors, now)
         if not fault and self.route is not None and self.route.ended:
             fault = "the end of the route is reached"
         return fault
