@@ -63,6 +63,21 @@ def steer_command(
             help="When to hand over: silence_s=3, rudder_deg=5; repeatable.",
         ),
     ] = None,
+    page: Annotated[
+        int | None,
+        Option(
+            metavar="PORT",
+            min=0,
+            max=65535,
+            help="Show the helm on a page of this computer; 0: any free port.",
+        ),
+    ] = None,
+    log: Annotated[
+        Path | None,
+        Option(
+            metavar="FILE", help="New file for all sentences; new-ship reads it too."
+        ),
+    ] = None,
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
 ) -> None:
@@ -72,13 +87,16 @@ def steer_command(
 
     It begins when everything that the autopilot reads is available. If a sensor falls
     silent, two disagree, the rudder does not follow or the computer is late, it raises
-    the alarm (ALR), marks its order invalid and stops steering. Not certified: read
+    the alarm (ALR), marks its order invalid and stops steering. In a terminal it shows
+    the helm and takes keys; with --page a browser does. Not certified: read
     docs/deployment.md first. Exits with 1 after an alarm.
     """
     import asyncio
 
     from agents.agent_file import load_agent
-    from agents.cli.terminal import answer, say
+    from agents.cli.terminal import answer, console, say, warn
+    from agents.deployment.helm import Helm
+    from agents.deployment.panel import has_screen, helm_panel
     from agents.deployment.route import Route
     from agents.deployment.sensors import Limits
     from agents.deployment.steering import steer
@@ -93,19 +111,31 @@ def steer_command(
         radius = getattr(pilot, "gains", {}).get("path_radius", 0.0)
         track = Route.from_csv(route, radius)
 
-    helm = asyncio.run(
-        steer(
-            pilot,
-            nmea,
-            heading=None if heading is None else radians(heading),
-            limits=Limits(**limits),
-            duration=duration,
+    async def steered() -> Helm:
+        panel = helm_panel(
+            title=f"shipgym steer {agent} on {nmea}",
+            say=say,
+            warn=warn,
+            console=console if has_screen(console) else None,
+            page=page,
+            log=log,
             speed_up=speed_up,
-            log=say,
-            route=track,
-            rate=None if rate is None else radians(rate) / 60.0,
         )
-    )
+        async with panel as (observer, note):
+            return await steer(
+                pilot,
+                nmea,
+                heading=None if heading is None else radians(heading),
+                limits=Limits(**limits),
+                duration=duration,
+                speed_up=speed_up,
+                log=note,
+                route=track,
+                rate=None if rate is None else radians(rate) / 60.0,
+                observers=[observer],
+            )
+
+    helm = asyncio.run(steered())
     answer({"state": helm.state, "alarm": helm.alarm, **helm.counts})
     if helm.alarm:
         fail(f"handed over: {helm.alarm}", FAILED)

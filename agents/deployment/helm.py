@@ -1,13 +1,14 @@
 """An autopilot between instruments and rudder, which hands over after a fault."""
 
 from dataclasses import replace
-from math import inf, radians, tau
+from math import inf, pi, radians, tau
 from typing import Any
 
 from agents.controllers.guided import TURNS, Guided
 from agents.controllers.turn_rate import TurnRate
 from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import render
+from agents.deployment.next_leg import NextLeg, PlottedCourse
 from agents.deployment.nmea import readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.sensors import HelmSensors, Limits
@@ -22,9 +23,9 @@ STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
 class Helm:
     """An autopilot that waits for its sensors, steers, and hands over after a fault.
 
-    Its state is `standby`, `steering` or, for good, `manual`. Raises InputError for an
-    autopilot that reads what no sentence of NMEA 0183 has, and for one that cannot
-    follow the route or the rate of turn.
+    Its state is `standby`, `steering` or, after a fault, `manual`, which only the
+    helmsman ends. Raises InputError for an autopilot that reads what no sentence of
+    NMEA 0183 has, and for one that cannot follow the route or the rate of turn.
 
     Parameters
     ----------
@@ -65,8 +66,15 @@ class Helm:
 
         self.state = STANDBY
         self.held = False  # in standby by the helmsman's wish
+        self.has_steered = False
+        self.obstacle = "no sensors"  # why it cannot steer
+        self.well_since = inf  # time since which there is none, s
+        self.now = -inf  # time of the last watch, s
+        self.plotted = PlottedCourse()
+        self.question: NextLeg | None = None  # for the helmsman
         self.alarm = ""
         self.warnings: list[str] = []
+        self.notices: list[str] = []  # warnings of others
         self.silent = ["sensors"]  # what it waits for
         self.order = 0.0  # rudder, rad
         self.counts = {"sentences": 0, "damaged": 0}
@@ -130,52 +138,164 @@ class Helm:
             self.sensors.take(reading, now)
 
     def watch(self, step: float, now: float, fault: str | None = None) -> None:
-        """Begin when all sensors are there; hand over for good at a fault.
+        """Begin when all sensors are there; hand over at a fault.
 
         `step`: time since the last call, s; `fault`: one of another part.
         """
         inputs = self.inputs(now)
+        self.now = now
         self.silent = []
         for name, value in inputs.items():
             if value is None:
                 self.silent.append(name.replace("_", " "))
 
         if self.state == STANDBY and not self.silent and not self.held:
-            self.state = STEERING
-        elif self.state == STEERING and not fault:
+            self._begin()
+        elif not fault:
             fault = self._fault(step, now)
+        self._note_obstacle(fault or "")
+        self._follow_plotter(now)
+
         self.warnings = []
         if fault and self.state == STEERING:
             self.state = MANUAL
             self.alarm = fault
         elif self.state == STEERING:
-            self.warnings = self.warnings_of(inputs, now)
+            self.warnings = [*self.warnings_of(inputs, now), *self.notices]
 
     def _fault(self, step: float, now: float) -> str:
         if self.silent:
             silent = " and no ".join(self.silent)
             return f"no {silent} for {self.limits.silence_s:g} s"
-        fault = self.sensors.fault(self.order, step, now)
+        order = self.order
+        if self.state != STEERING:  # the rudder follows the helmsman
+            order = self.sensors.value("rudder", now) or 0.0
+        fault = self.sensors.fault(order, step, now)
         if not fault and self.route is not None and self.route.ended:
             fault = "the end of the route is reached"
         return fault
 
+    def _note_obstacle(self, fault: str) -> None:
+        """Note why it cannot steer; after an alarm all has to be well for a while."""
+        if fault:
+            self.well_since = inf
+        else:
+            self.well_since = min(self.well_since, self.now)
+        self.obstacle = fault
+        well_s = self.now - self.well_since
+        enough_s = self.limits.persistence_s
+        if self.state == MANUAL and not fault and well_s < enough_s:
+            self.obstacle = f"all has to be well for {enough_s:g} s first"
+
+    def _follow_plotter(self, now: float) -> None:
+        """Follow the plotter's course; close a question that was not answered."""
+        if self.heading is None:
+            if self.state != STEERING:
+                self.plotted.take()
+            self.plotted.follow(self._plotters_course(now))
+        if self.question is not None and not self.question.is_open(now):
+            self.question = None
+
+    def _begin(self) -> None:
+        """Steer from the rudder and, if it steers its own, the heading of now."""
+        self.state = STEERING
+        self.has_steered = True
+        self.alarm = ""
+        self.held = False
+        self.order = self.sensors.value("rudder", self.now) or 0.0
+        self.sensors.expected = None
+        self.pilot.switch_on()
+
     def stand_by(self) -> None:
-        """Give the rudder back to the helmsman until `engage`."""
+        """Give the rudder back to the helmsman until `engage`.
+
+        After an alarm it is his already.
+        """
         self.held = True
+        self.question = None
         if self.state == STEERING:
             self.state = STANDBY
 
     def engage(self) -> None:
-        """Steer as soon as everything that the autopilot reads is available."""
-        self.held = False
+        """Steer again, after stand-by or an alarm.
 
-    def alter_course(self, angle: float) -> bool:
-        """Turn the set-point, rad, positive to starboard; False if it is not ours."""
+        An autopilot that keeps a heading of its own keeps the one that the ship has
+        now. Raises InputError unless all is well, after an alarm for `persistence_s`.
+        """
+        self.question = None
+        if self.state == STEERING:
+            return
+        if self.obstacle:
+            raise InputError(f"cannot steer: {self.obstacle}")
+        if self.heading is not None and self.has_steered:
+            self.heading = self.sensors.value("heading", self.now)
+        self._begin()
+
+    def change_heading(self, delta: float) -> None:
+        """Turn the set-point by an angle, rad, positive to starboard.
+
+        Of an autopilot that keeps a plotter's heading it becomes its own, until
+        `next_leg`. Raises InputError if it does not steer, follows a path or turns at a
+        rate, or if the set-point came near to the opposite of the heading, from where
+        the ship might turn to the other side.
+        """
+        check_number(delta, "change of heading")
+        self.question = None
+        inputs = self.inputs(self.now)
+        turns_at_rate = self.rate is not None and self.heading is None
+        if self.state != STEERING:
+            raise InputError("no change of heading: not steering")
+        if self.follows_path or turns_at_rate:
+            course = "rate of turn" if turns_at_rate else "track"
+            raise InputError(f"no change of heading: it steers a {course}")
+
+        set_point = inputs["set_point"]
+        heading = inputs["heading"]
+        if set_point is None or heading is None:
+            raise InputError("no change of heading: no heading")
+        to_turn = wrapped(set_point - heading) + delta
+        if abs(to_turn) > 0.95 * pi and abs(to_turn) > abs(to_turn - delta):
+            raise InputError("no change of heading: more than 170° from the heading")
+        self.heading = (set_point + delta) % tau
+        self.plotted.take()
+
+    def next_leg(self, confirm: bool = False) -> None:
+        """Ask the helmsman for the next leg; with `confirm` turn to it.
+
+        It is that of the route, which she is on from then, or that of the plotter.
+        Raises InputError if there is none, or it has not been asked for before.
+        """
+        asked = self.question
+        self.question = None
+        if self.state != STEERING:
+            raise InputError("no next leg: not steering")
+        course = self._next_course()
+        if course is None:
+            raise InputError("no next leg: none is known")
+
+        now_steered = self.inputs(self.now)["set_point"] or 0.0
+        turn = float(wrapped(course - now_steered))
+        question = NextLeg(course, turn, self.now)
+        if not confirm:
+            self.question = question
+            return
+        if asked is None or abs(wrapped(asked.course - course)) > PlottedCourse.new_leg:
+            raise InputError("nothing to confirm: ask for the next leg first")
+        if self.route is not None:
+            self.route.advance()
+            return
+        self.heading = None
+        self.plotted.take()
+
+    def _next_course(self) -> float | None:
+        """Direction of the next leg of the route or the plotter, rad; None if none."""
+        if self.route is not None:
+            return self.route.next_course()
+        if self.rate is not None:
+            return None
         if self.heading is None:
-            return False
-        self.heading = (self.heading + angle) % tau
-        return True
+            return self.plotted.waiting
+        return self._plotters_course(self.now)
 
     def steer(self, now: float) -> None:
         """One control interval."""
@@ -190,6 +310,8 @@ class Helm:
         inputs["rate_of_turn"] = self.rate if turns_at_rate else 0.0
         if self.route is None:
             inputs["set_point"] = self._set_point(now)
+            if "cross_track" in inputs and self.plotted.waiting is not None:
+                inputs["cross_track"] = 0.0  # that of the plotter is from the new leg
             return inputs
 
         latitude = inputs["latitude"]
@@ -199,11 +321,15 @@ class Helm:
         return inputs
 
     def _set_point(self, now: float) -> float | None:
-        """Heading to steer, its own or that of the plotter which was heard first."""
+        """Heading to steer, its own or that of the plotter."""
         if self.heading is not None:
             return self.heading
         if self.rate is not None:
             return 0.0
+        return self.plotted.steered(self._plotters_course(now))
+
+    def _plotters_course(self, now: float) -> float | None:
+        """Heading to steer by the plotter which was heard first, or her leg."""
         plotted = ("leg",) if self.follows_path else ("to_steer", "waypoint_bearing")
         for quantity in self.sensors.newest:
             if quantity in plotted:
@@ -229,6 +355,8 @@ class Helm:
         seconds_to_turn = self.seconds_to_turn(known, now)
         if seconds_to_turn <= self.limits.early_s:
             warnings.append("course change ahead")
+        if self.plotted.waiting is not None:
+            warnings.append("next leg waits to be confirmed")
         return warnings
 
     def seconds_to_turn(self, inputs: dict[str, float], now: float) -> float:

@@ -1,0 +1,347 @@
+"""The helm as a helmsman sees it: one record, and its form in a terminal."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import degrees
+from typing import Any, NamedTuple
+
+from rich.console import Group
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from agents.deployment.heard import HeardSentences
+from agents.deployment.helm import MANUAL, STANDBY, STEERING, Helm
+from shipgym.trials.nmea import NMEA_QUANTITIES
+from shipgym.trials.units import UNITS
+
+UNKNOWN = "--"
+#: Keys by command, and what they do; the page has them as buttons.
+KEYS = {
+    "stand-by": ("space", "stand-by"),
+    "steer": ("s", "steer"),
+    "port-10": ("<", "-10°"),
+    "port-1": ("-", "-1°"),
+    "starboard-1": ("+", "+1°"),
+    "starboard-10": (">", "+10°"),
+    "next-leg": ("n", "next leg"),
+    "confirm": ("y", "confirm"),
+    "cancel": ("c", "cancel"),
+    "quit": ("q", "quit"),
+}
+
+
+class SourceView(NamedTuple):
+    """An instrument: what it says, since when, and if it is steered by."""
+
+    quantity: str
+    value: str
+    source: str
+    age_s: float
+    is_fresh: bool
+    is_used: bool
+
+
+class Missing(NamedTuple):
+    """A quantity that is needed and missing, and what was heard instead."""
+
+    quantity: str
+    heard: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class HelmView:
+    """Helm as it is shown at one moment; None for what is not known.
+
+    Attributes
+    ----------
+    state, alarm, warnings, obstacle
+        As of a `Helm`.
+    heading, set_point, rudder, order : float or None
+        rad. The order only while it steers.
+    yaw_rate : float or None
+        rad/s.
+    cross_track : float or None
+        m, positive if the ship is to starboard of her track.
+    leads : str
+        Where the set-point comes from.
+    sources : tuple of SourceView
+    missing : tuple of Missing
+    question : str
+        What the helmsman has to confirm.
+    note : str
+        Answer to his last command.
+    """
+
+    state: str
+    alarm: str
+    warnings: tuple[str, ...]
+    obstacle: str
+    heading: float | None
+    set_point: float | None
+    yaw_rate: float | None
+    rudder: float | None
+    order: float | None
+    cross_track: float | None
+    leads: str
+    sources: tuple[SourceView, ...]
+    missing: tuple[Missing, ...]
+    question: str = ""
+    note: str = ""
+
+    @classmethod
+    def of(
+        cls, helm: Helm, heard: HeardSentences, now: float, note: str = ""
+    ) -> "HelmView":
+        """View of a helm at a time, s."""
+        inputs = helm.inputs(now)
+        sensors = helm.sensors
+
+        def known(quantity: str) -> float | None:
+            return inputs.get(quantity, sensors.value(quantity, now))
+
+        return cls(
+            state=helm.state,
+            alarm=helm.alarm,
+            warnings=tuple(helm.warnings),
+            obstacle=helm.obstacle,
+            heading=known("heading"),
+            set_point=known("set_point"),
+            yaw_rate=known("yaw_rate"),
+            rudder=known("rudder"),
+            order=helm.order if helm.state == STEERING else None,
+            cross_track=known("cross_track"),
+            leads=_leader(helm),
+            sources=tuple(_sources(helm, now)),
+            missing=tuple(_missing(helm, heard, now, inputs)),
+            question=str(helm.question or ""),
+            note=note,
+        )
+
+    @property
+    def headline(self) -> str:
+        """State in capitals; after a fault the alarm."""
+        if self.state == MANUAL:
+            return "ALARM: TAKE THE WHEEL"
+        return {STEERING: "STEERING", STANDBY: "STAND-BY"}[self.state]
+
+    @property
+    def detail(self) -> str:
+        """Alarm, warnings, or what has to be done to steer."""
+        if self.state == STEERING:
+            return ", ".join(self.warnings) or "all is well"
+        ready = f"cannot steer: {self.obstacle}" if self.obstacle else "s: steer"
+        return "; ".join(text for text in (self.alarm, ready) if text)
+
+    @property
+    def gauges(self) -> dict[str, str]:
+        """Texts of the numbers by name."""
+        return {
+            "heading": bearing(self.heading),
+            f"set-point ({self.leads})": bearing(self.set_point),
+            "rate of turn": _signed(self.yaw_rate, 60.0, "°/min"),
+            "rudder": sided(self.rudder),
+            "order": sided(self.order),
+            "cross-track": _cross_track(self.cross_track),
+        }
+
+
+def bearing(angle: float | None) -> str:
+    """A direction, rad, as 045.0°."""
+    if angle is None:
+        return UNKNOWN
+    tenths = round(degrees(angle) * 10.0) % 3600
+    return f"{tenths / 10.0:05.1f}°"
+
+
+def sided(angle: float | None) -> str:
+    """A rudder angle, rad, as 3.0° stbd."""
+    if angle is None:
+        return UNKNOWN
+    size = abs(degrees(angle))
+    if size < 0.05:
+        return "0.0°"
+    return f"{size:.1f}° {'stbd' if angle > 0.0 else 'port'}"
+
+
+def _signed(value: float | None, factor: float, unit: str) -> str:
+    if value is None:
+        return UNKNOWN
+    return f"{degrees(value) * factor:+.1f}{unit}"
+
+
+def _cross_track(value: float | None) -> str:
+    if value is None:
+        return UNKNOWN
+    side = "stbd" if value >= 0.0 else "port"
+    return f"{abs(value):.0f} m to {side}"
+
+
+def _leader(helm: Helm) -> str:
+    """Where the set-point comes from."""
+    if helm.route is not None:
+        return "route"
+    if helm.heading is not None:
+        return "own"
+    return "rate" if helm.rate is not None else "plotter"
+
+
+def _sources(helm: Helm, now: float) -> Iterator[SourceView]:
+    """Instruments, those first that the autopilot needs."""
+    sensors = helm.sensors
+
+    def is_needed(quantity: str) -> bool:
+        return quantity in helm.needed
+
+    for quantity in sorted(sensors.newest, key=is_needed, reverse=True):
+        fresh = sensors.fresh(quantity, now)
+        newest = sensors.newest[quantity]
+        first = next(iter(newest), None)
+        for source, (value, time) in newest.items():
+            yield SourceView(
+                quantity=quantity.replace("_", " "),
+                value=reading_text(quantity, value),
+                source=str(source),
+                age_s=max(now - time, 0.0),
+                is_fresh=source in fresh,
+                is_used=source == first and is_needed(quantity),
+            )
+
+
+def reading_text(quantity: str, value: float) -> str:
+    """A reading in the units of a bridge."""
+    if quantity in ("surge", "sway", "speed"):
+        knots = value / UNITS["speed"]["kn"]
+        return f"{knots:.1f} kn"
+    if quantity == "yaw_rate":
+        return _signed(value, 60.0, "°/min")
+    if quantity in ("rudder", "order", "released"):
+        return sided(value)
+    if quantity in ("latitude", "longitude"):
+        return f"{degrees(value):.4f}°"
+    if quantity == "cross_track":
+        return _cross_track(value)
+    is_distance = NMEA_QUANTITIES[quantity].largest > 1000.0
+    return f"{value:.0f} m" if is_distance else bearing(value)
+
+
+def _missing(
+    helm: Helm, heard: HeardSentences, now: float, inputs: Mapping[str, float | None]
+) -> Iterator[Missing]:
+    """Inputs that are not known, and what was heard instead."""
+    speeds = ["course", "speed"]
+    courses = ["to_steer", "waypoint_bearing"]
+    if helm.follows_path:
+        courses = ["leg"]
+    other_names = {"surge": speeds, "sway": speeds, "set_point": courses}
+    for name, value in inputs.items():
+        if value is None:
+            quantities = (name, *other_names.get(name, ()))
+            instead = heard.instead_of(quantities, now)
+            yield Missing(name.replace("_", " "), tuple(instead))
+
+
+def rendered(view: HelmView, title: str, lines: int = 24) -> Group:
+    """View in a terminal of so many lines."""
+    title_text = Text(title, style="dim", no_wrap=True, overflow="ellipsis")
+    question = Text(view.question, style="bold black on yellow")
+    if view.question:
+        question.append("  y: confirm   c: cancel")
+    fixed_lines = 17
+    return Group(
+        title_text,
+        _banner(view),
+        _gauges(view),
+        Text(),
+        _instruments(view, max(lines - fixed_lines, 1)),
+        Text(),
+        question if view.question else Text(view.note, style="italic"),
+        _keys(),
+    )
+
+
+def _banner(view: HelmView) -> Panel:
+    """State and alarm."""
+    styles = {
+        STEERING: "bold white on dark_green",
+        STANDBY: "bold black on grey70",
+        MANUAL: "bold white on red",
+    }
+    style = styles[view.state]
+    if view.state == STEERING and view.warnings:
+        style = "bold black on yellow"
+    headline = Text(view.headline, justify="center")
+    detail = Text(view.detail, justify="center", no_wrap=True, overflow="ellipsis")
+    return Panel(Group(headline, detail), style=style)
+
+
+def _gauges(view: HelmView) -> Table:
+    """The six numbers in two rows."""
+    table = Table.grid(expand=True, padding=(0, 1))
+    gauges = list(view.gauges.items())
+    per_row = 3
+    for _ in range(per_row):
+        table.add_column(ratio=1, no_wrap=True)
+    for begin in range(0, len(gauges), per_row):
+        row = gauges[begin : begin + per_row]
+        table.add_row(*[Text(name, style="dim") for name, _ in row])
+        table.add_row(*[Text(text, style="bold") for _, text in row])
+    return table
+
+
+def _instruments(view: HelmView, most: int) -> Table:
+    """What is missing, and each source with its age, in so many lines."""
+    table = Table.grid(expand=True, padding=(0, 1))
+    for ratio in (3, 3, 6, 2):
+        table.add_column(ratio=ratio, no_wrap=True, overflow="ellipsis")
+
+    rows: list[tuple[list[str], str]] = []
+    for missing in view.missing:
+        heard = "; ".join(missing.heard) or "nothing heard"
+        rows.append(([missing.quantity, "MISSING", heard, ""], "bold red"))
+    for one in view.sources:
+        cells = [one.quantity, one.value, one.source, f"{one.age_s:.1f} s"]
+        style = "" if one.is_used else "dim"
+        rows.append((cells, style if one.is_fresh else "red"))
+
+    shown = rows if len(rows) <= most else rows[: most - 1]
+    for cells, style in shown:
+        table.add_row(*[Text(cell) for cell in cells], style=style)
+    if len(shown) < len(rows):
+        hidden = len(rows) - len(shown)
+        table.add_row(Text(f"{hidden} more"), style="dim")
+    return table
+
+
+def _keys() -> Text:
+    """The keys, and what they do."""
+    text = Text(no_wrap=False)
+    for key, label in KEYS.values():
+        text.append(f" {key} ", style="reverse")
+        text.append(f" {label}  ")
+    return text
+
+
+def as_json(view: HelmView, title: str) -> dict[str, Any]:
+    """View as texts by name, for a page."""
+    sources = []
+    for one in view.sources:
+        entry = one._asdict() | {"age": f"{one.age_s:.1f} s"}
+        sources.append(entry)
+    missing = []
+    for lack in view.missing:
+        heard = "; ".join(lack.heard) or "nothing heard"
+        missing.append({"quantity": lack.quantity, "heard": heard})
+    level = "warning" if view.warnings else view.state
+    return {
+        "title": title,
+        "state": view.state,
+        "level": level,
+        "headline": view.headline,
+        "detail": view.detail,
+        "gauges": view.gauges,
+        "sources": sources,
+        "missing": missing,
+        "question": view.question,
+        "note": view.note,
+    }
