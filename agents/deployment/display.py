@@ -1,6 +1,6 @@
 """The helm as a helmsman sees it: one record, and its form in a terminal."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import degrees
 from typing import Any, NamedTuple
@@ -12,6 +12,8 @@ from rich.text import Text
 
 from agents.deployment.heard import HeardSentences
 from agents.deployment.helm import MANUAL, STANDBY, STEERING, Helm
+from agents.deployment.nmea import NmeaSource
+from agents.deployment.sensors import HelmSensors
 from shipgym.trials.nmea import NMEA_QUANTITIES
 from shipgym.trials.units import UNITS
 
@@ -100,13 +102,16 @@ class HelmView:
         def known(quantity: str) -> float | None:
             return inputs.get(quantity, sensors.value(quantity, now))
 
+        # its own heading is that of the moment when it begins again
+        is_own = helm.heading is not None and helm.has_steered
+        has_set_point = helm.state == STEERING or not is_own
         return cls(
             state=helm.state,
             alarm=helm.alarm,
             warnings=tuple(helm.warnings),
             obstacle=helm.obstacle,
             heading=known("heading"),
-            set_point=known("set_point"),
+            set_point=known("set_point") if has_set_point else None,
             yaw_rate=known("yaw_rate"),
             rudder=known("rudder"),
             order=helm.order if helm.state == STEERING else None,
@@ -130,7 +135,13 @@ class HelmView:
         """Alarm, warnings, or what has to be done to steer."""
         if self.state == STEERING:
             return ", ".join(self.warnings) or "all is well"
-        ready = f"cannot steer: {self.obstacle}" if self.obstacle else "s: steer"
+        if self.alarm and self.alarm == self.obstacle:
+            return self.alarm
+        ready = "all is well: s steers"
+        if self.leads == "own":
+            ready = "all is well: s steers the heading of now"
+        if self.obstacle:
+            ready = f"cannot steer: {self.obstacle}"
         return "; ".join(text for text in (self.alarm, ready) if text)
 
     @property
@@ -187,25 +198,53 @@ def _leader(helm: Helm) -> str:
 
 
 def _sources(helm: Helm, now: float) -> Iterator[SourceView]:
-    """Instruments, those first that the autopilot needs."""
+    """Instruments of what the autopilot needs, and after them the others."""
     sensors = helm.sensors
-
-    def is_needed(quantity: str) -> bool:
-        return quantity in helm.needed
-
-    for quantity in sorted(sensors.newest, key=is_needed, reverse=True):
-        fresh = sensors.fresh(quantity, now)
-        newest = sensors.newest[quantity]
+    followed = helm.needed
+    if helm.heading is None:
+        followed = [*followed, *_plotted(helm)]
+    for quantity in dict.fromkeys(followed):
+        newest = sensors.newest.get(quantity, {})
         first = next(iter(newest), None)
         for source, (value, time) in newest.items():
-            yield SourceView(
-                quantity=quantity.replace("_", " "),
-                value=reading_text(quantity, value),
-                source=str(source),
-                age_s=max(now - time, 0.0),
-                is_fresh=source in fresh,
-                is_used=source == first and is_needed(quantity),
-            )
+            is_fresh = source in sensors.fresh(quantity, now)
+            if is_fresh or sensors.value(quantity, now) is not None:
+                yield SourceView(
+                    quantity=quantity.replace("_", " "),
+                    value=reading_text(quantity, value),
+                    source=str(source),
+                    age_s=max(now - time, 0.0),
+                    is_fresh=is_fresh,
+                    is_used=source == first,
+                )
+    yield from _others(sensors, followed, now)
+
+
+def _others(
+    sensors: HelmSensors, followed: Sequence[str], now: float
+) -> Iterator[SourceView]:
+    """Instruments of what the autopilot does not need, each in one row."""
+    quantities: dict[NmeaSource, list[str]] = {}
+    times: dict[NmeaSource, float] = {}
+    for quantity in sensors.newest.keys() - set(followed):
+        for source, (_, time) in sensors.newest[quantity].items():
+            quantities.setdefault(source, []).append(quantity.replace("_", " "))
+            times[source] = max(time, times.get(source, time))
+    for source in sorted(quantities):
+        age_s = max(now - times[source], 0.0)
+        yield SourceView(
+            quantity=", ".join(sorted(quantities[source])),
+            value="",
+            source=str(source),
+            age_s=age_s,
+            is_fresh=age_s <= sensors.limits.silence_s,
+            is_used=False,
+        )
+
+
+def _plotted(helm: Helm) -> list[str]:
+    """Quantities of a plotter that may be the set-point."""
+    return ["leg"] if helm.follows_path else ["to_steer", "waypoint_bearing"]
 
 
 def reading_text(quantity: str, value: float) -> str:
@@ -230,15 +269,20 @@ def _missing(
 ) -> Iterator[Missing]:
     """Inputs that are not known, and what was heard instead."""
     speeds = ["course", "speed"]
-    courses = ["to_steer", "waypoint_bearing"]
-    if helm.follows_path:
-        courses = ["leg"]
-    other_names = {"surge": speeds, "sway": speeds, "set_point": courses}
+    other_names = {"surge": speeds, "sway": speeds, "set_point": _plotted(helm)}
     for name, value in inputs.items():
-        if value is None:
-            quantities = (name, *other_names.get(name, ()))
-            instead = heard.instead_of(quantities, now)
-            yield Missing(name.replace("_", " "), tuple(instead))
+        if value is not None:
+            continue
+        quantities = [name, *other_names.get(name, [])]
+        silent = []
+        for quantity in quantities:
+            for source, (_, time) in helm.sensors.newest.get(quantity, {}).items():
+                age_s = now - time
+                if age_s > helm.limits.silence_s:
+                    name = source.talker + source.kind
+                    silent.append(f"{name} silent for {age_s:.0f} s")
+        instead = heard.instead_of(quantities, now)
+        yield Missing(name.replace("_", " "), (*instead, *silent))
 
 
 def rendered(view: HelmView, title: str, lines: int = 24) -> Group:
@@ -247,7 +291,7 @@ def rendered(view: HelmView, title: str, lines: int = 24) -> Group:
     question = Text(view.question, style="bold black on yellow")
     if view.question:
         question.append("  y: confirm   c: cancel")
-    fixed_lines = 17
+    fixed_lines = 15  # all but the instruments
     return Group(
         title_text,
         _banner(view),
@@ -271,7 +315,7 @@ def _banner(view: HelmView) -> Panel:
     if view.state == STEERING and view.warnings:
         style = "bold black on yellow"
     headline = Text(view.headline, justify="center")
-    detail = Text(view.detail, justify="center", no_wrap=True, overflow="ellipsis")
+    detail = Text(view.detail, justify="center")
     return Panel(Group(headline, detail), style=style)
 
 
@@ -292,7 +336,7 @@ def _gauges(view: HelmView) -> Table:
 def _instruments(view: HelmView, most: int) -> Table:
     """What is missing, and each source with its age, in so many lines."""
     table = Table.grid(expand=True, padding=(0, 1))
-    for ratio in (3, 3, 6, 2):
+    for ratio in (5, 3, 9, 2):
         table.add_column(ratio=ratio, no_wrap=True, overflow="ellipsis")
 
     rows: list[tuple[list[str], str]] = []

@@ -153,14 +153,13 @@ class Helm:
             self._begin()
         elif not fault:
             fault = self._fault(step, now)
-        self._note_obstacle(fault or "")
-        self._follow_plotter(now)
-
-        self.warnings = []
         if fault and self.state == STEERING:
             self.state = MANUAL
             self.alarm = fault
-        elif self.state == STEERING:
+        self._note_obstacle(fault or "")
+        self._follow_plotter(now)
+        self.warnings = []
+        if self.state == STEERING:
             self.warnings = [*self.warnings_of(inputs, now), *self.notices]
 
     def _fault(self, step: float, now: float) -> str:
@@ -193,7 +192,8 @@ class Helm:
             if self.state != STEERING:
                 self.plotted.take()
             self.plotted.follow(self._plotters_course(now))
-        if self.question is not None and not self.question.is_open(now):
+        asked = self.question
+        if asked is not None and (self.state != STEERING or not asked.is_open(now)):
             self.question = None
 
     def _begin(self) -> None:

@@ -4,7 +4,7 @@ import asyncio
 import signal
 import sys
 from collections import deque
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import replace
 from math import radians
@@ -183,13 +183,18 @@ async def helm_panel(
         lines: deque[str] = deque(maxlen=200)
         warnings: list[str] = []
         panel.warn = warnings.append
-        stack.callback(lambda: [warn(line) for line in warnings])
-        stack.callback(lambda: [say(line) for line in lines])
+        stack.callback(_print_all, warnings, warn)
+        stack.callback(_print_all, lines, say)
         stack.enter_context(keyboard(panel.press))
         screen = Screen(console, title)
         stack.callback(screen.close)
         panel.displays.append(screen.show)
         yield panel, lines.append
+
+
+def _print_all(lines: Iterable[str], write: Callable[[str], None]) -> None:
+    for line in lines:
+        write(line)
 
 
 def has_screen(console: Console) -> bool:
