@@ -178,7 +178,8 @@ def sided(angle: float | None) -> str:
 def _signed(value: float | None, factor: float, unit: str) -> str:
     if value is None:
         return UNKNOWN
-    return f"{degrees(value) * factor:+.1f}{unit}"
+    size = round(degrees(value) * factor, 1) + 0.0  # no -0.0
+    return f"{size:+.1f}{unit}"
 
 
 def _cross_track(value: float | None) -> str:
@@ -250,7 +251,7 @@ def _plotted(helm: Helm) -> list[str]:
 def reading_text(quantity: str, value: float) -> str:
     """A reading in the units of a bridge."""
     if quantity in ("surge", "sway", "speed"):
-        knots = value / UNITS["speed"]["kn"]
+        knots = round(value / UNITS["speed"]["kn"], 1) + 0.0  # no -0.0
         return f"{knots:.1f} kn"
     if quantity == "yaw_rate":
         return _signed(value, 60.0, "°/min")
@@ -279,8 +280,8 @@ def _missing(
             for source, (_, time) in helm.sensors.newest.get(quantity, {}).items():
                 age_s = now - time
                 if age_s > helm.limits.silence_s:
-                    name = source.talker + source.kind
-                    silent.append(f"{name} silent for {age_s:.0f} s")
+                    sender = source.talker + source.kind
+                    silent.append(f"{sender} silent for {age_s:.0f} s")
         instead = heard.instead_of(quantities, now)
         yield Missing(name.replace("_", " "), (*instead, *silent))
 
