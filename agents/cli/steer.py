@@ -6,13 +6,20 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from agents.cli.command import FAILED, fail
+from agents.cli.command import FAILED, INTERRUPTED, TERMINATED, fail
 
 Address = Annotated[
     str,
     Option(
         "--nmea",
         help="tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD.",
+    ),
+]
+Gear = Annotated[
+    str | None,
+    Option(
+        metavar="ADDRESS",
+        help="Where rudder orders go; needed over UDP, else the --nmea connection.",
     ),
 ]
 Duration = Annotated[
@@ -32,13 +39,14 @@ def steer_command(
         ),
     ],
     nmea: Address,
+    gear: Gear = None,
     heading: Annotated[
         float | None,
         Option(
             metavar="DEG",
             min=0.0,
             max=360.0,
-            help="Heading to steer; default: the plotter's (APB).",
+            help="Heading to steer; default: commanded (HSC, HTC) or plotted (APB).",
         ),
     ] = None,
     rate: Annotated[
@@ -63,6 +71,22 @@ def steer_command(
             help="When to hand over: silence_s=3, rudder_deg=5; repeatable.",
         ),
     ] = None,
+    variation: Annotated[
+        float | None,
+        Option(
+            metavar="DEG",
+            min=-180.0,
+            max=180.0,
+            help="Magnetic variation, positive east; default: heard (RMC, HDG).",
+        ),
+    ] = None,
+    rudder_feedback: Annotated[
+        bool,
+        Option(
+            "--rudder-feedback/--no-rudder-feedback",
+            help="Measure the rudder (RSA); without, nobody sees if it follows.",
+        ),
+    ] = True,
     page: Annotated[
         int | None,
         Option(
@@ -74,22 +98,22 @@ def steer_command(
     ] = None,
     log: Annotated[
         Path | None,
-        Option(
-            metavar="FILE", help="New file for all sentences; new-ship reads it too."
-        ),
+        Option(metavar="FILE", help="New file for all sentences, as new-ship reads."),
     ] = None,
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
 ) -> None:
     """Steer over NMEA 0183.
 
-    Reads HDT/THS, ROT, RSA, VBW, VTG/RMC, APB, XTE, BWC, BWR; writes ROR, HTD.
+    Reads HDT/THS, HDG/HDM, ROT, RSA, VBW, VTG/RMC, APB, XTE, BWC, BWR, HSC, HTC, ACN;
+    writes ROR, HTD, ALR, ALF, ALC.
 
     It begins when everything that the autopilot reads is available. If a sensor falls
     silent, two disagree, the rudder does not follow or the computer is late, it raises
     the alarm (ALR), marks its order invalid and stops steering. In a terminal it shows
     the helm and takes keys; with --page a browser does. Not certified: read
-    docs/deployment.md first. Exits with 1 after an alarm.
+    docs/deployment.md first. Exits with 1 after an alarm, with 130 after Ctrl-C and 143
+    after SIGTERM; the last order is always marked invalid.
     """
     import asyncio
 
@@ -125,6 +149,7 @@ def steer_command(
             return await steer(
                 pilot,
                 nmea,
+                gear=gear,
                 heading=None if heading is None else radians(heading),
                 limits=Limits(**limits),
                 duration=duration,
@@ -132,6 +157,8 @@ def steer_command(
                 log=note,
                 route=track,
                 rate=None if rate is None else radians(rate) / 60.0,
+                variation=None if variation is None else radians(variation),
+                rudder_feedback=rudder_feedback,
                 observers=[observer],
             )
 
@@ -139,6 +166,11 @@ def steer_command(
     answer({"state": helm.state, "alarm": helm.alarm, **helm.counts})
     if helm.alarm:
         fail(f"handed over: {helm.alarm}", FAILED)
+    if helm.ended_by.startswith("SIG"):
+        code = INTERRUPTED if helm.ended_by == "SIGINT" else TERMINATED
+        fail(f"ended by {helm.ended_by}: the last order is marked invalid", code)
+    by = helm.ended_by or "--duration"
+    say(f"ended by {by}: the last order is marked invalid")
 
 
 def simulate_command(
@@ -147,6 +179,13 @@ def simulate_command(
         Argument(metavar="MODEL", help="A model file, or the name of a shipped model."),
     ],
     nmea: Address,
+    gear: Annotated[
+        str | None,
+        Option(
+            metavar="ADDRESS",
+            help="Where she receives rudder orders; default: the --nmea connection.",
+        ),
+    ] = None,
     leg: Annotated[
         float, Option(metavar="DEG", min=0.0, max=360.0, help="Leg on her plotter.")
     ] = 0.0,
@@ -164,10 +203,11 @@ def simulate_command(
 ) -> None:
     """Simulate a ship for `shipgym steer`.
 
-    Sends instrument readings and receives rudder orders.
+    Sends instrument readings and receives rudder orders; the rudder goes amidships when
+    valid orders stop for 5 s.
 
     Over TCP it waits for connections; the autopilot and a chart plotter may connect at
-    once.
+    once. Over UDP it sends to --nmea and listens for orders at --gear.
     """
     import asyncio
 
@@ -182,7 +222,15 @@ def simulate_command(
         dropped[kind.upper()] = check_number(after, f"--drop {kind}", at_least=0.0)
     ship = SimulatedShip(load_model(model), radians(leg), sea, seed)
     asyncio.run(
-        simulate_ship(ship, nmea, duration=duration, speed_up=speed_up, drop=dropped)
+        simulate_ship(
+            ship,
+            nmea,
+            gear=gear,
+            duration=duration,
+            speed_up=speed_up,
+            drop=dropped,
+            log=say,
+        )
     )
     seconds = ship.steps * STEP
     answer(

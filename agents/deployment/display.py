@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import degrees
+from math import degrees, inf
 from typing import Any, NamedTuple
 
 from rich.console import Group
@@ -11,7 +11,8 @@ from rich.table import Table
 from rich.text import Text
 
 from agents.deployment.heard import HeardSentences
-from agents.deployment.helm import MANUAL, STANDBY, STEERING, Helm
+from agents.deployment.helm import Helm
+from agents.deployment.helm_commands import MANUAL, STANDBY, STEERING
 from agents.deployment.nmea import NmeaSource
 from agents.deployment.sensors import HelmSensors
 from shipgym.trials.nmea import NMEA_QUANTITIES
@@ -201,20 +202,20 @@ def _leader(helm: Helm) -> str:
 def _sources(helm: Helm, now: float) -> Iterator[SourceView]:
     """Instruments of what the autopilot needs, and after them the others."""
     sensors = helm.sensors
-    followed = helm.needed
+    followed = list(dict.fromkeys(helm.needed))
     if helm.heading is None:
-        followed = [*followed, *_plotted(helm)]
-    for quantity in dict.fromkeys(followed):
+        followed += helm.plotter_quantities
+    for quantity in followed:
         newest = sensors.newest.get(quantity, {})
         first = next(iter(newest), None)
-        for source, (value, time) in newest.items():
+        for source, instrument in newest.items():
             is_fresh = source in sensors.fresh(quantity, now)
             if is_fresh or sensors.value(quantity, now) is not None:
                 yield SourceView(
                     quantity=quantity.replace("_", " "),
-                    value=reading_text(quantity, value),
+                    value=reading_text(quantity, instrument.value),
                     source=str(source),
-                    age_s=max(now - time, 0.0),
+                    age_s=max(now - instrument.time, 0.0),
                     is_fresh=is_fresh,
                     is_used=source == first,
                 )
@@ -228,9 +229,9 @@ def _others(
     quantities: dict[NmeaSource, list[str]] = {}
     times: dict[NmeaSource, float] = {}
     for quantity in sensors.newest.keys() - set(followed):
-        for source, (_, time) in sensors.newest[quantity].items():
+        for source, instrument in sensors.newest[quantity].items():
             quantities.setdefault(source, []).append(quantity.replace("_", " "))
-            times[source] = max(time, times.get(source, time))
+            times[source] = max(instrument.time, times.get(source, -inf))
     for source in sorted(quantities):
         age_s = max(now - times[source], 0.0)
         yield SourceView(
@@ -241,11 +242,6 @@ def _others(
             is_fresh=age_s <= sensors.limits.silence_s,
             is_used=False,
         )
-
-
-def _plotted(helm: Helm) -> list[str]:
-    """Quantities of a plotter that may be the set-point."""
-    return ["leg"] if helm.follows_path else ["to_steer", "waypoint_bearing"]
 
 
 def reading_text(quantity: str, value: float) -> str:
@@ -270,20 +266,16 @@ def _missing(
 ) -> Iterator[Missing]:
     """Inputs that are not known, and what was heard instead."""
     speeds = ["course", "speed"]
-    other_names = {"surge": speeds, "sway": speeds, "set_point": _plotted(helm)}
+    other_names = {
+        "surge": speeds,
+        "sway": speeds,
+        "set_point": helm.plotter_quantities,
+    }
     for name, value in inputs.items():
-        if value is not None:
-            continue
-        quantities = [name, *other_names.get(name, [])]
-        silent = []
-        for quantity in quantities:
-            for source, (_, time) in helm.sensors.newest.get(quantity, {}).items():
-                age_s = now - time
-                if age_s > helm.limits.silence_s:
-                    sender = source.talker + source.kind
-                    silent.append(f"{sender} silent for {age_s:.0f} s")
-        instead = heard.instead_of(quantities, now)
-        yield Missing(name.replace("_", " "), (*instead, *silent))
+        if value is None:
+            quantities = [name, *other_names.get(name, [])]
+            instead = heard.instead_of(quantities, now)
+            yield Missing(name.replace("_", " "), tuple(instead))
 
 
 def rendered(view: HelmView, title: str, lines: int = 24) -> Group:

@@ -15,7 +15,8 @@ class HeardSentences:
     """The newest sentence of each kind and source, in bounded memory."""
 
     most = 64  # kinds and sources
-    recent_s = 10.0
+    recent_s = 3.0  # older ones are silent
+    longest_s = 3600.0
 
     def __init__(self) -> None:
         self.newest: dict[tuple[str, str], tuple[str, float]] = {}
@@ -26,9 +27,8 @@ class HeardSentences:
         sentence = line[begin:]
         talker_and_kind = sentence[1:6]
         kind = talker_and_kind[2:]
-        is_known = kind in NMEA_SENTENCES or kind == "HDM"
         is_plain = talker_and_kind.isascii() and talker_and_kind.isalnum()
-        if not is_known or not is_plain:
+        if kind not in NMEA_SENTENCES or not is_plain:
             return
         key = talker_and_kind, source
         self.newest.pop(key, None)  # the oldest stands first
@@ -42,34 +42,37 @@ class HeardSentences:
         wanted = set(quantities)
         found = {}
         for (address, _), (line, time) in self.newest.items():
-            if now - time > self.recent_s:
-                continue
+            age_s = now - time
             reason = _why_not(line, address[2:], wanted)
-            if reason:
+            if reason == "" and self.recent_s < age_s < self.longest_s:
+                reason = f"silent for {age_s:.0f} s"
+            if reason and (age_s < self.recent_s or reason.startswith("silent")):
                 found[f"{address}: {reason}"] = True
         return list(found)
 
 
-def _why_not(line: str, name: str, wanted: set[str]) -> str:
-    """Reason why a sentence of a kind gives none of the quantities; empty if alien."""
-    magnetic = "heading" in wanted and name in ("HDM", "HDG")
-    kind = NMEA_SENTENCES.get(name)
-    fields = {} if kind is None else kind.fields
-    concerned = wanted & fields.keys()
-    if not concerned and not magnetic:
-        return ""
+def _why_not(line: str, name: str, wanted: set[str]) -> str | None:
+    """Reason why a sentence gives none of the quantities; empty if it gives one.
+
+    None for a kind that has nothing to do with them.
+    """
+    kind = NMEA_SENTENCES[name]
+    is_magnetic = "heading" in wanted and "compass_heading" in kind.fields
+    concerned = wanted & kind.fields.keys()
+    if not concerned and not is_magnetic:
+        return None
     try:
         sentence = parse_sentence(line)
         numbers = steering_numbers(sentence)
+        if concerned & numbers.keys():
+            return ""
+        if is_magnetic:
+            return "only magnetic headings, no variation"
+        if kind.log_only:
+            return "of a kind that is not steered by"
+        return _refused(sentence, sorted(concerned)[0])
     except (ValueError, IndexError, KeyError):
         return "damaged, or without a checksum"
-    if concerned & numbers.keys():
-        return ""  # it does, and nothing is wrong
-    if magnetic:
-        return "only a magnetic heading"
-    if kind is not None and kind.log_only:
-        return "of a kind that is not steered by"
-    return _refused(sentence, sorted(concerned)[0])
 
 
 def _refused(sentence: Sentence, quantity: str) -> str:
@@ -80,6 +83,10 @@ def _refused(sentence: Sentence, quantity: str) -> str:
         letter = sentence.fields[at]
         if letter not in letters:
             return f"status {letter or 'empty'}"
+    for at, letters in kind.mode.items():
+        letter = sentence.fields[at] if at < len(sentence.fields) else ""
+        if letter and letter not in letters:
+            return f"mode {letter}"
     for at, letters in place.letters.items():
         letter = sentence.fields[at]
         if letter == "M" and "T" in letters:

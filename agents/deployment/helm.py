@@ -1,14 +1,22 @@
 """An autopilot between instruments and rudder, which hands over after a fault."""
 
+from contextlib import suppress
 from dataclasses import replace
-from math import inf, pi, radians, tau
+from math import inf, radians
 from typing import Any
 
 from agents.controllers.guided import TURNS, Guided
 from agents.controllers.turn_rate import TurnRate
+from agents.deployment.alerts import Alerts
 from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import render
-from agents.deployment.next_leg import NextLeg, PlottedCourse
+from agents.deployment.compass import Compass
+from agents.deployment.helm_commands import (
+    MANUAL,
+    STANDBY,
+    STEERING,
+    HelmCommands,
+)
 from agents.deployment.nmea import readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.sensors import HelmSensors, Limits
@@ -16,11 +24,10 @@ from shipgym import InputError
 from shipgym.checks import check_number
 from shipgym.tasks.guidance import wrapped
 from shipgym.trials.nmea import NMEA_QUANTITIES
+from shipgym.trials.units import UNITS
 
-STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
 
-
-class Helm:
+class Helm(HelmCommands):
     """An autopilot that waits for its sensors, steers, and hands over after a fault.
 
     Its state is `standby`, `steering` or, after a fault, `manual`, which only the
@@ -41,6 +48,10 @@ class Helm:
     rate : float, optional
         Rate of turn, rad/s, of an autopilot that steers one; with a heading the
         largest.
+    variation : float, optional
+        Magnetic variation, rad, positive to the east; by default that of RMC or HDG.
+    rudder_feedback : bool
+        False: steer without a measured rudder, which then nobody watches.
     """
 
     def __init__(
@@ -50,7 +61,10 @@ class Helm:
         limits: Limits,
         route: Route | None = None,
         rate: float | None = None,
+        variation: float | None = None,
+        rudder_feedback: bool = True,
     ) -> None:
+        super().__init__()
         if rate is not None and heading is not None and isinstance(agent, TurnRate):
             agent = _with_largest_rate(agent, rate)
         self.pilot = Autopilot(agent)
@@ -60,23 +74,22 @@ class Helm:
         self.heading = heading
         self.route = route
         self.rate = rate
+        self.compass = Compass(variation)
+        self.rudder_feedback = rudder_feedback
         self.follows_path = isinstance(agent, Guided)
         self.needed = self._needed()
         self._check(agent)
 
         self.state = STANDBY
-        self.held = False  # in standby by the helmsman's wish
-        self.has_steered = False
-        self.obstacle = "no sensors"  # why it cannot steer
-        self.well_since = inf  # time since which there is none, s
-        self.now = -inf  # time of the last watch, s
-        self.plotted = PlottedCourse()
-        self.question: NextLeg | None = None  # for the helmsman
         self.alarm = ""
         self.warnings: list[str] = []
         self.notices: list[str] = []  # warnings of others
         self.silent = ["sensors"]  # what it waits for
         self.order = 0.0  # rudder, rad
+        self.commanded: float | None = None  # heading by HSC or HTC, rad
+        self.now = 0.0  # of the last watch, s
+        self.ended_by = ""  # the signal that ended it
+        self.alerts = Alerts()
         self.counts = {"sentences": 0, "damaged": 0}
 
     def _needed(self) -> list[str]:
@@ -84,6 +97,8 @@ class Helm:
         provided = {"set_point", "rate_of_turn"}
         if self.route is not None:
             provided.update(Route.GIVES)
+        if not self.rudder_feedback:
+            provided.add("rudder")
         needed = []
         for name in (*self.pilot.inputs, "rudder"):
             if name not in provided:
@@ -134,33 +149,50 @@ class Helm:
             self.counts["damaged"] += 1
             return
         self.counts["sentences"] += 1
-        for reading in heard:
+        for reading in self.compass.true(heard, now):
             self.sensors.take(reading, now)
+            if reading.quantity == "commanded":
+                self.commanded = reading.value
+        with suppress(ValueError, IndexError):
+            self.alerts.hear(line, now)
 
     def watch(self, step: float, now: float, fault: str | None = None) -> None:
         """Begin when all sensors are there; hand over at a fault.
 
         `step`: time since the last call, s; `fault`: one of another part.
         """
-        inputs = self.inputs(now)
         self.now = now
+        if self.state != STEERING:
+            self.sensors.renew(now)
+        inputs = self.inputs(now)
         self.silent = []
         for name, value in inputs.items():
             if value is None:
                 self.silent.append(name.replace("_", " "))
 
-        if self.state == STANDBY and not self.silent and not self.held:
-            self._begin()
+        may_begin = not (self.silent or self.held or fault)
+        if self.state == STANDBY and may_begin:
+            self.begin()
         elif not fault:
             fault = self._fault(step, now)
         if fault and self.state == STEERING:
             self.state = MANUAL
             self.alarm = fault
-        self._note_obstacle(fault or "")
-        self._follow_plotter(now)
+        self.note_obstacle(fault or "")
+        self.follow_plotter(now)
         self.warnings = []
         if self.state == STEERING:
             self.warnings = [*self.warnings_of(inputs, now), *self.notices]
+        else:
+            self.order = 0.0
+        self._give_alerts(now)
+
+    def _give_alerts(self, now: float) -> None:
+        """Hand the alarm and the warnings over to alert management."""
+        texts = {warning: warning for warning in self.warnings}
+        if self.alarm:
+            texts["alarm"] = self.alarm
+        self.alerts.update(texts, now)
 
     def _fault(self, step: float, now: float) -> str:
         if self.silent:
@@ -169,133 +201,10 @@ class Helm:
         order = self.order
         if self.state != STEERING:  # the rudder follows the helmsman
             order = self.sensors.value("rudder", now) or 0.0
-        fault = self.sensors.fault(order, step, now)
+        fault = self.sensors.fault(order, step, now, self.read)
         if not fault and self.route is not None and self.route.ended:
             fault = "the end of the route is reached"
         return fault
-
-    def _note_obstacle(self, fault: str) -> None:
-        """Note why it cannot steer; after an alarm all has to be well for a while."""
-        if fault:
-            self.well_since = inf
-        else:
-            self.well_since = min(self.well_since, self.now)
-        self.obstacle = fault
-        well_s = self.now - self.well_since
-        enough_s = self.limits.persistence_s
-        if self.state == MANUAL and not fault and well_s < enough_s:
-            self.obstacle = f"all has to be well for {enough_s:g} s first"
-
-    def _follow_plotter(self, now: float) -> None:
-        """Follow the plotter's course; close a question that was not answered."""
-        if self.heading is None:
-            if self.state != STEERING:
-                self.plotted.take()
-            self.plotted.follow(self._plotters_course(now))
-        asked = self.question
-        if asked is not None and (self.state != STEERING or not asked.is_open(now)):
-            self.question = None
-
-    def _begin(self) -> None:
-        """Steer from the rudder and, if it steers its own, the heading of now."""
-        self.state = STEERING
-        self.has_steered = True
-        self.alarm = ""
-        self.held = False
-        self.order = self.sensors.value("rudder", self.now) or 0.0
-        self.sensors.expected = None
-        self.pilot.switch_on()
-
-    def stand_by(self) -> None:
-        """Give the rudder back to the helmsman until `engage`.
-
-        After an alarm it is his already.
-        """
-        self.held = True
-        self.question = None
-        if self.state == STEERING:
-            self.state = STANDBY
-
-    def engage(self) -> None:
-        """Steer again, after stand-by or an alarm.
-
-        An autopilot that keeps a heading of its own keeps the one that the ship has
-        now. Raises InputError unless all is well, after an alarm for `persistence_s`.
-        """
-        self.question = None
-        if self.state == STEERING:
-            return
-        if self.obstacle:
-            raise InputError(f"cannot steer: {self.obstacle}")
-        if self.heading is not None and self.has_steered:
-            self.heading = self.sensors.value("heading", self.now)
-        self._begin()
-
-    def change_heading(self, delta: float) -> None:
-        """Turn the set-point by an angle, rad, positive to starboard.
-
-        Of an autopilot that keeps a plotter's heading it becomes its own, until
-        `next_leg`. Raises InputError if it does not steer, follows a path or turns at a
-        rate, or if the set-point came near to the opposite of the heading, from where
-        the ship might turn to the other side.
-        """
-        check_number(delta, "change of heading")
-        self.question = None
-        inputs = self.inputs(self.now)
-        turns_at_rate = self.rate is not None and self.heading is None
-        if self.state != STEERING:
-            raise InputError("no change of heading: not steering")
-        if self.follows_path or turns_at_rate:
-            course = "rate of turn" if turns_at_rate else "track"
-            raise InputError(f"no change of heading: it steers a {course}")
-
-        set_point = inputs["set_point"]
-        heading = inputs["heading"]
-        if set_point is None or heading is None:
-            raise InputError("no change of heading: no heading")
-        to_turn = wrapped(set_point - heading) + delta
-        if abs(to_turn) > 0.95 * pi and abs(to_turn) > abs(to_turn - delta):
-            raise InputError("no change of heading: more than 170° from the heading")
-        self.heading = (set_point + delta) % tau
-        self.plotted.take()
-
-    def next_leg(self, confirm: bool = False) -> None:
-        """Ask the helmsman for the next leg; with `confirm` turn to it.
-
-        It is that of the route, which she is on from then, or that of the plotter.
-        Raises InputError if there is none, or it has not been asked for before.
-        """
-        asked = self.question
-        self.question = None
-        if self.state != STEERING:
-            raise InputError("no next leg: not steering")
-        course = self._next_course()
-        if course is None:
-            raise InputError("no next leg: none is known")
-
-        now_steered = self.inputs(self.now)["set_point"] or 0.0
-        turn = float(wrapped(course - now_steered))
-        question = NextLeg(course, turn, self.now)
-        if not confirm:
-            self.question = question
-            return
-        if asked is None or abs(wrapped(asked.course - course)) > PlottedCourse.new_leg:
-            raise InputError("nothing to confirm: ask for the next leg first")
-        if self.route is not None:
-            self.route.advance()
-            return
-        self.heading = None
-        self.plotted.take()
-
-    def _next_course(self) -> float | None:
-        """Direction of the next leg of the route or the plotter, rad; None if none."""
-        if self.route is not None:
-            return self.route.next_course()
-        if self.rate is not None:
-            return None
-        if self.heading is None:
-            return self.plotted.waiting
-        return self._plotters_course(self.now)
 
     def steer(self, now: float) -> None:
         """One control interval."""
@@ -306,6 +215,10 @@ class Helm:
     def inputs(self, now: float) -> dict[str, float | None]:
         """Inputs of the autopilot by name; None for what is not known."""
         inputs = self.sensors.numbers(self.needed, now)
+        if not self.rudder_feedback:
+            rudder = self.sensors.value("rudder", now)
+            inputs["rudder"] = self.sensors.expected if rudder is None else rudder
+            inputs["rudder"] = inputs["rudder"] or 0.0
         turns_at_rate = self.rate is not None and self.heading is None
         inputs["rate_of_turn"] = self.rate if turns_at_rate else 0.0
         if self.route is None:
@@ -321,20 +234,24 @@ class Helm:
         return inputs
 
     def _set_point(self, now: float) -> float | None:
-        """Heading to steer, its own or that of the plotter."""
+        """Heading to steer, its own or that of the plotter which was heard first."""
         if self.heading is not None:
             return self.heading
         if self.rate is not None:
             return 0.0
-        return self.plotted.steered(self._plotters_course(now))
+        if self.commanded is not None and not self.follows_path:
+            return self.commanded
+        return self.plotted.steered(self.plotters_course(now))
 
-    def _plotters_course(self, now: float) -> float | None:
-        """Heading to steer by the plotter which was heard first, or her leg."""
-        plotted = ("leg",) if self.follows_path else ("to_steer", "waypoint_bearing")
-        for quantity in self.sensors.newest:
-            if quantity in plotted:
-                return self.sensors.value(quantity, now)
-        return None
+    @property
+    def read(self) -> set[str]:
+        """Quantities that it steers by."""
+        read = set(self.needed)
+        if self.heading is None and self.route is None:
+            read.update(self.plotter_quantities)
+        if (read & {"surge", "sway"}) - self.sensors.newest.keys():
+            read |= {"course", "speed", "heading"}
+        return read
 
     def warnings_of(self, inputs: dict[str, float | None], now: float) -> list[str]:
         """Warnings for the helmsman although the autopilot steers."""
@@ -382,26 +299,65 @@ class Helm:
         if self.state == STANDBY and self.held:
             return f"{STANDBY}, by the helmsman"
         if self.state == STANDBY:
-            silent = ", ".join(self.silent)
-            return f"{STANDBY}, waits for {silent}"
+            silent = ", ".join(self.silent or ["steering gear"])
+            return "; ".join([f"{STANDBY}, waits for {silent}", *self.hints])
         if self.alarm:
             return f"{MANUAL}: ALARM, {self.alarm}: take the wheel"
         return ", ".join([self.state, *self.warnings])
 
-    def sentences(self) -> str:
-        """Rudder order and status, and the alarm if there is one."""
-        text = render(
-            "helm.nmea.j2",
-            order=self.order,
-            valid=self.state == STEERING,
-            limit=self.pilot.largest,
-            set_point=self.heading,
-            alarm=self.alarm,
-            track=self.route is not None,
-            rate=self.rate,
-            warnings=self.warnings,
+    @property
+    def hints(self) -> list[str]:
+        """What was heard instead of that for which it waits, and what to do."""
+        hints = []
+        for name in ("heading", "to_steer", "leg"):
+            waits = name.replace("_", " ") in self.silent or (
+                name in self.plotter_quantities and "set point" in self.silent
+            )
+            if waits and self.compass.lacks(name, self.now, self.limits.silence_s):
+                hints = [
+                    "only magnetic bearings heard; no variation (RMC or HDG has one, or"
+                    " start with --variation DEG)"
+                ]
+        if self.silent == ["rudder"]:
+            hints.append("to steer without RSA start with --no-rudder-feedback")
+        return hints
+
+    def sentences(self, last: bool = False) -> str:
+        """Rudder order and status, and alerts; with `last` it steers no more."""
+        is_valid = self.state == STEERING and not last
+        report = self._report(is_valid)
+        order = self.order if is_valid else 0.0
+        text = render("helm.nmea.j2", order=order, **report)
+        return sentences(text) + self.alerts.sentences(self.now)
+
+    def _report(self, is_valid: bool) -> dict[str, Any]:
+        """Fields of HTD, and the status of ROR."""
+        set_point = self.inputs(self.now).get("set_point") if is_valid else None
+        keeps_track = self.follows_path or self.route is not None
+        mode = "S"  # by itself; H by another's command, T a track, M manual
+        if self.heading is None and self.rate is None:
+            mode = "T" if keeps_track else "H"
+
+        is_at_limit = abs(self.order) >= self.pilot.largest
+        wrong = (
+            is_at_limit,
+            "off heading" in self.warnings,
+            "off track" in self.warnings,
         )
-        return sentences(text)
+        statuses = ["V" if is_wrong or not is_valid else "A" for is_wrong in wrong]
+        off_track_miles = self.limits.off_track_m / UNITS["length"]["nm"]
+        return {
+            "status": "A" if is_valid else "V",
+            "mode": mode if is_valid else "M",
+            "limit": self.pilot.largest,
+            "off_heading_deg": self.limits.off_heading_deg,
+            "off_track": f"{off_track_miles:.3f}" if keeps_track else "",
+            "rate": self.rate,
+            "set_point": None if keeps_track else set_point,
+            "track": set_point if keeps_track else None,
+            "statuses": ",".join(statuses),
+            "heading": self.sensors.value("heading", self.now),
+        }
 
 
 def _known(inputs: dict[str, float | None]) -> dict[str, float]:

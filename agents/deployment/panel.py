@@ -14,7 +14,8 @@ from rich.console import Console
 
 from agents.deployment.display import HelmView
 from agents.deployment.heard import HeardSentences
-from agents.deployment.helm import STEERING, Helm
+from agents.deployment.helm import Helm
+from agents.deployment.helm_commands import STEERING
 from agents.deployment.keys import is_foreground, keyboard
 from agents.deployment.screen import Screen
 from agents.deployment.sentence_log import SentenceLog
@@ -124,7 +125,7 @@ class HelmPanel(HelmObserver):
             helm.next_leg(confirm=True)
             return "next leg taken"
         if command == "confirm" or (command == "quit" and helm.state != STEERING):
-            signal.raise_signal(signal.SIGINT)  # as Ctrl-C does
+            helm.ended_by = "the helmsman"
             return "ends"
         self.quits = command == "quit"
         helm.question = None

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.live import Live
 
 from agents.deployment.display import HelmView, rendered
-from agents.deployment.helm import MANUAL
+from agents.deployment.helm_commands import MANUAL
 
 
 class Screen:

@@ -13,12 +13,13 @@ from typer.testing import CliRunner
 
 from agents import LQ, PID, IntegralLineOfSight, WheelOver
 from agents.cli import app
+from agents.deployment.connection import Connection
 from agents.deployment.helm import MANUAL, STEERING
 from agents.deployment.nmea import readings
 from agents.deployment.route import Route
 from agents.deployment.sensors import Limits
 from agents.deployment.simulated import SimulatedShip, simulate_ship
-from agents.deployment.steering import Connection, steer
+from agents.deployment.steering import steer
 from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError
 from shipgym.ships import load_model
@@ -230,13 +231,15 @@ class AbsentLink:
 
     ends = ()
 
-    def __init__(self, error=None):
-        self.error = error
+    def __init__(self, refusal=None):
+        self.refusal = refusal
 
-    async def open(self, address):
-        if self.error is None:
+    error = ""
+
+    async def open(self, address, *, sends=False):
+        if self.refusal is None:
             await asyncio.sleep(100.0)
-        raise InputError(f"{address}: cannot be opened") from self.error
+        raise InputError(f"{address}: cannot be opened") from self.refusal
 
 
 @pytest.mark.parametrize(
@@ -309,7 +312,9 @@ def test_the_command_steers_with_what_it_is_told_and_fails_after_an_alarm(
         given.append((pilot.kind, nmea, more))
         more["log"]("0.0 s: standby")
         state, alarm = ends[len(given) - 1]
-        return SimpleNamespace(state=state, alarm=alarm, counts={"damaged": 2})
+        return SimpleNamespace(
+            state=state, alarm=alarm, counts={"damaged": 2}, ended_by=""
+        )
 
     monkeypatch.setattr("agents.deployment.steering.steer", stand_in)
     PID_MARINER.save(tmp_path / "pid.json")
