@@ -132,18 +132,18 @@ class HelmView:
         return {STEERING: "STEERING", STANDBY: "STAND-BY"}[self.state]
 
     @property
-    def detail(self) -> str:
-        """Alarm, warnings, or what has to be done to steer."""
+    def details(self) -> list[str]:
+        """Alarm, warnings, and what has to be done to steer; two lines at most."""
         if self.state == STEERING:
-            return ", ".join(self.warnings) or "all is well"
-        if self.alarm and self.alarm == self.obstacle:
-            return self.alarm
+            return [", ".join(self.warnings) or "all is well"]
         ready = "all is well: s steers"
         if self.leads == "own":
             ready = "all is well: s steers the heading of now"
         if self.obstacle:
             ready = f"cannot steer: {self.obstacle}"
-        return "; ".join(text for text in (self.alarm, ready) if text)
+        if not self.alarm:
+            return [ready]
+        return [self.alarm] if self.alarm == self.obstacle else [self.alarm, ready]
 
     @property
     def gauges(self) -> dict[str, str]:
@@ -280,19 +280,19 @@ def _missing(
 
 def rendered(view: HelmView, title: str, lines: int = 24) -> Group:
     """View in a terminal of so many lines."""
-    title_text = Text(title, style="dim", no_wrap=True, overflow="ellipsis")
-    question = Text(view.question, style="bold black on yellow")
+    answer = _line(view.note, "italic")
     if view.question:
-        question.append("  y: confirm   c: cancel")
-    fixed_lines = 15  # all but the instruments
+        question = f"{view.question}   y: confirm   c: cancel"
+        answer = _line(question, "bold black on yellow")
+    fixed_lines = 16  # all but the instruments
     return Group(
-        title_text,
+        _line(title, "dim"),
         _banner(view),
         _gauges(view),
         Text(),
         _instruments(view, max(lines - fixed_lines, 1)),
         Text(),
-        question if view.question else Text(view.note, style="italic"),
+        answer,
         _keys(),
     )
 
@@ -307,9 +307,16 @@ def _banner(view: HelmView) -> Panel:
     style = styles[view.state]
     if view.state == STEERING and view.warnings:
         style = "bold black on yellow"
-    headline = Text(view.headline, justify="center")
-    detail = Text(view.detail, justify="center")
-    return Panel(Group(headline, detail), style=style)
+    lines = [_line(text) for text in (view.headline, *view.details)]
+    for line in lines:
+        line.justify = "center"
+    return Panel(Group(*lines), style=style)
+
+
+def _line(text: str, style: str = "") -> Text:
+    """A text that takes one line, and is cut where it is too long."""
+    plain = " ".join(text.split())
+    return Text(plain, style=style, no_wrap=True, overflow="ellipsis")
 
 
 def _gauges(view: HelmView) -> Table:
@@ -321,8 +328,8 @@ def _gauges(view: HelmView) -> Table:
         table.add_column(ratio=1, no_wrap=True)
     for begin in range(0, len(gauges), per_row):
         row = gauges[begin : begin + per_row]
-        table.add_row(*[Text(name, style="dim") for name, _ in row])
-        table.add_row(*[Text(text, style="bold") for _, text in row])
+        table.add_row(*[_line(name, "dim") for name, _ in row])
+        table.add_row(*[_line(text, "bold") for _, text in row])
     return table
 
 
@@ -343,7 +350,7 @@ def _instruments(view: HelmView, most: int) -> Table:
 
     shown = rows if len(rows) <= most else rows[: most - 1]
     for cells, style in shown:
-        table.add_row(*[Text(cell) for cell in cells], style=style)
+        table.add_row(*map(_line, cells), style=style)
     if len(shown) < len(rows):
         hidden = len(rows) - len(shown)
         table.add_row(Text(f"{hidden} more"), style="dim")
@@ -375,7 +382,7 @@ def as_json(view: HelmView, title: str) -> dict[str, Any]:
         "state": view.state,
         "level": level,
         "headline": view.headline,
-        "detail": view.detail,
+        "detail": "; ".join(view.details),
         "gauges": view.gauges,
         "sources": sources,
         "missing": missing,

@@ -164,6 +164,7 @@ class Helm(HelmCommands):
         self.now = now
         if self.state != STEERING:
             self.sensors.renew(now)
+        self.follow_plotter(now)
         inputs = self.inputs(now)
         self.silent = []
         for name, value in inputs.items():
@@ -178,8 +179,8 @@ class Helm(HelmCommands):
         if fault and self.state == STEERING:
             self.state = MANUAL
             self.alarm = fault
+            self.question = None
         self.note_obstacle(fault or "")
-        self.follow_plotter(now)
         self.warnings = []
         if self.state == STEERING:
             self.warnings = [*self.warnings_of(inputs, now), *self.notices]

@@ -74,8 +74,7 @@ class HelmCommands:
             if self.state != STEERING:
                 self.plotted.take()
             self.plotted.follow(self.plotters_course(now))
-        asked = self.question
-        if asked is not None and (self.state != STEERING or not asked.is_open(now)):
+        if self.question is not None and not self.question.is_open(now):
             self.question = None
 
     def begin(self) -> None:

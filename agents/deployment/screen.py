@@ -25,6 +25,8 @@ class Screen:
         First line.
     """
 
+    patience_s = 2.0  # with a terminal that takes nothing
+
     def __init__(self, console: Console, title: str) -> None:
         self.console = console
         self.title = title
@@ -40,10 +42,10 @@ class Screen:
         self._has_news.set()
 
     def close(self) -> None:
-        """Restore the screen; a terminal that takes nothing is waited for 2 s."""
+        """Restore the screen."""
         self._ended.set()
         self._has_news.set()
-        self._thread.join(timeout=2.0)
+        self._thread.join(timeout=self.patience_s)
 
     def _draw(self) -> None:
         """Draw the newest view, again and again."""

@@ -45,7 +45,7 @@ def test_on_stand_by_orders_are_invalid_until_the_helmsman_steers_again():
         assert "AGROR,0.0,V" in helm.sentences()
     helm.engage()
     assert helm.state == STEERING
-    assert helm.heading == 0.43  # she keeps the heading that she has now
+    assert helm.heading == pytest.approx(0.43)  # she keeps the heading that she has now
     assert helm.order == 0.2  # and begins at the rudder that she has now
     helm.steer(3.0)
     assert helm.order == pytest.approx(PID_MARINER.neutral_rudder, abs=1e-9)
