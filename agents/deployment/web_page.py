@@ -18,7 +18,6 @@ from agents.deployment.local_http import (
     response,
 )
 from shipgym import InputError
-from shipgym.pages import render
 
 
 class HelmPage:
@@ -43,16 +42,27 @@ class HelmPage:
         self.press = press
         self.title = title
         self.token = secrets.token_urlsafe(24)
+        self.nonce = secrets.token_urlsafe(16)  # of the page's own script and style
         self.port = 0
         self.connections: set[StreamWriter] = set()
         self.listening: set[StreamWriter] = set()  # those that get each view
         self.newest = b""
+        self.html = b""
         self._sends_at = 0.0
         self._send_later: asyncio.TimerHandle | None = None
         self._server: asyncio.Server | None = None
 
     async def open(self, port: int) -> None:
         """Serve at a port, 0 for any that is free; InputError if it is taken."""
+        from shipgym.pages import render  # before a ship is steered: it takes a second
+
+        text = render(
+            "agents.deployment/templates/helm.html",
+            title=self.title,
+            keys=KEYS,
+            nonce=self.nonce,
+        )
+        self.html = text.encode()
         try:
             self._server = await asyncio.start_server(
                 self._serve, "127.0.0.1", port, limit=LONGEST_HEAD
@@ -166,17 +176,10 @@ class HelmPage:
         return response(HTTPStatus.NO_CONTENT, {}, None)
 
     def _page(self) -> bytes:
-        nonce = secrets.token_urlsafe(16)
-        text = render(
-            "agents.deployment/templates/helm.html",
-            title=self.title,
-            keys=KEYS,
-            nonce=nonce,
-        )
         policy = [
             "default-src 'none'",
-            f"script-src 'nonce-{nonce}'",
-            f"style-src 'nonce-{nonce}'",
+            f"script-src 'nonce-{self.nonce}'",
+            f"style-src 'nonce-{self.nonce}'",
             "img-src data:",
             "connect-src 'self'",
             "base-uri 'none'",
@@ -187,7 +190,7 @@ class HelmPage:
             "Content-Type": "text/html; charset=utf-8",
             "Content-Security-Policy": "; ".join(policy),
         }
-        return response(HTTPStatus.OK, headers, text.encode())
+        return response(HTTPStatus.OK, headers, self.html)
 
     def _events(self) -> bytes:
         """Head of the events, which follow."""
