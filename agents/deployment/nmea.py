@@ -118,7 +118,8 @@ class Line(asyncio.Protocol, asyncio.DatagramProtocol):
 
     def connection_lost(self, error: Exception | None) -> None:
         """Forget a closed connection."""
-        self.error = reason_of(error) if error else "the other end closed it"
+        nobody = "the other end closed it" if self.reader is None else "it has vanished"
+        self.error = reason_of(error) if error else nobody
         self.ends.discard(self)
 
     def error_received(self, error: Exception) -> None:
@@ -166,7 +167,11 @@ class Line(asyncio.Protocol, asyncio.DatagramProtocol):
 
 def reason_of(error: Exception) -> str:
     """What the system says of a failure."""
-    return str(getattr(error, "strerror", None) or error)
+    text = str(getattr(error, "strerror", None) or error)
+    if text.startswith("could not open port"):  # which pyserial says before it
+        _, _, text = text.rpartition("] ")
+        text, _, _ = text.partition(":")
+    return text
 
 
 def _place(address: Any) -> str:

@@ -63,6 +63,29 @@ from tests.agents.steering import free_port, sentence
                 ("waypoint_distance", 3704.0, "EC"),
             ],
         ),
+        (
+            sentence("HCHDG", 90.0, 2.0, "W", 3.0, "E"),
+            [
+                ("compass_heading", np.pi / 2, "HC"),
+                ("deviation", -np.pi / 90.0, "HC"),
+                ("variation", np.pi / 60.0, "HC"),
+            ],
+        ),
+        (sentence("HCHDM", 90.0, "M"), [("compass_heading", np.pi / 2, "HC")]),
+        (
+            sentence("IIHSC", 90.0, "T", 88.0, "M", "C"),
+            [
+                ("commanded", np.pi / 2, "II"),
+                ("magnetic_commanded", np.radians(88.0), "II"),
+            ],
+        ),
+        (sentence("IIHSC", 90.0, "T", "", "", "R"), []),
+        (
+            sentence("IIHTC", "V", "", "", "S", "N", *[""] * 4, 90.0, "", "", "M"),
+            [("magnetic_commanded", np.pi / 2, "II")],
+        ),
+        (sentence("IIHTC", "V", "", "", "M", "N", *[""] * 4, 90.0, "", "", "T"), []),
+        (sentence("IIHTC", "A", "", "", "S", "N", *[""] * 4, 90.0, "", "", "T"), []),
         (sentence("GPGLL", "5400.0", "N", "00700.0", "E"), []),
         (sentence("HEHDT", "", "T"), []),
         (sentence("HEHDT", 999.0, "T"), []),
@@ -77,6 +100,64 @@ def test_sentences_are_understood_in_si_units(line, expected):
     assert [one.value for one in found] == pytest.approx(
         [value for _, value, _ in expected], abs=1e-4
     )
+
+
+def moded(kind, mode, status="V"):
+    """A sentence with a mode indicator, which is whole in all else."""
+    position = ("5430.0", "N", "00815.0", "W")
+    fields = {
+        "RMC": ("", "A", *position, 9, 90, "010126", "2.0", "W", mode, status),
+        "VTG": (90, "T", "", "M", 10, "N", 18.5, "K", mode),
+        "XTE": ("A", "A", 0.1, "L", "N", mode),
+        "APB": ("A", "A", 0.1, "L", "N", *"VV", 9, "M", 1, 9, "T", 9, "T", mode),
+        "BWC": ("", *position, 45, "T", "", "M", 2.0, "N", 1, mode),
+        "BWR": ("", *position, 45, "T", "", "M", 2.0, "N", 1, mode),
+    }
+    return sentence(f"GP{kind}", *fields[kind])
+
+
+@pytest.mark.parametrize(
+    ("kind", "quantities"),
+    [
+        ("RMC", ["course", "speed", "latitude", "longitude", "variation"]),
+        ("VTG", ["course", "speed"]),
+        ("XTE", ["cross_track"]),
+        ("APB", ["cross_track", "to_steer", "magnetic_leg"]),
+        ("BWC", ["waypoint_bearing", "waypoint_distance"]),
+        ("BWR", ["waypoint_bearing", "waypoint_distance"]),
+    ],
+)
+def test_only_a_mode_in_which_a_receiver_measures_is_steered_by(kind, quantities):
+    for mode in ("A", "D", "R", "F", "P", ""):
+        assert [one.quantity for one in readings(moded(kind, mode))] == quantities
+    for mode in "NSEMX":
+        assert readings(moded(kind, mode)) == []
+
+
+def test_a_receiver_that_does_not_assess_integrity_is_believed_an_unsafe_one_not():
+    assert all(readings(moded("RMC", "A", status)) for status in ("V", "S", "C", ""))
+    assert readings(moded("RMC", "A", "U")) == []
+
+
+@pytest.mark.parametrize(
+    ("north", "side", "found"),
+    [
+        ("5459.9", "N", 54.99833),
+        ("5460.0", "N", None),
+        ("5499.0", "S", None),
+        ("-5430.0", "N", None),
+        ("9030.0", "N", ""),
+        ("5430.0", "E", ""),
+    ],
+)
+def test_a_latitude_has_minutes_below_sixty_and_its_own_letters(north, side, found):
+    line = sentence("GPRMC", "", "A", north, side, "00815.0", "W", 9, 90, "010126")
+    heard = readings(line)
+    if found is None:
+        assert heard is None
+        return
+    latitudes = [one.value for one in heard if one.quantity == "latitude"]
+    assert latitudes == ([pytest.approx(np.radians(found))] if found else [])
 
 
 @pytest.mark.parametrize(

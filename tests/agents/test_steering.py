@@ -306,14 +306,19 @@ def test_a_ship_that_runs_away_says_when():
 def test_the_command_steers_with_what_it_is_told_and_fails_after_an_alarm(
     tmp_path, monkeypatch
 ):
-    given, ends = [], [("off", ""), ("manual", "no heading for 3 s")]
+    given = []
+    ends = [
+        ("off", "", ""),
+        ("manual", "no heading for 3 s", ""),
+        ("off", "", "SIGINT"),
+    ]
 
     async def stand_in(pilot, nmea, **more):
         given.append((pilot.kind, nmea, more))
         more["log"]("0.0 s: standby")
-        state, alarm = ends[len(given) - 1]
+        state, alarm, ended_by = ends[len(given) - 1]
         return SimpleNamespace(
-            state=state, alarm=alarm, counts={"damaged": 2}, ended_by=""
+            state=state, alarm=alarm, counts={"damaged": 2}, ended_by=ended_by
         )
 
     monkeypatch.setattr("agents.deployment.steering.steer", stand_in)
@@ -372,6 +377,13 @@ def test_the_command_steers_with_what_it_is_told_and_fails_after_an_alarm(
     turn = more["route"].given(np.radians(54.0), np.radians(7.5))
     expected = Route.from_csv(tmp_path / "route.csv", WHEEL_OVER.gains["path_radius"])
     assert turn == expected.given(np.radians(54.0), np.radians(7.5))
+    more_words = ["--gear", "udp:gear:2", "--variation=-3", "--no-rudder-feedback"]
+    ended = CliRunner().invoke(app, [*words, *more_words])
+    assert ended.exit_code == 130
+    assert "ended by SIGINT: the last order is marked invalid" in ended.output
+    _, _, more = given[2]
+    assert (more["gear"], more["rudder_feedback"]) == ("udp:gear:2", False)
+    assert more["variation"] == pytest.approx(np.radians(-3.0))
     wrong = CliRunner().invoke(app, [*words, "--limit", "silense_s=4"])
     assert (wrong.exit_code, "--limit: unknown key 'silense_s'" in wrong.output) == (
         2,
