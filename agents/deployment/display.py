@@ -360,7 +360,9 @@ def _instruments(view: HelmView, most: int) -> Table:
 def _keys() -> Text:
     """The keys, and what they do."""
     text = Text(no_wrap=False)
-    for key, label in KEYS.values():
+    for command, (key, label) in KEYS.items():
+        if command == "confirm":
+            text.append("\n")
         text.append(f" {key} ", style="reverse")
         text.append(f" {label}  ")
     return text

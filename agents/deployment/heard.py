@@ -48,7 +48,7 @@ class HeardSentences:
                 reason = f"silent for {age_s:.0f} s"
             if reason and (age_s < self.recent_s or reason.startswith("silent")):
                 found[f"{address}: {reason}"] = True
-        return list(found)
+        return sorted(found, key=lambda text: ": silent for " in text)
 
 
 def _why_not(line: str, name: str, wanted: set[str]) -> str | None:

@@ -49,7 +49,8 @@ class HelmPanel(HelmObserver):
         self.helm: Helm | None = None
         self.now = 0.0
         self.note = ""
-        self.noted_at = 0.0
+        self.noted_at = 0.0  # s
+        self.noted_state = ""  # of the helm
         self.quits = False  # asked to, and not yet confirmed
 
     def heard(self, line: str, source: str, time: float) -> None:
@@ -72,7 +73,8 @@ class HelmPanel(HelmObserver):
         if self.log is not None and self.log.problem and not helm.notices:
             helm.notices = ["log cannot be written"]
             self.warn(self.log.problem)
-        if now - self.noted_at > self.longest_question_s:
+        is_old = now - self.noted_at > self.longest_question_s
+        if is_old or helm.state != self.noted_state:
             self.note = ""
             self.quits = False
         self._show(helm)
@@ -101,6 +103,7 @@ class HelmPanel(HelmObserver):
         except InputError as error:
             self.note = str(error)
         self.noted_at = self.now
+        self.noted_state = helm.state
         self._show(helm)
 
     def _do(self, command: str, helm: Helm) -> str:
