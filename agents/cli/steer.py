@@ -29,6 +29,20 @@ SpeedUp = Annotated[
     float, Option(min=0.01, help="Times faster than real time; same at both ends.")
 ]
 
+Page = Annotated[
+    int | None,
+    Option(
+        metavar="PORT",
+        min=0,
+        max=65535,
+        help="Show the helm on a page of this computer; 0: any free port.",
+    ),
+]
+Log = Annotated[
+    Path | None,
+    Option(metavar="FILE", help="New file for all sentences, as new-ship reads."),
+]
+
 
 def steer_command(
     agent: Annotated[
@@ -87,19 +101,8 @@ def steer_command(
             help="Measure the rudder (RSA); without, nobody sees if it follows.",
         ),
     ] = True,
-    page: Annotated[
-        int | None,
-        Option(
-            metavar="PORT",
-            min=0,
-            max=65535,
-            help="Show the helm on a page of this computer; 0: any free port.",
-        ),
-    ] = None,
-    log: Annotated[
-        Path | None,
-        Option(metavar="FILE", help="New file for all sentences, as new-ship reads."),
-    ] = None,
+    page: Page = None,
+    log: Log = None,
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
 ) -> None:
@@ -119,11 +122,9 @@ def steer_command(
 
     from agents.agent_file import load_agent
     from agents.cli.terminal import answer, console, say, warn
-    from agents.deployment.helm import Helm
-    from agents.deployment.panel import has_screen, helm_panel
+    from agents.deployment.panel import has_screen, helm_panel, steer_with
     from agents.deployment.route import Route
     from agents.deployment.sensors import Limits
-    from agents.deployment.steering import steer
     from shipgym.checks import check_keys
     from shipgym.files import named_values
 
@@ -135,34 +136,31 @@ def steer_command(
         radius = getattr(pilot, "gains", {}).get("path_radius", 0.0)
         track = Route.from_csv(route, radius)
 
-    async def steered() -> Helm:
-        panel = helm_panel(
-            title=f"shipgym steer {agent} on {nmea}",
-            say=say,
-            warn=warn,
-            console=console if has_screen(console) else None,
-            page=page,
-            log=log,
+    panel = helm_panel(
+        title=f"shipgym steer {agent} on {nmea}",
+        say=say,
+        warn=warn,
+        console=console if has_screen(console) else None,
+        page=page,
+        log=log,
+        speed_up=speed_up,
+    )
+    helm = asyncio.run(
+        steer_with(
+            panel,
+            pilot,
+            nmea,
+            gear=gear,
+            heading=None if heading is None else radians(heading),
+            limits=Limits(**limits),
+            duration=duration,
             speed_up=speed_up,
+            route=track,
+            rate=None if rate is None else radians(rate) / 60.0,
+            variation=None if variation is None else radians(variation),
+            rudder_feedback=rudder_feedback,
         )
-        async with panel as (observer, note):
-            return await steer(
-                pilot,
-                nmea,
-                gear=gear,
-                heading=None if heading is None else radians(heading),
-                limits=Limits(**limits),
-                duration=duration,
-                speed_up=speed_up,
-                log=note,
-                route=track,
-                rate=None if rate is None else radians(rate) / 60.0,
-                variation=None if variation is None else radians(variation),
-                rudder_feedback=rudder_feedback,
-                observers=[observer],
-            )
-
-    helm = asyncio.run(steered())
+    )
     answer({"state": helm.state, "alarm": helm.alarm, **helm.counts})
     if helm.alarm:
         fail(f"handed over: {helm.alarm}", FAILED)

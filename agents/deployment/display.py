@@ -1,6 +1,6 @@
 """The helm as a helmsman sees it: one record, and its form in a terminal."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import degrees, inf
 from typing import Any, NamedTuple
@@ -18,7 +18,6 @@ from agents.deployment.sensors import HelmSensors
 from shipgym.trials.nmea import NMEA_QUANTITIES
 from shipgym.trials.units import UNITS
 
-UNKNOWN = "--"
 #: Keys by command, and what they do; the page has them as buttons.
 KEYS = {
     "stand-by": ("space", "stand-by"),
@@ -50,6 +49,11 @@ class Missing(NamedTuple):
 
     quantity: str
     heard: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """What was heard instead."""
+        return "; ".join(self.heard) or "nothing heard"
 
 
 @dataclass(frozen=True)
@@ -149,45 +153,45 @@ class HelmView:
     def gauges(self) -> dict[str, str]:
         """Texts of the numbers by name."""
         return {
-            "heading": bearing(self.heading),
-            f"set-point ({self.leads})": bearing(self.set_point),
-            "rate of turn": _signed(self.yaw_rate, 60.0, "°/min"),
-            "rudder": sided(self.rudder),
-            "order": sided(self.order),
-            "cross-track": _cross_track(self.cross_track),
+            "heading": _known(bearing, self.heading),
+            f"set-point ({self.leads})": _known(bearing, self.set_point),
+            "rate of turn": _known(per_minute, self.yaw_rate),
+            "rudder": _known(sided, self.rudder),
+            "order": _known(sided, self.order),
+            "cross-track": _known(off_track, self.cross_track),
         }
 
 
-def bearing(angle: float | None) -> str:
+def _known(form: Callable[[float], str], value: float | None) -> str:
+    """Text of a value, or that there is none."""
+    return "--" if value is None else form(value)
+
+
+def bearing(angle: float) -> str:
     """A direction, rad, as 045.0°."""
-    if angle is None:
-        return UNKNOWN
     tenths = round(degrees(angle) * 10.0) % 3600
     return f"{tenths / 10.0:05.1f}°"
 
 
-def sided(angle: float | None) -> str:
+def sided(angle: float) -> str:
     """A rudder angle, rad, as 3.0° stbd."""
-    if angle is None:
-        return UNKNOWN
     size = abs(degrees(angle))
     if size < 0.05:
         return "0.0°"
-    return f"{size:.1f}° {'stbd' if angle > 0.0 else 'port'}"
+    side = "stbd" if angle > 0.0 else "port"
+    return f"{size:.1f}° {side}"
 
 
-def _signed(value: float | None, factor: float, unit: str) -> str:
-    if value is None:
-        return UNKNOWN
-    size = round(degrees(value) * factor, 1) + 0.0  # no -0.0
-    return f"{size:+.1f}{unit}"
+def per_minute(rate: float) -> str:
+    """A rate of turn, rad/s, as +12.0°/min."""
+    size = round(60.0 * degrees(rate), 1) + 0.0  # no -0.0
+    return f"{size:+.1f}°/min"
 
 
-def _cross_track(value: float | None) -> str:
-    if value is None:
-        return UNKNOWN
-    side = "stbd" if value >= 0.0 else "port"
-    return f"{abs(value):.0f} m to {side}"
+def off_track(distance: float) -> str:
+    """A cross-track error, m, as 12 m to port."""
+    side = "stbd" if distance >= 0.0 else "port"
+    return f"{abs(distance):.0f} m to {side}"
 
 
 def _leader(helm: Helm) -> str:
@@ -250,13 +254,13 @@ def reading_text(quantity: str, value: float) -> str:
         knots = round(value / UNITS["speed"]["kn"], 1) + 0.0  # no -0.0
         return f"{knots:.1f} kn"
     if quantity == "yaw_rate":
-        return _signed(value, 60.0, "°/min")
+        return per_minute(value)
     if quantity in ("rudder", "order", "released"):
         return sided(value)
     if quantity in ("latitude", "longitude"):
         return f"{degrees(value):.4f}°"
     if quantity == "cross_track":
-        return _cross_track(value)
+        return off_track(value)
     is_distance = NMEA_QUANTITIES[quantity].largest > 1000.0
     return f"{value:.0f} m" if is_distance else bearing(value)
 
@@ -341,12 +345,15 @@ def _instruments(view: HelmView, most: int) -> Table:
 
     rows: list[tuple[list[str], str]] = []
     for missing in view.missing:
-        heard = "; ".join(missing.heard) or "nothing heard"
-        rows.append(([missing.quantity, "MISSING", heard, ""], "bold red"))
+        cells = [missing.quantity, "MISSING", missing.text, ""]
+        rows.append((cells, "bold red"))
     for one in view.sources:
-        cells = [one.quantity, one.value, one.source, f"{one.age_s:.1f} s"]
+        age = f"{one.age_s:.1f} s"
+        cells = [one.quantity, one.value, one.source, age]
         style = "" if one.is_used else "dim"
-        rows.append((cells, style if one.is_fresh else "red"))
+        if not one.is_fresh:
+            style = "red"
+        rows.append((cells, style))
 
     shown = rows if len(rows) <= most else rows[: most - 1]
     for cells, style in shown:
@@ -376,8 +383,7 @@ def as_json(view: HelmView, title: str) -> dict[str, Any]:
         sources.append(entry)
     missing = []
     for lack in view.missing:
-        heard = "; ".join(lack.heard) or "nothing heard"
-        missing.append({"quantity": lack.quantity, "heard": heard})
+        missing.append({"quantity": lack.quantity, "heard": lack.text})
     level = "warning" if view.warnings else view.state
     return {
         "title": title,

@@ -8,26 +8,23 @@ from contextlib import contextmanager, suppress
 
 from agents.deployment.display import KEYS
 
-#: Other keys by what a terminal sends for them.
-OTHER_KEYS = {
-    "\x1b[D": "port-1",
-    "\x1b[C": "starboard-1",
-    "\x1bOD": "port-1",
-    "\x1bOC": "starboard-1",
-    "_": "port-1",
-    "=": "starboard-1",
-    ",": "port-10",
-    ".": "starboard-10",
-    "\x1b": "cancel",
-}
-
 
 def commands_of(typed: str) -> list[str]:
     """Commands of what a terminal sent at once; none of a text that was pasted."""
     longest_repeat = 16  # characters
     if len(typed) > longest_repeat:
         return []
-    by_key = dict(OTHER_KEYS)
+    by_key = {
+        "\x1b[D": "port-1",
+        "\x1b[C": "starboard-1",
+        "\x1bOD": "port-1",
+        "\x1bOC": "starboard-1",
+        "_": "port-1",
+        "=": "starboard-1",
+        ",": "port-10",
+        ".": "starboard-10",
+        "\x1b": "cancel",
+    }
     for command, (key, _) in KEYS.items():
         by_key[" " if key == "space" else key] = command
 

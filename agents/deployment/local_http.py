@@ -6,9 +6,6 @@ from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any, NamedTuple
 
-LONGEST_HEAD = 8192  # bytes
-LONGEST_BODY = 1000
-
 
 class Request(NamedTuple):
     """Method, path, headers by their names in small letters, and body."""
@@ -28,7 +25,10 @@ class HttpError(Exception):
 
 
 async def read_request(reader: StreamReader) -> Request:
-    """Read a request; HttpError for one that is malformed or too long."""
+    """Read a request; HttpError for one that is malformed or too long.
+
+    The longest head is the limit of the reader.
+    """
     try:
         head = await reader.readuntil(b"\r\n\r\n")
     except LimitOverrunError:
@@ -44,11 +44,12 @@ async def read_request(reader: StreamReader) -> Request:
     method, path, _ = words
     headers = _headers(lines)
 
+    longest_body = 1000  # bytes
     length = headers.get("content-length", "0")
     is_length = length.isascii() and length.isdigit()
     if not is_length or "transfer-encoding" in headers:
         raise HttpError(HTTPStatus.BAD_REQUEST)
-    if len(length) > 9 or int(length) > LONGEST_BODY:
+    if len(length) > 9 or int(length) > longest_body:
         raise HttpError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
     try:
         body = await reader.readexactly(int(length))

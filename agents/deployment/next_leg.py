@@ -58,10 +58,11 @@ class PlottedCourse:
 
     def steered(self, course: float | None) -> float | None:
         """Course to steer while the plotter gives this one, rad."""
-        if course is None or self.followed is None or not self.attended:
+        followed = self.followed
+        if course is None or followed is None or not self.attended:
             return course
-        is_new_leg = abs(wrapped(course - self.followed)) > self.new_leg
-        return self.followed if is_new_leg else course
+        change = abs(wrapped(course - followed))
+        return followed if change > self.new_leg else course
 
     def take(self) -> None:
         """Steer whatever course the plotter gives next."""

@@ -5,10 +5,15 @@ import signal
 import sys
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterable
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import (
+    AbstractAsyncContextManager,
+    AsyncExitStack,
+    asynccontextmanager,
+)
 from dataclasses import replace
 from math import radians
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
@@ -19,7 +24,7 @@ from agents.deployment.helm_commands import STEERING
 from agents.deployment.keys import is_foreground, keyboard
 from agents.deployment.screen import Screen
 from agents.deployment.sentence_log import SentenceLog
-from agents.deployment.steering import HelmObserver
+from agents.deployment.steering import HelmObserver, steer
 from agents.deployment.web_page import HelmPage
 from shipgym import InputError
 
@@ -194,6 +199,16 @@ async def helm_panel(
         stack.callback(screen.close)
         panel.displays.append(screen.show)
         yield panel, lines.append
+
+
+async def steer_with(
+    panel: AbstractAsyncContextManager[tuple[HelmPanel, Callable[[str], None]]],
+    *arguments: Any,
+    **options: Any,
+) -> Helm:
+    """Steer as `steer` does, watched by a panel."""
+    async with panel as (observer, log):
+        return await steer(*arguments, log=log, observers=[observer], **options)
 
 
 def _print_all(lines: Iterable[str], write: Callable[[str], None]) -> None:

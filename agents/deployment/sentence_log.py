@@ -53,13 +53,11 @@ class SentenceLog:
 
     def take(self, text: str, source: str, now: float) -> None:
         """Log lines that came from or went to a source at a time, s."""
-        milliseconds = round((self._epoch + now) * 1000.0)
-        place = re.sub(r"[^\w.:@/-]", "_", source, flags=re.ASCII)
-        tags = f"s:{place},c:{milliseconds}"
-        block = f"\\{tags}*{checksum(tags)}\\"
+        block = _tag_block(source, self._epoch + now)
         for line in text.splitlines():
+            sentence = _sentence(line)
             if not self.problem:
-                self._waiting.append(f"{block}{_sentence(line)}\r\n")
+                self._waiting.append(f"{block}{sentence}\r\n")
         if len(self._waiting) > self.most_waiting:
             self.problem = f"{self.path}: too slow to keep up with the sentences"
 
@@ -86,6 +84,14 @@ class SentenceLog:
 
     def _fail(self, error: OSError) -> None:
         self.problem = f"{self.path}: cannot be written ({error.strerror or error})"
+
+
+def _tag_block(source: str, seconds: float) -> str:
+    """TAG block with a source and a time, s since 1970."""
+    place = re.sub(r"[^\w.:@/-]", "_", source, flags=re.ASCII)
+    milliseconds = round(1000.0 * seconds)
+    tags = f"s:{place},c:{milliseconds}"
+    return f"\\{tags}*{checksum(tags)}\\"
 
 
 def _sentence(line: str) -> str:

@@ -10,7 +10,6 @@ from http import HTTPStatus
 
 from agents.deployment.display import KEYS, HelmView, as_json
 from agents.deployment.local_http import (
-    LONGEST_HEAD,
     HttpError,
     Request,
     json_body,
@@ -34,6 +33,7 @@ class HelmPage:
         Heading of the page.
     """
 
+    longest_head = 8192  # bytes
     most_connections = 50
     most_waiting = 65536  # bytes that a client has not taken; then it is dropped
     interval_s = 0.2  # shortest between two views
@@ -65,7 +65,7 @@ class HelmPage:
         self.html = text.encode()
         try:
             self._server = await asyncio.start_server(
-                self._serve, "127.0.0.1", port, limit=LONGEST_HEAD
+                self._serve, "127.0.0.1", port, limit=self.longest_head
             )
         except OSError as error:
             raise InputError(
@@ -123,7 +123,7 @@ class HelmPage:
             if answer is None:
                 self.listening.add(writer)
                 writer.write(self.newest)
-                while await reader.read(LONGEST_HEAD):
+                while await reader.read(self.longest_head):
                     pass  # until it goes away
         except (OSError, TimeoutError):
             pass
@@ -146,16 +146,23 @@ class HelmPage:
             return response(error.status, {"Content-Type": "text/plain"}, text)
 
     def _checked_path(self, request: Request) -> str:
-        """Path behind the token; HttpError of a stranger's request."""
+        """Path behind the token; HttpError for a stranger's request."""
         hosts = (f"127.0.0.1:{self.port}", f"localhost:{self.port}")
-        origins = [f"http://{host}" for host in hosts]
-        host = request.headers.get("host", "")
-        origin = request.headers.get("origin", origins[0])
-        _, token, path = f"{request.path}//".split("/", 2)
-        knows_token = secrets.compare_digest(token.encode(), self.token.encode())
-        if host not in hosts or origin not in origins or not knows_token:
+        host = request.headers.get("host")
+        if host not in hosts:
             raise HttpError(HTTPStatus.FORBIDDEN)
-        return path.removesuffix("//")
+
+        origins = [f"http://{host}" for host in hosts]
+        origin = request.headers.get("origin")
+        if origin is not None and origin not in origins:
+            raise HttpError(HTTPStatus.FORBIDDEN)
+
+        begin, _, rest = request.path.partition("/")
+        token, slash, path = rest.partition("/")
+        knows_token = secrets.compare_digest(token.encode(), self.token.encode())
+        if begin or not slash or not knows_token:
+            raise HttpError(HTTPStatus.FORBIDDEN)
+        return path
 
     def _route(self, request: Request, path: str) -> bytes | None:
         """Answer by path and method; None for the events."""
