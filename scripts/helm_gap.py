@@ -2,6 +2,7 @@
 
     python scripts/helm_gap.py              all disturbances, 20 s each
     python scripts/helm_gap.py --seconds 60
+    python scripts/helm_gap.py --memory     a million sentences of many sources
 
 `shipgym simulate` and `shipgym steer` run as programs of their own over UDP; this one
 stands between the autopilot and the gear, measures and passes orders on.
@@ -19,7 +20,9 @@ from itertools import pairwise
 from pathlib import Path
 
 from agents import PID
+from agents.deployment.helm import Helm
 from agents.deployment.nmea import sentences
+from agents.deployment.sensors import Limits
 from shipgym.ships import load_model
 
 HOST = "127.0.0.1"
@@ -118,8 +121,7 @@ def measured(disturb: Callable[..., None], seconds: float, folder: Path) -> str:
             last = hears.recv(65536)
             times.append(time.monotonic())
             hears.sendto(last, (HOST, ship))
-    status = Path(f"/proc/{steer.pid}/status").read_text(encoding="utf-8")
-    memory = int(status.partition("VmRSS:")[2].split()[0]) / 1024.0
+    megabytes = memory(steer.pid)
     end.set()
     thread.join()
     steer.terminate()
@@ -128,14 +130,44 @@ def measured(disturb: Callable[..., None], seconds: float, folder: Path) -> str:
     simulate.wait()
     gap = max(after - before for before, after in pairwise(times))
     state = "steering" if b",A,,V,B" in last else "not steering"
-    return f"largest gap {gap:.2f} s, {memory:.0f} MB, {state}"
+    return f"largest gap {gap:.2f} s, {megabytes:.0f} MB, {state}"
+
+
+def hear_a_million() -> None:
+    """Print the memory of a helm that hears a million sentences of many sources."""
+    helm = Helm(PID.from_model(load_model("mariner")), 0.0, Limits())
+    kinds = ("HDT,1,T", "HDM,1,M", "VTG,90,T,,M,9,N", "ROT,1,A", "RSA,1,A", "XYZ,1")
+    for number in range(1_000_001):
+        talker = chr(65 + number % 26) + chr(65 + number // 26 % 26)
+        line = sentences(talker + kinds[number % len(kinds)])
+        address = f"10.0.{number // 60_000}.1:{number % 60_000}"
+        now = number / 1000.0
+        helm.hear(line, address, now)
+        if number % 1000 == 0:
+            helm.watch(1.0, now)
+            helm.sentences()
+        if number % 250_000 == 0:
+            megabytes = memory("self")
+            print(f"{number} sentences: {megabytes:.0f} MB", flush=True)
+
+
+def memory(process: int | str) -> float:
+    """Memory of a process, MB."""
+    status = Path(f"/proc/{process}/status").read_text(encoding="utf-8")
+    kilobytes = status.partition("VmRSS:")[2].split()[0]
+    return int(kilobytes) / 1024.0
 
 
 def main() -> None:
-    """Measure all disturbances."""
+    """Measure all disturbances, or the memory."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0)
-    seconds = parser.parse_args().seconds
+    parser.add_argument("--memory", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.memory:
+        hear_a_million()
+        return
+    seconds = arguments.seconds
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         PID.from_model(load_model("mariner")).save(folder / "pid.json")

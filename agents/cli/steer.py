@@ -2,7 +2,7 @@
 
 from math import inf, radians
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from typer import Argument, Option
 
@@ -20,6 +20,53 @@ Gear = Annotated[
     Option(
         metavar="ADDRESS",
         help="Where rudder orders go; needed over UDP, else the --nmea connection.",
+    ),
+]
+Heading = Annotated[
+    float | None,
+    Option(
+        metavar="DEG",
+        min=0.0,
+        max=360.0,
+        help="Heading to steer; default: commanded (HSC, HTC) or plotted (APB).",
+    ),
+]
+Rate = Annotated[
+    float | None,
+    Option(
+        "--rate-of-turn",
+        metavar="DEG",
+        help="deg/min, for turn-rate; with --heading the limit.",
+    ),
+]
+RouteFile = Annotated[
+    Path | None,
+    Option(
+        metavar="CSV",
+        help="Route for wheel-over: columns latitude, longitude, degrees.",
+    ),
+]
+LimitValues = Annotated[
+    list[str] | None,
+    Option(
+        metavar="NAME=VALUE",
+        help="When to hand over: silence_s=3, rudder_deg=5; repeatable.",
+    ),
+]
+Variation = Annotated[
+    float | None,
+    Option(
+        metavar="DEG",
+        min=-180.0,
+        max=180.0,
+        help="Magnetic variation, positive east; default: heard (RMC, HDG).",
+    ),
+]
+RudderFeedback = Annotated[
+    bool,
+    Option(
+        "--rudder-feedback/--no-rudder-feedback",
+        help="Measure the rudder (RSA); without, nobody sees if it follows.",
     ),
 ]
 Duration = Annotated[
@@ -54,53 +101,12 @@ def steer_command(
     ],
     nmea: Address,
     gear: Gear = None,
-    heading: Annotated[
-        float | None,
-        Option(
-            metavar="DEG",
-            min=0.0,
-            max=360.0,
-            help="Heading to steer; default: commanded (HSC, HTC) or plotted (APB).",
-        ),
-    ] = None,
-    rate: Annotated[
-        float | None,
-        Option(
-            "--rate-of-turn",
-            metavar="DEG",
-            help="deg/min, for turn-rate; with --heading the limit.",
-        ),
-    ] = None,
-    route: Annotated[
-        Path | None,
-        Option(
-            metavar="CSV",
-            help="Route for wheel-over: columns latitude, longitude, degrees.",
-        ),
-    ] = None,
-    limit: Annotated[
-        list[str] | None,
-        Option(
-            metavar="NAME=VALUE",
-            help="When to hand over: silence_s=3, rudder_deg=5; repeatable.",
-        ),
-    ] = None,
-    variation: Annotated[
-        float | None,
-        Option(
-            metavar="DEG",
-            min=-180.0,
-            max=180.0,
-            help="Magnetic variation, positive east; default: heard (RMC, HDG).",
-        ),
-    ] = None,
-    rudder_feedback: Annotated[
-        bool,
-        Option(
-            "--rudder-feedback/--no-rudder-feedback",
-            help="Measure the rudder (RSA); without, nobody sees if it follows.",
-        ),
-    ] = True,
+    heading: Heading = None,
+    rate: Rate = None,
+    route: RouteFile = None,
+    limit: LimitValues = None,
+    variation: Variation = None,
+    rudder_feedback: RudderFeedback = True,
     page: Page = None,
     log: Log = None,
     duration: Duration = inf,
@@ -121,7 +127,7 @@ def steer_command(
     import asyncio
 
     from agents.agent_file import load_agent
-    from agents.cli.terminal import answer, console, say, warn
+    from agents.cli.terminal import console, say, warn
     from agents.deployment.panel import has_screen, helm_panel, steer_with
     from agents.deployment.route import Route
     from agents.deployment.sensors import Limits
@@ -151,16 +157,27 @@ def steer_command(
             pilot,
             nmea,
             gear=gear,
-            heading=None if heading is None else radians(heading),
+            heading=_radians(heading),
             limits=Limits(**limits),
             duration=duration,
             speed_up=speed_up,
             route=track,
             rate=None if rate is None else radians(rate) / 60.0,
-            variation=None if variation is None else radians(variation),
+            variation=_radians(variation),
             rudder_feedback=rudder_feedback,
         )
     )
+    _report_end(helm)
+
+
+def _radians(degrees: float | None) -> float | None:
+    return None if degrees is None else radians(degrees)
+
+
+def _report_end(helm: Any) -> None:
+    """Say how a helm was left; other exit codes after an alarm and a signal."""
+    from agents.cli.terminal import answer, say
+
     answer({"state": helm.state, "alarm": helm.alarm, **helm.counts})
     if helm.alarm:
         fail(f"handed over: {helm.alarm}", FAILED)

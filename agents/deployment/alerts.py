@@ -20,16 +20,6 @@ class AlertKind(NamedTuple):
     title: str
 
 
-KINDS = {
-    "alarm": AlertKind(1, "A", "AUTOPILOT FAULT"),
-    "off heading": AlertKind(2, "W", "OFF HEADING"),
-    "off track": AlertKind(3, "W", "OFF TRACK"),
-    "course change ahead": AlertKind(4, "C", "COURSE CHANGE"),
-    "next leg waits to be confirmed": AlertKind(5, "W", "NEXT LEG"),
-    "log cannot be written": AlertKind(6, "C", "LOG"),
-}
-
-
 @dataclass
 class Alert:
     """An alert and what has become of it."""
@@ -55,30 +45,67 @@ class Alert:
 
     def alr(self) -> str:
         """The alert as ALR, which has 40 characters of text."""
-        condition = "V" if self.state == "N" else "A"
-        acknowledged = "A" if self.state == "A" else "V"
-        text = _plain(self.text)[:40]
-        return f"AGALR,,{self.kind.number:03d},{condition},{acknowledged},{text}\n"
+        longest = 40
+        fields = [
+            "AGALR",
+            "",
+            f"{self.kind.number:03d}",
+            "V" if self.state == "N" else "A",
+            "A" if self.state == "A" else "V",
+            _plain(self.text, longest),
+        ]
+        return _line(fields)
 
     def alf(self) -> str:
         """The alert as one ALF, or two where its text says more than its title."""
-        number = f"{self.identifier},1,{self.revision},0"
-        text = _plain(self.text)[:44]
-        total = 1 if text.startswith(self.kind.title) else 2
-        message = self.kind.number
-        now = datetime.now(UTC).strftime("%H%M%S.%f")[:9]
-        priority = self.kind.priority
-        first = f"AGALF,{total},1,{message},{now},B,{priority},{self.state},,{number}"
-        lines = f"{first},{self.kind.title}\n"
-        if total > 1:
-            lines += f"AGALF,2,2,{message},,,,,,{number},{text}\n"
+        longest = 44
+        text = _plain(self.text, longest)
+        has_text = not text.startswith(self.kind.title)
+        number = ["", str(self.identifier), "1", str(self.revision), "0"]
+        first = [
+            "AGALF",
+            "2" if has_text else "1",
+            "1",
+            str(self.kind.number),
+            datetime.now(UTC).strftime("%H%M%S.00"),
+            "B",
+            self.kind.priority,
+            self.state,
+            *number,
+            self.kind.title,
+        ]
+        lines = _line(first)
+        if has_text:
+            nothing = [""] * 4
+            second = ["AGALF", "2", "2", str(self.kind.number), *nothing, *number, text]
+            lines += _line(second)
         return lines
 
 
-def _plain(text: str) -> str:
-    """A text without characters that mean something in a sentence."""
-    kept = [" " if letter in ",*$!\\^~\r\n" else letter for letter in text.upper()]
-    return "".join(kept)
+def _line(fields: list[str]) -> str:
+    return ",".join(fields) + "\n"
+
+
+def _plain(text: str, longest: int) -> str:
+    """The beginning of a text, without characters that mean something in a sentence."""
+    reserved = ",*$!\\^~\r\n"
+    blanks = str.maketrans(reserved, " " * len(reserved))
+    return text.upper().translate(blanks)[:longest]
+
+
+def _kind(name: str) -> AlertKind:
+    """Number, priority and title of an alert; any other warning has number 9."""
+    kinds = {
+        "alarm": AlertKind(1, "A", "AUTOPILOT FAULT"),
+        "off heading": AlertKind(2, "W", "OFF HEADING"),
+        "off track": AlertKind(3, "W", "OFF TRACK"),
+        "course change ahead": AlertKind(4, "C", "COURSE CHANGE"),
+        "next leg waits to be confirmed": AlertKind(5, "W", "NEXT LEG"),
+        "log cannot be written": AlertKind(6, "C", "LOG"),
+    }
+    title = _plain(name, longest=16)
+    other = AlertKind(9, "W", title)
+    return kinds.get(name, other)
 
 
 class Alerts:
@@ -96,11 +123,13 @@ class Alerts:
         for kind, text in texts.items():
             alert = self.given.get(kind)
             if alert is None:
-                self.given[kind] = Alert(KINDS[kind], text)
-            elif alert.state == "N":
+                self.given[kind] = Alert(_kind(kind), text)
+                continue
+            was_silent = now - alert.silenced_at > silence_s
+            if alert.state == "N":
                 alert.text = text
                 alert.change("V")
-            elif alert.state == "S" and now - alert.silenced_at > silence_s:
+            elif alert.state == "S" and was_silent:
                 alert.change("V")
         for kind, alert in self.given.items():
             if kind not in texts and alert.state != "N":
@@ -111,11 +140,13 @@ class Alerts:
         if line[3:6] not in ("ACN", "ACK"):
             return
         sentence = parse_sentence(line)
-        fields = sentence.fields
         if sentence.kind == "ACK":
-            self._command(10000 + int(fields[0]), "A", now)
-        elif fields[5] == "C" and fields[2].isdecimal():
-            self._command(int(fields[2]), fields[4], now)
+            number = int(sentence.fields[0])
+            self._command(10000 + number, "A", now)
+            return
+        _, _, identifier, _, command, flag = sentence.fields
+        if flag == "C":
+            self._command(int(identifier), command, now)
 
     def _command(self, identifier: int, command: str, now: float) -> None:
         """Acknowledge, silence or repeat an alert; refuse anything else."""
@@ -134,22 +165,34 @@ class Alerts:
 
     def sentences(self, now: float) -> str:
         """ALF of what has changed, ALR once a second, the list ALC twice a minute."""
-        changed = [alert for alert in self.given.values() if alert.is_new]
-        active = [alert for alert in self.given.values() if alert.state != "N"]
+        repeat_s, list_s = 0.99, 30.0
+        alerts = self.given.values()
+        changed = [alert for alert in alerts if alert.is_new]
+        active = [alert for alert in alerts if alert.state != "N"]
         text = self.answers
         self.answers = ""
         for alert in changed:
             alert.is_new = False
             text += alert.alf()
 
-        repeat_s, list_s = 0.99, 30.0
-        is_due = now == self.repeated_at or now - self.repeated_at >= repeat_s
-        if changed or is_due:
+        is_due = now - self.repeated_at >= repeat_s
+        if changed or is_due or now == self.repeated_at:
             self.repeated_at = now
-            for alert in {id(one): one for one in (*changed, *active)}.values():
+            ended = [alert for alert in changed if alert.state == "N"]
+            for alert in (*active, *ended):
                 text += alert.alr()
         if now - self.listed_at >= list_s:
             self.listed_at = now
-            entries = [f",,{one.identifier},1,{one.revision}" for one in active]
-            text += f"AGALC,01,01,00,{len(active)}{''.join(entries)}\n"
+            text += _listed(active)
         return sentences(text)
+
+
+def _listed(alerts: list[Alert]) -> str:
+    """Alerts as ALC."""
+    count = str(len(alerts))
+    fields = ["AGALC", "01", "01", "00", count]
+    for alert in alerts:
+        identifier = str(alert.identifier)
+        revision = str(alert.revision)
+        fields += ["", identifier, "1", revision]
+    return _line(fields)

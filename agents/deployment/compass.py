@@ -5,14 +5,6 @@ from dataclasses import dataclass, field
 
 from agents.deployment.nmea import NmeaReading
 
-#: True bearings by the magnetic ones that stand for them.
-TRUE = {
-    "compass_heading": "heading",
-    "magnetic_leg": "leg",
-    "magnetic_to_steer": "to_steer",
-    "magnetic_commanded": "commanded",
-}
-
 
 @dataclass
 class Compass:
@@ -36,6 +28,12 @@ class Compass:
 
     def true(self, readings: Sequence[NmeaReading], now: float) -> list[NmeaReading]:
         """Readings of one sentence with its magnetic bearings made true."""
+        true_names = {
+            "compass_heading": "heading",
+            "magnetic_leg": "leg",
+            "magnetic_to_steer": "to_steer",
+            "magnetic_commanded": "commanded",
+        }
         values = {reading.quantity: reading.value for reading in readings}
         if "variation" in values:
             self.heard = values["variation"]
@@ -43,7 +41,7 @@ class Compass:
 
         found = []
         for reading in readings:
-            true = TRUE.get(reading.quantity)
+            true = true_names.get(reading.quantity)
             if true is None:
                 found.append(reading)
             elif variation is None:

@@ -33,8 +33,8 @@ class Connection:
         longest_s, pause_s = 5.0, 1.0
         self.error = ""
         try:
-            opening = self.link.open(self.address, sends=self.sends)
-            await asyncio.wait_for(opening, longest_s)
+            async with asyncio.timeout(longest_s):
+                await self.link.open(self.address, sends=self.sends)
         except TimeoutError:
             self.error = f"{self.address}: no answer"
         except InputError as error:
@@ -52,17 +52,21 @@ class Connection:
     @property
     def problem(self) -> str:
         """Why nothing can come or go; empty where it can, as far as is known."""
+        reason = self.link.error
+        if self.is_open and self.sends and reason:
+            return f"{self.address}: nobody receives orders"
         if self.is_open:
-            nobody = self.sends and self.link.error
-            return f"{self.address}: nobody receives orders" if nobody else ""
-        return self.error or f"{self.address}: closed ({self.link.error})"
+            return ""
+        closed = f"{self.address}: closed ({reason})"
+        return self.error or closed
 
     def retry(self) -> None:
         """Begin to open the link again if it is closed, at most once a second."""
-        is_trying = self.opening is not None and not self.opening.done()
-        now = asyncio.get_running_loop().time()
-        if not self.is_open and not is_trying and now >= self.retry_at:
-            self.opening = asyncio.create_task(self.open())
+        loop = asyncio.get_running_loop()
+        if self.is_open or loop.time() < self.retry_at:
+            return
+        if self.opening is None or self.opening.done():
+            self.opening = loop.create_task(self.open())
 
     def close(self) -> None:
         """Close the link and try no more."""
@@ -93,17 +97,20 @@ def connections(
 
 def check_apart(data: Connection, gear: Connection) -> None:
     """Refuse a gear whose address is that at which data are received."""
-    are_datagrams = all(one.address.startswith("udp:") for one in (data, gear))
-    if data is gear or not are_datagrams:
+    datagrams = "udp:"
+    if data is gear or not data.address.startswith(datagrams):
+        return
+    if not gear.address.startswith(datagrams):
         return
     heard_at = data.link.address("sockname")
     sent_to = gear.link.address("peername")
     sent_from = gear.link.address("sockname")
-    is_everywhere = heard_at.startswith(("0.0.0.0:", ":::"))
     host, _, port = sent_to.rpartition(":")
-    is_here = host.startswith("127.") or sent_from.startswith(f"{host}:")
-    is_same_port = is_everywhere and is_here and heard_at.endswith(f":{port}")
-    if sent_to == heard_at or is_same_port:
+    is_own_host = host.startswith("127.") or sent_from.startswith(f"{host}:")
+    own = [sent_to]
+    if is_own_host:
+        own += [f"0.0.0.0:{port}", f":::{port}"]
+    if heard_at in own:
         raise InputError(
             f"--gear: expected another address than that of the data, got"
             f" {gear.address} with --nmea {data.address}; rudder orders would come"

@@ -5,13 +5,14 @@ from math import inf
 
 from shipgym.tasks.guidance import wrapped
 
-ANGLES = ("heading", "course", "leg", "to_steer", "rudder", "waypoint_bearing")
-
 
 def difference(quantity: str, value: float, other: float) -> float:
     """How far two values are apart, angles the shorter way round."""
+    angles = ("heading", "course", "leg", "to_steer", "rudder", "waypoint_bearing")
     apart = value - other
-    return abs(float(wrapped(apart))) if quantity in ANGLES else abs(apart)
+    if quantity in angles:
+        apart = float(wrapped(apart))
+    return abs(apart)
 
 
 @dataclass

@@ -115,14 +115,19 @@ class HelmSensors:
         return tolerance
 
     def renew(self, now: float) -> None:
-        """Forget sources that are silent; true headings come before magnetic ones."""
+        """Forget sources that are silent, and where the rudder was expected.
+
+        True headings come before magnetic ones.
+        """
+        self.expected = None
+        self.since.pop("order", None)
         for quantity, sources in list(self.newest.items()):
-            spoke = {}
-            for source in sorted(sources, key=lambda source: source.is_magnetic):
-                if self._is_fresh(sources[source].time, now):
-                    spoke[source] = sources[source]
-            self.newest[quantity] = spoke
-            if not spoke:
+            spoke = self._fresh(quantity, now)
+            order = sorted(spoke, key=lambda source: source.is_magnetic)
+            sources.clear()
+            for source in order:
+                sources[source] = spoke[source]
+            if not sources:
                 del self.newest[quantity]
 
     def value(self, quantity: str, now: float) -> float | None:
@@ -189,12 +194,12 @@ class HelmSensors:
 
     def _disagreement(self, now: float, read: Collection[str] | None) -> str:
         """Describe two sources of one quantity that differ."""
-        for quantity, sources in self.newest.items():
+        for quantity in self.newest:
             if read is not None and quantity not in read:
                 continue
             name = quantity.replace("_", " ")
-            for source, instrument in sources.items():
-                if instrument.is_two and self._is_fresh(instrument.time, now):
+            for source, instrument in self._fresh(quantity, now).items():
+                if instrument.is_two:
                     return f"two instruments send as {source}, each its own {name}"
             first, other = self._apart(quantity, now)
             if self.lasts(quantity, other is not None, now):
@@ -205,17 +210,17 @@ class HelmSensors:
         self, quantity: str, now: float
     ) -> tuple[NmeaSource | None, NmeaSource | None]:
         """The first source and one that differs from it, or no such."""
-        fresh = {}
-        for source, instrument in self.newest[quantity].items():
-            if self._is_fresh(instrument.time, now):
-                fresh[source] = instrument
-        if not fresh or (quantity == "course" and not self._has_way(now)):
+        fresh = self._fresh(quantity, now)
+        is_unsure = quantity == "course" and not self._has_way(now)
+        if not fresh or is_unsure:
             return None, None
+
         tolerance = NMEA_QUANTITIES[quantity].tolerance or inf
         tolerance *= self.limits.disagreement
-        first = next(iter(fresh))
+        first, *others = fresh
         reference = fresh[first]
-        for source, instrument in fresh.items():
+        for source in others:
+            instrument = fresh[source]
             allowed = tolerance
             if quantity in ("heading", "course"):
                 seconds = abs(instrument.time - reference.time)
@@ -233,10 +238,15 @@ class HelmSensors:
 
     def fresh(self, quantity: str, now: float) -> dict[NmeaSource, float]:
         """Newest values of a quantity by source, without those that are too old."""
+        instruments = self._fresh(quantity, now)
+        return {source: instrument.value for source, instrument in instruments.items()}
+
+    def _fresh(self, quantity: str, now: float) -> dict[NmeaSource, Instrument]:
+        """Instruments of a quantity, without those that are silent."""
         fresh = {}
         for source, instrument in self.newest.get(quantity, {}).items():
             if self._is_fresh(instrument.time, now):
-                fresh[source] = instrument.value
+                fresh[source] = instrument
         return fresh
 
     def _expect_rudder(self, order: float, step: float, now: float) -> None:

@@ -17,7 +17,6 @@ from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.ships.simulate import Conditions, Passage
 
 STEP = 0.1  # s, between two sentences of a compass
-ORDERS_STOP = 5.0  # s without a valid order after which the rudder goes amidships
 START = 54.0, 7.5  # degrees north and east, where the ship is at the beginning
 MINUTE = 1852.0  # m, of latitude
 
@@ -83,7 +82,8 @@ class SimulatedShip:
 
         Her rudder goes amidships when the orders that she heard stop.
         """
-        if self.ordered_at is not None and self.time - self.ordered_at > ORDERS_STOP:
+        patience_s = 5.0
+        if self.ordered_at is not None and self.time - self.ordered_at > patience_s:
             self.release()
         passage = self.passage
         order = np.array([[self.order, self.model.service_shaft_speed]])

@@ -159,8 +159,9 @@ class Bridge:
         number = 0
         while self.seconds < duration and not helm.ended_by:
             due = begin + self.seconds
-            pause = (due - self.now) / self.speed_up
-            await asyncio.sleep(max(0.0, pause))
+            if number:  # the first order goes out at once
+                pause = (due - self.now) / self.speed_up
+                await asyncio.sleep(max(0.0, pause))
             now = self.now
             for observer in self.observers:
                 for command in observer.commands():
@@ -203,10 +204,10 @@ class Bridge:
 
     def tell_status(self) -> None:
         """Tell the state of the helm when it or that of a connection changes."""
-        parts = [self.helm.status]
+        parts = {self.helm.status: True}  # in order, and each once
         for connection in (self.data, self.gear):
-            if connection.problem and connection.problem not in parts:
-                parts.append(connection.problem)
+            if connection.problem:
+                parts[connection.problem] = True
         status = "; ".join(parts)
         if status != self.status:
             self.log(f"{self.seconds:.1f} s: {status}")

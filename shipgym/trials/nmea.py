@@ -51,7 +51,6 @@ class NumberField:
     letters: Letters = field(default_factory=dict)
     only_if: Letters = field(default_factory=dict)
     optional: bool = False
-    steering_only: bool = False
 
 
 @dataclass(frozen=True)
@@ -205,8 +204,6 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
 
     numbers = {}
     for quantity, place in kind.fields.items():
-        if place.steering_only:
-            continue
         needed = {**valid, **place.only_if}
         for at, letters in place.letters.items():
             if fields[at]:
