@@ -2,7 +2,7 @@
 
 from math import inf, radians
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from typer import Argument, Option
 
@@ -76,6 +76,20 @@ SpeedUp = Annotated[
     float, Option(min=0.01, help="Times faster than real time; same at both ends.")
 ]
 
+Page = Annotated[
+    int | None,
+    Option(
+        metavar="PORT",
+        min=0,
+        max=65535,
+        help="Show the helm on a page of this computer; 0: any free port.",
+    ),
+]
+Log = Annotated[
+    Path | None,
+    Option(metavar="FILE", help="New file for all sentences, as new-ship reads."),
+]
+
 
 def steer_command(
     agent: Annotated[
@@ -93,6 +107,8 @@ def steer_command(
     limit: LimitValues = None,
     variation: Variation = None,
     rudder_feedback: RudderFeedback = True,
+    page: Page = None,
+    log: Log = None,
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
 ) -> None:
@@ -103,17 +119,18 @@ def steer_command(
 
     It begins when everything that the autopilot reads is available. If a sensor falls
     silent, two disagree, the rudder does not follow or the computer is late, it raises
-    the alarm (ALR), marks its order invalid and stops steering. Not certified: read
+    the alarm (ALR), marks its order invalid and stops steering. In a terminal it shows
+    the helm and takes keys; with --page a browser does. Not certified: read
     docs/deployment.md first. Exits with 1 after an alarm, with 130 after Ctrl-C and 143
     after SIGTERM; the last order is always marked invalid.
     """
     import asyncio
 
     from agents.agent_file import load_agent
-    from agents.cli.terminal import answer, say
+    from agents.cli.terminal import console, say, warn
+    from agents.deployment.panel import has_screen, helm_panel, steer_with
     from agents.deployment.route import Route
     from agents.deployment.sensors import Limits
-    from agents.deployment.steering import steer
     from shipgym.checks import check_keys
     from shipgym.files import named_values
 
@@ -125,29 +142,50 @@ def steer_command(
         radius = getattr(pilot, "gains", {}).get("path_radius", 0.0)
         track = Route.from_csv(route, radius)
 
+    panel = helm_panel(
+        title=f"shipgym steer {agent} on {nmea}",
+        say=say,
+        warn=warn,
+        console=console if has_screen(console) else None,
+        page=page,
+        log=log,
+        speed_up=speed_up,
+    )
     helm = asyncio.run(
-        steer(
+        steer_with(
+            panel,
             pilot,
             nmea,
             gear=gear,
-            heading=None if heading is None else radians(heading),
+            heading=_radians(heading),
             limits=Limits(**limits),
             duration=duration,
             speed_up=speed_up,
-            log=say,
             route=track,
             rate=None if rate is None else radians(rate) / 60.0,
-            variation=None if variation is None else radians(variation),
+            variation=_radians(variation),
             rudder_feedback=rudder_feedback,
         )
     )
+    _report_end(helm)
+
+
+def _radians(degrees: float | None) -> float | None:
+    return None if degrees is None else radians(degrees)
+
+
+def _report_end(helm: Any) -> None:
+    """Say how a helm was left; other exit codes after an alarm and a signal."""
+    from agents.cli.terminal import answer, say
+
     answer({"state": helm.state, "alarm": helm.alarm, **helm.counts})
     if helm.alarm:
         fail(f"handed over: {helm.alarm}", FAILED)
-    if helm.ended_by:
+    if helm.ended_by.startswith("SIG"):
         code = INTERRUPTED if helm.ended_by == "SIGINT" else TERMINATED
         fail(f"ended by {helm.ended_by}: the last order is marked invalid", code)
-    say("ended after --duration: the last order is marked invalid")
+    by = helm.ended_by or "--duration"
+    say(f"ended by {by}: the last order is marked invalid")
 
 
 def simulate_command(

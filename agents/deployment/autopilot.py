@@ -335,9 +335,14 @@ class Autopilot:
         self.dt = self.parameters.dt
         self.limit = self.parameters.limit
         self.largest = self.limit
+        self.switch_on()
+        self._given: Any = None
+
+    def switch_on(self) -> None:
+        """Forget what was before."""
         guidance: Any = Nothing()
-        if isinstance(agent, Guided):
-            guidance = _no_memory(agent)
+        if isinstance(self.agent, Guided):
+            guidance = _no_memory(self.agent)
         zero = np.zeros(1)
         self.state = BridgeState(
             integral=zero,
@@ -346,7 +351,6 @@ class Autopilot:
             memory=_no_memory(self.pilot),
             guidance=guidance,
         )
-        self._given: Any = None
         self.transfer: Transfer | None = None
 
     def engage(self, rudder: float) -> None:

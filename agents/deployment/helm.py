@@ -2,7 +2,7 @@
 
 from contextlib import suppress
 from dataclasses import replace
-from math import inf, radians, tau
+from math import inf, radians
 from typing import Any
 
 from agents.controllers.guided import TURNS, Guided
@@ -12,6 +12,12 @@ from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import render
 from agents.deployment.compass import Compass
 from agents.deployment.heading_belief import HeadingBelief
+from agents.deployment.helm_commands import (
+    MANUAL,
+    STANDBY,
+    STEERING,
+    HelmCommands,
+)
 from agents.deployment.nmea import readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.sensors import HelmSensors, Limits
@@ -21,15 +27,13 @@ from shipgym.tasks.guidance import wrapped
 from shipgym.trials.nmea import NMEA_QUANTITIES
 from shipgym.trials.units import UNITS
 
-STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
 
-
-class Helm:
+class Helm(HelmCommands):
     """An autopilot that waits for its sensors, steers, and hands over after a fault.
 
-    Its state is `standby`, `steering` or, for good, `manual`. Raises InputError for an
-    autopilot that reads what no sentence of NMEA 0183 has, and for one that cannot
-    follow the route or the rate of turn.
+    Its state is `standby`, `steering` or, after a fault, `manual`, which only the
+    helmsman ends. Raises InputError for an autopilot that reads what no sentence of
+    NMEA 0183 has, and for one that cannot follow the route or the rate of turn.
 
     Parameters
     ----------
@@ -61,6 +65,7 @@ class Helm:
         variation: float | None = None,
         rudder_feedback: bool = True,
     ) -> None:
+        super().__init__()
         if rate is not None and heading is not None and isinstance(agent, TurnRate):
             agent = _with_largest_rate(agent, rate)
         self.pilot = Autopilot(agent)
@@ -78,9 +83,9 @@ class Helm:
         self._check(agent)
 
         self.state = STANDBY
-        self.held = False  # in standby by the helmsman's wish
         self.alarm = ""
         self.warnings: list[str] = []
+        self.notices: list[str] = []  # warnings of others
         self.silent = ["sensors"]  # what it waits for
         self.order = 0.0  # rudder, rad
         self.commanded: float | None = None  # heading by HSC or HTC, rad
@@ -157,13 +162,14 @@ class Helm:
             self.alerts.hear(line, now)
 
     def watch(self, step: float, now: float, fault: str | None = None) -> None:
-        """Begin when all sensors are there; hand over for good at a fault.
+        """Begin when all sensors are there; hand over at a fault.
 
         `step`: time since the last call, s; `fault`: one of another part.
         """
         self.now = now
         if self.state != STEERING:
             self.sensors.renew(now)
+        self.follow_plotter(now)
         inputs = self.inputs(now)
         self.silent = []
         for name, value in inputs.items():
@@ -172,16 +178,18 @@ class Helm:
 
         may_begin = not (self.silent or self.held or fault)
         if self.state == STANDBY and may_begin:
-            self._begin(inputs["rudder"] or 0.0)
-        elif self.state == STEERING and not fault:
+            self.begin()
+        elif not fault:
             fault = self._fault(step, now)
-        self.warnings = []
         if fault and self.state == STEERING:
             self.state = MANUAL
             self.alarm = fault
-        elif self.state == STEERING:
-            self.warnings = self.warnings_of(inputs, now)
-        if self.state != STEERING:
+            self.question = None
+        self.note_obstacle(fault or "")
+        self.warnings = []
+        if self.state == STEERING:
+            self.warnings = [*self.warnings_of(inputs, now), *self.notices]
+        else:
             self.order = 0.0
         self._give_alerts(now)
 
@@ -192,40 +200,27 @@ class Helm:
             texts["alarm"] = self.alarm
         self.alerts.update(texts, now)
 
-    def _begin(self, rudder: float) -> None:
-        """Begin to steer from where the rudder is, rad."""
-        self.state = STEERING
+    def begin(self) -> None:
+        """Begin to steer from where the rudder is."""
+        super().begin()
+        self.pilot.engage(self.order)
         largest = self.pilot.largest
-        self.order = min(max(rudder, -largest), largest)
-        self.pilot.engage(rudder)
+        self.order = min(max(self.order, -largest), largest)
         self.belief = HeadingBelief(self.pilot.agent, self.limits)
 
     def _fault(self, step: float, now: float) -> str:
         if self.silent:
             silent = " and no ".join(self.silent)
             return f"no {silent} for {self.limits.silence_s:g} s"
-        fault = self.sensors.fault(self.order, step, now, self.read)
-        fault = fault or self.belief.doubt(self.sensors, now)
+        order = self.order
+        if self.state != STEERING:  # the rudder follows the helmsman
+            order = self.sensors.value("rudder", now) or 0.0
+        fault = self.sensors.fault(order, step, now, self.read)
+        if not fault and self.state == STEERING:
+            fault = self.belief.doubt(self.sensors, now)
         if not fault and self.route is not None and self.route.ended:
             fault = "the end of the route is reached"
         return fault
-
-    def stand_by(self) -> None:
-        """Give the rudder back to the helmsman until `engage`."""
-        self.held = True
-        if self.state == STEERING:
-            self.state = STANDBY
-
-    def engage(self) -> None:
-        """Steer as soon as everything that the autopilot reads is available."""
-        self.held = False
-
-    def alter_course(self, angle: float) -> bool:
-        """Turn the set-point, rad, positive to starboard; False if it is not ours."""
-        if self.heading is None:
-            return False
-        self.heading = (self.heading + angle) % tau
-        return True
 
     def steer(self, now: float) -> None:
         """One control interval."""
@@ -244,6 +239,8 @@ class Helm:
         inputs["rate_of_turn"] = self.rate if turns_at_rate else 0.0
         if self.route is None:
             inputs["set_point"] = self._set_point(now)
+            if "cross_track" in inputs and self.plotted.waiting is not None:
+                inputs["cross_track"] = 0.0  # that of the plotter is from the new leg
             return inputs
 
         latitude = inputs["latitude"]
@@ -260,22 +257,14 @@ class Helm:
             return 0.0
         if self.commanded is not None and not self.follows_path:
             return self.commanded
-        for quantity in self.sensors.newest:
-            if quantity in self._plotted:
-                return self.sensors.value(quantity, now)
-        return None
-
-    @property
-    def _plotted(self) -> tuple[str, ...]:
-        """Quantities of a plotter that may be the set-point."""
-        return ("leg",) if self.follows_path else ("to_steer", "waypoint_bearing")
+        return self.plotted.steered(self.plotters_course(now))
 
     @property
     def read(self) -> set[str]:
         """Quantities that it steers by."""
         read = set(self.needed)
         if self.heading is None and self.route is None:
-            read.update(self._plotted)
+            read.update(self.plotter_quantities)
         if (read & {"surge", "sway"}) - self.sensors.newest.keys():
             read |= {"course", "speed", "heading"}
         return read
@@ -299,6 +288,8 @@ class Helm:
         seconds_to_turn = self.seconds_to_turn(known, now)
         if seconds_to_turn <= self.limits.early_s:
             warnings.append("course change ahead")
+        if self.plotted.waiting is not None:
+            warnings.append("next leg waits to be confirmed")
         return warnings
 
     def seconds_to_turn(self, inputs: dict[str, float], now: float) -> float:
@@ -336,7 +327,7 @@ class Helm:
         hints = []
         for name in ("heading", "to_steer", "leg"):
             waits = name.replace("_", " ") in self.silent or (
-                name in self._plotted and "set point" in self.silent
+                name in self.plotter_quantities and "set point" in self.silent
             )
             if waits and self.compass.lacks(name, self.now, self.limits.silence_s):
                 hints = [

@@ -6,7 +6,8 @@ from math import ceil, inf
 from typing import Any
 
 from agents.deployment.connection import check_apart, connections
-from agents.deployment.helm import STEERING, Helm
+from agents.deployment.helm import Helm
+from agents.deployment.helm_commands import STEERING
 from agents.deployment.interruptions import interruptions
 from agents.deployment.route import Route
 from agents.deployment.sensors import Limits
@@ -94,7 +95,7 @@ async def steer(
         await bridge.open()
         with interruptions() as signals:
             await bridge.watch(duration)
-        helm.ended_by = signals[0] if signals else ""
+        helm.ended_by = signals[0] if signals else helm.ended_by
     finally:
         bridge.close()
     bridge.check_heard()
@@ -156,7 +157,7 @@ class Bridge:
         tick = helm.pilot.dt / ticks_per_step
         begin = self.now
         number = 0
-        while self.seconds < duration:
+        while self.seconds < duration and not helm.ended_by:
             due = begin + self.seconds
             if number:  # the first order goes out at once
                 pause = (due - self.now) / self.speed_up
