@@ -129,7 +129,11 @@ def read_text(path: Path, what: str, largest: int, latin: bool = False) -> str:
     degrees, unless they are control characters there, or those of UTF-16 and of memory
     that was never written.
     """
-    data = read_bytes(path, what, largest)
+    return decode_text(read_bytes(path, what, largest), path, what, latin)
+
+
+def decode_text(data: bytes, path: Path, what: str, latin: bool = False) -> str:
+    """Decode what was read of a file, as `read_text` does."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -17,7 +17,8 @@ def new_ship_command(
     logs: Annotated[
         list[Path],
         Argument(
-            metavar="LOG...", help="Logs: CSV, NMEA 0183, Excel, Parquet or MATLAB."
+            metavar="LOG...",
+            help="Logs: CSV, NMEA 0183 or 2000, Signal K, Excel, Parquet or MATLAB.",
         ),
     ],
     out: Annotated[Path, Option(metavar="FILE", help="The ship file to write.")] = Path(
@@ -31,6 +32,10 @@ def new_ship_command(
             help="Length between perpendiculars, m; or fill it in later.",
         ),
     ] = None,
+    strict: Annotated[
+        bool,
+        Option("--strict", help="Refuse sentences of NMEA 0183 without a checksum."),
+    ] = False,
 ) -> None:
     """Write a ship file for recorded trials.
 
@@ -46,13 +51,15 @@ def new_ship_command(
         raise InputError(
             f"{out}: exists already; choose another name with --out, or remove it"
         )
-    guessed = _guess_trials(logs)
+    checksums = "required" if strict else "optional"
+    guessed = _guess_trials(logs, checksums)
     conventions = _conventions(guessed)
     rudder_side = conventions.pop("rudder_positive", "starboard")
     first, *_ = guessed
     facts: dict[str, Any] = {
         "out": out,
         "length": length,
+        "checksums": checksums,
         "guesses": first.columns,
         "side": rudder_side,
         "conventions": conventions,
@@ -102,14 +109,14 @@ def _columns(guessed: TrialGuess) -> dict[str, Any]:
     return columns
 
 
-def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
+def _guess_trials(logs: list[Path], checksums: str) -> list[TrialGuess]:
     """Logs read with guessed columns; only the first has to be readable."""
     from agents.cli.terminal import warn
     from shipgym.errors import InputError
     from shipgym.trials.guesses import guess_trial
 
     try:
-        guessed = [guess_trial(logs[0])]
+        guessed = [guess_trial(logs[0], checksums=checksums)]
     except InputError as error:
         message = str(error)
         remedies = ("[columns]", "[conventions]", "[sensors]", "declare ")
@@ -122,7 +129,7 @@ def _guess_trials(logs: list[Path]) -> list[TrialGuess]:
 
     for log in logs[1:]:
         try:
-            guessed.append(guess_trial(log))
+            guessed.append(guess_trial(log, checksums=checksums))
         except InputError as error:
             warn(str(error))
     return guessed
@@ -155,6 +162,10 @@ def look_command(
     out: Annotated[Path, Option(metavar="FILE", help="The page to write.")] = Path(
         "look.html"
     ),
+    strict: Annotated[
+        bool,
+        Option("--strict", help="Refuse sentences of NMEA 0183 without a checksum."),
+    ] = False,
 ) -> None:
     """Draw the trials of a ship file, or a log.
 
@@ -171,7 +182,8 @@ def look_command(
     if log.suffix == ".toml":
         trials = ShipFile.load(log).trials()
     else:
-        trials = [guess_trial(log).trial]
+        checksums = "required" if strict else "optional"
+        trials = [guess_trial(log, checksums=checksums).trial]
 
     write_text(look_page(log.name, trials), out)
     fields = []

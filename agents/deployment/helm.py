@@ -11,6 +11,7 @@ from agents.deployment.alerts import Alerts
 from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import render
 from agents.deployment.compass import Compass
+from agents.deployment.heading_belief import HeadingBelief
 from agents.deployment.helm_commands import (
     MANUAL,
     STANDBY,
@@ -71,6 +72,7 @@ class Helm(HelmCommands):
         self.pilot.largest = min(self.pilot.largest, radians(limits.order_deg))
         self.limits = limits
         self.sensors = HelmSensors(limits)
+        self.belief = HeadingBelief(agent, limits)
         self.heading = heading
         self.route = route
         self.rate = rate
@@ -151,6 +153,9 @@ class Helm(HelmCommands):
         self.counts["sentences"] += 1
         for reading in self.compass.true(heard, now):
             self.sensors.take(reading, now)
+            is_steered_by = self.sensors.value(reading.quantity, now) == reading.value
+            if is_steered_by:
+                self.belief.take(reading, now)
             if reading.quantity == "commanded":
                 self.commanded = reading.value
         with suppress(ValueError, IndexError):
@@ -199,10 +204,15 @@ class Helm(HelmCommands):
         if self.silent:
             silent = " and no ".join(self.silent)
             return f"no {silent} for {self.limits.silence_s:g} s"
+        is_steering = self.state == STEERING
         order = self.order
-        if self.state != STEERING:  # the rudder follows the helmsman
+        if not is_steering:  # the rudder follows the helmsman
             order = self.sensors.value("rudder", now) or 0.0
         fault = self.sensors.fault(order, step, now, self.read)
+        doubt = self.belief.doubt(self.sensors, now)
+        if doubt and not is_steering:  # look again
+            self.belief = HeadingBelief(self.pilot.agent, self.limits)
+        fault = fault or doubt
         if not fault and self.route is not None and self.route.ended:
             fault = "the end of the route is reached"
         return fault

@@ -29,6 +29,12 @@ class Limits:
         How long a disagreement may last.
     late_s : float
         How late a step may be; beyond, the computer cannot keep up.
+    heading_noise_deg : float
+        Standard deviation of the compass against the rate gyro.
+    wave_yaw_deg : float
+        Standard deviation of the heading in the roughest sea.
+    course_deg : float
+        Change of the angle between heading and course over ground.
     order_deg : float
         Largest rudder order, if it is less than the ship's limit.
     off_heading_deg, off_track_m : float
@@ -43,6 +49,9 @@ class Limits:
     rudder_rate_deg_s: float = 2.3
     persistence_s: float = 2.0
     late_s: float = 1.0
+    heading_noise_deg: float = 0.5
+    wave_yaw_deg: float = 1.0
+    course_deg: float = 10.0
     order_deg: float = 90.0
     off_heading_deg: float = 10.0
     off_track_m: float = 200.0
@@ -70,6 +79,8 @@ class HelmSensors:
         When a fault was first seen, s.
     expected : float or None
         Where the rudder should be by now, if the gear is as slow as allowed, rad.
+    reachable : (float, float) or None
+        Between which angles it is, if the gear is no slower than that, rad.
     turning : float
         Largest rate of turn of the last seconds, rad/s.
     """
@@ -78,6 +89,7 @@ class HelmSensors:
     newest: dict[str, dict[NmeaSource, Instrument]] = field(default_factory=dict)
     since: dict[str, float] = field(default_factory=dict)
     expected: float | None = None
+    reachable: tuple[float, float] | None = None
     turning: float = 0.0
     most_sources: int = 16
 
@@ -251,18 +263,21 @@ class HelmSensors:
 
     def _expect_rudder(self, order: float, step: float, now: float) -> None:
         """Move the expected rudder to its order as fast as a slow gear."""
-        if self.expected is None:
+        if self.expected is None or self.reachable is None:
             self.expected = self.value("rudder", now) or 0.0
+            self.reachable = self.expected, self.expected
         reach = radians(self.limits.rudder_rate_deg_s) * step
         to_go = order - self.expected
         self.expected += min(max(to_go, -reach), reach)
+        low, high = self.reachable
+        self.reachable = min(low + reach, order), max(high - reach, order)
 
     def _rudder_fault(self, order: float, now: float) -> str:
-        """Compare the rudder with its order, and where a slow gear would have it."""
+        """Compare the rudder with where its orders brought it, slowly or fast."""
+        if self.reachable is None:
+            return ""
         rudder = self.value("rudder", now) or 0.0
-        expected = self.expected or 0.0
-        low = min(expected, order)
-        high = max(expected, order)
+        low, high = self.reachable
         off = max(low - rudder, rudder - high)
         tolerance = radians(self.limits.rudder_deg)
         if self.lasts("order", off > tolerance, now):

@@ -89,7 +89,23 @@ def without_current(
             found[name] = through_water(found[name], *current.velocity)
         rows[name] = _row(current, taken_out, one_heading)
     remarks += _remarks(doubtful)
+    remarks += _remark_magnetic(trials)
     return rows
+
+
+def _remark_magnetic(trials: Iterable[Trial]) -> list[str]:
+    """A remark on trials over ground whose heading counts from magnetic north."""
+    names = []
+    for trial in trials:
+        if trial.over_ground and trial.magnetic:
+            names.append(PurePath(trial.name).name)
+    if not names:
+        return []
+    return [
+        f"{', '.join(names)}: no current is looked for, as the heading is magnetic and"
+        " the variation would look like drift; write variation_deg (east positive) in"
+        " [sensors]"
+    ]
 
 
 def _remarks(doubtful: dict[str, list[str]]) -> list[str]:
@@ -204,7 +220,8 @@ def currents_of(
 
 def _shows_current(trial: Trial) -> bool:
     needed = {"psi", "u", "v", "r", "delta"}
-    return trial.over_ground and trial.channels.keys() >= needed
+    is_true = not trial.magnetic
+    return trial.over_ground and is_true and trial.channels.keys() >= needed
 
 
 def _estimated_currents(

@@ -13,7 +13,14 @@ from shipgym.trials.units import DEGREE
 if TYPE_CHECKING:
     from shipgym.ships.particulars import Particulars
 
-_KEYS = ("gnss_antenna", "heading_offset_deg", "rudder_offset_deg", "clock_offsets")
+_KEYS = (
+    "gnss_antenna",
+    "heading_offset_deg",
+    "variation_deg",
+    "rudder_offset_deg",
+    "clock_offsets",
+    "checksums",
+)
 
 
 @dataclass(frozen=True)
@@ -25,10 +32,13 @@ class Installation:
     forward, starboard : float
         The antenna from midship, m.
     heading_offset, rudder_offset : float or "estimate"
-        What they show where the truth is zero, rad.
+        What they show where the truth is zero, rad; a heading less the magnetic
+        variation that is given for it.
     clock_offsets : {"correct", "keep"}, optional
         By default late channels are corrected where they have clocks of their own, else
         refused.
+    checksums : {"required", "optional"}
+        Whether sentences of NMEA 0183 without a checksum are refused.
     """
 
     forward: float = 0.0
@@ -36,6 +46,7 @@ class Installation:
     heading_offset: float | str = 0.0
     rudder_offset: float | str = 0.0
     clock_offsets: str | None = None
+    checksums: str = "optional"
 
     @classmethod
     def from_mapping(
@@ -49,15 +60,18 @@ class Installation:
         clocks = table.get("clock_offsets")
         if clocks is not None:
             check_choice(clocks, ("correct", "keep"), f"{where} clock_offsets")
+        checksums = table.get("checksums", "optional")
+        check_choice(checksums, ("required", "optional"), f"{where} checksums")
         place = f"{where} gnss_antenna"
         antenna = table.get("gnss_antenna", {})
         check_table(antenna, place, ("forward", "starboard"))
         return cls(
             forward=_distance(antenna, "forward", place, ship),
             starboard=_distance(antenna, "starboard", place, ship),
-            heading_offset=_offset(table, "heading_offset_deg", where),
+            heading_offset=_heading_offset(table, where),
             rudder_offset=_offset(table, "rudder_offset_deg", where),
             clock_offsets=clocks,
+            checksums=checksums,
         )
 
     @property
@@ -86,6 +100,21 @@ def _distance(
             f" perpendicular take off {ship.length / 2:g}"
         )
     return distance
+
+
+def _heading_offset(table: Mapping[str, Any], where: str) -> float | str:
+    """How much too high the heading is, rad: by an east variation it is too low."""
+    offset = _offset(table, "heading_offset_deg", where)
+    if "variation_deg" not in table:
+        return offset
+    variation = _offset(table, "variation_deg", where)
+    if isinstance(offset, str) or isinstance(variation, str):
+        raise InputError(
+            f"{where} variation_deg: expected degrees, east positive, and"
+            ' heading_offset_deg in degrees too, got "estimate"; what is estimated'
+            " includes the variation: leave variation_deg out"
+        )
+    return offset - variation
 
 
 def _offset(table: Mapping[str, Any], key: str, where: str) -> float | str:

@@ -131,7 +131,11 @@ def to_midship(log: Log, installation: Installation) -> None:
     """
     is_elsewhere = not installation.is_at_midship
     needs_heading = is_elsewhere or log.has("ground_north")
-    if needs_heading and not log.has("psi"):
+    is_track_alone = log.has("x") and not log.has("psi") and not log.has("delta")
+    if is_track_alone and not is_elsewhere:
+        log.channels.pop("ground_north", None)
+        log.channels.pop("ground_east", None)
+    elif needs_heading and not log.has("psi"):
         raise InputError(
             f"{log.where}: expected a column psi, the heading, with positions or"
             " velocities of GNSS, got none"
@@ -146,7 +150,7 @@ def to_midship(log: Log, installation: Installation) -> None:
     if velocity is None:
         return
     u, v = velocity
-    if water is not None:
+    if water is not None and not log.magnetic:
         # leeway is what is left of the sway without the current
         v = _sway_through_water(log, water, u, v)
     if not log.has("u"):

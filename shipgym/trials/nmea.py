@@ -8,7 +8,7 @@ checksum: the exclusive or of all characters between.
 import re
 from collections import ChainMap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from math import copysign, isfinite
 from operator import xor
@@ -20,15 +20,13 @@ from shipgym.trials.units import UNITS
 _SENTENCE = re.compile(
     r"\s*\$?"
     r"(?P<text>(?P<talker>P|\w{1,2})(?P<kind>\w*),(?P<fields>[^*]*))"
-    r"\*(?P<checksum>[0-9A-Fa-f]{2})\s*"
+    r"(\*(?P<checksum>[0-9A-Fa-f]{2}))?\s*"
 )
 _QUANTITIES_IN_SI = ("length", "angle", "angular rate", "speed", "shaft speed")
 _SPEED_UNITS = {"N": "knots", "K": "km/h", "M": "m/s"}
 
 #: Sign of a number by the letter of its side; L and R are the sides to steer to.
 _SIGNS = {"N": 1.0, "S": -1.0, "E": 1.0, "W": -1.0, "L": 1.0, "R": -1.0}
-_ABSENT = [""] * 20  # fields beyond the end of a sentence
-
 Letters = Mapping[int, frozenset[str]]  # letters allowed in a field, by its place
 
 
@@ -50,6 +48,7 @@ class NumberField:
     side: int | None = None
     letters: Letters = field(default_factory=dict)
     only_if: Letters = field(default_factory=dict)
+    valid: Letters = field(default_factory=dict)
     optional: bool = False
 
 
@@ -58,11 +57,13 @@ class SentenceKind:
     """Contents of a kind of sentence; `nmea.toml` explains the names."""
 
     fields: Mapping[str, NumberField]  # by quantity
+    log_fields: Mapping[str, NumberField]  # of logs: the same, and more
     valid: Letters = field(default_factory=dict)
     mode: Letters = field(default_factory=dict)
     degraded: Letters = field(default_factory=dict)
     time: int | None = None
     date: int | None = None
+    day: int | None = None
     log_only: bool = False
 
 
@@ -89,13 +90,26 @@ def _with_letters(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _sentence_kind(entry: Mapping[str, Any]) -> SentenceKind:
+    kind = _with_letters(entry)
+    kind["fields"] = _number_fields(entry.get("fields", {}))
+    log_fields = kind["fields"] | _number_fields(entry.get("log_fields", {}))
+    kind["log_fields"] = {}
+    degraded = kind.get("degraded", {})
+    for quantity, place in log_fields.items():
+        valid = place.valid or kind.get("valid", {})
+        valid = dict(valid)
+        for at, letters in degraded.items():
+            valid[at] |= letters
+        kind["log_fields"][quantity] = replace(place, valid=valid)
+    return SentenceKind(**kind)
+
+
+def _number_fields(entries: Mapping[str, Any]) -> dict[str, NumberField]:
     numbers = {}
-    for quantity, place in entry["fields"].items():
+    for quantity, place in entries.items():
         place = _with_letters(place)
         numbers[quantity] = NumberField(**place)
-    kind = _with_letters(entry)
-    kind["fields"] = numbers
-    return SentenceKind(**kind)
+    return numbers
 
 
 def _quantity(entry: Mapping[str, Any]) -> NmeaQuantity:
@@ -127,18 +141,20 @@ def checksum(text: str) -> str:
     return f"{reduce(xor, map(ord, text), 0):02X}"
 
 
-def parse_sentence(line: str) -> Sentence:
+def parse_sentence(line: str, *, needs_checksum: bool = True) -> Sentence:
     """Cut a line into talker, kind and fields.
 
     A proprietary sentence has the talker P. Raises ValueError where the line is no
-    sentence, or its checksum is wrong or missing.
+    sentence, or its checksum is wrong or, if it is needed, missing.
     """
     match = _SENTENCE.fullmatch(line)
     if match is None:
         raise ValueError(f"expected a sentence with a checksum, got {line!r}")
-    expected = checksum(match["text"])
     found = match["checksum"]
-    if expected != found.upper():
+    if found is None and needs_checksum:
+        raise ValueError(f"expected a sentence with a checksum, got {line!r}")
+    expected = checksum(match["text"])
+    if found is not None and expected != found.upper():
         raise ValueError(f"expected the checksum {expected}, got {found}")
 
     fields = match["fields"]
@@ -164,7 +180,7 @@ def steering_numbers(sentence: Sentence) -> dict[str, float]:
         needed = {**kind.valid, **place.letters, **place.only_if}
         fields = sentence.fields
         if place.optional:
-            fields = [*fields, *_ABSENT]
+            fields = _padded(sentence)
             needed |= _sides(place)
         value = _number(place, fields, needed)
         if value is None:
@@ -193,19 +209,16 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
     """Numbers of a sentence in a log, in SI units and radians, by quantity.
 
     More lenient than :func:`steering_numbers`: estimated and simulated values count,
-    letters that the standard puts next to a number may be missing, and no number is too
-    large. Raises ValueError where one is broken.
+    letters that the standard puts next to a number may be missing, a status may be
+    empty, and no number is too large. Raises ValueError where one is broken.
     """
     kind = NMEA_SENTENCES[sentence.kind]
-    fields = [*sentence.fields, *_ABSENT]  # those at the end may be missing
-    valid = dict(kind.valid)
-    for at, letters in kind.degraded.items():
-        valid[at] |= letters
-
+    fields = _padded(sentence)
     numbers = {}
-    for quantity, place in kind.fields.items():
-        needed = {**valid, **place.only_if}
-        for at, letters in place.letters.items():
+    for quantity, place in kind.log_fields.items():
+        needed = dict(place.only_if)
+        optional = {**place.valid, **place.letters}
+        for at, letters in optional.items():
             if fields[at]:
                 needed[at] = letters
         needed |= _sides(place)
@@ -216,6 +229,19 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
             raise ValueError(f"expected a finite number, got {value}")
         numbers[quantity] = value
     return numbers
+
+
+def lacks_status(sentence: Sentence, quantity: str) -> bool:
+    """Return whether the status of a number in a log is empty or not there."""
+    place = NMEA_SENTENCES[sentence.kind].log_fields[quantity]
+    fields = _padded(sentence)
+    return any(not fields[at] for at in place.valid)
+
+
+def _padded(sentence: Sentence) -> list[str]:
+    """Fields of a sentence; those at the end may be missing."""
+    absent = [""] * 20
+    return [*sentence.fields, *absent]
 
 
 def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float | None:

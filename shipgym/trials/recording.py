@@ -153,7 +153,8 @@ def _signals(
     table = {"t": t, **channels}
     columns = np.array(list(table.values()))
     is_whole = bool(np.isfinite(columns).all())
-    if not is_whole and have_own_clocks(t, channels):
+    own_clocks = locator.table.own_clocks or have_own_clocks(t, channels)
+    if not is_whole and own_clocks:
         check_ranges(table, locator)
         for channel, values in channels.items():
             signals[channel] = _own_signal(channel, t, values, locator)

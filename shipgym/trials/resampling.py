@@ -46,6 +46,8 @@ class Log:
         Whether surge and sway are velocities over ground; None: where they are derived.
     start : float or None
         Clock at t = 0 as the file has it, s since 1970 or of the day.
+    magnetic : bool
+        Whether the heading counts from magnetic north.
     """
 
     t: Floats
@@ -56,6 +58,7 @@ class Log:
     repaired: dict[str, int] = field(default_factory=dict)
     over_ground: bool | None = None
     start: float | None = None
+    magnetic: bool = False
 
     def has(self, *channels: str) -> bool:
         """Return whether the log has all of these channels."""
@@ -121,7 +124,7 @@ def on_one_clock(signals: Mapping[str, Signal], where: str) -> Log:
 
 def _resampled(signals: Mapping[str, Signal], where: str) -> Log:
     clocks = _motion_clocks(signals)
-    t = max(clocks.values(), key=usual_step)
+    t = max(clocks.values(), key=_slowness)
     # a longer one is a hole
     longest_step = 6.0 * usual_step(t)
 
@@ -157,6 +160,11 @@ def _resampled(signals: Mapping[str, Signal], where: str) -> Log:
     )
 
 
+def _slowness(t: Floats) -> tuple[float, int]:
+    """Usual step to a millisecond, s; of equal ones the clock with fewer holes."""
+    return round(usual_step(t), 3), t.size
+
+
 def _motion_clocks(signals: Mapping[str, Signal]) -> dict[str, Floats]:
     """Clocks of the motion's channels, between whose samples nothing is invented.
 
@@ -181,7 +189,9 @@ def _inside(t: Floats, clock: Floats, is_hole: Flags) -> Flags:
     is_before = t < clock[after]
     in_hole = is_hole[before] & is_after & is_before
 
-    has_begun = t >= clock[0]
-    has_ended = t > clock[-1]
+    # sentences of one moment are logged one after the other
+    tolerance = 0.1 * usual_step(t) if t.size > 1 else 0.0
+    has_begun = t >= clock[0] - tolerance
+    has_ended = t > clock[-1] + tolerance
     inside: Flags = has_begun & ~has_ended & ~in_hole
     return inside

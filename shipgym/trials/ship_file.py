@@ -124,7 +124,8 @@ class ShipFile:
             "length": self.particulars.length,
         }
         with placed(entry.where):
-            tables = [read_log(path) for path in entry.paths]
+            checksums = entry.conventions.installation.checksums
+            tables = [read_log(path, checksums=checksums) for path in entry.paths]
             log = import_tables(tables, entry.columns, entry.conventions)
             if entry.cut is None:
                 trials = [trial_of(log, entry.file, **facts)]

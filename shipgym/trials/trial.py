@@ -95,6 +95,8 @@ class Trial:
         positions.
     notes : sequence of str, optional
         Remarks of the reader: what it corrected, left out or found amiss.
+    magnetic : bool, optional
+        Whether the heading counts from magnetic north.
     """
 
     t: Floats
@@ -107,6 +109,7 @@ class Trial:
     repaired: Mapping[str, int]
     over_ground: bool
     notes: tuple[str, ...]
+    magnetic: bool
 
     def __init__(
         self,
@@ -122,6 +125,7 @@ class Trial:
         raw: Trial | None = None,
         over_ground: bool | None = None,
         notes: Sequence[str] = (),
+        magnetic: bool = False,
     ) -> None:
         check_text(name, "trial: name")
         where = f"trial '{name}'"
@@ -152,6 +156,7 @@ class Trial:
             repaired=MappingProxyType(dict(repaired or {})),
             over_ground=bool(over_ground),
             notes=tuple(notes),
+            magnetic=magnetic,
             _raw=raw,
         )
 
@@ -231,6 +236,7 @@ class Trial:
             "raw": vars(self)["_raw"],
             "over_ground": self.over_ground,
             "notes": self.notes,
+            "magnetic": self.magnetic,
         }
 
     def with_(self, **changes: Any) -> Trial:
@@ -308,8 +314,8 @@ class Trial:
         Parameters
         ----------
         path : str or Path
-            CSV with one header line, NMEA 0183, Excel (.xlsx), Parquet or MATLAB
-            (.mat).
+            CSV with one header line, NMEA 0183 or 2000, Signal K, Excel (.xlsx),
+            Parquet or MATLAB (.mat).
         columns : mapping of str to str or mapping, optional
             For each channel (``t`` included) its column, or ``{"column": name, "unit":
             unit}``. By default every column that is named like a channel, in SI units.
@@ -330,12 +336,12 @@ class Trial:
         sensors : mapping, optional
             The table ``[sensors]`` of a ship file.
         """
-        table = read_log(path)
-        where = f"{table.path}:"
+        where = f"{path.path if isinstance(path, LogTable) else path}:"
+        installation = Installation.from_mapping(sensors or {}, f"{where} sensors")
+        table = read_log(path, checksums=installation.checksums)
         chosen = None
         if columns is not None:
             chosen = parse_columns(columns, f"{where} columns")
-        installation = Installation.from_mapping(sensors or {}, f"{where} sensors")
         conventions = Conventions(
             rudder_positive=rudder_positive,
             velocity_frame=velocity_frame,
@@ -393,6 +399,7 @@ def trial_of(log: Log, name: str, samples: slice = slice(None), **facts: Any) ->
         repaired=log.repaired,
         over_ground=log.over_ground,
         notes=log.notes,
+        magnetic=log.magnetic,
         **facts,
     )
 

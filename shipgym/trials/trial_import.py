@@ -34,6 +34,11 @@ _NO_RUDDER = (
     " can only be looked at; log the rudder too (in NMEA 0183 the sentence RSA)"
 )
 
+_MAGNETIC = (
+    "the heading stays magnetic: the log has no variation; write variation_deg (east"
+    " positive) in [sensors], or drift and current cannot be told from it"
+)
+
 
 def import_tables(
     tables: Sequence[LogTable],
@@ -69,6 +74,10 @@ def import_tables(
         motion_remarks += clock_remarks
     _check_agreement(log, first.locator, conventions)
 
+    is_magnetic = any(table.magnetic for table in tables)
+    log.magnetic = is_magnetic and conventions.installation.heading_offset == 0.0
+    if log.magnetic:
+        remarks.append(_MAGNETIC)
     log.notes = remarks + log.notes + motion_remarks
     to_project_conventions(log, conventions)
     _complete(log, recordings)

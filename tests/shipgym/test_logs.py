@@ -250,7 +250,9 @@ def test_an_nmea_log_becomes_a_trial(tmp_path):
     assert trial["u"] == pytest.approx(13.6 * KNOT)
     assert not trial.over_ground
     assert error(trial, "v") < 0.1
-    assert "psi is from HETHS; HCHDG left out" in trial.notes
+    assert (
+        "psi is from HETHS (1200 values); HCHDG (1200 values) left out" in trial.notes
+    )
     assert any(
         "set and drift" in note and "toward 3" in note for note in trial.notes
     ), trial.notes

@@ -35,13 +35,14 @@ class TrialGuess:
     unused: list[str]  # columns of which no channel was made
 
 
-def guess_trial(path: str | Path) -> TrialGuess:
+def guess_trial(path: str | Path, *, checksums: str = "optional") -> TrialGuess:
     """Read a log with guesses; where a check proposes another setting, try that.
 
-    A unit given in a column's name is kept. Raises InputError, as the readers do, for
+    A unit given in a column's name is kept. With `checksums` "required" sentences of
+    NMEA 0183 without one count as damaged. Raises InputError, as the readers do, for
     a log that cannot be read so.
     """
-    table = read_log(path)
+    table = read_log(path, checksums=checksums)
     columns: dict[str, ColumnGuess] = {}
     if not table.units:  # the reader knows none
         columns = {guess.channel: guess for guess in guess_columns(table)}

@@ -6,8 +6,9 @@ from collections import Counter
 from pathlib import Path
 
 from shipgym.errors import InputError
-from shipgym.files import LARGEST_CSV, read_text
+from shipgym.files import decode_text
 from shipgym.trials.readers.log_table import LogTable, is_number
+from shipgym.trials.readers.text_files import read_log_bytes
 
 _LONGEST_LINE = 100_000  # characters
 
@@ -66,7 +67,7 @@ def read_csv(path: str | Path) -> LogTable:
 
 def read_lines(path: Path, what: str) -> list[str]:
     """Lines of a text file, at most a million; `what` names the file's kind."""
-    text = read_text(path, what, LARGEST_CSV, latin=True)
+    text = decode_text(read_log_bytes(path, what), path, what, latin=True)
     text = text.replace("\r\n", "\n")
     text = text.replace("\r", "\n")
     lines = text.split("\n")

@@ -38,6 +38,10 @@ class LogTable:
         Units of columns, where the reader knows them.
     notes : tuple of str
         What the reader left out or assumed.
+    own_clocks : bool
+        Whether each column has a clock of its own, so that a row may lack values.
+    magnetic : bool
+        Whether the heading counts from magnetic north.
     """
 
     path: Path
@@ -47,6 +51,8 @@ class LogTable:
     decimal_comma: bool = False
     units: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    own_clocks: bool = False
+    magnetic: bool = False
 
     @property
     def header(self) -> tuple[str, ...]:

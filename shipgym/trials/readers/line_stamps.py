@@ -1,0 +1,81 @@
+"""Times that a recorder puts before each line: TAG blocks, dates, clocks, seconds."""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from shipgym.arrays import Floats
+from shipgym.trials.clock_texts import read_clock
+
+_TAG = re.compile(r"[\\,]c:(\d{9,14}(?:\.\d+)?)")
+_CLOCK = re.compile(
+    r"(?<!\d)(?P<date>\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4})?[-T ,;_Z]*"
+    r"(?P<time>\d\d?:\d\d:\d\d(?:[.,]\d+)?)"
+    r" ?(?P<zone>Z|UTC|[+-]\d\d:?\d\d)?"
+)
+_COMPACT = re.compile(
+    r"(?<!\d)(\d{4})(\d\d)(\d\d)[-T _]?([0-2]\d)([0-5]\d)([0-5]\d(?:\.\d+)?)(?!\d)"
+)
+#: Seconds or fractions of them since 1970, or seconds with decimals since some start.
+_NUMBER = re.compile(r"(?<![\w.:/-])A?(\d{9,19}(?:\.\d+)?|\d+\.\d+)(?![\w.:/])")
+
+
+def stamp_text(before: str) -> str:
+    r"""The time in what a recorder wrote before a message; empty where there is none.
+
+    Examples are ``2021-05-03 09:59:50.123``, ``[12:00:01]``, ``1620035990123;A;``,
+    ``(1620035990.123) can0`` and ``\s:gyro,c:1620035990*3F\``.
+    """
+    tag = _TAG.search(before)
+    if tag is not None:
+        return tag[1]
+    clock = _CLOCK.search(before)
+    if clock is not None:
+        return clock_text_of(clock)
+    compact = _COMPACT.search(before)
+    if compact is not None:  # such as 20210503T095950
+        year, month, day, hour, minute, second = compact.groups()
+        return f"{year}-{month}-{day} {hour}:{minute}:{second}"
+    number = _NUMBER.search(before)
+    return "" if number is None else number[1]
+
+
+def clock_text_of(match: re.Match[str]) -> str:
+    """Date, time and zone, one blank apart, as `read_clock` reads them."""
+    date = match["date"] or ""
+    zone = match["zone"] or ""
+    if date[:4].isdigit():
+        date = re.sub("[/.]", "-", date)
+    time = match["time"].replace(",", ".")
+    zone = "" if zone in ("Z", "UTC") or not date else zone
+    text = f"{date} {time}{zone}"
+    return text.strip()
+
+
+def read_stamps(texts: Sequence[str]) -> Floats:
+    """Seconds since 1970, of the day or since some start, nan for another form.
+
+    Numbers that are too large for seconds are milli-, micro- or nanoseconds.
+    """
+    is_clock = np.array([":" in text for text in texts], dtype=bool)
+    seconds = np.full(len(texts), np.nan)
+    mostly_clocks = is_clock.mean() > 0.5
+    rows = np.flatnonzero(is_clock == mostly_clocks)
+    chosen = [texts[row] for row in rows.tolist()]
+    if not mostly_clocks:
+        seconds[rows] = _seconds(np.array(chosen, dtype=np.float64))
+        return seconds
+    try:
+        seconds[rows] = read_clock(chosen).seconds
+    except ValueError:  # such as 25:00:00
+        return seconds
+    return seconds
+
+
+def _seconds(numbers: Floats) -> Floats:
+    size = float(np.median(numbers))
+    for smallest, factor in ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3)):
+        if size >= smallest:
+            return numbers * factor
+    return numbers

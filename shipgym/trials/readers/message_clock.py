@@ -1,0 +1,250 @@
+"""The clock of a log of messages: what satellites say, and stamps before the lines."""
+
+from collections import Counter, defaultdict
+from datetime import UTC, datetime
+from operator import itemgetter
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from shipgym.arrays import Floats
+from shipgym.errors import InputError
+from shipgym.trials.clock_texts import DAY, clock_text
+from shipgym.trials.readers.line_stamps import read_stamps
+from shipgym.trials.readers.messages import BySource, Heard, Value
+
+_ROLLOVER = 1024 * 7 * DAY  # the week of GPS has ten bits
+
+
+class Clock(NamedTuple):
+    """Times, s, that only increase, and the lines from which on they hold."""
+
+    t: Floats
+    lines: Floats
+    source: str  # of the times, for a note
+    later: float = 0.0  # s to add to the times that messages give
+    in_bursts: bool = False  # messages of one moment follow each other
+    is_first: bool = False  # no time may have been lost before the first one
+
+
+def log_clock(path: Path, heard: Heard, notes: list[str]) -> Clock | None:
+    """The clock of a log; None where nothing in it tells the time.
+
+    Stamps of lines are preferred, as they are there for every message; by the times of
+    satellites they are put right. Raises InputError for a clock that was set back.
+    """
+    clock = _agreed_clock(path, heard, notes)
+    if clock is None:
+        return None
+    heard.order.sort(key=itemgetter(0))
+    return clock._replace(
+        in_bursts=_come_in_bursts(clock, heard.order),
+        is_first=min(heard.damaged, default=np.inf) > clock.lines[0],
+    )
+
+
+def _agreed_clock(path: Path, heard: Heard, notes: list[str]) -> Clock | None:
+    own = _own_clock(path, heard.times)
+    stamps = _stamp_clock(heard)
+    if stamps is None:
+        return _noted(own, notes)
+    if own is None:
+        return stamps
+
+    values = heard.times[own.source]
+    ahead = _ahead(stamps, values)
+    if np.ptp(np.quantile(ahead, [0.1, 0.9])) > 2.0:
+        notes.append(
+            f"times before the lines do not run with those of {own.source}: left out"
+        )
+        return _noted(own, notes)
+    return _agreed(stamps, float(np.median(ahead)), own, notes)
+
+
+def _own_clock(path: Path, times: BySource) -> Clock | None:
+    """Times of the source that gives a date, of those the busiest one."""
+    if not times:
+        return None
+
+    def rank(source: str) -> tuple[bool, int]:
+        values = times[source]
+        moments = {value.time for value in values}
+        return _is_dated(values[0].time), len(moments)
+
+    best = max(sorted(times), key=rank)
+    lines, t, _ = np.array(times[best]).T
+    if not _is_dated(t[0]):
+        t = np.unwrap(t, period=DAY)
+    goes_back = np.flatnonzero(np.diff(t) < -5.0)
+    if goes_back.size:
+        k = goes_back[0]
+        before, after = clock_text(t[k]), clock_text(t[k + 1])
+        line = int(lines[k + 1])
+        raise InputError(
+            f"{path}: line {line}: expected time to go on, got {after} after {before};"
+            " the clock was set back, or two logs are joined: cut the log there"
+        )
+    return _increasing(t, lines, best)
+
+
+def _stamp_clock(heard: Heard) -> Clock | None:
+    """Times before the lines; None where few lines have one or they go back."""
+    if len(heard.stamps) < 0.5 * heard.count:
+        return None
+    stamps = sorted(heard.stamps.items())
+    texts = [text for _, text in stamps]
+    t = read_stamps(texts)
+    is_known = np.isfinite(t)
+    lines = np.array([line for line, _ in stamps], dtype=np.float64)
+
+    t = t[is_known]
+    moments = np.unique(t).size
+    goes_back = np.diff(t) < 0.0
+    if moments < 3 or goes_back.mean() > 0.01:
+        return None
+    return _increasing(t, lines[is_known], "stamps of the lines")
+
+
+def _increasing(t: Floats, lines: Floats, source: str) -> Clock:
+    never_back = np.maximum.accumulate(t)
+    t, first = np.unique(never_back, return_index=True)
+    return Clock(t, lines[first], source)
+
+
+def _is_dated(time: float) -> bool:
+    return bool(time > 2.0 * DAY)
+
+
+def _ahead(stamps: Clock, values: list[Value]) -> Floats:
+    """Seconds that stamps are ahead of times that messages give, day or no day."""
+    lines, t, _ = np.array(values).T
+    after = np.searchsorted(stamps.lines, lines, side="right")
+    at = np.maximum(after - 1, 0)
+    ahead: Floats = stamps.t[at] - t
+    if _is_dated(t[0]):  # stamps of the day take the day of the messages
+        return ahead
+    of_day: Floats = np.unwrap(ahead, period=DAY)
+    days = np.round(np.median(of_day) / DAY)
+    return of_day - DAY * days
+
+
+def _agreed(stamps: Clock, ahead: float, own: Clock, notes: list[str]) -> Clock:
+    """Stamps put right by the clock of satellites, unless its weeks are too few."""
+    rollovers = round(ahead / _ROLLOVER)
+    rest = ahead - rollovers * _ROLLOVER
+    if _is_dated(own.t[0]) and rollovers >= 1 and abs(rest) < DAY:
+        notes.append(
+            f"the date of {own.source} is {1024 * rollovers} weeks back"
+            f" ({_day(own.t[0])}), a rollover of the weeks of GPS: that before the"
+            f" lines is taken ({_day(stamps.t[0])})"
+        )
+        return stamps._replace(later=ahead)
+
+    if abs(ahead) <= 1.0:  # a message takes part of a second
+        return stamps
+    if _is_dated(stamps.t[0]):
+        size = f"{ahead / DAY:.3g} days" if abs(ahead) > DAY else f"{ahead:.6g} s"
+        notes.append(
+            f"the times before the lines are {size} ahead of those of {own.source},"
+            " which are taken"
+        )
+    return stamps._replace(t=stamps.t - ahead)
+
+
+def _noted(own: Clock | None, notes: list[str]) -> Clock | None:
+    """The clock of satellites; a note where its date may be weeks back."""
+    if own is None or not _is_dated(own.t[0]):
+        return own
+    begin = float(own.t[0])
+    since = datetime(1980, 1, 1, tzinfo=UTC).timestamp()
+    latest = datetime.now(UTC).timestamp() - _ROLLOVER
+    if since <= begin <= latest:
+        later = begin + _ROLLOVER
+        notes.append(
+            f"the date of {own.source} is {_day(begin)}: if it should be {_day(later)},"
+            " the receiver is 1024 weeks back, a rollover of the weeks of GPS; only the"
+            " date is affected"
+        )
+    return own
+
+
+def _day(seconds: float) -> str:
+    return clock_text(seconds)[:10]
+
+
+def times_of(values: list[Value], clock: Clock) -> Floats:
+    """Time of each value, s: its own, else that of the clock at its line."""
+    lines, own, _ = np.array(values).T
+    by_line = _spread(lines, clock)
+    is_known = np.isfinite(own)
+    if not is_known.any():
+        return by_line
+
+    t = own + clock.later
+    # a time of the day is that of the day on which its line stands
+    t = t + DAY * np.round((by_line - t) / DAY)
+    known = t[is_known]
+    of_known = lines[is_known]
+    distinct = np.unique(known).size
+    if distinct < 0.6 * known.size:  # whole seconds of a faster source
+        own_clock = _increasing(known, of_known, clock.source)
+        own_clock = own_clock._replace(in_bursts=True)
+        t[is_known] = _spread(of_known, own_clock)
+    return np.where(is_known, t, by_line)
+
+
+def _spread(lines: Floats, clock: Clock) -> Floats:
+    """Times of lines between those with a time.
+
+    Where the same messages come at every moment, they are of that moment; of a source
+    that speaks several times the first one is, and the others follow evenly. A source
+    that is heard as often before the first moment always speaks before. In other logs
+    messages come one by one, and the time goes on from line to line.
+    """
+    if not clock.in_bursts or clock.t.size < 2:
+        return np.interp(lines, clock.lines, clock.t)
+    moments = np.searchsorted(clock.lines, lines, side="right")
+    _, counts = np.unique(moments, return_counts=True)
+    usual = max(1, round(float(np.median(counts))))
+    begins_before = moments[0] == 0 and counts[0] >= usual
+    if begins_before and clock.is_first:
+        moments = 1 + np.searchsorted(clock.lines, lines, side="left")
+    return _evenly(moments, usual, clock.t)
+
+
+def _evenly(moments: npt.NDArray[np.intp], usual: int, t: Floats) -> Floats:
+    """Times of values from moment to moment, evenly from each one on.
+
+    The moments count from 1, 0 being before the first one; values are `usual` at each,
+    or more where the clock paused.
+    """
+    step = float(np.median(np.diff(t)))
+    before = t[0] - step
+    after = t[-1] + step
+    begins = np.concatenate([[before], t, [after]])
+    pauses = np.append(np.diff(begins), step)
+
+    _, first, counts = np.unique(moments, return_index=True, return_counts=True)
+    place = np.arange(moments.size) - np.repeat(first, counts)
+    if moments[0] == 0:  # the last ones before the first moment
+        place[: counts[0]] += usual - counts[0]
+    count = np.maximum(np.repeat(counts, counts), usual)
+    # the clock goes on later after a pause of the recorder
+    longest = step * np.ceil(count / usual)
+    pause = np.minimum(pauses[moments], longest)
+    times: Floats = begins[moments] + pause * place / count
+    return times
+
+
+def _come_in_bursts(clock: Clock, order: list[tuple[int, str]]) -> bool:
+    """Return whether the same messages follow each other at most of the moments."""
+    lines = [line for line, _ in order]
+    moments = np.searchsorted(clock.lines, lines, side="right")
+    of_moment: dict[int, str] = defaultdict(str)
+    for moment, (_, source) in zip(moments.tolist(), order, strict=True):
+        of_moment[moment] += f"{source} "
+    patterns = Counter(of_moment.values())
+    most = max(patterns.values())
+    return most > 0.6 * len(of_moment)

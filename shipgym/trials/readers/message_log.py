@@ -1,0 +1,156 @@
+"""Logs of messages of a ship's buses, read as a table of channels.
+
+The messages are sentences of NMEA 0183, PGNs of NMEA 2000 and deltas of Signal K, also
+mixed, with or without a time before each.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from shipgym.arrays import Floats
+from shipgym.checks import placed
+from shipgym.errors import InputError
+from shipgym.trials.readers.csv_file import read_lines
+from shipgym.trials.readers.log_table import LogTable
+from shipgym.trials.readers.message_clock import log_clock
+from shipgym.trials.readers.message_tracks import Track, choose_tracks
+from shipgym.trials.readers.messages import WINDS, Heard
+from shipgym.trials.readers.nmea2000 import hear_pgns
+from shipgym.trials.readers.nmea_log import hear_sentences
+from shipgym.trials.readers.signalk import hear_deltas
+
+
+def read_messages(path: Path, *, strict: bool = False) -> LogTable:
+    """Read a log's channels: SI units, positions in degrees, nan where absent.
+
+    Of several sources of a channel the best is taken, and a note names the others.
+    `strict` refuses sentences without a checksum. Raises InputError for a damaged log
+    and one without time or channels.
+    """
+    lines = read_lines(path, "log of messages")
+    heard = Heard()
+    hear_sentences(lines, heard, strict=strict)
+    with placed(str(path)):
+        hear_pgns(lines, heard)
+    hear_deltas(lines, heard)
+    notes = _check_damage(path, heard) + heard.notes
+    if not heard.count and any("!AIVD" in line for line in lines):
+        raise InputError(
+            f"{path}: this looks like a log of AIS: positions of other ships, without"
+            " their rudders; expected the own ship's sentences (RMC, HDT, RSA), got"
+            " none; log these too"
+        )
+    clock = log_clock(path, heard, notes)
+    if clock is None:
+        raise InputError(
+            f"{path}: expected sentences with a time (RMC, GGA, GLL or ZDA) or a time"
+            " before each line, got none; log these too"
+        )
+    if not heard.channels.keys() - {*WINDS, "variation"}:
+        raise InputError(
+            f"{path}: expected sentences of a ship's motion (RMC, HDT, HDG, ROT, RSA"
+            " and others), got none; log these too"
+        )
+
+    chosen = choose_tracks(heard, clock)
+    notes += chosen.notes
+    tracks = dict(chosen.by_channel)
+    winds = {}
+    for name in WINDS:
+        if name in tracks:
+            winds[name] = tracks.pop(name)
+    if winds and "psi" in tracks:
+        tracks |= _wind_over_ground(winds, tracks)
+    notes += _note_speed(tracks)
+    return _table(path, tracks, notes, magnetic=chosen.magnetic)
+
+
+def _check_damage(path: Path, heard: Heard) -> list[str]:
+    """Refuse a log of many damaged messages; a note of few."""
+    damaged = len(heard.damaged)
+    if damaged > 0.1 * heard.count:
+        raise InputError(
+            f"{path}: line {heard.damaged[0]}: expected hardly any damaged sentences,"
+            f" got {damaged} of {heard.count} with a wrong or no checksum or broken"
+            " fields, this the first; the log was damaged on the way: take the original"
+        )
+    if damaged:
+        return [
+            f"{damaged} of {heard.count} sentences with a wrong checksum or broken"
+            " fields left out"
+        ]
+    return []
+
+
+def _note_speed(tracks: dict[str, Track]) -> list[str]:
+    """A note where nothing in a log shows the speed of the ship."""
+    if {"lat", "sog", "stw"} & tracks.keys():
+        return []
+    return [
+        "no speed is known: the log has neither positions (RMC, GGA, GLL) nor a speed"
+        " (VTG, VHW, VBW); give the service speed in the ship file"
+    ]
+
+
+def _wind_over_ground(
+    winds: dict[str, Track], tracks: dict[str, Track]
+) -> dict[str, Track]:
+    """Wind over ground from that off the bow; empty where the velocity is missing."""
+    if {"wind_angle", "wind_speed"} <= winds.keys():
+        angle = winds["wind_angle"]
+        heading = _angle_at(angle.t, tracks["psi"])
+        return {
+            "wind_from": angle._replace(values=angle.values + heading),
+            "wind_speed": winds["wind_speed"],
+        }
+    has_wind = {"apparent_wind_angle", "apparent_wind_speed"} <= winds.keys()
+    has_velocity = {"sog", "cog"} <= tracks.keys()
+    if not has_wind or not has_velocity:
+        return {}
+
+    # complex: north + i east
+    angle = winds["apparent_wind_angle"]
+    heading = _angle_at(angle.t, tracks["psi"])
+    bearing = np.exp(1j * (angle.values + heading))
+    apparent = winds["apparent_wind_speed"].values * bearing
+    over_ground = tracks["sog"]
+    speed = np.interp(angle.t, over_ground.t, over_ground.values)
+    course = _angle_at(angle.t, tracks["cog"])
+    wind = apparent - speed * np.exp(1j * course)
+    return {
+        "wind_from": angle._replace(values=np.angle(wind)),
+        "wind_speed": angle._replace(values=np.abs(wind)),
+    }
+
+
+def _angle_at(t: Floats, track: Track) -> Floats:
+    """An angle at other times, rad."""
+    return np.interp(t, track.t, np.unwrap(track.values))
+
+
+def _table(
+    path: Path, tracks: dict[str, Track], notes: list[str], *, magnetic: bool
+) -> LogTable:
+    """One row for each time at which some channel has a value."""
+    clocks = [track.t for track in tracks.values()]
+    all_times = np.concatenate(clocks)
+    t = np.unique(all_times)
+    columns = {"t": t}
+    first_lines = np.full(t.size, np.inf)
+    for channel, track in tracks.items():
+        rows = np.searchsorted(t, track.t)
+        values = np.full(t.size, np.nan)
+        values[rows] = track.values
+        columns[channel] = values
+        first_lines[rows] = np.minimum(first_lines[rows], track.lines)
+    return LogTable(
+        path=path,
+        cells=columns,
+        rows=first_lines.astype(int).tolist(),
+        place_words="line {line}",
+        units={"t": "unix"},
+        notes=tuple(notes),
+        own_clocks=True,
+        magnetic=magnetic,
+    )

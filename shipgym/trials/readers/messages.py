@@ -1,0 +1,89 @@
+"""Messages of a bus or a recorder, whatever their form, by channel and source."""
+
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from shipgym.trials.readers.line_stamps import stamp_text
+
+#: Winds from the bow, which are no channels before the heading is added.
+WINDS = ("wind_angle", "wind_speed", "apparent_wind_angle", "apparent_wind_speed")
+
+
+class Value(NamedTuple):
+    """One value of a channel, or one time."""
+
+    line: int
+    time: float  # s since 1970 or of the day; nan where the message has none
+    value: float
+
+
+def port_source(source: str) -> str:
+    """Name of the port one of two rudders that a source shows."""
+    return f"{source} port"
+
+
+BySource = dict[str, list[Value]]  # by sender and kind, such as HEHDT
+
+
+def _by_source() -> BySource:
+    return defaultdict(list)
+
+
+@dataclass
+class Heard:
+    """Contents of the messages of a log.
+
+    Attributes
+    ----------
+    times : dict
+        Times that messages give, by source.
+    channels : dict
+        Values by channel and source, in SI units, positions in degrees. Channels of
+        their own are `WINDS`, ``psi_magnetic`` (a heading by compass) and
+        ``variation``.
+    stamps : dict of int to str
+        Time before a line, by line.
+    order : list of tuple
+        Line and source of each message.
+    count : int
+        Messages of known kinds.
+    damaged : list of int
+        Lines of messages that could not be read.
+    notes : list of str
+        What was left out or assumed.
+    """
+
+    times: BySource = field(default_factory=_by_source)
+    channels: dict[str, BySource] = field(
+        default_factory=lambda: defaultdict(_by_source)
+    )
+    stamps: dict[int, str] = field(default_factory=dict)
+    order: list[tuple[int, str]] = field(default_factory=list)
+    count: int = 0
+    damaged: list[int] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def hear(
+        self,
+        line: int,
+        source: str,
+        values: Mapping[str, float],
+        time: float = np.nan,
+    ) -> None:
+        """Add what a source said in a line, with the time that it gave, if any."""
+        self.count += 1
+        self.order.append((line, source))
+        if np.isfinite(time):
+            self.times[source].append(Value(line, time, time))
+        for channel, value in values.items():
+            self.channels[channel][source].append(Value(line, time, value))
+
+    def stamp(self, line: int, before: str) -> None:
+        """Add the time that a recorder wrote before a message, if there is one."""
+        text = stamp_text(before)
+        if text:
+            self.stamps[line] = text

@@ -1,0 +1,587 @@
+"""Logs as strangers' recorders write them: one zigzag in all of their forms."""
+
+import gzip
+import json
+import math
+import struct
+from datetime import UTC, datetime
+from functools import cache, reduce
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from shipgym import InputError
+from shipgym.trials.guesses import guess_trial
+from shipgym.trials.ship_file import ShipFile
+from shipgym.trials.trial import Trial
+from shipgym.trials.units import DEGREE, KNOT
+
+CASES = Path(__file__).parents[2].parent / "shared" / "cases" / "logs"
+BEGIN = datetime(2021, 5, 3, 9, 59, 50, tzinfo=UTC).timestamp()
+SPEED, METRES = 7.0, 60.0 * 1852.0  # m/s, of a degree
+
+
+class Second(NamedTuple):
+    """The ship at a second."""
+
+    t: float
+    psi: float  # deg
+    r: float  # deg/s
+    rudder: float  # deg
+    lat: float
+    lon: float
+    course: float  # deg
+    speed: float  # m/s over ground
+
+
+@cache
+def sailed(count=240, step=1.0):
+    """A zigzag of a ship of first order in yaw, without current."""
+    psi, r, rudder, side, lat, lon = 40.0, 0.0, 0.0, 1.0, 57.7, 11.8
+    rows = []
+    for k in range(count):
+        t = k * step
+        sway = -30.0 * r * DEGREE
+        speed, drift = math.hypot(SPEED, sway), math.atan2(sway, SPEED) / DEGREE
+        rows.append(Second(t, psi, r, rudder, lat, lon, psi + drift, speed))
+        order = 20.0 * side if t >= 30.0 else 0.0
+        if side * (psi - 40.0) >= 20.0:
+            side = -side
+        for _ in range(10):
+            rudder += np.clip(order - rudder, -0.25 * step, 0.25 * step)
+            r += 0.1 * step * (0.08 * rudder - r) / 25.0
+            psi += 0.1 * step * r
+            sway = -30.0 * r * DEGREE
+            north = SPEED * math.cos(psi * DEGREE) - sway * math.sin(psi * DEGREE)
+            east = SPEED * math.sin(psi * DEGREE) + sway * math.cos(psi * DEGREE)
+            lat += 0.1 * step * north / METRES
+            lon += 0.1 * step * east / METRES / math.cos(57.7 * DEGREE)
+    return rows
+
+
+def sentence(text):
+    return f"${text}*{reduce(lambda a, b: a ^ b, map(ord, text)):02X}"
+
+
+def clock(t, form="%H%M%S", begin=BEGIN):
+    return datetime.fromtimestamp(begin + t, UTC).strftime(form)
+
+
+def place(one):
+    lat, lon = one.lat % 1 * 60.0, one.lon % 1 * 60.0
+    return f"{int(one.lat):02d}{lat:08.5f},N,{int(one.lon):03d}{lon:08.5f},E"
+
+
+def rmc(one, variation="", begin=BEGIN):
+    course = one.course % 360.0
+    at, date = clock(one.t, begin=begin), clock(one.t, "%d%m%y", begin)
+    speed = one.speed / KNOT
+    return (
+        f"GPRMC,{at}.00,A,{place(one)},{speed:.2f},{course:.2f},{date},"
+        f"{variation or ','},A"
+    )
+
+
+def gll(one, begin=BEGIN):
+    return f"GPGLL,{place(one)},{clock(one.t, begin=begin)}.00,A,A"
+
+
+def zda(one):
+    return f"GPZDA,{clock(one.t)}.00,{clock(one.t, '%d,%m,%Y')},00,00"
+
+
+def hdt(one, talker="HE"):
+    return f"{talker}HDT,{one.psi % 360.0:.2f},T"
+
+
+def rsa(one, fields="{:.1f},A,,", talker="AG"):
+    return f"{talker}RSA,{fields.format(one.rudder)}"
+
+
+def plain(*kinds):
+    """Lines of these sentences for every second."""
+    return [sentence(kind(one)) for one in sailed() for kind in kinds]
+
+
+def stamped(form, *kinds):
+    """Lines of these sentences, each after what a recorder writes before it."""
+    return [
+        form(one, number) + sentence(kind(one))
+        for one in sailed()
+        for number, kind in enumerate(kinds)
+    ]
+
+
+def read(tmp_path, lines, name="log.nmea", end="\r\n"):
+    path = tmp_path / name
+    content = (end.join(lines) + end).encode()
+    path.write_bytes(gzip.compress(content) if name.endswith("gz") else content)
+    return guess_trial(path).trial
+
+
+def check(trial, step=1.0, rows=240, turned=0.0, kept=slice(None)):
+    """Heading, rudder and speed are those of the ship, row by row."""
+    truth = sailed(rows, step)
+    t = np.array([one.t for one in truth])[kept]
+    assert t.size - 1 <= len(trial) <= t.size
+    since = trial.t + t[0]
+    psi = np.interp(since, t, [one.psi for one in truth][kept])
+    error = trial["psi"] / DEGREE - psi - turned
+    error -= 360.0 * np.round(error / 360.0)
+    assert np.sqrt(np.mean(error**2)) < 0.25
+    delta = np.interp(since, t, [one.rudder for one in truth][kept])
+    assert np.sqrt(np.mean((trial["delta"] / DEGREE - delta) ** 2)) < 0.3
+    if "u" in trial and not turned:
+        assert np.abs(trial["u"] - SPEED)[2:-2].max() < 0.1
+
+
+def said(trial, *words):
+    for word in words:
+        assert any(word in note for note in trial.notes), (word, trial.notes)
+
+
+def hdm(one):
+    return f"HCHDM,{(one.psi - 16.0) % 360.0:.2f},M"
+
+
+def hdg(one):
+    return f"HCHDG,{(one.psi - 16.0) % 360.0:.2f},,,,"
+
+
+def rmc_varied(one):
+    return rmc(one, "16.0,E")
+
+
+def half_past(one, _):
+    return clock(one.t, "%Y-%m-%d %H:%M:%S.500 ", BEGIN + 7200)
+
+
+STAMPS = {
+    "dated": lambda one, k: clock(one.t, "%Y-%m-%d %H:%M:%S.") + f"{k:03d} ",
+    "iso": lambda one, k: clock(one.t, "%Y-%m-%dT%H:%M:%S.") + f"{k:03d}Z;",
+    "german": lambda one, k: clock(one.t, "%d.%m.%Y %H:%M:%S,") + f"{k:03d}\t",
+    "of the day": lambda one, k: clock(one.t, "[%H:%M:%S] "),
+    "seconds": lambda one, k: f"{BEGIN + one.t:.0f} ",
+    "milliseconds": lambda one, k: f"{1000 * (BEGIN + one.t):.0f};A;",
+    "nanoseconds": lambda one, k: f"{BEGIN + one.t:.0f}000000000,",
+    "candump": lambda one, k: f"({BEGIN + one.t:.6f}) ",
+    "tag": lambda one, k: f"\\s:gyro,c:{BEGIN + one.t:.0f}*00\\",
+    "tag in ms": lambda one, k: f"\\g:1-2-7,s:gyro,c:{BEGIN + one.t:.0f}000*00\\",
+    "since the start": lambda one, k: f"{one.t + 0.001 * k:.3f} ",
+    "vdr": lambda one, k: f"{BEGIN + one.t:.0f}000,NMEA0183,/dev/ttyUSB0,X,",
+    "zone": lambda one, k: clock(one.t, "%Y-%m-%dT%H:%M:%S+02:00 ", BEGIN + 7200),
+}
+
+
+@pytest.mark.parametrize("with_fix", [True, False])
+@pytest.mark.parametrize("stamp", STAMPS)
+def test_times_before_the_lines_are_a_clock(stamp, with_fix, tmp_path):
+    kinds = (rmc, hdt, rsa) if with_fix else (hdt, rsa)
+    trial = read(tmp_path, stamped(STAMPS[stamp], *kinds), "log.txt")
+    check(trial)
+    if not with_fix:
+        said(trial, "no speed is known")
+
+
+def test_a_recorder_in_another_zone_takes_the_time_of_the_satellites(tmp_path):
+    trial = read(tmp_path, stamped(half_past, rmc, hdt, rsa))
+    check(trial)
+    said(trial, "7200.5 s ahead of those of GPRMC")
+
+
+@pytest.mark.parametrize("name", ["log", "log.log", "log.vdr", "log.nmea.gz", "a.csv"])
+@pytest.mark.parametrize("end", ["\r\n", "\n", "\r"])
+def test_the_name_of_a_file_and_its_ends_of_lines_do_not_matter(name, end, tmp_path):
+    check(read(tmp_path, plain(rmc, hdt, rsa), name, end))
+
+
+@pytest.mark.parametrize(
+    "kinds",
+    [(hdt, rsa, rmc), (rsa, hdt, gll), (rmc, hdt, rsa, gll), (hdt, rmc, rsa)],
+)
+def test_sentences_of_one_second_stand_in_any_order(kinds, tmp_path):
+    check(read(tmp_path, plain(*kinds)))
+
+
+@pytest.mark.parametrize(
+    ("kinds", "words"),
+    [
+        (
+            (rmc_varied, hdm, rsa),
+            ["HCHDM with the variation of GPRMC added, 16.0 deg E"],
+        ),
+        ((rmc_varied, hdg, rsa), ["HCHDG with the variation of GPRMC"]),
+        ((rmc, lambda one: hdg(one)[:-4] + ",,,16.0,E", rsa), []),
+        ((rmc_varied, hdg, hdt, rsa), ["psi is from HEHDT (240 values); HCHDG"]),
+        (
+            (rmc, hdt, lambda one: rsa(one, ",V,{:.1f},A")),
+            ["in the port field of AGRSA"],
+        ),
+        ((rmc, hdt, lambda one: rsa(one, "{:.1f},,,")), ["status in 240 sentences"]),
+        ((rmc, hdt, lambda one: rsa(one, "{0:.1f},A,{0:.1f},A")), ["mean of two"]),
+        ((rmc, hdt, lambda one: rsa(one, "{:.1f},A,0.0,A")), ["the port one is still"]),
+        (
+            (rmc, hdt, lambda one: rsa(one, "0.0,A,{:.1f},A")),
+            ["starboard one is still"],
+        ),
+        (
+            (rmc, hdt, rsa, lambda one: rsa(one, talker="II")),
+            ["IIRSA (240 values) left"],
+        ),
+        ((rmc, hdt, lambda one: f"IIXDR,A,{one.rudder:.1f},D,RUDDER"), []),
+        (
+            (rmc, hdt, lambda one: f"IIXDR,C,20.1,C,AIR,A,{one.rudder:.1f},D,Rudder#1"),
+            [],
+        ),
+        ((gll, lambda one: hdt(one, "GP"), lambda one: rsa(one, talker="SD")), []),
+        ((zda, hdt, rsa), ["no speed is known"]),
+    ],
+)
+def test_what_sentences_hold_is_read(kinds, words, tmp_path):
+    trial = read(tmp_path, plain(*kinds))
+    check(trial)
+    said(trial, *words)
+
+
+def test_a_heading_that_stays_magnetic_says_so_until_the_variation_is_given(tmp_path):
+    trial = read(tmp_path, plain(rmc, hdm, rsa))
+    check(trial, turned=-16.0)
+    said(trial, "the heading stays magnetic")
+    assert trial.magnetic
+
+    turned = {"variation_deg": 16.0}
+    trial = Trial.from_csv(tmp_path / "log.nmea", sensors=turned)
+    check(trial)
+    assert not trial.magnetic
+    assert not any("magnetic" in note for note in trial.notes)
+
+
+def test_the_talker_with_the_data_is_read(tmp_path):
+    lines = plain(rmc, lambda one: hdt(one, "II"), rsa)
+    for at in (30, 300, 600):
+        lines[at + 1] = sentence("HEHDT,123.4,T")
+    trial = read(tmp_path, lines)
+    check(trial)
+    said(trial, "psi is from IIHDT (237 values); HEHDT (3 values) left out")
+
+
+def test_sentences_without_checksums_are_read_unless_they_are_required(tmp_path):
+    lines = [line[:-3] for line in plain(rmc, hdt, rsa)]
+    lines[301] = lines[301][:9]  # cut short
+    trial = read(tmp_path, lines)
+    check(trial)
+    said(trial, "719 of 720 sentences have no checksum", "1 of 720 sentences with a")
+    required = {"checksums": "required"}
+    with pytest.raises(InputError, match="720 of 720 with a wrong or no checksum"):
+        Trial.from_csv(tmp_path / "log.nmea", sensors=required)
+    (tmp_path / "ship.toml").write_text(
+        "[ship]\nlength = 150.0\n[sensors]\nchecksums = 'required'\n"
+        "[[trials]]\nfile = 'log.nmea'\n"
+    )
+    with pytest.raises(InputError, match="wrong or no checksum"):
+        ShipFile.load(tmp_path / "ship.toml").trials()
+
+
+def test_a_cut_sentence_among_protected_ones_is_left_out(tmp_path):
+    lines = plain(rmc, hdt, rsa)
+    lines[301] = "$HEHDT,4"
+    lines[400] += lines[401][:7]
+    trial = read(tmp_path, lines)
+    check(trial)
+    said(trial, "2 of 721 sentences")
+
+
+def test_a_faster_gyro_is_spread_over_the_second(tmp_path):
+    fast = sailed(1200, 0.2)
+    lines = []
+    for k, one in enumerate(fast):
+        if k % 5 == 0:
+            lines += [sentence(rmc(one)), sentence(rsa(one))]
+        lines.append(sentence(hdt(one)))
+    path = tmp_path / "log.nmea"
+    path.write_text("\n".join(lines))
+    check(guess_trial(path).trial, step=0.2, rows=1200, kept=slice(None, None, 5))
+
+
+def test_whole_seconds_of_a_fast_receiver_are_spread(tmp_path):
+    lines = []
+    for one in sailed(1200, 0.2):
+        whole = one._replace(t=math.floor(one.t + 1e-9))
+        lines += [sentence(rmc(whole)), sentence(hdt(one)), sentence(rsa(one))]
+    check(read(tmp_path, lines), step=0.2, rows=1200)
+
+
+def test_a_log_without_dates_goes_over_midnight(tmp_path):
+    evening = datetime(2021, 5, 3, 23, 58, tzinfo=UTC).timestamp()
+    check(read(tmp_path, plain(lambda one: gll(one, evening), hdt, rsa)))
+
+
+def test_a_pause_of_the_recorder_is_a_hole(tmp_path):
+    lines = plain(rmc, hdt, rsa)
+    trial = read(tmp_path, lines[:450] + lines[510:])
+    assert len(trial) == 220
+    assert np.diff(trial.t).max() == pytest.approx(21.0)
+
+
+def test_weeks_of_satellites_that_began_again_are_named(tmp_path):
+    old = BEGIN - 1024 * 7 * 86400.0
+    lines = plain(lambda one: rmc(one, begin=old), hdt, rsa)
+    trial = read(tmp_path, lines)
+    check(trial)
+    said(trial, "if it should be 2021-05-03, the receiver is 1024 weeks back")
+
+    lines = stamped(STAMPS["dated"], lambda one: rmc(one, begin=old), hdt, rsa)
+    trial = read(tmp_path, lines)
+    check(trial)
+    said(trial, "is 1024 weeks back (2001-09-17)")
+
+
+# --- Signal K
+
+
+def delta(one, values, context="vessels.self", of="$source"):
+    source = "gyro" if of == "$source" else {"label": "n2k", "src": "3", "pgn": 127250}
+    update = {
+        "timestamp": clock(one.t, "%Y-%m-%dT%H:%M:%S.000Z"),
+        of: source,
+        "values": [{"path": path, "value": value} for path, value in values.items()],
+    }
+    return json.dumps({"context": context, "updates": [update]})
+
+
+def deltas(one, **settings):
+    heading = "navigation.headingTrue"
+    position = {"latitude": one.lat, "longitude": one.lon}
+    course = {
+        "navigation.speedOverGround": one.speed,
+        "navigation.courseOverGroundTrue": one.course * DEGREE,
+        "navigation.position": position,
+    }
+    return [
+        delta(one, {heading: one.psi % 360 * DEGREE}, **settings),
+        delta(one, {"steering.rudderAngle": one.rudder * DEGREE}, **settings),
+        delta(one, course, **settings),
+    ]
+
+
+@pytest.mark.parametrize("of", ["$source", "source"])
+def test_deltas_of_signal_k_are_read_and_other_vessels_left_out(of, tmp_path):
+    own, other = "vessels.urn:mrn:imo:mmsi:230099999", "vessels.urn:mrn:imo:mmsi:1"
+    lines = []
+    for one in sailed():
+        lines += deltas(one, context=own, of=of)
+        lines += deltas(one._replace(psi=10.0), context=other)[2:] * 4
+    trial = read(tmp_path, lines, "log.jsonl")
+    check(trial)
+    said(trial, f"960 deltas of other vessels than {own} left out")
+
+
+def test_a_multiplexed_log_of_a_signal_k_server_is_read(tmp_path):
+    lines = []
+    for one in sailed():
+        before = f"{1000 * (BEGIN + one.t):.0f}"
+        lines += [f"{before};N;{sentence(kind(one))}" for kind in (rmc, rsa)]
+        lines.append(f"{before};I;{deltas(one)[0]}")
+    check(read(tmp_path, lines, "signalk-raw.log"))
+
+
+# --- NMEA 2000
+
+
+def pgns(one, magnetic=False):
+    """Payloads of rudder, heading, rate of turn, position, course and speed."""
+    psi = (one.psi - 16.0 * magnetic) % 360.0 * DEGREE
+    course = one.course % 360.0 * DEGREE
+    lat, lon = round(one.lat * 1e7), round(one.lon * 1e7)
+    frames = {
+        127245: struct.pack(
+            "<BBhhH", 0, 0xF8, 0x7FFF, round(one.rudder * DEGREE * 1e4), 0xFFFF
+        ),
+        127250: struct.pack(
+            "<BHhhB", 1, round(psi * 1e4), 0x7FFF, 0x7FFF, 0xFC + magnetic
+        ),
+        127251: struct.pack("<BiBH", 1, round(one.r * DEGREE / 3.125e-8), 0xFF, 0xFFFF),
+        129025: struct.pack("<ii", lat, lon),
+        129026: struct.pack(
+            "<BBHHH", 1, 0xFC, round(course * 1e4), round(one.speed * 100), 0xFFFF
+        ),
+    }
+    if magnetic:
+        frames[127258] = struct.pack(
+            "<BBHhH", 1, 0xF4, 0xFFFF, round(16 * DEGREE * 1e4), 0xFFFF
+        )
+    return frames
+
+
+def can_id(pgn):
+    return f"{0x08000000 | pgn << 8 | 0x23:08X}"
+
+
+def candump(t, pgn, data):
+    return f"({BEGIN + t:.6f}) can0 {can_id(pgn)}#{data.hex().upper()}"
+
+
+def candump_in_columns(t, pgn, data):
+    octets = data.hex(" ").upper()
+    return f" ({BEGIN + t:.6f})  can1  {can_id(pgn)}   [8]  {octets}"
+
+
+def yacht_devices(t, pgn, data):
+    at = clock(t, "%H:%M:%S.000")
+    return f"{at} R {can_id(pgn)} {data.hex(' ').upper()}"
+
+
+def actisense(t, pgn, data):
+    return f"A{35990 + t:010.3f} 23FF2 {pgn:05X} {data.hex().upper()}"
+
+
+def canboat_plain(t, pgn, data):
+    at = clock(t, "%Y-%m-%dT%H:%M:%S.000Z")
+    return f"{at},2,{pgn},35,255,8,{data.hex(',')}"
+
+
+def signalk_raw(t, pgn, data):
+    return f"{1000 * (BEGIN + t):.0f};A;{canboat_plain(t, pgn, data)}"
+
+
+@pytest.mark.parametrize("magnetic", [False, True])
+@pytest.mark.parametrize(
+    "form",
+    [candump, candump_in_columns, yacht_devices, actisense, canboat_plain, signalk_raw],
+)
+def test_raw_frames_of_nmea_2000_are_decoded(form, magnetic, tmp_path):
+    pytest.importorskip("nmea2000", reason="needs the extra nmea2000")
+    lines = [
+        form(one.t, pgn, data)
+        for one in sailed()
+        for pgn, data in pgns(one, magnetic).items()
+    ]
+    trial = read(tmp_path, lines, "log.txt")
+    check(trial)
+    assert "r" not in trial.derived
+    if magnetic:
+        said(trial, "with the variation of PGN 127258 of 35 added, 16.0 deg E")
+
+
+def analyzed(one, unit="deg"):
+    """Fields of messages as canboat's analyzer prints them."""
+    angle = 1.0 if unit == "deg" else DEGREE
+    return {
+        (127245, "Rudder"): {"Instance": 0, "Position": round(one.rudder * angle, 4)},
+        (127250, "Vessel Heading"): {
+            "SID": 1,
+            "Heading": round(one.psi % 360 * angle, 4),
+            "Reference": "True",
+        },
+        (129025, "Position, Rapid Update"): {
+            "Latitude": round(one.lat, 7),
+            "Longitude": round(one.lon, 7),
+        },
+        (129026, "COG & SOG, Rapid Update"): {
+            "COG Reference": "True",
+            "COG": round(one.course % 360 * angle, 4),
+            "SOG": round(one.speed, 2),
+        },
+    }
+
+
+def as_text(one):
+    at = clock(one.t, "%Y-%m-%d-%H:%M:%S.120")
+    units = {"Position": " deg", "Heading": " deg", "COG": " deg", "SOG": " m/s"}
+    for (pgn, name), fields in analyzed(one).items():
+        words = [
+            f"{key} = {value}{units.get(key, '')}" for key, value in fields.items()
+        ]
+        yield f"{at} 2 127 255 {pgn} {name}:  {'; '.join(words)}"
+
+
+def as_json(one, unit="deg"):
+    at = clock(one.t, "%Y-%m-%d-%H:%M:%S.120")
+    for (pgn, name), fields in analyzed(one, unit).items():
+        content = {"timestamp": at, "prio": 2, "src": 204, "dst": 255, "pgn": pgn}
+        yield json.dumps(content | {"description": name, "fields": fields})
+
+
+def as_json_si(one):
+    return as_json(one, "rad")
+
+
+def as_json_named(one):
+    for line in as_json(one):
+        yield line.replace('"True"', '{"value": 0, "name": "True"}')
+
+
+@pytest.mark.parametrize("form", [as_text, as_json, as_json_si, as_json_named])
+def test_what_canboat_prints_is_read(form, tmp_path):
+    lines = ["INFO 2025-12-16T17:22:41.995Z [analyzer] New PGN 127245 for device 127"]
+    for one in sailed():
+        lines += form(one)
+    check(read(tmp_path, lines, "analyzed.txt"))
+
+
+# --- what can only be looked at
+
+
+def test_a_gpx_track_is_named_and_can_be_looked_at(tmp_path):
+    points = [
+        f'<trkpt lat="{one.lat:.6f}" lon="{one.lon:.6f}">'
+        f"<time>{clock(one.t, '%Y-%m-%dT%H:%M:%SZ')}</time></trkpt>"
+        for one in sailed()
+    ]
+    trial = read(
+        tmp_path,
+        [
+            '<?xml version="1.0"?><gpx xmlns="http://www.topografix.com/GPX/1/1">',
+            "<trk><trkseg>",
+            *points,
+            "</trkseg></trk></gpx>",
+        ],
+        "track.gpx",
+    )
+    assert len(trial) == 240
+    said(trial, "this looks like a GPX track: it has neither rudder nor heading")
+
+
+def test_a_log_of_ais_is_named(tmp_path):
+    lines = ["!AIVDM,1,1,,B,13u=gHP3CWPlvs2Q8sHW:5fD0h6a,0*1B"] * 9
+    with pytest.raises(InputError, match="this looks like a log of AIS"):
+        read(tmp_path, lines)
+
+
+# --- the cases beside the checkout
+
+RIGHT = {
+    "nmea_rare_talker.nmea": (540, "GIHDG (3 values) left out"),
+    "nmea_hdg_rmcvar.nmea": (500, "with the variation of GPRMC added"),
+    "nmea_hdg_novar.nmea": (500, "the heading stays magnetic"),
+    "nmea_hdm.nmea": (500, "with the variation of GPRMC added"),
+    "nmea_nosum.nmea": (500, "have no checksum"),
+    "nmea_rsa_port_only.nmea": (500, "in the port field of AGRSA"),
+    "nmea_rsa_nostatus.nmea": (500, "is empty"),
+    "nmea_xdr_rudder.nmea": (500, ""),
+    "nmea_zda_hdt_rsa.nmea": (600, "no speed is known"),
+    "nmea_tag.nmea": (300, ""),
+    "nmea_midnight_gll.nmea": (500, ""),
+    "opencpn_vdr_new.csv": (240, ""),
+}
+
+
+@pytest.mark.skipif(not CASES.is_dir(), reason="the cases lie beside the checkout")
+@pytest.mark.parametrize("name", RIGHT)
+def test_cases_beside_the_checkout_are_right(name):
+    rows, words = RIGHT[name]
+    trial = guess_trial(CASES / name).trial
+    truth = np.genfromtxt(CASES / "truth.csv", delimiter=",", skip_header=1)
+    assert rows - 1 <= len(trial) <= rows
+    k = np.round(trial.t - trial.t[0]).astype(int)
+    turned = 16.0 if "novar" in name else 0.0
+    error = trial["psi"] / DEGREE + turned - truth[k, 1]
+    assert np.sqrt(np.mean(error**2)) < 0.5
+    error = trial["delta"] / DEGREE - truth[k, 3]
+    assert abs(error.mean()) < 0.3
+    assert error.std() < 1.0
+    if "u" in trial and not turned:
+        assert np.abs(trial["u"] - truth[k, 4]).max() < 0.2
+    assert not words or any(words in note for note in trial.notes)
