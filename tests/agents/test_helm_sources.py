@@ -5,6 +5,7 @@ import pytest
 
 from agents import LQ, PID, IntegralLineOfSight
 from agents.deployment.helm import MANUAL, STANDBY, STEERING, Helm
+from agents.deployment.nmea import NmeaReading
 from agents.deployment.sensors import HelmSensors, Limits
 from tests.agents.policies import MARINER
 from tests.agents.steering import sentence
@@ -76,16 +77,16 @@ def test_two_compasses_that_send_as_one_are_found(every):
 
 def test_a_ship_that_yaws_fast_has_one_compass():
     """A boat in quartering seas: 12 degrees to each side in 4 s, read once a second."""
-    helm = Helm(PID_MARINER, 0.0, Limits())
+    sensors = HelmSensors(Limits())
     for number in range(600):
         now = 0.1 * number
         phase = 2.0 * np.pi * now / 4.0
-        rate = 12.0 * 2.0 * np.pi / 4.0 * np.cos(phase) * 60.0
-        hear(helm, now, sentence("TIROT", rate, "A"), MOVING[1])
+        rate = np.radians(12.0) * 2.0 * np.pi / 4.0 * np.cos(phase)
+        sensors.take(NmeaReading("yaw_rate", rate, "TI"), now)
         if number % 10 == 3:
-            hear(helm, now, sentence("HEHDT", 12.0 * np.sin(phase) % 360.0, "T"))
-        helm.watch(0.1, now)
-    assert (helm.state, helm.alarm) == (STEERING, "")
+            heading = np.radians(12.0) * np.sin(phase)
+            sensors.take(NmeaReading("heading", heading, "HE"), now)
+        assert sensors.fault(0.0, 0.1, now, {"heading"}) == ""
 
 
 @pytest.mark.parametrize(
@@ -93,8 +94,8 @@ def test_a_ship_that_yaws_fast_has_one_compass():
     [
         [(sentence("SDDPT", depth, "0"), HERE) for depth in (9.0, 12.0)],
         [(sentence("IIVBW", knots, 0.0, "A", "", "", "V"), HERE) for knots in (9, 19)],
-        [(sentence("GPVTG", 90, "T", "", "M", 9, "N"), HERE)],
-        [(sentence("GPVTG", 190, "T", "", "M", 19, "N"), "10.0.0.2:1")],
+        [(sentence("GPVTG", 0, "T", "", "M", 9, "N"), HERE)],
+        [(sentence("GPVTG", 3, "T", "", "M", 19, "N"), "10.0.0.2:1")],
         [("x", "10.0.0.9:9"), ("\xff$", "10.0.0.9:1")],
     ],
 )
