@@ -335,6 +335,7 @@ class Autopilot:
         self.dt = self.parameters.dt
         self.limit = self.parameters.limit
         self.largest = self.limit
+        self.transfer: Transfer | None = None
         self.switch_on()
         self._given: Any = None
 
@@ -351,10 +352,10 @@ class Autopilot:
             memory=_no_memory(self.pilot),
             guidance=guidance,
         )
-        self.transfer: Transfer | None = None
 
     def engage(self, rudder: float) -> None:
         """Take over from a rudder angle, rad, without a jump of the order."""
+        self.switch_on()
         lengths = 0.5  # in which the rudder comes to that of the law
         scales = zip(
             self.agent.observation_names,

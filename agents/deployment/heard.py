@@ -66,10 +66,10 @@ def _why_not(line: str, name: str, wanted: set[str]) -> str | None:
         numbers = steering_numbers(sentence)
         if concerned & numbers.keys():
             return ""
-        if is_magnetic:
-            return "only magnetic headings, no variation"
         if kind.log_only:
             return "of a kind that is not steered by"
+        if is_magnetic:
+            return "only magnetic headings, no variation"
         return _refused(sentence, sorted(concerned)[0])
     except (ValueError, IndexError, KeyError):
         return "damaged, or without a checksum"

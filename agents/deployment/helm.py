@@ -200,24 +200,19 @@ class Helm(HelmCommands):
             texts["alarm"] = self.alarm
         self.alerts.update(texts, now)
 
-    def begin(self) -> None:
-        """Begin to steer from where the rudder is."""
-        super().begin()
-        self.pilot.engage(self.order)
-        largest = self.pilot.largest
-        self.order = min(max(self.order, -largest), largest)
-        self.belief = HeadingBelief(self.pilot.agent, self.limits)
-
     def _fault(self, step: float, now: float) -> str:
         if self.silent:
             silent = " and no ".join(self.silent)
             return f"no {silent} for {self.limits.silence_s:g} s"
+        is_steering = self.state == STEERING
         order = self.order
-        if self.state != STEERING:  # the rudder follows the helmsman
+        if not is_steering:  # the rudder follows the helmsman
             order = self.sensors.value("rudder", now) or 0.0
         fault = self.sensors.fault(order, step, now, self.read)
-        if not fault and self.state == STEERING:
-            fault = self.belief.doubt(self.sensors, now)
+        doubt = self.belief.doubt(self.sensors, now)
+        if doubt and not is_steering:  # look again
+            self.belief = HeadingBelief(self.pilot.agent, self.limits)
+        fault = fault or doubt
         if not fault and self.route is not None and self.route.ended:
             fault = "the end of the route is reached"
         return fault

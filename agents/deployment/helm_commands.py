@@ -3,6 +3,7 @@
 from math import inf, pi, tau
 from typing import Any
 
+from agents.deployment.heading_belief import HeadingBelief
 from agents.deployment.next_leg import NextLeg, PlottedCourse
 from agents.deployment.route import Route
 from agents.deployment.sensors import HelmSensors, Limits
@@ -34,6 +35,7 @@ class HelmCommands:
     pilot: Any
     limits: Limits
     sensors: HelmSensors
+    belief: HeadingBelief
     heading: float | None
     rate: float | None
     route: Route | None
@@ -64,7 +66,7 @@ class HelmCommands:
             self.well_since = min(self.well_since, self.now)
         self.obstacle = fault
         well_s = self.now - self.well_since
-        enough_s = self.limits.persistence_s
+        enough_s = 10.0  # in which each fault of a heading shows
         if self.state == MANUAL and not fault and well_s < enough_s:
             self.obstacle = f"all has to be well for {enough_s:g} s first"
 
@@ -83,9 +85,12 @@ class HelmCommands:
         self.has_steered = True
         self.alarm = ""
         self.held = False
-        self.order = self.sensors.value("rudder", self.now) or 0.0
         self.sensors.expected = None
-        self.pilot.switch_on()
+        rudder = self.inputs(self.now)["rudder"] or 0.0
+        largest = self.pilot.largest
+        self.order = min(max(rudder, -largest), largest)
+        self.pilot.engage(rudder)
+        self.belief = HeadingBelief(self.pilot.agent, self.limits)
 
     def stand_by(self) -> None:
         """Give the rudder back to the helmsman until `engage`.
@@ -101,7 +106,7 @@ class HelmCommands:
         """Steer again, after stand-by or an alarm.
 
         An autopilot that keeps a heading of its own keeps the one that the ship has
-        now. Raises InputError unless all is well, after an alarm for `persistence_s`.
+        now. Raises InputError unless all is well, after an alarm for 10 s.
         """
         self.question = None
         if self.state == STEERING:

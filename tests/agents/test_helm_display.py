@@ -129,7 +129,7 @@ def test_an_alarm_stands_first_and_says_what_has_fallen_silent():
     lines = text_of(view).splitlines()
     assert "ALARM: TAKE THE WHEEL" in lines[2]
     assert "no heading for 3 s" in lines[3]
-    for _ in range(4):
+    for _ in range(11):
         view = watched.tick(COMPASS, *OTHERS)
     assert "all is well: s steers the heading of now" in view.details
     assert watched.press("steer").headline == "STEERING"
