@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 
 from agents.cli.parameters import take_parameters, typed_parameters
 
-FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130  # exit codes
+FAILED, WRONG_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143  # exit codes
 
 ShipFileArgument = Annotated[
     Path, Argument(metavar="SHIP.TOML", help="The ship file with its trials.")

@@ -6,6 +6,7 @@ What it adds to a controller's law are plain functions on records too, which
 
 from collections.abc import Mapping
 from functools import cache
+from math import exp
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -260,6 +261,51 @@ def observation_bounds() -> dict[str, tuple[float, float]]:
     return bounds
 
 
+class Transfer:
+    """Bumpless transfer: from the rudder of the helmsman to that of the law.
+
+    The order begins at the rudder as it is. The difference to what the law would order
+    then fades as two equal lags in series do, without a jump of its rate, and the order
+    moves no faster than the slowest gear of SOLAS II-1/29.
+
+    Source: Astrom & Hagglund 2006, Advanced PID Control, section 13.5.
+
+    Parameters
+    ----------
+    rudder : float
+        Where it is, rad.
+    lag : float
+        s.
+    """
+
+    fastest = float(np.radians(2.3))  # rad/s
+    lags = 8.0  # in which it ends
+
+    def __init__(self, rudder: float, lag: float) -> None:
+        self.last = rudder
+        self.lag = lag
+        self.elapsed = 0.0  # s
+        self.off: float | None = None  # rad, of the rudder from the law's first order
+
+    @property
+    def has_ended(self) -> bool:
+        """True when the order is that of the law."""
+        return self.elapsed > self.lags * self.lag
+
+    def order(self, of_law: float, dt: float) -> float:
+        """Order in this interval, rad; `dt`: its length, s."""
+        if self.off is None:
+            self.off = self.last - of_law
+        lags = self.elapsed / self.lag
+        wanted = of_law + self.off * (1.0 + lags) * exp(-lags)
+
+        reach = self.fastest * dt
+        moved = min(max(wanted - self.last, -reach), reach)
+        self.last += moved
+        self.elapsed += dt
+        return self.last
+
+
 class Autopilot:
     """Any controller or policy, stepped once a control interval in double precision.
 
@@ -289,9 +335,15 @@ class Autopilot:
         self.dt = self.parameters.dt
         self.limit = self.parameters.limit
         self.largest = self.limit
+        self.transfer: Transfer | None = None
+        self.switch_on()
+        self._given: Any = None
+
+    def switch_on(self) -> None:
+        """Forget what was before."""
         guidance: Any = Nothing()
-        if isinstance(agent, Guided):
-            guidance = _no_memory(agent)
+        if isinstance(self.agent, Guided):
+            guidance = _no_memory(self.agent)
         zero = np.zeros(1)
         self.state = BridgeState(
             integral=zero,
@@ -300,7 +352,18 @@ class Autopilot:
             memory=_no_memory(self.pilot),
             guidance=guidance,
         )
-        self._given: Any = None
+
+    def engage(self, rudder: float) -> None:
+        """Take over from a rudder angle, rad, without a jump of the order."""
+        self.switch_on()
+        lengths = 0.5  # in which the rudder comes to that of the law
+        scales = zip(
+            self.agent.observation_names,
+            self.agent.observation_scales,
+            strict=True,
+        )
+        turning = dict(scales).get("yaw_rate", 0.05)  # speed over length, rad/s
+        self.transfer = Transfer(rudder, lengths / turning)
 
     @property
     def integral(self) -> float:
@@ -325,7 +388,13 @@ class Autopilot:
         else:
             order, after = heading_step(inputs, state, p, self._law)
         self.state = after
-        return float(order[0])
+        if self.transfer is None or self.transfer.has_ended:
+            return float(order[0])
+
+        of_transfer = self.transfer.order(float(order[0]), self.dt)
+        ordered = min(max(of_transfer, -self.largest), self.largest)
+        self.state = after._replace(last_command=np.array([ordered]))
+        return ordered
 
     def _guide(self, seen: PathSignals, memory: Any, _: Any) -> tuple[Number, Any]:
         """Course of guidance, by its law or by a search of its own."""

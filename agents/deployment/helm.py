@@ -1,13 +1,23 @@
 """An autopilot between instruments and rudder, which hands over after a fault."""
 
+from contextlib import suppress
 from dataclasses import replace
 from math import inf, radians
 from typing import Any
 
 from agents.controllers.guided import TURNS, Guided
 from agents.controllers.turn_rate import TurnRate
+from agents.deployment.alerts import Alerts
 from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import render
+from agents.deployment.compass import Compass
+from agents.deployment.heading_belief import HeadingBelief
+from agents.deployment.helm_commands import (
+    MANUAL,
+    STANDBY,
+    STEERING,
+    HelmCommands,
+)
 from agents.deployment.nmea import readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.sensors import HelmSensors, Limits
@@ -15,16 +25,15 @@ from shipgym import InputError
 from shipgym.checks import check_number
 from shipgym.tasks.guidance import wrapped
 from shipgym.trials.nmea import NMEA_QUANTITIES
+from shipgym.trials.units import UNITS
 
-STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
 
-
-class Helm:
+class Helm(HelmCommands):
     """An autopilot that waits for its sensors, steers, and hands over after a fault.
 
-    Its state is `standby`, `steering` or, for good, `manual`. Raises InputError for an
-    autopilot that reads what no sentence of NMEA 0183 has, and for one that cannot
-    follow the route or the rate of turn.
+    Its state is `standby`, `steering` or, after a fault, `manual`, which only the
+    helmsman ends. Raises InputError for an autopilot that reads what no sentence of
+    NMEA 0183 has, and for one that cannot follow the route or the rate of turn.
 
     Parameters
     ----------
@@ -40,6 +49,10 @@ class Helm:
     rate : float, optional
         Rate of turn, rad/s, of an autopilot that steers one; with a heading the
         largest.
+    variation : float, optional
+        Magnetic variation, rad, positive to the east; by default that of RMC or HDG.
+    rudder_feedback : bool
+        False: steer without a measured rudder, which then nobody watches.
     """
 
     def __init__(
@@ -49,16 +62,22 @@ class Helm:
         limits: Limits,
         route: Route | None = None,
         rate: float | None = None,
+        variation: float | None = None,
+        rudder_feedback: bool = True,
     ) -> None:
+        super().__init__()
         if rate is not None and heading is not None and isinstance(agent, TurnRate):
             agent = _with_largest_rate(agent, rate)
         self.pilot = Autopilot(agent)
         self.pilot.largest = min(self.pilot.largest, radians(limits.order_deg))
         self.limits = limits
         self.sensors = HelmSensors(limits)
+        self.belief = HeadingBelief(agent, limits)
         self.heading = heading
         self.route = route
         self.rate = rate
+        self.compass = Compass(variation)
+        self.rudder_feedback = rudder_feedback
         self.follows_path = isinstance(agent, Guided)
         self.needed = self._needed()
         self._check(agent)
@@ -66,8 +85,13 @@ class Helm:
         self.state = STANDBY
         self.alarm = ""
         self.warnings: list[str] = []
+        self.notices: list[str] = []  # warnings of others
         self.silent = ["sensors"]  # what it waits for
         self.order = 0.0  # rudder, rad
+        self.commanded: float | None = None  # heading by HSC or HTC, rad
+        self.now = 0.0  # of the last watch, s
+        self.ended_by = ""  # the signal that ended it
+        self.alerts = Alerts()
         self.counts = {"sentences": 0, "damaged": 0}
 
     def _needed(self) -> list[str]:
@@ -75,6 +99,8 @@ class Helm:
         provided = {"set_point", "rate_of_turn"}
         if self.route is not None:
             provided.update(Route.GIVES)
+        if not self.rudder_feedback:
+            provided.add("rudder")
         needed = []
         for name in (*self.pilot.inputs, "rudder"):
             if name not in provided:
@@ -118,43 +144,75 @@ class Helm:
                 f" route, or another without, got '{name}' {preposition} a route"
             )
 
-    def hear(self, line: str, now: float) -> None:
-        """Take in a line that was received at a time, s."""
-        heard = readings(line)
+    def hear(self, line: str, source: str, now: float) -> None:
+        """Take in a line that was received from an address at a time, s."""
+        heard = readings(line, source)
         if heard is None:
             self.counts["damaged"] += 1
             return
         self.counts["sentences"] += 1
-        for reading in heard:
+        for reading in self.compass.true(heard, now):
             self.sensors.take(reading, now)
+            is_steered_by = self.sensors.value(reading.quantity, now) == reading.value
+            if is_steered_by:
+                self.belief.take(reading, now)
+            if reading.quantity == "commanded":
+                self.commanded = reading.value
+        with suppress(ValueError, IndexError):
+            self.alerts.hear(line, now)
 
     def watch(self, step: float, now: float, fault: str | None = None) -> None:
-        """Begin when all sensors are there; hand over for good at a fault.
+        """Begin when all sensors are there; hand over at a fault.
 
         `step`: time since the last call, s; `fault`: one of another part.
         """
+        self.now = now
+        if self.state != STEERING:
+            self.sensors.renew(now)
+        self.follow_plotter(now)
         inputs = self.inputs(now)
         self.silent = []
         for name, value in inputs.items():
             if value is None:
                 self.silent.append(name.replace("_", " "))
 
-        if self.state == STANDBY and not self.silent:
-            self.state = STEERING
-        elif self.state == STEERING and not fault:
+        may_begin = not (self.silent or self.held or fault)
+        if self.state == STANDBY and may_begin:
+            self.begin()
+        elif not fault:
             fault = self._fault(step, now)
-        self.warnings = []
         if fault and self.state == STEERING:
             self.state = MANUAL
             self.alarm = fault
-        elif self.state == STEERING:
-            self.warnings = self.warnings_of(inputs, now)
+            self.question = None
+        self.note_obstacle(fault or "")
+        self.warnings = []
+        if self.state == STEERING:
+            self.warnings = [*self.warnings_of(inputs, now), *self.notices]
+        else:
+            self.order = 0.0
+        self._give_alerts(now)
+
+    def _give_alerts(self, now: float) -> None:
+        """Hand the alarm and the warnings over to alert management."""
+        texts = {warning: warning for warning in self.warnings}
+        if self.alarm:
+            texts["alarm"] = self.alarm
+        self.alerts.update(texts, now)
 
     def _fault(self, step: float, now: float) -> str:
         if self.silent:
             silent = " and no ".join(self.silent)
             return f"no {silent} for {self.limits.silence_s:g} s"
-        fault = self.sensors.fault(self.order, step, now)
+        is_steering = self.state == STEERING
+        order = self.order
+        if not is_steering:  # the rudder follows the helmsman
+            order = self.sensors.value("rudder", now) or 0.0
+        fault = self.sensors.fault(order, step, now, self.read)
+        doubt = self.belief.doubt(self.sensors, now)
+        if doubt and not is_steering:  # look again
+            self.belief = HeadingBelief(self.pilot.agent, self.limits)
+        fault = fault or doubt
         if not fault and self.route is not None and self.route.ended:
             fault = "the end of the route is reached"
         return fault
@@ -168,10 +226,16 @@ class Helm:
     def inputs(self, now: float) -> dict[str, float | None]:
         """Inputs of the autopilot by name; None for what is not known."""
         inputs = self.sensors.numbers(self.needed, now)
+        if not self.rudder_feedback:
+            rudder = self.sensors.value("rudder", now)
+            inputs["rudder"] = self.sensors.expected if rudder is None else rudder
+            inputs["rudder"] = inputs["rudder"] or 0.0
         turns_at_rate = self.rate is not None and self.heading is None
         inputs["rate_of_turn"] = self.rate if turns_at_rate else 0.0
         if self.route is None:
             inputs["set_point"] = self._set_point(now)
+            if "cross_track" in inputs and self.plotted.waiting is not None:
+                inputs["cross_track"] = 0.0  # that of the plotter is from the new leg
             return inputs
 
         latitude = inputs["latitude"]
@@ -186,11 +250,19 @@ class Helm:
             return self.heading
         if self.rate is not None:
             return 0.0
-        plotted = ("leg",) if self.follows_path else ("to_steer", "waypoint_bearing")
-        for quantity in self.sensors.newest:
-            if quantity in plotted:
-                return self.sensors.value(quantity, now)
-        return None
+        if self.commanded is not None and not self.follows_path:
+            return self.commanded
+        return self.plotted.steered(self.plotters_course(now))
+
+    @property
+    def read(self) -> set[str]:
+        """Quantities that it steers by."""
+        read = set(self.needed)
+        if self.heading is None and self.route is None:
+            read.update(self.plotter_quantities)
+        if (read & {"surge", "sway"}) - self.sensors.newest.keys():
+            read |= {"course", "speed", "heading"}
+        return read
 
     def warnings_of(self, inputs: dict[str, float | None], now: float) -> list[str]:
         """Warnings for the helmsman although the autopilot steers."""
@@ -211,6 +283,8 @@ class Helm:
         seconds_to_turn = self.seconds_to_turn(known, now)
         if seconds_to_turn <= self.limits.early_s:
             warnings.append("course change ahead")
+        if self.plotted.waiting is not None:
+            warnings.append("next leg waits to be confirmed")
         return warnings
 
     def seconds_to_turn(self, inputs: dict[str, float], now: float) -> float:
@@ -233,27 +307,68 @@ class Helm:
     @property
     def status(self) -> str:
         """The state, what it waits for, or why it has handed over."""
+        if self.state == STANDBY and self.held:
+            return f"{STANDBY}, by the helmsman"
         if self.state == STANDBY:
-            silent = ", ".join(self.silent)
-            return f"{STANDBY}, waits for {silent}"
+            silent = ", ".join(self.silent or ["steering gear"])
+            return "; ".join([f"{STANDBY}, waits for {silent}", *self.hints])
         if self.alarm:
             return f"{MANUAL}: ALARM, {self.alarm}: take the wheel"
         return ", ".join([self.state, *self.warnings])
 
-    def sentences(self) -> str:
-        """Rudder order and status, and the alarm if there is one."""
-        text = render(
-            "helm.nmea.j2",
-            order=self.order,
-            valid=self.state == STEERING,
-            limit=self.pilot.largest,
-            set_point=self.heading,
-            alarm=self.alarm,
-            track=self.route is not None,
-            rate=self.rate,
-            warnings=self.warnings,
+    @property
+    def hints(self) -> list[str]:
+        """What was heard instead of that for which it waits, and what to do."""
+        hints = []
+        for name in ("heading", "to_steer", "leg"):
+            waits = name.replace("_", " ") in self.silent or (
+                name in self.plotter_quantities and "set point" in self.silent
+            )
+            if waits and self.compass.lacks(name, self.now, self.limits.silence_s):
+                hints = [
+                    "only magnetic bearings heard; no variation (RMC or HDG has one, or"
+                    " start with --variation DEG)"
+                ]
+        if self.silent == ["rudder"]:
+            hints.append("to steer without RSA start with --no-rudder-feedback")
+        return hints
+
+    def sentences(self, last: bool = False) -> str:
+        """Rudder order and status, and alerts; with `last` it steers no more."""
+        is_valid = self.state == STEERING and not last
+        report = self._report(is_valid)
+        order = self.order if is_valid else 0.0
+        text = render("helm.nmea.j2", order=order, **report)
+        return sentences(text) + self.alerts.sentences(self.now)
+
+    def _report(self, is_valid: bool) -> dict[str, Any]:
+        """Fields of HTD, and the status of ROR."""
+        set_point = self.inputs(self.now).get("set_point") if is_valid else None
+        keeps_track = self.follows_path or self.route is not None
+        mode = "S"  # by itself; H by another's command, T a track, M manual
+        if self.heading is None and self.rate is None:
+            mode = "T" if keeps_track else "H"
+
+        is_at_limit = abs(self.order) >= self.pilot.largest
+        wrong = (
+            is_at_limit,
+            "off heading" in self.warnings,
+            "off track" in self.warnings,
         )
-        return sentences(text)
+        statuses = ["V" if is_wrong or not is_valid else "A" for is_wrong in wrong]
+        off_track_miles = self.limits.off_track_m / UNITS["length"]["nm"]
+        return {
+            "status": "A" if is_valid else "V",
+            "mode": mode if is_valid else "M",
+            "limit": self.pilot.largest,
+            "off_heading_deg": self.limits.off_heading_deg,
+            "off_track": f"{off_track_miles:.3f}" if keeps_track else "",
+            "rate": self.rate,
+            "set_point": None if keeps_track else set_point,
+            "track": set_point if keeps_track else None,
+            "statuses": ",".join(statuses),
+            "heading": self.sensors.value("heading", self.now),
+        }
 
 
 def _known(inputs: dict[str, float | None]) -> dict[str, float]:

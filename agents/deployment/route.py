@@ -115,6 +115,15 @@ class Route:
             "second_turn_angle": leg.second_turn,
         }
 
+    def next_course(self) -> float | None:
+        """Direction of the next leg, rad; None on the last."""
+        leg = self.leg
+        return leg.course + leg.turn if leg.turn else None
+
+    def advance(self) -> None:
+        """Go on to the next leg before its turn."""
+        self.leg = leg_after(self.leg, self.scale.turn_radius, self.plan)
+
     def _fix(self, latitude: float, longitude: float) -> Fix:
         """Position on the leg or arc of the ship, after any turns that are over."""
         scale = self.scale

@@ -1,14 +1,15 @@
 """`shipgym simulate`: a ship model with instruments, to steer over NMEA 0183."""
 
 import asyncio
-from collections.abc import Mapping
-from contextlib import closing, suppress
+from collections.abc import Callable, Mapping
+from contextlib import closing
 from math import atan2, cos, degrees, hypot, inf, radians, sin
 from typing import Any
 
 import numpy as np
 
 from agents.deployment.c99 import render
+from agents.deployment.interruptions import interruptions
 from agents.deployment.nmea import Link, readings, sentences
 from shipgym import InputError, ShipModel, Weather
 from shipgym.checks import check_keys, check_number
@@ -51,21 +52,39 @@ class SimulatedShip:
         self.model = model
         self.leg = check_number(leg, "leg")
         self.order = 0.0  # rudder, rad
+        self.ordered_at: float | None = None  # last valid order, s
         self.steps = 0
         self.step = step
         self.passage = Passage(model, Conditions(weather=weather, seed=seed), step)
         self.states = self.passage.states(model.service_state, 1)
 
-    def hear(self, line: str) -> None:
+    def hear(self, line: str, source: str = "") -> None:
         """Take a rudder order; an invalid one lets the rudder go amidships."""
         for reading in readings(line) or ():
             if reading.quantity == "order":
                 self.order = reading.value
+                self.ordered_at = self.time
             elif reading.quantity == "released":
-                self.order = 0.0
+                self.release()
+
+    def release(self) -> None:
+        """Let the rudder go amidships until the next valid order."""
+        self.order = 0.0
+        self.ordered_at = None
+
+    @property
+    def time(self) -> float:
+        """Since she began, s."""
+        return self.steps * self.step
 
     def advance(self) -> None:
-        """Simulate one step; InputError if the ship runs away."""
+        """Simulate one step; InputError if the ship runs away.
+
+        Her rudder goes amidships when the orders that she heard stop.
+        """
+        patience_s = 5.0
+        if self.ordered_at is not None and self.time - self.ordered_at > patience_s:
+            self.release()
         passage = self.passage
         order = np.array([[self.order, self.model.service_shaft_speed]])
         simulate = passage.loop("simulate")
@@ -77,9 +96,8 @@ class SimulatedShip:
             passage.numbers,
         )
         if not is_sound:
-            seconds = self.steps * self.step
             raise InputError(
-                f"model '{self.model.name}' ran away after {seconds:.1f} s"
+                f"model '{self.model.name}' ran away after {self.time:.1f} s"
             )
         self.states[0] = self.states[1]
         self.steps += 1
@@ -166,7 +184,7 @@ class SimulatedShip:
 
     def _time(self) -> str:
         """Time of day as HHMMSS.SS; she begins at midnight."""
-        minutes, seconds = divmod(self.steps * self.step, 60.0)
+        minutes, seconds = divmod(self.time, 60.0)
         hours, minutes = divmod(int(minutes), 60)
         return f"{hours % 24:02d}{minutes:02d}{seconds:05.2f}"
 
@@ -182,26 +200,33 @@ async def simulate_ship(
     ship: SimulatedShip,
     address: str,
     *,
+    gear: str | None = None,
     duration: float = inf,
     speed_up: float = 1.0,
     drop: Mapping[str, float] | None = None,
+    log: Callable[[str], None] | None = None,
 ) -> None:
     """Simulate a ship over NMEA 0183.
 
     Over TCP others connect to the address, over UDP she sends there. Raises InputError
     for an address that cannot be opened, or a type of sentence that she does not send.
+    SIGINT, SIGTERM and SIGHUP end it.
 
     Parameters
     ----------
     ship : SimulatedShip
     address : str
         Address of a `Link`.
+    gear : str, optional
+        Address at which she receives rudder orders; by default on the same connection.
     duration : float
         How long, s of the ship.
     speed_up : float
         Seconds of the ship that pass in one.
     drop : mapping of str to float, optional
         Types of sentence that fall silent, such as HDT, and when, s.
+    log : callable, optional
+        Called with a line when her rudder is steered and when it is released.
     """
     check_number(speed_up, "speed_up", above=0.0)
     dropped = dict(drop or {})
@@ -211,18 +236,31 @@ async def simulate_ship(
 
     loop = asyncio.get_running_loop()
     link = Link(ship.hear)
-    await link.open(address, serve=True)
+    orders = Link(ship.hear)
     begin = loop.time()
-    with closing(link), suppress(asyncio.CancelledError):  # an interruption ends it
-        now = ship.steps * ship.step
-        while now < duration:
-            due = begin + now / speed_up
+    steered = False
+    with closing(link), closing(orders), interruptions():
+        await link.open(address, serve=True, sends=True)
+        if gear not in (None, address):
+            await orders.open(gear, serve=True)
+        while ship.time < duration:
+            due = begin + ship.time / speed_up
             pause = due - loop.time()
             await asyncio.sleep(max(0.0, pause))
-            text = _still_sent(ship.sentences(), dropped, now)
+            text = _still_sent(ship.sentences(), dropped, ship.time)
             link.send(text)
             ship.advance()
-            now = ship.steps * ship.step
+
+            steered_before = steered
+            steered = ship.ordered_at is not None
+            if log is not None and steered != steered_before:
+                log(f"{ship.time:.1f} s: {_GEAR[steered]}")
+
+
+_GEAR = {
+    True: "the rudder follows orders",
+    False: "no valid rudder orders: rudder amidships",
+}
 
 
 def _still_sent(text: str, dropped: Mapping[str, float], now: float) -> str:

@@ -247,7 +247,7 @@ def read_zip(path: Path) -> Any:
 def read_bridge(path: Path) -> Helm:
     """A helm that was told the bytes of a line, and steers by what it understood."""
     helm = Helm(pid(), 0.5, Limits(silence_s=1e9))
-    Line(lambda text: helm.hear(text, 0.0), set()).data_received(
+    Line(lambda text, source: helm.hear(text, source, 0.0), set()).data_received(
         read_bytes(path, "log", LARGEST_TOML)
     )
     for now in range(4):

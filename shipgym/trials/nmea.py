@@ -27,7 +27,6 @@ _SPEED_UNITS = {"N": "knots", "K": "km/h", "M": "m/s"}
 
 #: Sign of a number by the letter of its side; L and R are the sides to steer to.
 _SIGNS = {"N": 1.0, "S": -1.0, "E": 1.0, "W": -1.0, "L": 1.0, "R": -1.0}
-
 Letters = Mapping[int, frozenset[str]]  # letters allowed in a field, by its place
 
 
@@ -50,6 +49,7 @@ class NumberField:
     letters: Letters = field(default_factory=dict)
     only_if: Letters = field(default_factory=dict)
     valid: Letters = field(default_factory=dict)
+    optional: bool = False
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,7 @@ class SentenceKind:
     fields: Mapping[str, NumberField]  # by quantity
     log_fields: Mapping[str, NumberField]  # of logs: the same, and more
     valid: Letters = field(default_factory=dict)
+    mode: Letters = field(default_factory=dict)
     degraded: Letters = field(default_factory=dict)
     time: int | None = None
     date: int | None = None
@@ -78,7 +79,7 @@ class NmeaQuantity:
 def _with_letters(entry: Mapping[str, Any]) -> dict[str, Any]:
     """An entry of the table whose tables of letters are by place."""
     fields = dict(entry)
-    for name in ("valid", "degraded", "letters", "only_if"):
+    for name in ("valid", "mode", "degraded", "letters", "only_if"):
         if name not in entry:
             continue
         by_place = {}
@@ -172,23 +173,41 @@ def parse_sentence(line: str, *, needs_checksum: bool = True) -> Sentence:
 def steering_numbers(sentence: Sentence) -> dict[str, float]:
     """Numbers that an autopilot may steer by, in SI units and radians, by quantity.
 
-    Nothing for a kind that is not known, a status that is not valid, an empty field, or
-    a number beyond any sensor's range. Raises ValueError, KeyError or IndexError where
-    fields are broken or missing.
+    Nothing for a kind that is not known, a status or mode that is not valid, an empty
+    field, or a number beyond any sensor's range. Raises ValueError, KeyError or
+    IndexError where fields are broken or missing.
     """
     kind = NMEA_SENTENCES.get(sentence.kind)
-    if kind is None or kind.log_only:
+    if kind is None or kind.log_only or not _has_mode(kind, sentence.fields):
         return {}
     numbers = {}
     for name, place in kind.fields.items():
         needed = {**kind.valid, **place.letters, **place.only_if}
-        value = _number(place, sentence.fields, needed)
+        fields = sentence.fields
+        if place.optional:
+            fields = _padded(sentence)
+            needed |= _sides(place)
+        value = _number(place, fields, needed)
         if value is None:
             continue
         quantity = NMEA_QUANTITIES[name]
         if abs(value) <= quantity.largest:
             numbers[name] = value
     return numbers
+
+
+def _sides(place: NumberField) -> Letters:
+    """Letters that a number needs for its direction, by place."""
+    return {} if place.side is None else {place.side: frozenset(_SIGNS)}
+
+
+def _has_mode(kind: SentenceKind, fields: Sequence[str]) -> bool:
+    """False where a mode indicator is there and says that it is not to be used."""
+    for at, letters in kind.mode.items():
+        letter = fields[at].strip() if at < len(fields) else ""
+        if letter and letter not in letters:
+            return False
+    return True
 
 
 def logged_numbers(sentence: Sentence) -> dict[str, float]:
@@ -200,7 +219,6 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
     """
     kind = NMEA_SENTENCES[sentence.kind]
     fields = _padded(sentence)
-    sides = frozenset(_SIGNS)
     numbers = {}
     for quantity, place in kind.log_fields.items():
         needed = dict(place.only_if)
@@ -208,8 +226,7 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
         for at, letters in optional.items():
             if fields[at]:
                 needed[at] = letters
-        if place.side is not None:
-            needed[place.side] = sides
+        needed |= _sides(place)
         value = _number(place, fields, needed)
         if value is None:
             continue
@@ -253,6 +270,8 @@ def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float
         unit = _SPEED_UNITS[letter]
     if unit == "ddmm.mm":  # 5430.5 is 54 degrees and 30.5 minutes
         degrees, minutes = divmod(value, 100.0)
+        if not minutes < 60.0 or value < 0.0:
+            raise ValueError(f"expected degrees and minutes below 60, got {text}")
         value = degrees + minutes / 60.0
         unit = "deg"
     value *= _TO_SI[unit]

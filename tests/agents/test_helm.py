@@ -38,7 +38,7 @@ def tell(found, now, heading=0.4, rudder=0.0, talker="HE"):
 
 def test_it_waits_for_all_that_it_reads():
     found = Helm(PID_MARINER, 0.5, Limits())
-    found.hear(sentence("HEHDT", 20.0, "T"), 0.0)
+    found.hear(sentence("HEHDT", 20.0, "T"), "", 0.0)
     found.watch(1.0, 0.0)
     found.steer(0.0)
     assert (found.state, found.order) == (STANDBY, 0.0)
@@ -47,10 +47,14 @@ def test_it_waits_for_all_that_it_reads():
 
 def test_it_steers_to_its_set_point():
     found = helm()
-    found.steer(0.0)
-    assert found.order == pytest.approx(
-        PID_MARINER.gains["proportional"] * 0.1 + PID_MARINER.neutral_rudder
-    )
+    for _ in range(120):  # after the transfer
+        found.steer(0.0)
+    gains = PID_MARINER.gains
+    error_integral = 119.0 * 0.1
+    of_integral = gains["integral"] * error_integral
+    of_error = gains["proportional"] * 0.1
+    expected = PID_MARINER.neutral_rudder + of_error + of_integral
+    assert found.order == pytest.approx(expected)
     assert f"AGROR,{round(np.degrees(found.order), 4)},A" in found.sentences()
 
 
@@ -100,7 +104,8 @@ def test_it_hands_over_when_the_rudder_does_not_follow(rate_deg_s, state):
 
 def test_the_rudder_ordered_is_limited_and_the_helmsman_is_warned():
     found = helm(order_deg=2.0, off_heading_deg=3.0)
-    found.steer(0.0)
+    for _ in range(120):  # after the transfer
+        found.steer(0.0)
     assert found.order == pytest.approx(np.radians(2.0))
     assert found.status == "steering, off heading"
     assert "AGALR,,002,A,V,OFF HEADING" in found.sentences()

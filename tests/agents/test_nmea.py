@@ -63,6 +63,29 @@ from tests.agents.steering import free_port, sentence
                 ("waypoint_distance", 3704.0, "EC"),
             ],
         ),
+        (
+            sentence("HCHDG", 90.0, 2.0, "W", 3.0, "E"),
+            [
+                ("compass_heading", np.pi / 2, "HC"),
+                ("deviation", -np.pi / 90.0, "HC"),
+                ("variation", np.pi / 60.0, "HC"),
+            ],
+        ),
+        (sentence("HCHDM", 90.0, "M"), [("compass_heading", np.pi / 2, "HC")]),
+        (
+            sentence("IIHSC", 90.0, "T", 88.0, "M", "C"),
+            [
+                ("commanded", np.pi / 2, "II"),
+                ("magnetic_commanded", np.radians(88.0), "II"),
+            ],
+        ),
+        (sentence("IIHSC", 90.0, "T", "", "", "R"), []),
+        (
+            sentence("IIHTC", "V", "", "", "S", "N", *[""] * 4, 90.0, "", "", "M"),
+            [("magnetic_commanded", np.pi / 2, "II")],
+        ),
+        (sentence("IIHTC", "V", "", "", "M", "N", *[""] * 4, 90.0, "", "", "T"), []),
+        (sentence("IIHTC", "A", "", "", "S", "N", *[""] * 4, 90.0, "", "", "T"), []),
         (sentence("GPGLL", "5400.0", "N", "00700.0", "E"), []),
         (sentence("HEHDT", "", "T"), []),
         (sentence("HEHDT", 999.0, "T"), []),
@@ -77,6 +100,64 @@ def test_sentences_are_understood_in_si_units(line, expected):
     assert [one.value for one in found] == pytest.approx(
         [value for _, value, _ in expected], abs=1e-4
     )
+
+
+def moded(kind, mode, status="V"):
+    """A sentence with a mode indicator, which is whole in all else."""
+    position = ("5430.0", "N", "00815.0", "W")
+    fields = {
+        "RMC": ("", "A", *position, 9, 90, "010126", "2.0", "W", mode, status),
+        "VTG": (90, "T", "", "M", 10, "N", 18.5, "K", mode),
+        "XTE": ("A", "A", 0.1, "L", "N", mode),
+        "APB": ("A", "A", 0.1, "L", "N", *"VV", 9, "M", 1, 9, "T", 9, "T", mode),
+        "BWC": ("", *position, 45, "T", "", "M", 2.0, "N", 1, mode),
+        "BWR": ("", *position, 45, "T", "", "M", 2.0, "N", 1, mode),
+    }
+    return sentence(f"GP{kind}", *fields[kind])
+
+
+@pytest.mark.parametrize(
+    ("kind", "quantities"),
+    [
+        ("RMC", ["course", "speed", "latitude", "longitude", "variation"]),
+        ("VTG", ["course", "speed"]),
+        ("XTE", ["cross_track"]),
+        ("APB", ["cross_track", "to_steer", "magnetic_leg"]),
+        ("BWC", ["waypoint_bearing", "waypoint_distance"]),
+        ("BWR", ["waypoint_bearing", "waypoint_distance"]),
+    ],
+)
+def test_only_a_mode_in_which_a_receiver_measures_is_steered_by(kind, quantities):
+    for mode in ("A", "D", "R", "F", "P", ""):
+        assert [one.quantity for one in readings(moded(kind, mode))] == quantities
+    for mode in "NSEMX":
+        assert readings(moded(kind, mode)) == []
+
+
+def test_a_receiver_that_does_not_assess_integrity_is_believed_an_unsafe_one_not():
+    assert all(readings(moded("RMC", "A", status)) for status in ("V", "S", "C", ""))
+    assert readings(moded("RMC", "A", "U")) == []
+
+
+@pytest.mark.parametrize(
+    ("north", "side", "found"),
+    [
+        ("5459.9", "N", 54.99833),
+        ("5460.0", "N", None),
+        ("5499.0", "S", None),
+        ("-5430.0", "N", None),
+        ("9030.0", "N", ""),
+        ("5430.0", "E", ""),
+    ],
+)
+def test_a_latitude_has_minutes_below_sixty_and_its_own_letters(north, side, found):
+    line = sentence("GPRMC", "", "A", north, side, "00815.0", "W", 9, 90, "010126")
+    heard = readings(line)
+    if found is None:
+        assert heard is None
+        return
+    latitudes = [one.value for one in heard if one.quantity == "latitude"]
+    assert latitudes == ([pytest.approx(np.radians(found))] if found else [])
 
 
 @pytest.mark.parametrize(
@@ -97,7 +178,7 @@ def test_what_is_damaged_is_told_apart(line):
 
 def test_lines_come_in_any_portions_and_an_endless_one_is_forgotten():
     heard = []
-    line = Line(heard.append, set())
+    line = Line(lambda text, _: heard.append(text), set())
     for portion in (
         b"$HE",
         b"HDT",
@@ -125,7 +206,7 @@ class Wire:
             False,
         )
         if datagrams:
-            self.sendto = lambda data, peer: self.sent.append((data, peer))
+            self.sendto = self.sent.append
 
     def get_extra_info(self, name):
         return self.connected if name == "peername" else None
@@ -139,30 +220,26 @@ class Wire:
         self.closed = True
 
 
-def test_datagrams_go_to_whoever_was_heard_last_or_where_the_socket_is_connected():
+def test_datagrams_go_where_the_socket_is_connected_and_to_nobody_who_spoke():
     open_, connected = Wire(), Wire(connected=("host", 1))
-    lines = [Line(lambda line: None, set()) for _ in range(2)]
+    lines = [Line(lambda *_: None, set()) for _ in range(2)]
     for line, wire in zip(lines, (open_, connected), strict=True):
         line.connection_made(wire)
+        line.datagram_received(b"$HEHDT,1", ("a", 2))
         line.send(b"1")
-    assert (open_.sent, connected.sent) == ([], [(b"1", None)])
-    lines[0].datagram_received(b"$HEHDT,1", ("a", 2))
-    lines[0].send(b"2")
-    lines[0].datagram_received(b"$HEHDT,1", ("b", 3))
-    lines[0].send(b"3")
-    assert open_.sent == [(b"2", ("a", 2)), (b"3", ("b", 3))]
+    assert (open_.sent, connected.sent) == ([], [b"1"])
 
 
 def test_a_datagram_holds_whole_lines():
     heard = []
-    line = Line(heard.append, set())
+    line = Line(lambda text, _: heard.append(text), set())
     for data in (b"$A,1\r\n$B,2", b"$C,3\r\n"):
         line.datagram_received(data, ("a", 2))
     assert heard == ["$A,1", "$B,2", "$C,3"]
 
 
 def test_all_connected_ends_are_sent_to_though_one_is_broken():
-    link = Link(lambda line: None)
+    link = Link(lambda *_: None)
     wires = [Wire(datagrams=False, broken=k == 0) for k in range(3)]
     lines = [link.line() for _ in wires]
     for line, wire in zip(lines, wires, strict=True):
@@ -170,10 +247,11 @@ def test_all_connected_ends_are_sent_to_though_one_is_broken():
     link.send("order")
     assert [wire.sent for wire in wires] == [[], [b"order"], [b"order"]]
     lines[2].connection_lost(None)
-    assert link.ends == {lines[0], lines[1]}
+    assert link.ends == {lines[1]}
     link.others.append(server := Wire())
     link.close()
     assert [one.closed for one in (*wires, server)] == [True, True, False, True]
+    assert lines[0].error == "broken"
 
 
 @pytest.mark.parametrize(
@@ -196,7 +274,7 @@ def test_a_serial_line_has_the_speed_of_the_standard_unless_another_is_named(
             return reader, line
 
         asyncio.get_running_loop().connect_read_pipe = connected
-        link = Link(lambda line: None)
+        link = Link(lambda *_: None)
         await link.open(address)
         link.send("order")
         link.close()
@@ -213,11 +291,11 @@ def test_datagrams_and_a_serial_line_carry_it_too():
     port, heard = free_port(), []
 
     async def talk():
-        ends = [Link(heard.append), Link(lambda line: None)]
+        ends = [Link(lambda text, _: heard.append(text)), Link(lambda *_: None)]
         await ends[0].open(f"udp:127.0.0.1:{port}")
-        await ends[1].open(f"udp:127.0.0.1:{port}", serve=True)
+        await ends[1].open(f"udp:127.0.0.1:{port}", sends=True)
         ends[1].send(sentence("HEHDT", 1.0, "T"))
-        serial = Link(heard.append)
+        serial = Link(lambda text, _: heard.append(text))
         await serial.open(f"serial:{os.ttyname(slave)}@38400")
         os.write(master, sentence("HEHDT", 2.0, "T").encode())
         while len(heard) < 2:
@@ -246,12 +324,12 @@ def test_datagrams_and_a_serial_line_carry_it_too():
 )
 def test_an_address_that_cannot_be_opened_is_refused(address, message):
     with pytest.raises(InputError, match=message):
-        asyncio.run(Link(lambda line: None).open(address))
+        asyncio.run(Link(lambda *_: None).open(address))
 
 
 def test_a_missing_library_is_named_with_its_extra(monkeypatch):
     nmea.library.cache_clear()
     monkeypatch.setitem(sys.modules, "serial", None)
     with pytest.raises(InputError, match=r"pip install 'shipgym\[nmea\]'"):
-        asyncio.run(Link(lambda line: None).open("serial:/dev/null"))
+        asyncio.run(Link(lambda *_: None).open("serial:/dev/null"))
     nmea.library.cache_clear()

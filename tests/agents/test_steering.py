@@ -13,12 +13,13 @@ from typer.testing import CliRunner
 
 from agents import LQ, PID, IntegralLineOfSight, WheelOver
 from agents.cli import app
+from agents.deployment.connection import Connection
 from agents.deployment.helm import MANUAL, STEERING
 from agents.deployment.nmea import readings
 from agents.deployment.route import Route
 from agents.deployment.sensors import Limits
 from agents.deployment.simulated import SimulatedShip, simulate_ship
-from agents.deployment.steering import Connection, steer
+from agents.deployment.steering import steer
 from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError
 from shipgym.ships import load_model
@@ -34,7 +35,7 @@ ROUTE = "latitude,longitude\n54.0,7.5\n54.02,7.5\n54.03,7.52\n"
 class HearingShip(SimulatedShip):
     """She keeps what she hears."""
 
-    def hear(self, line):
+    def hear(self, line, source=""):
         self.heard = [*getattr(self, "heard", []), line]
         super().hear(line)
 
@@ -230,13 +231,15 @@ class AbsentLink:
 
     ends = ()
 
-    def __init__(self, error=None):
-        self.error = error
+    def __init__(self, refusal=None):
+        self.refusal = refusal
 
-    async def open(self, address):
-        if self.error is None:
+    error = ""
+
+    async def open(self, address, *, sends=False):
+        if self.refusal is None:
             await asyncio.sleep(100.0)
-        raise InputError(f"{address}: cannot be opened") from self.error
+        raise InputError(f"{address}: cannot be opened") from self.refusal
 
 
 @pytest.mark.parametrize(
@@ -303,13 +306,20 @@ def test_a_ship_that_runs_away_says_when():
 def test_the_command_steers_with_what_it_is_told_and_fails_after_an_alarm(
     tmp_path, monkeypatch
 ):
-    given, ends = [], [("off", ""), ("manual", "no heading for 3 s")]
+    given = []
+    ends = [
+        ("off", "", ""),
+        ("manual", "no heading for 3 s", ""),
+        ("off", "", "SIGINT"),
+    ]
 
     async def stand_in(pilot, nmea, **more):
         given.append((pilot.kind, nmea, more))
         more["log"]("0.0 s: standby")
-        state, alarm = ends[len(given) - 1]
-        return SimpleNamespace(state=state, alarm=alarm, counts={"damaged": 2})
+        state, alarm, ended_by = ends[len(given) - 1]
+        return SimpleNamespace(
+            state=state, alarm=alarm, counts={"damaged": 2}, ended_by=ended_by
+        )
 
     monkeypatch.setattr("agents.deployment.steering.steer", stand_in)
     PID_MARINER.save(tmp_path / "pid.json")
@@ -367,6 +377,13 @@ def test_the_command_steers_with_what_it_is_told_and_fails_after_an_alarm(
     turn = more["route"].given(np.radians(54.0), np.radians(7.5))
     expected = Route.from_csv(tmp_path / "route.csv", WHEEL_OVER.gains["path_radius"])
     assert turn == expected.given(np.radians(54.0), np.radians(7.5))
+    more_words = ["--gear", "udp:gear:2", "--variation=-3", "--no-rudder-feedback"]
+    ended = CliRunner().invoke(app, [*words, *more_words])
+    assert ended.exit_code == 130
+    assert "ended by SIGINT: the last order is marked invalid" in ended.output
+    _, _, more = given[2]
+    assert (more["gear"], more["rudder_feedback"]) == ("udp:gear:2", False)
+    assert more["variation"] == pytest.approx(np.radians(-3.0))
     wrong = CliRunner().invoke(app, [*words, "--limit", "silense_s=4"])
     assert (wrong.exit_code, "--limit: unknown key 'silense_s'" in wrong.output) == (
         2,
