@@ -443,7 +443,11 @@ def print_table(by_lie: dict[str, list[Outcome]]) -> None:
     print("| --- | --- | --- | --- | --- | --- |")
     for name, outcomes in by_lie.items():
         worst = worst_of(outcomes)
-        longest = "-" if worst.shown_s == inf else f"{worst.shown_s:.0f}"
+        longest = f"{worst.shown_s:.0f}"
+        if worst.shown_s == inf:
+            longest = "-"
+        elif worst.shown_s < 0.0:
+            longest = "before it shows"
         print(
             f"| {name} | {worst.alarms} of {worst.feeds} | {worst.in_time} |"
             f" {longest} | {worst.off_deg:.1f} | {worst.alarm} |"

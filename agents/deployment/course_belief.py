@@ -20,7 +20,7 @@ class CourseCheck:
     memory_s = 600.0  # in which a current may change
     #: Drift angle of a turning ship, in the angle that she turns in a ship length.
     drift = 0.45
-    uncertain_drift = 0.3
+    uncertain_drift = 0.5
     #: Times, in those to travel a ship length: in which drift follows the rate of turn,
     #: and in which a turn is forgotten.
     smoothing = 0.4

@@ -269,8 +269,11 @@ class HelmSensors:
         reach = radians(self.limits.rudder_rate_deg_s) * step
         to_go = order - self.expected
         self.expected += min(max(to_go, -reach), reach)
+
         low, high = self.reachable
-        self.reachable = min(low + reach, order), max(high - reach, order)
+        low = min(low + reach, order)
+        high = max(high - reach, order)
+        self.reachable = low, high
 
     def _rudder_fault(self, order: float, now: float) -> str:
         """Compare the rudder with where its orders brought it, slowly or fast."""
