@@ -17,6 +17,7 @@ from agents.deployment.ship_response import (
     HeadingObserver,
     RudderAlone,
     ShipResponse,
+    WaveYaw,
     response_of,
 )
 from shipgym.tasks.guidance import wrapped
@@ -54,40 +55,54 @@ class Heard:
         self.rate: tuple[float, float] | None = None
         self.turned = 0.0
         self.angle = 0.0
+        self.angle_then = 0.0  # at the newest heading
         self.jumps = LeakySum(memory=10.0)
         self.rate_jumps = LeakySum(memory=10.0)
 
     def take_heading(self, heading: float, now: float) -> None:
         """Take in a heading, rad."""
+        angle = self.angle_at(now)
         if self.heading is not None:
             before, then = self.heading
             step = now - then
             change = float(wrapped(heading - before))
             self.turned += change
-            self.jumps.add(float(self._is_jump(change, step)), step)
+            is_jump = self._is_jump(change, angle - self.angle_then, step)
+            self.jumps.add(float(is_jump), step)
         self.heading = heading, now
+        self.angle_then = angle
 
-    def _is_jump(self, change: float, step: float) -> bool:
+    def _is_jump(self, change: float, by_rate: float, step: float) -> bool:
         """Compare the change of the heading with what the rate makes in a step, s."""
-        by_rate = 0.0
-        uncertain = self.ship.turning
+        uncertain = self.ship.turning * step
         if self.rate is not None:
-            by_rate = self.rate[0] * step
-            uncertain = 0.5 * abs(self.rate[0])
-        return abs(change - by_rate) > self.jump + uncertain * step
+            uncertain = 0.5 * abs(by_rate)
+        return abs(change - by_rate) > self.jump + uncertain
 
     def take_rate(self, rate: float, now: float) -> None:
         """Take in a rate of turn, rad/s."""
         if self.rate is not None:
             before, then = self.rate
             step = now - then
+            self._place_heading(rate, now)
             self.angle += 0.5 * (before + rate) * step
             largest = self.rate_jump + self.ship.turning * step
             self.rate_jumps.add(float(abs(rate - before) > largest), step)
         self.rate = rate, now
 
+    def _place_heading(self, rate: float, now: float) -> None:
+        """Find the angle at the newest heading between two rates, the later one now."""
+        if self.rate is None or self.heading is None:
+            return
+        before, begin = self.rate
+        _, then = self.heading
+        if begin < then < now:
+            share = (then - begin) / (now - begin)
+            mean = before + 0.5 * share * (rate - before)
+            self.angle_then = self.angle + mean * (then - begin)
+
     def angle_at(self, now: float) -> float:
-        """Integral of the rate of turn until a time, s."""
+        """Integral of the rate of turn until a time, s, with its newest value."""
         if self.rate is None:
             return self.angle
         rate, then = self.rate
@@ -127,6 +142,8 @@ class HeadingBelief:
         self.bias = 0.0  # mean rate of turn of the last minute, rad/s
         self.off_rate = 0.0
         self.observer = HeadingObserver(self.ship)
+        self.waves = WaveYaw()
+        self.unanswered = Lasting(limits.persistence_s)
         self.rudder_alone = RudderAlone(self.ship)
         self.course = CourseCheck(self.ship, limits.course_deg, limits.persistence_s)
         self.before: Motion | None = None
@@ -151,7 +168,7 @@ class HeadingBelief:
         return (
             self._noise()
             or self._against_rate(motion, before, now, step)
-            or self._against_rudder(motion, before, step)
+            or self._against_rudder(motion, before, now, step)
             or self._against_course(motion, now, step)
         )
 
@@ -160,14 +177,14 @@ class HeadingBelief:
         heard = self.heard
         if heard.heading is None or sensors.value("heading", now) is None:
             return None
-        heading, then = heard.heading
+        heading, _ = heard.heading
         over_ground = _velocity(sensors, now)
         speed = self._speed(sensors.value("surge", now), over_ground)
         return Motion(
             heading=heading,
             turned=heard.turned,
             rate=sensors.value("yaw_rate", now),
-            rate_angle=heard.angle_at(then),
+            rate_angle=heard.angle_then,
             rudder=sensors.value("rudder", now),
             speed=speed,
             over_ground=over_ground,
@@ -226,12 +243,15 @@ class HeadingBelief:
             return "the rate of turn stands still while the heading changes"
         return ""
 
-    def _against_rudder(self, motion: Motion, before: Motion, step: float) -> str:
+    def _against_rudder(
+        self, motion: Motion, before: Motion, now: float, step: float
+    ) -> str:
         """Compare the heading with the ship's answer to her rudder."""
         if motion.rudder is None:
             return ""
+        change = motion.turned - before.turned
         residual = self.observer.observe(
-            turned=motion.turned - before.turned,
+            turned=change,
             rudder=motion.rudder,
             speed=motion.speed,
             step=step,
@@ -245,10 +265,9 @@ class HeadingBelief:
         )
         if alone > DEVIATIONS * self.noise:
             return "the heading does not move under rudder"
-        if abs(residual) > DEVIATIONS * self.yaw + self.observer.doubt:
-            has_jumped = self.heard.jumps.value > 0.5
-            if has_jumped:
-                return "the heading jumps"
+        swing = max(self.yaw, self.waves.observe(change, step))
+        is_off = abs(residual) > DEVIATIONS * swing + self.observer.doubt
+        if self.unanswered.observe(is_off, now):
             return "the heading does not answer to the rudder"
         return ""
 

@@ -5,6 +5,7 @@ rudder gives per ship length); Fossen 2011, Handbook of Marine Craft Hydrodynami
 Motion Control, 7.2 (Nomoto's form with nonlinear damping).
 """
 
+from math import exp, sqrt
 from typing import Any, NamedTuple
 
 from agents.controllers.controller import Controller
@@ -117,6 +118,34 @@ class HeadingObserver:
         change = share * effect * abs(off) - forgotten * self.doubt_rate
         self.doubt_rate += change * step
         self.doubt += (self.doubt_rate - forgotten * self.doubt) * step
+
+
+class WaveYaw:
+    """Standard deviation of the heading in waves, by two high-pass filters in series.
+
+    A turn passes neither, a heading that begins to drift for a moment.
+    """
+
+    memory_s = 5.0  # of the filters
+    mean_s = 60.0
+
+    def __init__(self) -> None:
+        self.elapsed = 0.0  # s
+        self.fast = 0.0  # rad
+        self.faster = 0.0
+        self.mean_square = 0.0
+
+    def observe(self, turned: float, step: float) -> float:
+        """Take a change of the heading, rad, in a step, s; the deviation, rad."""
+        kept = exp(-step / self.memory_s)
+        before = self.fast
+        self.fast = kept * self.fast + turned
+        self.faster = kept * self.faster + self.fast - before
+
+        self.elapsed += step
+        share = step / min(max(self.elapsed, self.memory_s), self.mean_s)
+        self.mean_square += share * (self.faster**2 - self.mean_square)
+        return sqrt(self.mean_square)
 
 
 class RudderAlone:

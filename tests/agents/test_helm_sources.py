@@ -94,8 +94,8 @@ def test_a_ship_that_yaws_fast_has_one_compass():
     [
         [(sentence("SDDPT", depth, "0"), HERE) for depth in (9.0, 12.0)],
         [(sentence("IIVBW", knots, 0.0, "A", "", "", "V"), HERE) for knots in (9, 19)],
-        [(sentence("GPVTG", 0, "T", "", "M", 9, "N"), HERE)],
-        [(sentence("GPVTG", 3, "T", "", "M", 19, "N"), "10.0.0.2:1")],
+        [(sentence("GPVTG", 5, "T", "", "M", 9, "N"), HERE)],
+        [(sentence("GPVTG", 190, "T", "", "M", 1, "N"), "10.0.0.2:1")],
         [("x", "10.0.0.9:9"), ("\xff$", "10.0.0.9:1")],
     ],
 )
