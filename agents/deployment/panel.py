@@ -17,7 +17,6 @@ from typing import Any
 
 from rich.console import Console
 
-from agents.deployment import steering
 from agents.deployment.display import HelmView
 from agents.deployment.heard import HeardSentences
 from agents.deployment.helm import Helm
@@ -25,7 +24,7 @@ from agents.deployment.helm_commands import STEERING
 from agents.deployment.keys import is_foreground, keyboard
 from agents.deployment.screen import Screen
 from agents.deployment.sentence_log import SentenceLog
-from agents.deployment.steering import HelmObserver
+from agents.deployment.steering import HelmObserver, steer
 from agents.deployment.web_page import HelmPage
 from shipgym import InputError
 
@@ -209,9 +208,7 @@ async def steer_with(
 ) -> Helm:
     """Steer as `steer` does, watched by a panel."""
     async with panel as (observer, log):
-        return await steering.steer(
-            *arguments, log=log, observers=[observer], **options
-        )
+        return await steer(*arguments, log=log, observers=[observer], **options)
 
 
 def _print_all(lines: Iterable[str], write: Callable[[str], None]) -> None:
