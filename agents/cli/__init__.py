@@ -156,6 +156,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # names of files may have any bytes
             stream.reconfigure(errors="backslashreplace")
+    os.environ["PYTHONSAFEPATH"] = "1"  # for processes that libraries start
     warnings.showwarning = _show_warning  # names in it come from files
     try:
         app(prog_name="shipgym")
