@@ -8,9 +8,12 @@ import sys
 
 # `python -m agents.cli` finds modules in the working folder first, where a stranger's
 # may lie; while it imports this package, its first argument is still "-m"
-if sys.argv[:1] == ["-m"] and not sys.flags.safe_path:
-    if __path__ != [sys.path[0] + os.sep + "agents"]:  # it is no checkout
-        del sys.path[0]
+if (
+    sys.argv[:1] == ["-m"]
+    and not sys.flags.safe_path
+    and __path__ != [sys.path[0] + os.sep + "agents"]  # as in a checkout
+):
+    del sys.path[0]
 
 import lazy_loader
 

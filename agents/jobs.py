@@ -7,6 +7,7 @@ has one thread, and jobs and results pass through JSON in every case.
 import json
 import logging
 import os
+import signal
 import socket
 import sys
 import threading
@@ -18,6 +19,7 @@ from contextlib import chdir, closing, contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -231,17 +233,32 @@ def _in_processes(function: JobFunction, texts: list[str], workers: int) -> Fini
         pre_dispatch=workers,
     )
     try:
-        with (
-            _environment(SAFE),
-            warnings.catch_warnings(),
-            closing(run(_calls(function, texts))) as finished,
-        ):
+        with _environment(SAFE), _interrupts_held():
+            results = run(_calls(function, texts))
+        with warnings.catch_warnings(), closing(results) as finished:
             warnings.filterwarnings("ignore", ".*tasks which were still being")
             yield from finished
     except BrokenProcessPool:
         raise _killed_worker() from None
     finally:
         get_reusable_executor().shutdown(wait=True, kill_workers=True)
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold Ctrl-C back while processes start, so that it never reaches them.
+
+    They inherit this and would end with tracebacks, which this process ends itself.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # its start would let Ctrl-C through
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _on_ray(function: JobFunction, texts: list[str], where: JobEngine) -> Finished:

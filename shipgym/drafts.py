@@ -1,7 +1,7 @@
 """Files and folders written under a draft's name and renamed when complete.
 
-Where others may write, as in /tmp, a name that can be guessed would let a link of theirs
-lead elsewhere: a draft has random letters in its name, and is made, never opened.
+Where others may write, as in /tmp, a name that can be guessed would let a link of
+theirs lead elsewhere: a draft has random letters in its name, and is always new.
 """
 
 import os

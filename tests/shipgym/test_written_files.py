@@ -79,8 +79,10 @@ def test_a_draft_has_a_random_name_and_never_follows_what_lies_there(
         guessed.symlink_to(target)
         with pytest.raises(FileExistsError), draft_folder(tmp_path / "a"):
             pass
+        assert guessed.is_symlink()
     assert victim.read_text() == "precious"
-    assert {path.name for path in tmp_path.iterdir() if path.is_file()} == {"victim"}
+    assert not (tmp_path / "a").exists()
+    assert not (tmp_path / "nowhere").exists()
 
 
 @pytest.mark.parametrize("error", [errno.EXDEV, errno.EBUSY])
