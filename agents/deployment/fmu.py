@@ -14,7 +14,7 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 from agents.deployment.c99 import Source, render
 from shipgym import InputError
 from shipgym.checks import check_choice
-from shipgym.drafts import atomic_path
+from shipgym.drafts import atomic_path, draft_folder
 
 
 def write_fmu(source: Source, path: str | Path, fmi: str = "3.0") -> None:
@@ -100,7 +100,8 @@ def _compiled(files: dict[str, str], name: str) -> bytes:
     flags = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")
     command = [compiler, *flags, "fmu.c", f"{name}.c", "-o", "fmu.so", "-lm"]
     compiling_s = 120.0
-    with tempfile.TemporaryDirectory() as folder:
+    home = Path(tempfile.gettempdir(), "shipgym-fmu")
+    with draft_folder(home) as folder:  # that of a killed process is removed
         for file, text in files.items():
             path = Path(folder, Path(file).name)
             path.write_text(text, encoding="utf-8")

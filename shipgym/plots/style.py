@@ -85,9 +85,28 @@ def panels(
     for name, settings in axes.items():
         drawn[name] |= settings
     drawn |= layout(height, titled=is_titled, **changes)
-    figure.layout = drawn
-    figure.add_traces(_placed_traces(shown))
+    figure.layout = plain_texts(drawn)
+    figure.add_traces([plain_texts(trace) for trace in _placed_traces(shown)])
     return figure
+
+
+def plain_texts(part: Any) -> Any:
+    """A part of a figure whose texts mean no mark-up to plotly: names come from files.
+
+    Its `hovertemplate`, which is ours, stays.
+    """
+    if isinstance(part, str):
+        return part.replace("&", "&amp;").replace("<", "&lt;")
+    if isinstance(part, dict):
+        return {
+            key: value if key == "hovertemplate" else plain_texts(value)
+            for key, value in part.items()
+        }
+    if isinstance(part, np.ndarray) and part.dtype.kind in "OU":
+        part = part.tolist()
+    if isinstance(part, list | tuple):
+        return [plain_texts(value) for value in part]
+    return part
 
 
 def _axes(shown: Sequence[Panel]) -> dict[str, dict[str, Any]]:
