@@ -19,6 +19,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_table
 from shipgym.envs.episode import Episode
 from shipgym.envs.episode_file import SERIES, from_file, to_file
+from shipgym.envs.registration import check_named
 from shipgym.errors import InputError
 from shipgym.extras import library
 from shipgym.trials.trial import Trial
@@ -69,6 +70,7 @@ def to_minari(
     actions. The infos of the dataset hold all that `RecordEpisode` recorded.
 
     Raises InputError for no episodes or episodes of several environments, for an
+    environment that is not registered or code that a recording names, for an
     episode without a seed or whose rewards differ by more than rounding when it is run
     again, and if Minari is not installed.
 
@@ -89,7 +91,9 @@ def to_minari(
             f" {len(environments)}"
         )
 
-    env = gymnasium.make(episodes[0].environment, **episodes[0].arguments)
+    first = episodes[0]
+    check_named(first.environment, first.arguments, "episodes[0]")
+    env = gymnasium.make(first.environment, **first.arguments)
     buffers = []
     for index, episode in enumerate(episodes):
         observations = _observations(env, episode, f"episodes[{index}]")
