@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.controllers.interface import Policy, check_names, check_scales
-from shipgym import InputError, ShipModel, load_model
+from shipgym import InputError, ShipModel
 from shipgym.checks import check_whole
 from shipgym.envs.engine import Engine
 from shipgym.tasks.task import Task, course_keeping_task
@@ -53,7 +53,7 @@ def check_controller(
         Control intervals.
     """
     check_whole(n_steps, "n_steps", at_least=2)
-    ship = model or load_model("mariner")
+    ship = ship_of("mariner" if model is None else model)
     asked = task or course_keeping_task()
     name = type(controller).__name__
     check_signature(controller, name)

@@ -65,7 +65,7 @@ def margin_uncertainty(
         raise InputError("models: expected at least one, got none")
     found = []
     stable = []
-    for model in models:
+    for model in map(ship_of, models):
         try:
             found.append(controller.margins_on(model))
             stable.append(True)

@@ -29,6 +29,7 @@ from agents.controllers.law import (
 from agents.controllers.lq import LQ
 from shipgym import ShipModel
 from shipgym.checks import check_number
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.linear import linearise, straight_running
 from shipgym.tasks.task import Task, path_following_task
 
@@ -91,6 +92,7 @@ class WheelOver(Guided):
     }
 
     @classmethod
+    @takes_name
     def from_model(
         cls,
         model: ShipModel,

@@ -288,9 +288,9 @@ class _NewCourse:
 
 
 def _ships(models: ShipModel | Sequence[ShipModel]) -> list[ShipModel]:
-    if isinstance(models, ShipModel):
-        return [models]
-    ships = list(models)
+    if isinstance(models, ShipModel | str | Path):
+        return [ship_of(models)]
+    ships = [ship_of(model) for model in models]
     if not ships:
         raise InputError("models: expected at least one, got none")
     return ships

@@ -12,6 +12,7 @@ from shipgym.arrays import finite
 from shipgym.checks import check_number
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import Structure
+from shipgym.ships.by_name import takes_name
 
 
 def table_of(model: ShipModel) -> Structure:
@@ -24,6 +25,7 @@ def table_of(model: ShipModel) -> Structure:
     return model.table
 
 
+@takes_name
 def sensitivity(
     model: ShipModel, manoeuvre: Callable[[ShipModel], Trial], change: float = 0.01
 ) -> dict[str, float]:

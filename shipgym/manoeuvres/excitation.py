@@ -11,11 +11,13 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import number_of_steps
 from shipgym.sea.conditions import Weather
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.trial import Trial
 
 
+@takes_name
 def prbs_rudder(
     model: ShipModel,
     amplitude_deg: float = 10.0,
@@ -79,6 +81,7 @@ def prbs_rudder(
     )
 
 
+@takes_name
 def multi_sine_rudder(
     model: ShipModel,
     amplitude_deg: float = 10.0,
@@ -149,6 +152,7 @@ def _least_crest(harmonics: Floats, turns: Floats, seed: Seed) -> Floats:
     return np.asarray(waves[best] / crests[best])
 
 
+@takes_name
 def random_rudder_steps(
     model: ShipModel,
     largest_deg: float = 20.0,
@@ -182,6 +186,7 @@ def random_rudder_steps(
     )
 
 
+@takes_name
 def shaft_speed_steps(
     model: ShipModel,
     lowest_ratio: float = 0.5,

@@ -12,6 +12,7 @@ from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres.quantiles import LEVELS_95, quantiles
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.standard import standard_manoeuvres
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 
 #: From a ship to the indices of one of her manoeuvres, a dataclass such as
@@ -88,6 +89,7 @@ class IndexInterval:
         return ", ".join(lost)
 
 
+@takes_name
 def index_intervals(
     model: ShipModel,
     manoeuvre: str | Evaluation = "zigzag 20/20, starboard first",

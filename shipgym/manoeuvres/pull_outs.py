@@ -14,6 +14,7 @@ from shipgym.manoeuvres.execution import require, rudder, turning_rudder
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.trial import Trial
@@ -32,6 +33,7 @@ class PullOutIndices:
     residual_rate_deg_s: float
 
 
+@takes_name
 def pull_out(
     model: ShipModel,
     rudder_deg: float = 20.0,

@@ -10,6 +10,7 @@ import numpy as np
 
 from shipgym.checks import check_text
 from shipgym.errors import InputError, UnstableModelError
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import KINDS, Trial
 
@@ -135,6 +136,7 @@ def families_of(
     }
 
 
+@takes_name
 def standard_manoeuvres(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, Manoeuvre]:

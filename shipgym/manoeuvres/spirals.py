@@ -20,6 +20,7 @@ from shipgym.manoeuvres.execution import is_ordered, require, rudder
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.linear import is_course_stable
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Conditions, Seed
@@ -83,6 +84,7 @@ class _Curve(NamedTuple):
     rates: Floats  # deg/s
 
 
+@takes_name
 def direct_spiral(
     model: ShipModel,
     rudder_deg: Sequence[float] = DIRECT_RUDDER_DEG,
@@ -117,6 +119,7 @@ def direct_spiral(
     )
 
 
+@takes_name
 def reverse_spiral(
     model: ShipModel,
     yaw_rate_deg_s: Sequence[float] | None = None,

@@ -14,6 +14,7 @@ from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipEquations, ShipModel
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
@@ -129,6 +130,7 @@ def goes_astern(model: ShipModel) -> bool:
     return isinstance(model.dynamics, ShipEquations) and model.dynamics.astern
 
 
+@takes_name
 def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
     """Full astern stopping test: the shaft astern as fast as ahead, until at rest.
 
@@ -175,6 +177,7 @@ def stopping_indices(
     )
 
 
+@takes_name
 def acceleration(
     model: ShipModel,
     start_ratio: float = 0.25,

@@ -17,6 +17,7 @@ from shipgym.manoeuvres.execution import (
 )
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.navigation import rotate_to_body
@@ -60,6 +61,7 @@ class _SteadyTurn(NamedTuple):
     drift_deg: float | None
 
 
+@takes_name
 def turning_circle(
     model: ShipModel,
     rudder_deg: float = 35.0,

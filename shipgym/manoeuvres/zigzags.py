@@ -21,6 +21,7 @@ from shipgym.manoeuvres.execution import (
 )
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Conditions, Passage, Seed, as_trial, orders
 from shipgym.trials.trial import Trial
@@ -41,6 +42,7 @@ class ZigzagIndices:
     period_s: float | None  # time from the first to the third reversal, s
 
 
+@takes_name
 def zigzag(
     model: ShipModel,
     rudder_deg: float = 20.0,

@@ -14,6 +14,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.inertia import inertia
 from shipgym.ships.ship_model import ShipModel
 
@@ -375,6 +376,7 @@ class StraightLineStability:
         )
 
 
+@takes_name
 def straight_line_stability(model: ShipModel) -> StraightLineStability:
     """Straight-line stability with rudder, speed and shaft fixed and roll balanced.
 

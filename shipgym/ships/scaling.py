@@ -7,6 +7,7 @@ import numpy as np
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.envelope import Envelope
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.particulars_limits import LIMITS
@@ -14,6 +15,7 @@ from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.term_table import Structure
 
 
+@takes_name
 def scale_model(
     model: ShipModel,
     length: float,

@@ -9,6 +9,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.engine.records import field_types
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.manoeuvring_model import ship_of
 from shipgym.ships.ship_model import ShipModel
 from shipgym.tasks.contract import ObservationSpec
@@ -46,6 +47,7 @@ def observation_scales(model: ShipModel) -> Floats:
     return np.array(scales)
 
 
+@takes_name
 def control_interval(model: ShipModel) -> float:
     """Control interval of a ship, s: about a twentieth of the time to travel a length.
 
