@@ -57,10 +57,10 @@ def _evaluated(annotation: Any, function: Any) -> Any:
     if not isinstance(annotation, str):
         return annotation
     import shipgym
-    from shipgym.ships.term_table import Structure
 
-    names = {name: getattr(shipgym, name) for name in ("ShipModel", "Trial")}
-    names["Structure"] = Structure
+    names = {}  # of types that modules import only for annotations
+    for home in (shipgym, shipgym.ships):
+        names |= {name: getattr(home, name) for name in dir(home)}
     try:
         return eval(annotation, {**names, **inspect.unwrap(function).__globals__})
     except (NameError, AttributeError, TypeError):
@@ -99,10 +99,10 @@ def _fits(value: Any, expected: Any) -> bool:
 
 
 def _is_instance(value: Any, expected: type) -> bool:
-    try:
-        return isinstance(value, expected)
-    except TypeError:  # a protocol that cannot be asked at run time
-        return True
+    if getattr(expected, "_is_protocol", False):
+        members = [name for name in vars(expected) if not name.startswith("_")]
+        return all(hasattr(value, name) for name in members)
+    return isinstance(value, expected)
 
 
 def _is_numeric(value: Any) -> bool:

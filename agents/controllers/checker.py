@@ -15,7 +15,9 @@ from agents.controllers.interface import Policy, check_names, check_scales
 from shipgym import InputError, ShipModel
 from shipgym.checks import check_whole
 from shipgym.envs.engine import Engine
+from shipgym.ships.by_name import ship_of
 from shipgym.tasks.task import Task, course_keeping_task
+from shipgym.wrong_types import typed
 
 Observations = NDArray[np.float32]
 
@@ -23,6 +25,7 @@ N_SHIPS = 3
 SIGNATURE = "predict(observation, state=None, episode_start=None, deterministic=True)"
 
 
+@typed
 def check_controller(
     controller: Policy,
     model: ShipModel | None = None,

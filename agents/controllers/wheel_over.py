@@ -32,6 +32,7 @@ from shipgym.checks import check_number
 from shipgym.ships.by_name import takes_name
 from shipgym.ships.linear import linearise, straight_running
 from shipgym.tasks.task import Task, path_following_task
+from shipgym.wrong_types import typed
 
 # what a ship is slow to begin a turn with, as measured on the reference ships, ship
 # lengths
@@ -93,6 +94,7 @@ class WheelOver(Guided):
 
     @classmethod
     @takes_name
+    @typed
     def from_model(
         cls,
         model: ShipModel,

@@ -13,6 +13,7 @@ from shipgym.checks import check_number
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import Structure
 from shipgym.ships.by_name import takes_name
+from shipgym.wrong_types import typed
 
 
 def table_of(model: ShipModel) -> Structure:
@@ -26,6 +27,7 @@ def table_of(model: ShipModel) -> Structure:
 
 
 @takes_name
+@typed
 def sensitivity(
     model: ShipModel, manoeuvre: Callable[[ShipModel], Trial], change: float = 0.01
 ) -> dict[str, float]:

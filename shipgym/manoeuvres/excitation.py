@@ -15,9 +15,11 @@ from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.trial import Trial
+from shipgym.wrong_types import typed
 
 
 @takes_name
+@typed
 def prbs_rudder(
     model: ShipModel,
     amplitude_deg: float = 10.0,
@@ -82,6 +84,7 @@ def prbs_rudder(
 
 
 @takes_name
+@typed
 def multi_sine_rudder(
     model: ShipModel,
     amplitude_deg: float = 10.0,
@@ -153,6 +156,7 @@ def _least_crest(harmonics: Floats, turns: Floats, seed: Seed) -> Floats:
 
 
 @takes_name
+@typed
 def random_rudder_steps(
     model: ShipModel,
     largest_deg: float = 20.0,
@@ -187,6 +191,7 @@ def random_rudder_steps(
 
 
 @takes_name
+@typed
 def shaft_speed_steps(
     model: ShipModel,
     lowest_ratio: float = 0.5,

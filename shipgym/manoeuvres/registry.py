@@ -13,6 +13,7 @@ from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import KINDS, Trial
+from shipgym.wrong_types import typed
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -91,6 +92,7 @@ class Family:
 FAMILIES: dict[str, Family] = {}
 
 
+@typed
 def register_manoeuvre(
     name: str, variants: Variants, title: str = "", kind: str | None = None
 ) -> None:
@@ -137,6 +139,7 @@ def families_of(
 
 
 @takes_name
+@typed
 def standard_manoeuvres(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, Manoeuvre]:

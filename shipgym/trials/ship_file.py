@@ -17,6 +17,7 @@ from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import USES, Trial, cut_trials, trial_of
 from shipgym.trials.trial_entries import TrialEntry, read_entries
 from shipgym.trials.trial_import import import_tables
+from shipgym.wrong_types import typed
 
 _SECTIONS = (
     "ship",
@@ -60,6 +61,7 @@ class ShipFile:
     structure: Structure | None = None
 
     @classmethod
+    @typed
     def load(cls, path: str | Path) -> Self:
         """Read and check a ship file; its logs must exist, :meth:`trials` reads them.
 
