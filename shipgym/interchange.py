@@ -16,7 +16,7 @@ import gymnasium
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_table
+from shipgym.checks import check_table, shown
 from shipgym.envs.episode import Episode
 from shipgym.envs.episode_file import SERIES, from_file, to_file
 from shipgym.envs.registration import check_named
@@ -57,6 +57,8 @@ def from_frame(frame: DataFrame) -> Trial | Episode:
 
     Raises InputError for any other frame.
     """
+    if not hasattr(frame, "attrs"):
+        raise InputError(f"frame: expected a pandas DataFrame, got {shown(frame)}")
     series = {str(name): column.to_numpy() for name, column in frame.items()}
     remedy = "for the frame of a log use Trial.from_frame"
     return _rebuild(frame.index.to_numpy(), series, frame.attrs, remedy)

@@ -3,10 +3,12 @@
 import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from shipgym.checks import shown
 from shipgym.errors import InputError
@@ -56,11 +58,10 @@ def _evaluated(annotation: Any, function: Any) -> Any:
         return None
     if not isinstance(annotation, str):
         return annotation
-    import shipgym
-
-    names = {}  # of types that modules import only for annotations
-    for home in (shipgym, shipgym.ships):
-        names |= {name: getattr(home, name) for name in dir(home)}
+    names: dict[str, Any] = {}  # of types that modules import only for annotations
+    for home in ("shipgym", "shipgym.ships"):
+        module = import_module(home)
+        names |= {name: getattr(module, name) for name in dir(module)}
     try:
         return eval(annotation, {**names, **inspect.unwrap(function).__globals__})
     except (NameError, AttributeError, TypeError):
@@ -76,6 +77,8 @@ def _fits(value: Any, expected: Any) -> bool:
     origin = get_origin(expected)
     inner = get_args(expected)
     if origin in (Union, UnionType):
+        if set(get_args(ArrayLike)) <= set(inner):
+            return _is_numeric(value) or (value is None and type(None) in inner)
         return any(_fits(value, one) for one in inner)
     if expected is None or expected is type(None):
         return value is None
@@ -89,12 +92,14 @@ def _fits(value: Any, expected: Any) -> bool:
         if isinstance(value, str | bytes) or not hasattr(value, "__len__"):
             return False
         return not inner or all(_fits(one, inner[0]) for one in list(value)[:100])
+    if origin is Callable:
+        return callable(value)
     if origin is not None:
         return not isinstance(origin, type) or isinstance(value, origin)
     if expected is float:
         return _is_numeric(value) and np.ndim(value) == 0
     if expected is int:
-        return isinstance(value, int | np.integer) and abs(value) < 2**63
+        return isinstance(value, int | np.integer) and -(2**63) <= value < 2**63
     return not isinstance(expected, type) or _is_instance(value, expected)
 
 

@@ -20,11 +20,10 @@ def load_numba() -> ModuleType:
     sys.modules["yaml"] = None  # type: ignore[assignment]
     try:
         with warnings.catch_warnings(action="ignore"):  # that YAML is missing
-            import numba
             from numba.core import config
     finally:
         del sys.modules["yaml"]
         if yaml is not None:
             sys.modules["yaml"] = yaml
     config._config_fname = ""  # it is looked for again at each compilation
-    return numba
+    return sys.modules["numba"]

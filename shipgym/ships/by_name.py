@@ -3,6 +3,7 @@
 import functools
 import inspect
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -33,13 +34,11 @@ def takes_name(function: Function) -> Function:
 
 def ship_of(model: Any) -> Any:
     """The model itself, or that of a name or a file."""
-    from shipgym.ships.catalogue import load_model
-    from shipgym.ships.ship_model import ShipModel
-
-    if isinstance(model, ShipModel):
+    ships = import_module("shipgym.ships")
+    if isinstance(model, ships.ShipModel):
         return model
     if isinstance(model, str | Path):
-        return load_model(model)
+        return ships.load_model(model)
     raise InputError(
         f"model: expected a ship model, its name or its file, got {shown(model)}"
     )

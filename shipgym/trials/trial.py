@@ -109,6 +109,7 @@ class Trial:
     over_ground: bool
     notes: tuple[str, ...]
 
+    @typed
     def __init__(
         self,
         t: npt.ArrayLike,
