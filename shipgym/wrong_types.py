@@ -99,7 +99,7 @@ def _fits(value: Any, expected: Any) -> bool:
     if expected is float:
         return _is_numeric(value) and np.ndim(value) == 0
     if expected is int:
-        return isinstance(value, int | np.integer) and -(2**63) <= value < 2**63
+        return isinstance(value, int | np.integer) and bool(abs(int(value)) < 2**63)
     return not isinstance(expected, type) or _is_instance(value, expected)
 
 
