@@ -95,13 +95,7 @@ def build_autopilot(
         result = examined(ship, fit, guests, verified)
         write_agents(result, draft)
         try:
-            found = result.verification
-            if standards and found is not None and result.refusal is None:
-                with stage(tell, "standards"):
-                    found = with_standards(found, fit.model)
-                    result = replace(result, verification=found)
-            with stage(tell, "writing the report"):
-                write_findings(result, draft)
+            result = reported(result, draft, standards, tell)
         except OSError:
             raise
         except Exception as error:  # a fault of ours costs nobody the autopilots
@@ -203,6 +197,20 @@ def with_standards(found: Verification, model: ShipModel) -> Verification:
     tracks = [track for track in found.tracks if track.key not in refused]
     requirements = standards(model, best, tracks)
     return replace(found, standards=tuple(requirements))
+
+
+def reported(
+    result: AutopilotResult, folder: Path, standards: bool, tell: Progress
+) -> AutopilotResult:
+    """Result with its standards if asked for, after figures and report are written."""
+    found = result.verification
+    if standards and found is not None and result.refusal is None:
+        with stage(tell, "standards"):
+            tested = with_standards(found, result.model)
+            result = replace(result, verification=tested)
+    with stage(tell, "writing the report"):
+        write_findings(result, folder)
+    return result
 
 
 def write_agents(result: AutopilotResult, folder: Path) -> None:
