@@ -42,8 +42,6 @@ from shipgym.python_files import working_folder
 
 __all__ = ["HERE", "EngineError", "JobEngine", "JobError", "run_jobs"]
 
-#: Keeps processes that are started from finding modules in the working folder.
-SAFE = {"PYTHONSAFEPATH": "1"}
 #: Called with the number of jobs done and their total.
 JobProgress = Callable[[int, int], None]
 #: A job and its result as JSON, in the order in which jobs finish.
@@ -233,7 +231,7 @@ def _in_processes(function: JobFunction, texts: list[str], workers: int) -> Fini
         pre_dispatch=workers,
     )
     try:
-        with _environment(SAFE), _interrupts_held():
+        with _environment({"PYTHONSAFEPATH": "1"}), _interrupts_held():
             results = run(_calls(function, texts))
         with warnings.catch_warnings(), closing(results) as finished:
             warnings.filterwarnings("ignore", ".*tasks which were still being")
@@ -263,7 +261,11 @@ def _interrupts_held() -> Iterator[None]:
 
 def _on_ray(function: JobFunction, texts: list[str], where: JobEngine) -> Finished:
     """Do jobs by joblib's Ray backend, in rounds, each of which returns as a whole."""
-    with _environment(SAFE), _connected_ray(where) as ray, parallel_config("ray"):
+    with (
+        _environment({"PYTHONSAFEPATH": "1"}),
+        _connected_ray(where) as ray,
+        parallel_config("ray"),
+    ):
         cores = int(ray.cluster_resources().get("CPU", 1))
         workers = min(where.workers or cores, cores)
         jobs_a_round = 2 * workers
