@@ -7,6 +7,7 @@ has one thread, and jobs and results pass through JSON in every case.
 import json
 import logging
 import os
+import signal
 import socket
 import sys
 import threading
@@ -18,6 +19,7 @@ from contextlib import chdir, closing, contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -229,11 +231,9 @@ def _in_processes(function: JobFunction, texts: list[str], workers: int) -> Fini
         pre_dispatch=workers,
     )
     try:
-        with (
-            _environment({"PYTHONSAFEPATH": "1"}),
-            warnings.catch_warnings(),
-            closing(run(_calls(function, texts))) as finished,
-        ):
+        with _environment({"PYTHONSAFEPATH": "1"}), _interrupts_held():
+            results = run(_calls(function, texts))
+        with warnings.catch_warnings(), closing(results) as finished:
             warnings.filterwarnings("ignore", ".*tasks which were still being")
             yield from finished
     except BrokenProcessPool:
@@ -242,9 +242,30 @@ def _in_processes(function: JobFunction, texts: list[str], workers: int) -> Fini
         get_reusable_executor().shutdown(wait=True, kill_workers=True)
 
 
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold Ctrl-C back while processes start, so that it never reaches them.
+
+    They inherit this and would end with tracebacks, which this process ends itself.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # its start would let Ctrl-C through
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _on_ray(function: JobFunction, texts: list[str], where: JobEngine) -> Finished:
     """Do jobs by joblib's Ray backend, in rounds, each of which returns as a whole."""
-    with _connected_ray(where) as ray, parallel_config("ray"):
+    with (
+        _environment({"PYTHONSAFEPATH": "1"}),
+        _connected_ray(where) as ray,
+        parallel_config("ray"),
+    ):
         cores = int(ray.cluster_resources().get("CPU", 1))
         workers = min(where.workers or cores, cores)
         jobs_a_round = 2 * workers

@@ -1,7 +1,12 @@
-"""Files and folders written under a draft's name and renamed when complete."""
+"""Files and folders written under a draft's name and renamed when complete.
+
+Where others may write, as in /tmp, a name that can be guessed would let a link of
+theirs lead elsewhere: a draft has random letters in its name, and is always new.
+"""
 
 import os
 import re
+import secrets
 import shutil
 import socket
 import time
@@ -10,6 +15,7 @@ from contextlib import contextmanager, suppress
 from errno import EBUSY, ENOENT, EXDEV
 from functools import cache
 from pathlib import Path
+from string import ascii_lowercase
 from zlib import crc32
 
 from shipgym.errors import InputError
@@ -30,6 +36,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
         if path.exists() and not path.is_file():
             raise InputError(f"{path}: is not a file; choose another name")
         remove_drafts(path.parent)
+        _make_file(draft)
         yield draft
         try:
             draft.replace(path)
@@ -53,17 +60,26 @@ def draft_folder(path: Path) -> Iterator[Path]:
     """Temporary folder next to a path, removed when the block ends unless renamed."""
     remove_drafts(path.parent)
     draft = draft_name(path)
-    shutil.rmtree(draft, ignore_errors=True)  # of a killed process of the same number
+    draft.mkdir()
     try:
-        draft.mkdir()
         yield draft
     finally:
         shutil.rmtree(draft, ignore_errors=True)
 
 
 def draft_name(path: Path) -> Path:
-    """Hidden name next to a file or folder under which this process writes it."""
-    return path.parent / f".{path.name}.{_host()}-{os.getpid()}.draft"
+    """Hidden name next to a file or folder that this process may write it under.
+
+    Each call gives another one.
+    """
+    letters = "".join(secrets.choice(ascii_lowercase) for _ in range(16))
+    return path.parent / f".{path.name}.{letters}.{_host()}-{os.getpid()}.draft"
+
+
+def _make_file(path: Path) -> None:
+    """Make an empty file; OSError if anything is there, be it a link to nowhere."""
+    new = os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_NOFOLLOW", 0)
+    os.close(os.open(path, new, 0o666))
 
 
 def abandoned_drafts(folder: Path) -> list[Path]:

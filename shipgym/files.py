@@ -18,6 +18,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
+
 from shipgym.checks import check_table, did_you_mean, shown, unexpected
 from shipgym.drafts import atomic_path
 from shipgym.errors import InputError
@@ -63,7 +65,22 @@ def write_text(text: str, path: Path) -> None:
 
 def write_json(fields: Mapping[str, Any], path: Path, indent: int | None = 1) -> None:
     """Write JSON atomically (`atomic_path`); ValueError for nan and infinities."""
-    write_text(json.dumps(fields, indent=indent, allow_nan=False) + "\n", path)
+    write_text(json_text(fields, indent) + "\n", path)
+
+
+def json_text(fields: Mapping[str, Any], indent: int | None = 1) -> str:
+    """Text of a JSON object; numbers, booleans and arrays of NumPy are as Python's.
+
+    Raises ValueError for nan and infinities.
+    """
+    return json.dumps(fields, indent=indent, allow_nan=False, default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    """Python's own value for one of NumPy."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    raise TypeError(f"expected what JSON holds, got {type(value).__name__}: {value!r}")
 
 
 # ---- reading

@@ -16,12 +16,14 @@ import gymnasium
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_table
+from shipgym.checks import check_table, shown
 from shipgym.envs.episode import Episode
 from shipgym.envs.episode_file import SERIES, from_file, to_file
+from shipgym.envs.registration import check_named
 from shipgym.errors import InputError
 from shipgym.extras import library
 from shipgym.trials.trial import Trial
+from shipgym.wrong_types import typed
 
 if TYPE_CHECKING:
     from minari import MinariDataset
@@ -34,6 +36,7 @@ ATTRIBUTE = "shipgym"
 OF_STEPS = ("commands", "reward_parts", "rewards", "actions")
 
 
+@typed
 def to_frame(recorded: Trial | Episode) -> DataFrame:
     """Convert a trial or an episode to a pandas frame, with time in s as its index.
 
@@ -48,11 +51,14 @@ def to_frame(recorded: Trial | Episode) -> DataFrame:
     return frame
 
 
+@typed
 def from_frame(frame: DataFrame) -> Trial | Episode:
     """Convert a frame of `to_frame` back; the `raw` channels of a trial are lost.
 
     Raises InputError for any other frame.
     """
+    if not hasattr(frame, "attrs"):
+        raise InputError(f"frame: expected a pandas DataFrame, got {shown(frame)}")
     series = {str(name): column.to_numpy() for name, column in frame.items()}
     remedy = "for the frame of a log use Trial.from_frame"
     return _rebuild(frame.index.to_numpy(), series, frame.attrs, remedy)
@@ -69,6 +75,7 @@ def to_minari(
     actions. The infos of the dataset hold all that `RecordEpisode` recorded.
 
     Raises InputError for no episodes or episodes of several environments, for an
+    environment that is not registered or code that a recording names, for an
     episode without a seed or whose rewards differ by more than rounding when it is run
     again, and if Minari is not installed.
 
@@ -89,7 +96,9 @@ def to_minari(
             f" {len(environments)}"
         )
 
-    env = gymnasium.make(episodes[0].environment, **episodes[0].arguments)
+    first = episodes[0]
+    check_named(first.environment, first.arguments, "episodes[0]")
+    env = gymnasium.make(first.environment, **first.arguments)
     buffers = []
     for index, episode in enumerate(episodes):
         observations = _observations(env, episode, f"episodes[{index}]")

@@ -9,17 +9,27 @@ import os
 import subprocess
 import sys
 import time
+import warnings
+import zipfile
+from contextlib import suppress
 from pathlib import Path
 from random import Random
 
+import openpyxl
 import pytest
 from fuzzing import processes, reading
+from fuzzing.calls import faults
+from fuzzing.kinds import pid, use_helm
 from fuzzing.mutations import mutate
 from fuzzing.processes import chunks, run
 from fuzzing.reading import Kind
 
+from agents.deployment.helm import Helm
+from agents.deployment.nmea import sentences
+from agents.deployment.sensors import Limits
 from shipgym.errors import InputError
 from shipgym.files import read_json
+from shipgym.trials.guesses import guess_trial
 
 ROOT = Path(__file__).parents[1]
 INPUTS = 2000  # of the fast kinds
@@ -153,3 +163,61 @@ def test_every_kind_of_file_is_read_or_refused():
         command, cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_public_functions_explain_arguments_of_wrong_types(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    warnings.simplefilter("ignore")
+    assert list(faults(210, 0)) == []
+
+
+def test_helm_survives_valid_sentences_that_lie():
+    draw = Random(38)
+    for _ in range(100):
+        helm = Helm(pid(), 0.5, Limits(silence_s=1e9))
+        for now in range(20):
+            helm.hear(lie(draw), float(now))
+            helm.watch(1.0, float(now))
+            helm.steer(float(now))
+        use_helm(helm)
+
+
+def test_integers_of_spreadsheets_are_numbers_or_refused(tmp_path):
+    draw = Random(38)
+    path = tmp_path / "log.xlsx"
+    for _ in range(15):
+        book = openpyxl.Workbook()
+        book.active.append(["t", "psi", "r", "delta"])
+        for k in range(20):
+            book.active.append([k, 30 + k % 7, 1, k % 3])
+        book.active.cell(draw.randint(2, 20), draw.randint(1, 4)).value = 777
+        book.save(path)
+        with_integer(path, draw.choice(["1", "-1"]) + "0" * draw.randint(1, 5000))
+        with suppress(InputError):
+            guess_trial(path)
+
+
+def with_integer(path, digits):
+    """Replace the cell of 777 in a workbook."""
+    with zipfile.ZipFile(path) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, part in parts.items():
+            archive.writestr(name, part.replace(b"<v>777<", f"<v>{digits}<".encode()))
+
+
+def lie(draw):
+    """A valid sentence whose numbers may be anything."""
+    number = draw.choice([0.0, 359.9, 1e6, -90.0, 1e-9, 60.0]) * draw.random()
+    fields = draw.choice(
+        [
+            f"HEHDT,{number:.1f},T",
+            f"HETHS,{number:.1f},{draw.choice('AEMSV')}",
+            f"TIROT,{number:.1f},A",
+            f"AGRSA,{number:.1f},A,,V",
+            f"VDVBW,{number:.2f},0.0,A,{number:.2f},0.0,A",
+            f"GPVTG,{number:.1f},T,,M,{number:.1f},N,,K,{draw.choice('ADENS')}",
+            f"ECXTE,A,A,{number:.3f},{draw.choice('LR')},N,A",
+        ]
+    )
+    return sentences(fields)

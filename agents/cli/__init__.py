@@ -1,38 +1,48 @@
 """The command `shipgym`: each subcommand imports what it needs when it is called.
 
 Exit codes: 0 done; 1 the work ran and failed its check; 2 wrong input or usage, with
-one message on standard error and nothing written; 130 interrupted.
+one message on standard error and nothing written; 130 interrupted (Ctrl-C, SIGTERM).
 """
 
 from __future__ import annotations
 
 import os
 import sys
-import warnings
-from collections.abc import Callable
-from io import TextIOWrapper
-from pathlib import Path
-from typing import Annotated, Any
 
-import typer
-from typer import Argument, Option
+try:
+    import signal
+    import warnings
+    from collections.abc import Callable
+    from io import TextIOWrapper
+    from pathlib import Path
+    from typing import Annotated, Any
 
-from agents.cli.autopilot import autopilot_command
-from agents.cli.benchmark import benchmark_command
-from agents.cli.command import (
-    FAILED,
-    CommandGroup,
-    report_os_error,
-    shared_options,
-)
-from agents.cli.export import export_command
-from agents.cli.identification import advise_command, identify_command, reduce_command
-from agents.cli.logs import look_command, new_ship_command
-from agents.cli.reproduction import reproduce_command
-from agents.cli.steer import simulate_command, steer_command
-from agents.cli.training import train_command, tune_command
-from agents.cli.trials import trials_command
-from agents.cli.warm import warm_command
+    import typer
+    from typer import Argument, Option
+
+    from agents.cli.autopilot import autopilot_command
+    from agents.cli.benchmark import benchmark_command
+    from agents.cli.command import (
+        FAILED,
+        INTERRUPTED,
+        CommandGroup,
+        report_os_error,
+        shared_options,
+    )
+    from agents.cli.export import export_command
+    from agents.cli.identification import (
+        advise_command,
+        identify_command,
+        reduce_command,
+    )
+    from agents.cli.logs import look_command, new_ship_command
+    from agents.cli.reproduction import reproduce_command
+    from agents.cli.steer import simulate_command, steer_command
+    from agents.cli.training import train_command, tune_command
+    from agents.cli.trials import trials_command
+    from agents.cli.warm import warm_command
+except KeyboardInterrupt:  # Ctrl-C before any command began
+    sys.exit(130)
 
 app = typer.Typer(
     cls=CommandGroup,
@@ -156,8 +166,16 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # names of files may have any bytes
             stream.reconfigure(errors="backslashreplace")
+    os.environ["PYTHONSAFEPATH"] = "1"  # for processes that libraries start
     warnings.showwarning = _show_warning  # names in it come from files
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # clean up as on Ctrl-C
     try:
         app(prog_name="shipgym")
     except OSError as error:  # of the help, which no command prints
         sys.exit(report_os_error(error))
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+    finally:
+        # all is done: an interruption now could only end in a traceback
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)

@@ -1,5 +1,6 @@
 """`shipgym reproduce`: the papers' tables, run from a checkout."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -48,7 +49,12 @@ def reproduce_command(
     if as_json:
         arguments.append("--json")
     is_silent = console.quiet and not as_json
+    # Python finds what the program imports in the program's own folder
+    environment = {**os.environ, "PYTHONSAFEPATH": ""}
     done = subprocess.run(
-        arguments, stdout=subprocess.DEVNULL if is_silent else None, check=False
+        arguments,
+        env=environment,
+        stdout=subprocess.DEVNULL if is_silent else None,
+        check=False,
     )
     raise typer.Exit(done.returncode)

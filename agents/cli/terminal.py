@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -69,7 +68,9 @@ def printing(as_json: bool, quiet: bool) -> Iterator[None]:
 def answer(fields: Mapping[str, Any]) -> None:
     """Print the result of a command as one JSON object, if `--json` asks for it."""
     if AS_JSON.get():
-        print(json.dumps(fields, indent=1, allow_nan=False))
+        from shipgym.files import json_text
+
+        print(json_text(fields))
 
 
 def say(*lines: str | Text) -> None:

@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.controllers.interface import Policy, check_names, check_scales
-from shipgym import InputError, ShipModel, load_model
+from shipgym import InputError, ShipModel
 from shipgym.checks import check_whole
 from shipgym.envs.engine import Engine
+from shipgym.ships.by_name import ship_of
 from shipgym.tasks.task import Task, course_keeping_task
+from shipgym.wrong_types import typed
 
 Observations = NDArray[np.float32]
 
@@ -23,6 +25,7 @@ N_SHIPS = 3
 SIGNATURE = "predict(observation, state=None, episode_start=None, deterministic=True)"
 
 
+@typed
 def check_controller(
     controller: Policy,
     model: ShipModel | None = None,
@@ -53,7 +56,7 @@ def check_controller(
         Control intervals.
     """
     check_whole(n_steps, "n_steps", at_least=2)
-    ship = model or load_model("mariner")
+    ship = ship_of("mariner" if model is None else model)
     asked = task or course_keeping_task()
     name = type(controller).__name__
     check_signature(controller, name)

@@ -22,7 +22,9 @@ from agents.controllers.law import Law, Nothing, Number, PathSignals
 from shipgym import ShipModel
 from shipgym.checks import check_number
 from shipgym.engine.records import Record
+from shipgym.ships.by_name import takes_name
 from shipgym.tasks.task import Task, path_following_task
+from shipgym.wrong_types import typed
 
 # integral time over lookahead time with which s^2 + s / T + 1 / (T Ti) has a double
 # root
@@ -91,6 +93,8 @@ class LineOfSight(Guided):
     }
 
     @classmethod
+    @takes_name
+    @typed
     def from_model(
         cls,
         model: ShipModel,

@@ -25,6 +25,7 @@ from agents.controllers.linear_loop import (
 from shipgym import ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
+from shipgym.ships.by_name import takes_name
 from shipgym.tasks.scales import RUDDER_WEIGHT
 
 
@@ -58,6 +59,7 @@ class LQ(Controller):
     }
 
     @classmethod
+    @takes_name
     def from_model(
         cls,
         model: ShipModel,

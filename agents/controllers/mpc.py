@@ -38,6 +38,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.engine.records import Record, table_of
 from shipgym.envs.engine import Engine
+from shipgym.ships.by_name import takes_name
 from shipgym.tasks.scales import STEPS_PER_LENGTH
 from shipgym.tasks.steering import HEADING_SCALE
 from shipgym.tasks.task import Task, course_keeping_task, path_following_task
@@ -102,6 +103,7 @@ class MPC(WheelOver):
             raise InputError(f"autopilot: expected LQ, got {name}")
 
     @classmethod
+    @takes_name
     def from_model(
         cls,
         model: ShipModel,

@@ -15,6 +15,7 @@ from agents.controllers.controller import Controller
 from agents.controllers.linear_loop import checked_interval, rate_weight, sample_ship
 from shipgym import ShipModel
 from shipgym.checks import check_number
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.linear import Nomoto, linearise, nomoto_of
 from shipgym.tasks.scales import RUDDER_WEIGHT
 
@@ -35,6 +36,7 @@ class PID(Controller):
     }
 
     @classmethod
+    @takes_name
     def from_model(
         cls,
         model: ShipModel,

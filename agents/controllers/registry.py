@@ -6,6 +6,7 @@ from typing import TypeVar
 from agents.controllers.controller import Controller
 from shipgym import InputError
 from shipgym.checks import check_choice
+from shipgym.wrong_types import typed
 
 #: Module and class of the controllers of this package by kind; they are imported when
 #: they are first used.
@@ -27,6 +28,7 @@ C = TypeVar("C", bound=Controller)
 _REGISTERED: dict[str, type[Controller]] = {}
 
 
+@typed
 def register_controller(controller: type[C]) -> type[C]:
     """Register a controller by its `kind`.
 
@@ -79,6 +81,7 @@ def _home(controller: type[Controller]) -> str:
     return f"{controller.__module__}:{controller.__qualname__}"
 
 
+@typed
 def controller_kinds() -> tuple[str, ...]:
     """Kinds of all controllers, those of users last."""
     return (*BUILT_IN, *_REGISTERED)

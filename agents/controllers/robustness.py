@@ -10,6 +10,8 @@ from agents.controllers.controller import UNKNOWN_MARGINS, Controller
 from agents.controllers.margins import Margins
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
+from shipgym.ships.by_name import ship_of
+from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +49,7 @@ class MarginUncertainty:
         return quantiles
 
 
+@typed
 def margin_uncertainty(
     controller: Controller, models: Sequence[ShipModel]
 ) -> MarginUncertainty:
@@ -65,7 +68,7 @@ def margin_uncertainty(
         raise InputError("models: expected at least one, got none")
     found = []
     stable = []
-    for model in models:
+    for model in map(ship_of, models):
         try:
             found.append(controller.margins_on(model))
             stable.append(True)

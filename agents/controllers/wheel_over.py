@@ -29,8 +29,10 @@ from agents.controllers.law import (
 from agents.controllers.lq import LQ
 from shipgym import ShipModel
 from shipgym.checks import check_number
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.linear import linearise, straight_running
 from shipgym.tasks.task import Task, path_following_task
+from shipgym.wrong_types import typed
 
 # what a ship is slow to begin a turn with, as measured on the reference ships, ship
 # lengths
@@ -91,6 +93,8 @@ class WheelOver(Guided):
     }
 
     @classmethod
+    @takes_name
+    @typed
     def from_model(
         cls,
         model: ShipModel,

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +17,10 @@ from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats, Integers
 from shipgym.checks import check_number, unexpected
 from shipgym.envs.engine import Engine
+from shipgym.ships.by_name import ship_of
 from shipgym.tasks.scales import observation_scales
 from shipgym.tasks.task import Task, course_keeping_task
+from shipgym.wrong_types import typed
 
 RECORDED = ("psi", "delta", "set_point", *course_keeping_task().info_names)
 
@@ -79,6 +82,7 @@ class StepResponses(NamedTuple):
     rudder: Floats
 
 
+@typed
 def sail(
     controller: Policy,
     models: ShipModel | Sequence[ShipModel],
@@ -189,6 +193,7 @@ def _figures(run: Rollout) -> dict[str, NDArray[np.generic]]:
     }
 
 
+@typed
 def step_response(
     controller: Policy,
     models: ShipModel | Sequence[ShipModel],
@@ -288,9 +293,9 @@ class _NewCourse:
 
 
 def _ships(models: ShipModel | Sequence[ShipModel]) -> list[ShipModel]:
-    if isinstance(models, ShipModel):
-        return [models]
-    ships = list(models)
+    if isinstance(models, ShipModel | str | Path):
+        return [ship_of(models)]
+    ships = [ship_of(model) for model in models]
     if not ships:
         raise InputError("models: expected at least one, got none")
     return ships

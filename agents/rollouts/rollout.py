@@ -13,6 +13,7 @@ from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats
 from shipgym.envs.engine import Engine
 from shipgym.tasks.task import Task
+from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +68,7 @@ class Rollout:
         return np.asarray(self.sailing.sum(axis=0, dtype=np.float64))
 
 
+@typed
 def rollout(
     policy: Policy,
     engine: Engine,

@@ -4,10 +4,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import gymnasium
-
 from shipgym import InputError
 from shipgym.checks import did_you_mean, quoted
+from shipgym.envs.registration import registered
 from shipgym.python_files import working_folder
 
 #: Tasks of the shipped environments by their short names.
@@ -86,14 +85,10 @@ def _import(module: str, text: str, where: str) -> None:
 
 def _registered(name: str, where: str) -> dict[str, Any]:
     """Keywords of an environment of shipgym by its id."""
-    registered = {}
-    entry_point = "shipgym.envs.ship_env:ShipEnv"  # of every environment of shipgym
-    for env_id, spec in gymnasium.registry.items():
-        if spec.entry_point == entry_point and "task" in spec.kwargs:
-            registered[env_id] = spec.kwargs
-    if name in registered:
-        return registered[name]
-    known = [*SHORT_NAMES, *registered]
+    found = registered()
+    if name in found:
+        return found[name]
+    known = [*SHORT_NAMES, *found]
     raise InputError(
         f"{where}: expected one of {quoted(known)}, the file of a task, or module:id,"
         f" got '{name}'.{did_you_mean(name, known)}"

@@ -75,6 +75,7 @@ def build_autopilot(
         controller_class(kind, "autopilots")
     graph_objects()  # a missing extra is reported now, not after the work
     tell = progress or (lambda *_: None)
+    failure: Exception | None = None
     files = (*FILES, *(f"{kind}.json" for kind in controller_kinds()))
     with whole_folder(Path(out), files) as draft:
         with stage(tell, "reading trials"):
@@ -92,13 +93,16 @@ def build_autopilot(
             )
 
         result = examined(ship, fit, guests, verified)
-        found = result.verification
-        if standards and found is not None and result.refusal is None:
-            with stage(tell, "standards"):
-                found = with_standards(found, fit.model)
-                result = replace(result, verification=found)
-        with stage(tell, "writing the report"):
-            write_result(result, draft)
+        write_agents(result, draft)
+        try:
+            result = reported(result, draft, standards, tell)
+        except OSError:
+            raise
+        except Exception as error:  # a fault of ours costs nobody the autopilots
+            error.add_note(f"the model and its autopilots are kept in {out}")
+            failure = error
+    if failure is not None:
+        raise failure
     return result
 
 
@@ -195,18 +199,37 @@ def with_standards(found: Verification, model: ShipModel) -> Verification:
     return replace(found, standards=tuple(requirements))
 
 
-def write_result(result: AutopilotResult, folder: Path) -> None:
-    """Write the files of a result."""
+def reported(
+    result: AutopilotResult, folder: Path, standards: bool, tell: Progress
+) -> AutopilotResult:
+    """Result with its standards if asked for, after figures and report are written."""
+    found = result.verification
+    if standards and found is not None and result.refusal is None:
+        with stage(tell, "standards"):
+            tested = with_standards(found, result.model)
+            result = replace(result, verification=tested)
+    with stage(tell, "writing the report"):
+        write_findings(result, folder)
+    return result
+
+
+def write_agents(result: AutopilotResult, folder: Path) -> None:
+    """Write the model, and the autopilots that are not refused."""
+    found = result.verification
+    if found is None:
+        return
+    result.model.save(folder / "model.json")
+    autopilots: list[Pilot | Track] = [*found.pilots, *found.tracks]
+    for autopilot in autopilots:
+        key = autopilot.key
+        agent = autopilot.controller
+        if isinstance(agent, Controller) and key not in found.refused:
+            agent.save(folder / f"{key}.json")
+
+
+def write_findings(result: AutopilotResult, folder: Path) -> None:
+    """Write figures and report."""
     from agents.verification.page import write_report
 
     write_json(result.metrics, folder / "metrics.json")
-    found = result.verification
-    if found is not None:
-        result.model.save(folder / "model.json")
-        autopilots: list[Pilot | Track] = [*found.pilots, *found.tracks]
-        for autopilot in autopilots:
-            key = autopilot.key
-            agent = autopilot.controller
-            if isinstance(agent, Controller) and key not in found.refused:
-                agent.save(folder / f"{key}.json")
     write_report(result, folder / "report.html")

@@ -18,6 +18,7 @@ from shipgym import InputError, Trial, register_structure
 from shipgym.arrays import finite
 from shipgym.checks import check_choice
 from shipgym.ships import GreyBox, Structure
+from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +75,7 @@ def _plain_path(reduction: Reduction) -> list[dict[str, Any]]:
     return path
 
 
+@typed
 def identify_reduced(
     trials: Sequence[Trial],
     direction: str = "backward",

@@ -26,6 +26,7 @@ from identification.validation.diagnostics import (
 from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
+from shipgym.wrong_types import typed
 
 FOLDS = 5
 
@@ -142,6 +143,7 @@ def _relative_errors(estimator: TruncatedLSSVM) -> Floats:
     return errors
 
 
+@typed
 def backward_elimination(
     X: ArrayLike,
     y: ArrayLike,
@@ -241,6 +243,7 @@ def collinear_terms(features: Floats, kept: Sequence[int]) -> set[int]:
     return {kept[place] for place in places}
 
 
+@typed
 def forward_selection(
     X: ArrayLike,
     y: ArrayLike,

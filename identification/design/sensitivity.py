@@ -12,6 +12,8 @@ from shipgym.arrays import finite
 from shipgym.checks import check_number
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import Structure
+from shipgym.ships.by_name import takes_name
+from shipgym.wrong_types import typed
 
 
 def table_of(model: ShipModel) -> Structure:
@@ -24,6 +26,8 @@ def table_of(model: ShipModel) -> Structure:
     return model.table
 
 
+@takes_name
+@typed
 def sensitivity(
     model: ShipModel, manoeuvre: Callable[[ShipModel], Trial], change: float = 0.01
 ) -> dict[str, float]:

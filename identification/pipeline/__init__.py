@@ -15,9 +15,11 @@ from identification.uncertainty.uncertainty import Uncertainty
 from shipgym import ShipModel, SteeringGear, Trial
 from shipgym.ships import Structure
 from shipgym.ships.structures import MMG
+from shipgym.wrong_types import typed
 
 
 @single_threaded()
+@typed
 def identify(
     trials: Sequence[Trial],
     structure: str | Structure = "abkowitz",

@@ -14,6 +14,7 @@ from identification.search.optimisers import (
 from identification.search.search import Objective, Optimiser, SearchResult
 from shipgym import InputError
 from shipgym.checks import check_choice
+from shipgym.wrong_types import typed
 
 OPTIMISERS: dict[str, type[Optimiser]] = {
     "abc": ArtificialBeeColony,
@@ -39,6 +40,7 @@ def get_optimiser(optimiser: str | Mapping[str, Any] | Optimiser) -> Optimiser:
         ) from None
 
 
+@typed
 def minimise(
     objective: Objective,
     bounds: ArrayLike,

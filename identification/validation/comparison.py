@@ -36,6 +36,7 @@ from shipgym.checks import check_number
 from shipgym.files import write_json, write_text
 from shipgym.ships import Structure
 from shipgym.ships.structures import GREY_BOX, MMG
+from shipgym.wrong_types import typed
 
 #: Compared where none are named; for a grey box also RM-SVM.
 USUAL = (
@@ -89,6 +90,7 @@ class Comparison(Ranking):
         return models
 
 
+@typed
 def compare_methods(
     trials: Sequence[Trial],
     methods: Sequence[Any] | None = None,
@@ -240,6 +242,7 @@ def _each_in_turn(
     return cross_validate(trials, **{**others, **own})
 
 
+@typed
 def cross_validate(
     trials: Sequence[Trial], folds: int | None = None, **arguments: Any
 ) -> dict[str, Any]:

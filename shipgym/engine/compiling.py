@@ -19,6 +19,7 @@ import numpy as np
 from shipgym.engine.cache_folder import locked, usable_folder
 from shipgym.engine.fingerprint import fingerprint, traced
 from shipgym.engine.numba_errors import explanation
+from shipgym.engine.numba_import import load_numba
 from shipgym.engine.specialise import Hooks, Specialisation
 from shipgym.errors import InputError
 
@@ -99,9 +100,7 @@ def plain(loop: Any, hooks: Hooks) -> Any:
 
 def plain_python() -> bool:
     """Return whether nothing is compiled (`NUMBA_DISABLE_JIT=1`)."""
-    import numba
-
-    return bool(numba.config.DISABLE_JIT)
+    return bool(load_numba().config.DISABLE_JIT)
 
 
 class Compilation(Specialisation):
@@ -109,8 +108,7 @@ class Compilation(Specialisation):
 
     def inner(self, function: Any, inlined: bool, checked: bool) -> Any:
         """Compile a function that others call."""
-        import numba
-
+        numba = load_numba()
         tag, records = traced(function, self.hooks)
         code = function.__code__
         place = (code.co_filename, code.co_firstlineno)  # which errors name
@@ -128,7 +126,7 @@ class Compilation(Specialisation):
 
 def _compiled(loop: Any, signature: str, hooks: Hooks, what: str) -> Any:
     """Compile a loop and what it calls."""
-    import numba
+    numba = load_numba()
     from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
     specialised = _named(Compilation(hooks).copy(loop))

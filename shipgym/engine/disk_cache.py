@@ -5,11 +5,8 @@ import pickle
 from pathlib import Path
 from typing import Any
 
-import numba
-from numba.core.compiler import CompileResult
-from numba.core.serialize import dumps
-
 from shipgym.engine.cache_folder import LOOP, read_loop, tell, warn_of, write_loop
+from shipgym.engine.numba_import import load_numba
 from shipgym.errors import InputError
 
 
@@ -36,7 +33,9 @@ class CachedLoop:
                 " (see shipgym doctor)"
             )
             return None
-        dispatcher = numba.njit(loop)
+        dispatcher = load_numba().njit(loop)
+        from numba.core.compiler import CompileResult
+
         dispatcher.targetctx.refresh()
         try:
             result = CompileResult._rebuild(
@@ -58,6 +57,8 @@ class CachedLoop:
         if result.library.has_dynamic_globals:  # addresses of this process
             return
         try:
+            from numba.core.serialize import dumps
+
             write_loop(dumps(result._reduce()), self.path)
         except InputError as error:
             warn_of(self.path.parent, error.__cause__ or error)

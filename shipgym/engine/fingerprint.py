@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from shipgym.engine.numba_import import load_numba
 from shipgym.engine.records import is_record
 from shipgym.engine.specialise import (
     Hooks,
@@ -154,9 +155,9 @@ class _Trace:
 @cache
 def _compiler() -> str:
     """Versions and settings of the compiler, and the processor."""
-    import numba
     from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
 
+    numba = load_numba()
     sources = hashlib.sha256()
     # Modules that determine the machine code.
     compiler = ("compiling", "specialise")

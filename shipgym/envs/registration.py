@@ -1,14 +1,17 @@
 """The environments' ids, and tasks of your own."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import gymnasium
 
-from shipgym.checks import check_text
+from shipgym.checks import check_choice, check_text, data_only
 from shipgym.errors import InputError
 from shipgym.tasks.source import kept_source
+from shipgym.wrong_types import typed
 
+ENTRY_POINT = "shipgym.envs.ship_env:ShipEnv"  # of every environment
 #: Keywords of each environment by its id.
 ENVIRONMENTS: dict[str, dict[str, Any]] = {
     "shipgym/CourseKeeping-v0": {"task": "CourseKeeping"},
@@ -61,6 +64,7 @@ def register_environments() -> None:
         _register(name, options)
 
 
+@typed
 def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     """Register a task of your own, so that `gym.make` and `gym.make_vec` know it.
 
@@ -113,12 +117,32 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
         ) from None
 
 
+def registered() -> dict[str, dict[str, Any]]:
+    """Keywords of the environments of shipgym, shipped and users' own, by their ids."""
+    found = {}
+    for name, spec in gymnasium.registry.items():
+        if spec.entry_point == ENTRY_POINT and "task" in spec.kwargs:
+            found[name] = spec.kwargs
+    return found
+
+
+def check_named(name: str, arguments: Mapping[str, Any], where: str) -> None:
+    """Refuse an id and arguments, which data name, that would run other code.
+
+    Gymnasium imports the module of an id `module:id`, and a reward may be a Python
+    file. InputError begins with `where`, such as "episode".
+    """
+    known = registered()
+    check_choice(name, known, f"{where}: environment")
+    data_only(arguments, f"{where}: arguments", known[name])
+
+
 def _register(env_id: str, options: dict[str, Any]) -> None:
     if env_id in gymnasium.registry:
         return
     gymnasium.register(
         id=env_id,
-        entry_point="shipgym.envs.ship_env:ShipEnv",
+        entry_point=ENTRY_POINT,
         vector_entry_point="shipgym.envs.ship_vector_env:ShipVectorEnv",
         # it checks its actions itself; the tests run check_env
         disable_env_checker=True,

@@ -19,6 +19,7 @@ from shipgym.findings import Findings
 from shipgym.python_files import asked
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
+from shipgym.wrong_types import typed
 
 STEPS = 400
 LANES = 70  # more than a tile
@@ -32,6 +33,7 @@ class TaskCheck(Findings):
     """Result of checking a task; its name is that of the task, or its file."""
 
 
+@typed
 def check_task(task: Any, **options: Any) -> TaskCheck:
     """Check a task for errors.
 

@@ -11,11 +11,15 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import number_of_steps
 from shipgym.sea.conditions import Weather
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.trial import Trial
+from shipgym.wrong_types import typed
 
 
+@takes_name
+@typed
 def prbs_rudder(
     model: ShipModel,
     amplitude_deg: float = 10.0,
@@ -79,6 +83,8 @@ def prbs_rudder(
     )
 
 
+@takes_name
+@typed
 def multi_sine_rudder(
     model: ShipModel,
     amplitude_deg: float = 10.0,
@@ -149,6 +155,8 @@ def _least_crest(harmonics: Floats, turns: Floats, seed: Seed) -> Floats:
     return np.asarray(waves[best] / crests[best])
 
 
+@takes_name
+@typed
 def random_rudder_steps(
     model: ShipModel,
     largest_deg: float = 20.0,
@@ -182,6 +190,8 @@ def random_rudder_steps(
     )
 
 
+@takes_name
+@typed
 def shaft_speed_steps(
     model: ShipModel,
     lowest_ratio: float = 0.5,

@@ -12,7 +12,9 @@ from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres.quantiles import LEVELS_95, quantiles
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.standard import standard_manoeuvres
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
+from shipgym.wrong_types import typed
 
 #: From a ship to the indices of one of her manoeuvres, a dataclass such as
 #: `ZigzagIndices`.
@@ -88,6 +90,8 @@ class IndexInterval:
         return ", ".join(lost)
 
 
+@takes_name
+@typed
 def index_intervals(
     model: ShipModel,
     manoeuvre: str | Evaluation = "zigzag 20/20, starboard first",

@@ -14,9 +14,11 @@ from shipgym.manoeuvres.execution import require, rudder, turning_rudder
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.trial import Trial
+from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,8 @@ class PullOutIndices:
     residual_rate_deg_s: float
 
 
+@takes_name
+@typed
 def pull_out(
     model: ShipModel,
     rudder_deg: float = 20.0,
@@ -56,6 +60,7 @@ def pull_out(
     return voyage.trial("pull-out")
 
 
+@typed
 def pull_out_indices(trial: Trial) -> PullOutIndices:
     """Yaw rate of the turn and the yaw rate left at the end of a pull-out.
 

@@ -10,8 +10,10 @@ import numpy as np
 
 from shipgym.checks import check_text
 from shipgym.errors import InputError, UnstableModelError
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import KINDS, Trial
+from shipgym.wrong_types import typed
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -90,6 +92,7 @@ class Family:
 FAMILIES: dict[str, Family] = {}
 
 
+@typed
 def register_manoeuvre(
     name: str, variants: Variants, title: str = "", kind: str | None = None
 ) -> None:
@@ -135,6 +138,8 @@ def families_of(
     }
 
 
+@takes_name
+@typed
 def standard_manoeuvres(
     model: ShipModel, water_depth: float = np.inf
 ) -> dict[str, Manoeuvre]:

@@ -20,10 +20,12 @@ from shipgym.manoeuvres.execution import is_ordered, require, rudder
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.linear import is_course_stable
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.trial import Trial
+from shipgym.wrong_types import typed
 
 SpiralMethod = Literal["direct", "reverse"]
 
@@ -83,6 +85,8 @@ class _Curve(NamedTuple):
     rates: Floats  # deg/s
 
 
+@takes_name
+@typed
 def direct_spiral(
     model: ShipModel,
     rudder_deg: Sequence[float] = DIRECT_RUDDER_DEG,
@@ -117,6 +121,8 @@ def direct_spiral(
     )
 
 
+@takes_name
+@typed
 def reverse_spiral(
     model: ShipModel,
     yaw_rate_deg_s: Sequence[float] | None = None,
@@ -192,6 +198,7 @@ def one_way(
     return numbers
 
 
+@typed
 def spiral_from_trial(
     trial: Trial, rudder_deg: Sequence[float] | None = None, tolerance_deg: float = 0.5
 ) -> Spiral:
@@ -259,6 +266,7 @@ def _near(angle: float, wanted: Sequence[float], tolerance: float) -> bool:
     return any(abs(angle - other) <= tolerance for other in wanted)
 
 
+@typed
 def spiral_indices(spiral: Spiral) -> SpiralIndices:
     """Width and height of the loop of a spiral, simulated or from a trial.
 

@@ -14,9 +14,11 @@ from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipEquations, ShipModel
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
+from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True)
@@ -129,6 +131,8 @@ def goes_astern(model: ShipModel) -> bool:
     return isinstance(model.dynamics, ShipEquations) and model.dynamics.astern
 
 
+@takes_name
+@typed
 def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
     """Full astern stopping test: the shaft astern as fast as ahead, until at rest.
 
@@ -138,6 +142,7 @@ def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
     return stopping(model, -shaft_of(model), speed_ratio=0.0, water_depth=water_depth)
 
 
+@typed
 def stopping_indices(
     trial: Trial, speed_ratio: float | None = None, length: float | None = None
 ) -> StoppingIndices:
@@ -175,6 +180,8 @@ def stopping_indices(
     )
 
 
+@takes_name
+@typed
 def acceleration(
     model: ShipModel,
     start_ratio: float = 0.25,
@@ -213,6 +220,7 @@ def acceleration(
     return voyage.trial("straight")
 
 
+@typed
 def acceleration_indices(
     trial: Trial, part: float = 0.9, length: float | None = None
 ) -> AccelerationIndices:

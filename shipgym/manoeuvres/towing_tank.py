@@ -14,6 +14,7 @@ import numpy as np
 from shipgym.arrays import Floats, integral
 from shipgym.checks import check_number
 from shipgym.errors import InputError
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.inertia import inertia, rigid_inertia
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.navigation import rotate_to_body
@@ -89,6 +90,7 @@ class Tank:
         return rudder, self.shaft_speed
 
 
+@takes_name
 def static_drift(
     model: ShipModel,
     drift_deg: Sequence[float],
@@ -124,6 +126,7 @@ def static_drift(
     )
 
 
+@takes_name
 def pure_surge(
     model: ShipModel,
     amplitude: float,
@@ -154,6 +157,7 @@ def pure_surge(
     )
 
 
+@takes_name
 def pure_sway(
     model: ShipModel,
     amplitude: float,
@@ -177,6 +181,7 @@ def pure_sway(
     )
 
 
+@takes_name
 def pure_yaw(
     model: ShipModel,
     amplitude_deg_s: float,
@@ -190,6 +195,7 @@ def pure_yaw(
     return yaw_with_drift(model, amplitude_deg_s, 0.0, period_s, tank)
 
 
+@takes_name
 def yaw_with_drift(
     model: ShipModel,
     amplitude_deg_s: float,

@@ -17,10 +17,12 @@ from shipgym.manoeuvres.execution import (
 )
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
+from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,8 @@ class _SteadyTurn(NamedTuple):
     drift_deg: float | None
 
 
+@takes_name
+@typed
 def turning_circle(
     model: ShipModel,
     rudder_deg: float = 35.0,
@@ -89,6 +93,7 @@ def turning_circle(
     )
 
 
+@typed
 def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices:
     """Advance, transfer, diameters and the steady turn of a turning circle.
 

@@ -21,9 +21,11 @@ from shipgym.manoeuvres.execution import (
 )
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Conditions, Passage, Seed, as_trial, orders
 from shipgym.trials.trial import Trial
+from shipgym.wrong_types import typed
 
 STANDARD_DEG = (10.0, 20.0)
 
@@ -41,6 +43,8 @@ class ZigzagIndices:
     period_s: float | None  # time from the first to the third reversal, s
 
 
+@takes_name
+@typed
 def zigzag(
     model: ShipModel,
     rudder_deg: float = 20.0,
@@ -125,6 +129,7 @@ def _refuse_without_reversal(
     )
 
 
+@typed
 def zigzag_indices(
     trial: Trial, length: float | None = None, heading_deg: float | None = None
 ) -> ZigzagIndices:
@@ -172,6 +177,7 @@ def _initial_turning(
     return float(then - before) / length
 
 
+@typed
 def switch_heading_deg(trial: Trial) -> float | None:
     """Heading change at which the rudder was to be reversed, degrees; None if never.
 

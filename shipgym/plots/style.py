@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym.extras import library
+from shipgym.wrong_types import typed
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure as Figure
@@ -34,6 +35,7 @@ def _plotly(module: str) -> Any:
     return library(f"plotly.{module}", "report", "figures and reports need it")
 
 
+@typed
 def subplots(
     rows: int, columns: int, titles: Sequence[str] = (), **settings: Any
 ) -> Figure:
@@ -85,9 +87,28 @@ def panels(
     for name, settings in axes.items():
         drawn[name] |= settings
     drawn |= layout(height, titled=is_titled, **changes)
-    figure.layout = drawn
-    figure.add_traces(_placed_traces(shown))
+    figure.layout = plain_texts(drawn)
+    figure.add_traces([plain_texts(trace) for trace in _placed_traces(shown)])
     return figure
+
+
+def plain_texts(part: Any) -> Any:
+    """A part of a figure whose texts mean no mark-up to plotly: names come from files.
+
+    Its `hovertemplate`, which is ours, stays.
+    """
+    if isinstance(part, str):
+        return part.replace("&", "&amp;").replace("<", "&lt;")
+    if isinstance(part, dict):
+        return {
+            key: value if key == "hovertemplate" else plain_texts(value)
+            for key, value in part.items()
+        }
+    if isinstance(part, np.ndarray) and part.dtype.kind in "OU":
+        part = part.tolist()
+    if isinstance(part, list | tuple):
+        return [plain_texts(value) for value in part]
+    return part
 
 
 def _axes(shown: Sequence[Panel]) -> dict[str, dict[str, Any]]:
@@ -189,11 +210,13 @@ def axis(title: str = "", zero: bool = False, **changes: Any) -> dict[str, Any]:
     return shared | changes
 
 
+@typed
 def compact(values: ArrayLike) -> NDArray[np.float32]:
     """Values in single precision: half the size in a file, and finer than a pixel."""
     return np.asarray(values, dtype=np.float32)
 
 
+@typed
 def line_styles(labels: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Line of each label: measurements thin and dark, others by the palette."""
     styles: dict[str, dict[str, Any]] = {}
@@ -206,12 +229,14 @@ def line_styles(labels: Iterable[str]) -> dict[str, dict[str, Any]]:
     return styles
 
 
+@typed
 def translucent(colour: str, opacity: float) -> str:
     """A colour "#rrggbb" with an opacity, as CSS knows it."""
     red, green, blue = bytes.fromhex(colour.removeprefix("#"))
     return f"rgba({red},{green},{blue},{opacity})"
 
 
+@typed
 def line(
     x: ArrayLike,
     y: ArrayLike,
@@ -233,6 +258,7 @@ def line(
     )
 
 
+@typed
 def points(
     x: ArrayLike, y: ArrayLike, name: str, colour: str, size: float = 7.0, **more: Any
 ) -> Any:

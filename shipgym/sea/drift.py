@@ -27,6 +27,7 @@ from shipgym.sea.waves import (
     wave_spectrum,
 )
 from shipgym.ships.particulars import Particulars
+from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ class WaveDrift:
         )
 
 
+@typed
 def wave_drift(
     waves: Waves, particulars: Particulars, speed: float | None = None
 ) -> WaveDrift:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_array, check_table, unexpected
+from shipgym.wrong_types import typed
 
 ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
 
@@ -71,6 +72,7 @@ class Envelope:
         }
 
     @classmethod
+    @typed
     def from_dict(cls, content: Any, where: str) -> Self:
         """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
         shapes = {

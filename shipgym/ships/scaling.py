@@ -7,13 +7,17 @@ import numpy as np
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.envelope import Envelope
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.particulars_limits import LIMITS
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.term_table import Structure
+from shipgym.wrong_types import typed
 
 
+@takes_name
+@typed
 def scale_model(
     model: ShipModel,
     length: float,

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
 
 from shipgym.checks import check_number, check_table, placed
+from shipgym.wrong_types import typed
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,7 @@ class SteeringGear:
             object.__setattr__(self, name, number)
 
     @classmethod
+    @typed
     def from_mapping(
         cls, mapping: Mapping[str, Any], where: str = "steering gear"
     ) -> Self:

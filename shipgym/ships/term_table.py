@@ -36,6 +36,7 @@ from shipgym.ships.terms import (
     read_term_list,
     symbols_in,
 )
+from shipgym.wrong_types import typed
 
 FORCE_OF_EQUATION = {"u": "X", "v": "Y", "r": "N"}
 ANGULAR = ("r", "p", "q")  # of these the unit holds 1 / length once more
@@ -428,6 +429,7 @@ class Structure:
         return table
 
     @classmethod
+    @typed
     def from_dict(cls, table: Mapping[str, Any], where: str = "structure") -> Self:
         """Read what `to_dict` wrote; errors begin with `where`."""
         return cls(**structure_fields(table, where))

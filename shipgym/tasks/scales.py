@@ -9,6 +9,7 @@ from math import radians
 import numpy as np
 
 from shipgym.arrays import Floats
+from shipgym.ships.by_name import takes_name
 from shipgym.ships.ship_model import ShipModel
 
 #: Control intervals in the time to travel one ship length, about.
@@ -60,6 +61,7 @@ def observation_scales(model: ShipModel) -> Floats:
     return np.array([scales[name] for name in OBSERVATION_NAMES])
 
 
+@takes_name
 def control_interval(model: ShipModel) -> float:
     """Control interval of a ship, s: about a twentieth of the time to travel a length.
 

@@ -1,9 +1,19 @@
+import signal
 from pathlib import Path
 
 import pytest
 
 DEMO = Path(__file__).parents[2] / "examples" / "mariner" / "ship.toml"
 DRAWS = 24
+
+
+@pytest.fixture(autouse=True)
+def signals():
+    """Handlers of signals as before: the command line ignores Ctrl-C at its end."""
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture(scope="session")

@@ -4,18 +4,24 @@ import json
 import linecache
 import random
 import re
+import sys
+from io import StringIO
 
 import pytest
 from typer.testing import CliRunner
 
 from agents import load_agent
 from agents.cli import app
+from agents.cli.terminal import PlainConsole
 from agents.identifying import identification_settings
 from agents.suites.suite import parse_suite
 from agents.training.request import TrainingRequest, make_plan
 from agents.training.run_folder import RUN, begin_folder, read_plan
 from identification.regression.grey_box import chosen_box
 from shipgym import InputError, ShipFile, ShipModel, load_model
+from shipgym.envs.registration import check_named
+from shipgym.pages.templates import environment
+from shipgym.plots.style import plain_texts
 from shipgym.ships import term_functions
 from shipgym.ships.term_functions import accelerations_function, accelerations_source
 from tests.agents.policies import random_policy
@@ -462,3 +468,53 @@ def test_a_suite_names_no_code(evil, line):
         "suite",
     )
     assert suite.task("one").ship.structure == TEXTS[0]
+
+
+MARKS = (
+    "<a href='javascript:1'>",
+    "</script><script>",
+    "&lt;b",
+    "[red]",
+    "[link=file:///etc/passwd]",
+    ":smile:",
+    "{{ 7 * 7 }}",
+    "{% raw %}",
+    "%{x}",
+    "\x1b]8;;http://a\x07",
+    "\x1b[2J",
+    "\r",
+    "\u202e",
+    "$(touch RAN)",
+    "`touch RAN`",
+    "evil:CourseKeeping-v0",
+    "evil:",
+    "shipgym/",
+    "evil.py",
+    "../",
+    *TEXTS,
+)
+
+
+def test_ten_thousand_names_ids_and_texts_run_nothing_and_mean_nothing(
+    evil, monkeypatch
+):
+    monkeypatch.syspath_prepend(evil.parent)
+    draw = random.Random(38)
+    shown = StringIO()
+    console = PlainConsole(file=shown, width=200)
+    page = environment().from_string("<p title='{{ text }}'>{{ text }}</p>")
+    for _ in range(10_000):
+        text = "".join(draw.choices(MARKS, k=draw.randint(1, 3)))
+        with pytest.raises(InputError):
+            check_named(text, {}, "episode")
+        with pytest.raises(InputError):
+            check_named("shipgym/CourseKeeping-v0", {"reward": text}, "episode")
+        assert "<" not in plain_texts({"name": [text]})["name"][0]
+        assert page.render(text=text).count("<") == 2
+        shown.seek(0)
+        shown.truncate()
+        console.print(text, soft_wrap=True)
+        told = shown.getvalue()
+        assert "\x1b" not in told
+        assert told.count("[") == text.count("[")
+    assert "evil" not in sys.modules

@@ -9,7 +9,7 @@ import pytest
 from agents import PID
 from agents.cli.standard_trials import standard_trials
 from agents.identifying import identification_settings, identify_ship
-from agents.verification.chain import write_result
+from agents.verification.chain import write_agents, write_findings
 from agents.verification.refusal import (
     Steering,
     helpful_trial,
@@ -169,7 +169,8 @@ def test_designs_that_lose_control_are_not_written(chain, tmp_path):
         verification=replace(found, refused=refusals.by_design),
         refusal=refusals.of_all,
     )
-    write_result(refused, tmp_path)
+    write_agents(refused, tmp_path)
+    write_findings(refused, tmp_path)
     names = sorted(path.name for path in tmp_path.iterdir())
     assert names == ["metrics.json", "model.json", "report.html"]
     metrics = json.loads((tmp_path / "metrics.json").read_text())
@@ -188,7 +189,9 @@ def test_a_refusal_of_a_structure_that_was_chosen_names_another(chain):
 
 def test_a_model_that_is_refused_gives_a_report_that_says_why(chain, tmp_path):
     why = "its steering is wrong; run a turn"
-    write_result(replace(chain[1], verification=None, refusal=why), tmp_path)
+    unverified = replace(chain[1], verification=None, refusal=why)
+    write_agents(unverified, tmp_path)
+    write_findings(unverified, tmp_path)
     names = sorted(path.name for path in tmp_path.iterdir())
     assert names == ["metrics.json", "report.html"]
     page = (tmp_path / "report.html").read_text()

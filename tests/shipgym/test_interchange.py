@@ -138,3 +138,23 @@ def test_episodes_without_a_seed_or_of_several_environments_are_refused(
     for several in ([], [episodes[0], longer]):
         with pytest.raises(InputError, match=f"got episodes of {len(several)}"):
             interchange.to_minari(several, "shipgym/a/b-v0", **CARD)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"environment": "evil:CourseKeeping-v0"}, r"episodes\[0\]: environment"),
+        ({"environment": "CartPole-v1"}, r"episodes\[0\]: environment"),
+        ({"arguments": {"reward": "evil.py"}}, r"arguments\.reward: expected data"),
+        ({"arguments": {"sensors": "evil"}}, r"arguments\.sensors: expected data"),
+        ({"arguments": {"task": "evil:Task"}}, r"arguments\.task: expected data"),
+        ({"arguments": {"model": "./evil.py"}}, r"arguments\.model: expected data"),
+    ],
+)
+def test_a_recording_names_no_code(changes, message, episodes, tmp_path, monkeypatch):
+    (tmp_path / "evil.py").write_text('open("RAN", "w").close()\n')
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(InputError, match=message):
+        interchange.to_minari([replace(episodes[0], **changes)], "shipgym/a/b-v0")
+    assert not (tmp_path / "RAN").exists()

@@ -63,6 +63,28 @@ def test_drafts_of_dead_processes_are_removed_by_the_next_writer_beside(tmp_path
     remove_drafts.cache_clear()
 
 
+def test_a_draft_has_a_random_name_and_never_follows_what_lies_there(
+    tmp_path, monkeypatch
+):
+    names = {draft_name(tmp_path / "a") for _ in range(100)}
+    assert len(names) == 100
+    victim = tmp_path / "victim"
+    victim.write_text("precious")
+    for target in (victim, tmp_path / "nowhere"):
+        guessed = tmp_path / f".a.guessed.{target.name}.draft"
+        guessed.symlink_to(target)
+        monkeypatch.setattr("shipgym.drafts.draft_name", lambda _, name=guessed: name)
+        with pytest.raises(InputError, match=r"cannot be written \(File exists\)"):
+            write_text("stolen", tmp_path / "a")
+        guessed.symlink_to(target)
+        with pytest.raises(FileExistsError), draft_folder(tmp_path / "a"):
+            pass
+        assert guessed.is_symlink()
+    assert victim.read_text() == "precious"
+    assert not (tmp_path / "a").exists()
+    assert not (tmp_path / "nowhere").exists()
+
+
 @pytest.mark.parametrize("error", [errno.EXDEV, errno.EBUSY])
 def test_a_file_that_is_a_mount_point_is_written(tmp_path, monkeypatch, error):
     def replace(*_):
@@ -121,9 +143,6 @@ def test_json_is_written_with_a_space_a_level_and_an_end_of_line(tmp_path):
 
 def test_a_folder_is_removed_unless_it_was_renamed(tmp_path, dead):
     left = draft(tmp_path / "result", dead)
-    own = draft_name(tmp_path / "result")
-    own.mkdir()
-    (own / "old").write_text("of a killed process of the same number")
     with draft_folder(tmp_path / "result") as folder:
         assert not left.exists()
         assert list(folder.iterdir()) == []

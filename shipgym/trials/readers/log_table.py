@@ -103,7 +103,7 @@ class LogTable:
             return np.asarray(cells, dtype=np.float64)
         try:
             return plain_numbers(cells)
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, OverflowError):  # integers of any size in Excel
             return self._numbers_of_texts(name, sided=sided)
 
     def _numbers_of_texts(self, name: str, *, sided: bool) -> Floats:

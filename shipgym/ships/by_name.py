@@ -1,0 +1,44 @@
+"""Functions of a ship model that take its name or its file too."""
+
+import functools
+import inspect
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from shipgym.checks import shown
+from shipgym.errors import InputError
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def takes_name(function: Function) -> Function:
+    """Let the argument `model` be a model, or what `load_model` takes.
+
+    Anything else is an InputError.
+    """
+    place = [*inspect.signature(function).parameters].index("model")
+
+    @functools.wraps(function)
+    def wrapped(*given: Any, **named: Any) -> Any:
+        if "model" in named:
+            named["model"] = ship_of(named["model"])
+        elif place < len(given):
+            ship = ship_of(given[place])
+            given = (*given[:place], ship, *given[place + 1 :])
+        return function(*given, **named)
+
+    return cast(Function, wrapped)
+
+
+def ship_of(model: Any) -> Any:
+    """The model itself, or that of a name or a file."""
+    ships = import_module("shipgym.ships")
+    if isinstance(model, ships.ShipModel):
+        return model
+    if isinstance(model, str | Path):
+        return ships.load_model(model)
+    raise InputError(
+        f"model: expected a ship model, its name or its file, got {shown(model)}"
+    )

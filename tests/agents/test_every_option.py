@@ -1,0 +1,194 @@
+"""Every option of every command, as a user runs it on the shipped example, no stubs.
+
+Beside the data lie modules with the names of all that commands import, and settings of
+Numba: nothing in a folder of data is ever run or read as settings.
+"""
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import gymnasium
+import pytest
+import typer
+from typer.testing import CliRunner
+
+import agents
+from agents.cli import app
+from agents.controllers.pid import PID
+from shipgym import RecordEpisode, example_ship, load_model
+from tests.agents.small_suite import write_suite
+
+LINEAR = (
+    "--structure abkowitz --method ridge --preprocessing savgol --hold-out"
+    " zigzag_15_15.csv --current none --wind none --prior auto --prior-strength 1"
+    " --set alpha=0.01"
+)
+GREY = "--structure grey-box --reference-model mariner"
+WRONG = "--structure abkowitz --reference-model mariner --kernel none-such"
+TASK = "--task calm --suite small.toml --allow-code reward.py"
+#: Sizes at which a rollout of learning takes a moment.
+SMALL = "--set ships=2 --set n_steps=16 --set batch_size=16 --set evaluate_every=32"
+TASK_OF_OWN = (
+    "--env course-keeping --model mariner --sea calm --option episode_steps=20"
+)
+LEARNING = "--settings ppo.toml --total-steps 32"
+PILOT = "--nmea udp:127.0.0.1:9 --duration 0.5 --speed-up 10 --limit silence_s=2"
+
+#: Command lines in their order (later ones use what earlier ones wrote), each with its
+#: exit code; every command also takes --json and --quiet.
+LINES = (
+    ("new-ship zigzag_15_15.csv --length 160.9 --out new.toml", 0),
+    ("look ship.toml --out look.html", 0),
+    (f"identify ship.toml {LINEAR} --out linear", 0),
+    (f"identify ship.toml {GREY} --kernel rbf --out grey", 0),
+    ("identify ship.toml --compare --structures abkowitz --methods ls --out ls", 0),
+    (f"advise ship.toml {LINEAR} --criterion c --coefficient N_d --number 1", 0),
+    (f"advise ship.toml {WRONG}", 2),
+    (f"reduce ship.toml {LINEAR} --direction forward --tolerance 0.1 --out reduced", 0),
+    (f"reduce ship.toml {WRONG} --out reduced", 2),
+    ("trials linear/model.json --draws 2 --seed 1 --out trials.html", 0),
+    ("trials tanker --draws 0 --depth 25", 0),
+    (
+        f"autopilot ship.toml {LINEAR} --draws 2 --seed 1 --agent pid.json --autopilots"
+        " lq,turn-rate --standards --engine local --workers 1 --out report",
+        0,
+    ),
+    (f"autopilot ship.toml {WRONG} --out report2", 2),
+    ("autopilot ship.toml --address 127.0.0.1:9 --out report2", 2),
+    ("export report/lq.json --c c --fmu lq.fmu --fmi 2.0 --name lq", 0),
+    ("export sharp-turns-ppo-s1 --onnx policy.onnx", 0),
+    ("export tanker --c tanker --depth 25", 0),
+    (f"steer report/turn-rate.json {PILOT} --heading 45 --rate-of-turn 10", 0),
+    (f"steer report/lq.json {PILOT} --route route.csv", 2),
+    (
+        "simulate mariner --nmea udp:127.0.0.1:9 --leg 30 --sea slight --seed 1 --drop"
+        " HDT=1 --duration 0.2 --speed-up 10",
+        0,
+    ),
+    (
+        f"train ppo {TASK_OF_OWN} {LEARNING} {SMALL} --randomise --from-nothing --seed"
+        " 1 --threads 1 --max-seconds 60 --out run",
+        0,
+    ),
+    ("train ppo --resume --out run", 0),
+    (f"train ppo {TASK} {LEARNING} {SMALL} --out run2", 0),
+    (
+        f"tune ppo {TASK_OF_OWN} {LEARNING} {SMALL} --randomise --trials 1 --seed 1"
+        " --engine local --workers 1 --out study",
+        0,
+    ),
+    (f"tune ppo {TASK} --address 127.0.0.1:9 --out study2", 2),
+    (
+        "benchmark --controllers pid,lq --suite small.toml --tasks calm --episodes 2"
+        " --workers 1 --engine local --page --allow-code reward.py --out results",
+        0,
+    ),
+    (
+        "benchmark --controllers pid,lq --suite small.toml --tasks calm --episodes 2"
+        " --workers 1 --resume --no-page --out results",
+        0,
+    ),
+    ("benchmark --controllers pid --address 127.0.0.1:9 --out results2", 2),
+    ("reproduce nobody --markdown tables.md", 2),
+    ("warm mariner --model mariner", 0),
+    ("replay recordings/episode-00000.json --out replay.html", 0),
+    ("doctor", 0),
+)
+MODULES = sorted(
+    name
+    for name in {*packages_distributions(), *sys.stdlib_module_names}
+    if name.isidentifier() and name not in ("shipgym", "identification", "agents")
+)
+ALL = ["warm", "--all"]  # in plain Python, since it compiles for minutes
+
+
+def options():
+    """Each option of each command by its first long name, and its other names."""
+    group = typer.main.get_command(app)
+    context = typer.Context(group, info_name="shipgym")
+    for name, command in group.commands.items():
+        made = command.make_context(name, [], resilient_parsing=True, parent=context)
+        for one in made.command.params:
+            flags = [*one.opts, *one.secondary_opts]
+            long = [flag for flag in flags if flag.startswith("--")]
+            if long and long[0] not in ("--json", "--quiet", "--help"):
+                yield from ((name, flag) for flag in long)
+
+
+def test_every_option_has_a_command_line_here():
+    lines = [shlex.split(line) for line, _ in LINES]
+    tried = {(words[0], word) for words in [*lines, ALL] for word in words[1:]}
+    missing = [
+        f"{name} {flag}" for name, flag in options() if (name, flag) not in tried
+    ]
+    assert not missing, "add a command line to LINES with: " + ", ".join(missing)
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    """The shipped example, and what commands take beside it."""
+    folder = tmp_path_factory.mktemp("data")
+    for path in example_ship().parent.iterdir():
+        (folder / path.name).write_bytes(path.read_bytes())
+    for name in MODULES:
+        (folder / f"{name}.py").write_text(
+            f'open("RAN", "a").write("{name} ")\n1 / 0\n'
+        )
+    (folder / ".numba_config.yaml").write_text("cache_dir: [\n: broken")
+    write_suite(folder)
+    PID.from_model(load_model("mariner")).save(folder / "pid.json")
+    (folder / "ppo.toml").write_text("gamma = 0.98\n")
+    (folder / "route.csv").write_text("latitude,longitude\n0,0\n0,0.1\n0.1,0.1\n")
+    env = gymnasium.make("shipgym/CourseKeeping-v0", episode_steps=5)
+    with RecordEpisode(env, folder / "recordings") as env:
+        env.reset(seed=1)
+        for _ in range(5):
+            env.step(env.action_space.sample())
+    yield folder
+    assert not (folder / "RAN").exists(), (folder / "RAN").read_text()
+
+
+@pytest.mark.parametrize(("line", "code"), LINES, ids=[line for line, _ in LINES])
+def test_a_command_runs_as_a_user_runs_it(line, code, data, monkeypatch):
+    monkeypatch.chdir(data)
+    answer = CliRunner().invoke(app, [*shlex.split(line), "--json", "--quiet"])
+    assert answer.exit_code == code, answer.stderr
+    assert answer.stderr.count("\n") <= 1 or code == 0
+    if code == 0:
+        json.loads(answer.stdout)
+
+
+def run(*words, **environment):
+    """Run the command in a process of its own, in this folder."""
+    home = str(Path(agents.__file__).parents[1])
+    return subprocess.run(
+        [sys.executable, "-m", "agents.cli", *words],
+        env={**os.environ, "PYTHONPATH": home, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_all_can_be_warmed(data, monkeypatch):
+    monkeypatch.chdir(data)
+    answer = run(*ALL, NUMBA_DISABLE_JIT="1")
+    assert answer.returncode == 0, answer.stderr
+    assert "160/160" in answer.stdout
+
+
+def test_processes_of_a_command_take_no_modules_from_the_folder_of_data(
+    data, monkeypatch
+):
+    monkeypatch.chdir(data)
+    words = (
+        "benchmark --controllers pid,lq --suite small.toml --tasks calm --episodes 2"
+    )
+    answer = run(*shlex.split(words), "--workers=2", "--out=in-processes")
+    assert answer.returncode == 0, answer.stderr
+    assert not (data / "RAN").exists(), (data / "RAN").read_text()
