@@ -295,6 +295,13 @@ class Posterior:
             expected=float(variances.sum()),
         )
 
+    def without_trials(self, trials: Sequence[int], whole: Estimate) -> Floats:
+        """Coefficients fitted to the segments of the other trials."""
+        of_segments = np.array([segment.trial for segment in self.segments])
+        others = np.flatnonzero(~np.isin(of_segments, trials))
+        z, _ = self._without(others, whole)
+        return z
+
     def _without(self, others: Integers, whole: Estimate) -> tuple[Floats, Floats]:
         """Coefficients fitted to some segments, and their covariance.
 

@@ -63,13 +63,22 @@ def without_trial(
     samples: Samples,
     trial: int,
 ) -> tuple[Estimators, Samples]:
-    """Estimators as if fitted without a trial, and the rows of the others.
+    """Estimators as if fitted without a trial, and the rows of the others."""
+    return without_trials(estimators, samples, [trial])
+
+
+def without_trials(
+    estimators: Estimators,
+    samples: Samples,
+    trials: Sequence[int],
+) -> tuple[Estimators, Samples]:
+    """Estimators as if fitted without some trials, and the rows of the others.
 
     Exact for linear estimators that keep their directions and penalty: the normal
     equations less the rows left out.
     """
     errors = residuals(estimators, samples)
-    out = samples.trial == trial
+    out = np.isin(samples.trial, trials)
     found = {}
     for q, estimator in estimators.items():
         found[q] = _without_rows(
