@@ -36,6 +36,7 @@ from identification.uncertainty.uncertainty import Uncertainty
 from identification.validation.diagnostics import diagnose
 from identification.validation.guard import GuardedFit, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
+from identification.validation.rudder_bias import rudder_bias
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.ships import GreyBox
@@ -244,8 +245,13 @@ def evaluated(
     complete["steering"] = "estimated" if options.steering is None else "given"
     if lost:
         complete |= {"stable": False, "runs_away_on": lost}
+    bias = rudder_bias(model, problem)
+    if bias is not None:
+        complete["rudder_bias"] = bias.plain()
     model = replace(model, provenance=complete)
     metrics = _stability(complete, lost)
+    if bias is not None:
+        metrics["rudder_bias"] = bias.plain()
     metrics |= _accuracy(model, problem, trials, predictions)
     return IdentificationResult(
         model=model,

@@ -36,6 +36,8 @@ STRUCTURES = (*TABLES, GREY_BOX, MMG)
 RM_SVM = "rm-svm"
 #: Methods that a table that predicts best is also fitted by; quick ones.
 OTHERS = ("ls", "cv-lssvr")
+#: Structures of the same terms with a constant.
+WITH_BIAS = {"nomoto": "nomoto-bias", "norrbin": "norrbin-bias"}
 WHOLE_TRIALS = Refinement(segment_lengths=1e6, staggered=False)
 
 
@@ -108,10 +110,31 @@ def select(
         "ranking": [asdict(one) for one in (best, *others)],
         "refused": attempts.refused,
     }
-    chosen, whole = attempts.fits[fit_name(best.structure, best.method)]
+    own, whole = attempts.fits[fit_name(best.structure, best.method)]
     if single:
-        whole = fit(trials, chosen)
-    return Choice(chosen, whole, report)
+        whole = fit(trials, own)
+    found = Choice(own, whole, report)
+    with_bias = WITH_BIAS.get(best.structure)
+    if with_bias in structures and options.method_is_default:
+        return _with_bias(found, with_bias, fit, trials)
+    return found
+
+
+def _with_bias(
+    choice: Choice, structure: str, fit: Fit, trials: Sequence[Trial]
+) -> Choice:
+    """The same structure with the bias of the rudder, where that differs from 0.
+
+    By the standard error of the bias in the fit to all trials: in what is predicted
+    from the start of a short piece it hardly shows.
+    """
+    options = replace(choice.options, structure=structure, method=WHOLE_TRIALS)
+    other = fit(trials, options)
+    bias = other.result(options).metrics.get("rudder_bias")
+    report = choice.report | {"rudder_bias": bias}
+    if bias is None or not bias["significant"] or not other.stable:
+        return choice._replace(report=report)
+    return Choice(options, other, report)
 
 
 @dataclass(frozen=True, eq=False)
