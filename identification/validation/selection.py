@@ -88,9 +88,9 @@ def select(
     and each trial (each third of a single one) predicted by fits without it; those of
     the largest rudder also by fits to the trials of less rudder. The choice is the one
     with the fewest coefficients whose error exceeds the least by no more than one
-    standard error of their difference over the trials, or by 2 %. A method other than
-    the default is the only one, and what does not know a setting is refused; InputError
-    where nothing can be fitted, with the first reason.
+    standard error of their difference over the trials (a quarter at most), or by 2 %. A
+    method other than the default is the only one, and what does not know a setting is
+    refused; InputError where nothing can be fitted, with the first reason.
     """
     to_fit = [trial for trial in trials if trial.use == "fit"]
     parts = list(trials)
@@ -314,7 +314,11 @@ def simplest(ranked: Sequence[RankedFit]) -> RankedFit:
 
 
 def _differs_by_chance(fit: RankedFit, first: RankedFit) -> bool:
-    """Tell whether errors exceed the first's by one standard error, or 2 %, at most."""
+    """Tell whether errors exceed the first's by no more than chance.
+
+    By one standard error of the difference, but no more than a quarter of the first's:
+    of few trials a single one that goes wrong makes that error large. 2 % are nothing.
+    """
     differences = []
     for name, error in first.errors.items():
         own = fit.errors[name] or 0.0
@@ -324,5 +328,7 @@ def _differs_by_chance(fit: RankedFit, first: RankedFit) -> bool:
     excess = np.mean(differences)
     deviation = float(np.std(differences, ddof=1))
     standard_error = deviation / np.sqrt(n_trials)
-    nothing = 0.02 * (first.error or 0.0)
-    return bool(excess <= max(standard_error, nothing))
+    least = first.error or 0.0
+    by_chance = min(standard_error, 0.25 * least)
+    nothing = 0.02 * least
+    return bool(excess <= max(by_chance, nothing))
