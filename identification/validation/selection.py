@@ -13,6 +13,7 @@ from identification.result import IdentificationResult
 from identification.simulation_error.refinement import Refinement
 from identification.simulation_error.similarity import AUTO
 from identification.validation.folds import pieces
+from identification.validation.predicted import predicts_track
 from identification.validation.prediction import predict
 from identification.validation.ranking import RankedFit, fit_name
 from shipgym import InputError, ShipModel, Trial
@@ -194,6 +195,15 @@ class _Attempts:
         return sorted(self.ranked, key=lambda fit: fit.rank)
 
 
+class HeldOut(NamedTuple):
+    """Errors of the prediction of a trial held out."""
+
+    relative: float  # of the heading, by its standard deviation; without one, of r
+    heading: float  # root mean square, rad
+    yaw_rate: float  # rad/s
+    speed: float  # of the surge speed, by its standard deviation
+
+
 def _ranked(options: Options, fit: Fitted) -> RankedFit:
     """Rank of a fit, by what it predicts of trials held out."""
     trials = fit.problem.used
@@ -227,7 +237,16 @@ def _ranked(options: Options, fit: Fitted) -> RankedFit:
         heading_deg=heading,
         yaw_rate_deg_s=yaw_rate,
         errors=errors,
+        predicts_speed=_predicts_speed(fit.model, known),
     )
+
+
+def _predicts_speed(model: ShipModel, known: Sequence[HeldOut]) -> bool:
+    """Whether the speed in trials held out is better predicted than by a constant."""
+    if not known or not predicts_track(model):
+        return False
+    most = np.sqrt(0.5)
+    return bool(np.mean([error.speed for error in known]) < most)
 
 
 def _groups(trials: Sequence[Trial]) -> list[Integers]:
@@ -244,14 +263,6 @@ def _groups(trials: Sequence[Trial]) -> list[Integers]:
     return groups
 
 
-class HeldOut(NamedTuple):
-    """Errors of the prediction of a trial held out."""
-
-    relative: float  # of the heading, by its standard deviation; without one, of r
-    heading: float  # root mean square, rad
-    yaw_rate: float  # rad/s
-
-
 def _held_out(model: ShipModel, trial: Trial) -> HeldOut | None:
     """Errors of the prediction of a trial; None where the model runs away."""
     run = predict(model, trial)
@@ -259,7 +270,7 @@ def _held_out(model: ShipModel, trial: Trial) -> HeldOut | None:
         return None
     errors = {}
     relative = {}
-    for name in ("psi", "r"):
+    for name in ("psi", "r", "u"):
         if name in trial:
             errors[name] = root_mean_square(run[name] - trial[name])
             relative[name] = errors[name] / max(float(np.std(trial[name])), 1e-12)
@@ -267,6 +278,7 @@ def _held_out(model: ShipModel, trial: Trial) -> HeldOut | None:
         relative=next(iter(relative.values())),
         heading=errors.get("psi", np.nan),
         yaw_rate=errors["r"],
+        speed=relative.get("u", np.inf),
     )
 
 
@@ -297,7 +309,10 @@ def reference_of(structure: str, named: Any) -> Any:
 
 
 def simplest(ranked: Sequence[RankedFit]) -> RankedFit:
-    """The fit of fewest coefficients whose errors differ from the first's by chance."""
+    """The fit of fewest coefficients whose errors differ from the first's by chance.
+
+    Those that predict the speed come first, where any does.
+    """
     first = ranked[0]
     if first.error is None:
         return first
@@ -308,7 +323,11 @@ def simplest(ranked: Sequence[RankedFit]) -> RankedFit:
             as_good.append(fit)
     return min(
         as_good,
-        key=lambda fit: (fit.coefficients, fit.method in OTHERS),
+        key=lambda fit: (
+            not fit.predicts_speed,
+            fit.coefficients,
+            fit.method in OTHERS,
+        ),
         default=first,
     )
 
