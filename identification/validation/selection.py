@@ -311,7 +311,7 @@ def reference_of(structure: str, named: Any) -> Any:
 def simplest(ranked: Sequence[RankedFit]) -> RankedFit:
     """The fit of fewest coefficients whose errors differ from the first's by chance.
 
-    Those that predict the speed come first, where any does.
+    Of those with no larger error than it has, one that predicts the speed, too.
     """
     first = ranked[0]
     if first.error is None:
@@ -321,15 +321,21 @@ def simplest(ranked: Sequence[RankedFit]) -> RankedFit:
         sails = fit.stable and not fit.ran_away
         if sails and _differs_by_chance(fit, first):
             as_good.append(fit)
-    return min(
-        as_good,
-        key=lambda fit: (
-            not fit.predicts_speed,
-            fit.coefficients,
-            fit.method in OTHERS,
-        ),
-        default=first,
-    )
+    if not as_good:
+        return first
+
+    fewest = min(as_good, key=_coefficients)
+    most = fewest.error or 0.0
+    with_speed = []
+    for fit in as_good:
+        if fit.predicts_speed and (fit.error or 0.0) <= most:
+            with_speed.append(fit)
+    return min(with_speed, key=_coefficients, default=fewest)
+
+
+def _coefficients(fit: RankedFit) -> tuple[int, bool]:
+    """Number of coefficients, of methods of one structure the usual first."""
+    return fit.coefficients, fit.method in OTHERS
 
 
 def _differs_by_chance(fit: RankedFit, first: RankedFit) -> bool:
