@@ -3,7 +3,6 @@
 from shipgym import ShipModel
 
 COMPARED = ("u", "v", "r", "psi")
-YAW_ALONE = ("r", "psi")  # those that a structure of yaw predicts
 
 
 def predicted_channels(model: ShipModel) -> tuple[str, ...]:
@@ -21,3 +20,8 @@ def predicted_channels(model: ShipModel) -> tuple[str, ...]:
 def predicts_track(model: ShipModel) -> bool:
     """Return True if speed and drift are predicted, as a track needs."""
     return {"u", "v"}.issubset(predicted_channels(model))
+
+
+def is_yaw_alone(model: ShipModel) -> bool:
+    """Return True where nothing but yaw rate and heading is predicted."""
+    return predicted_channels(model) == ("r", "psi")

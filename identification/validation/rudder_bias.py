@@ -24,9 +24,6 @@ from shipgym.arrays import Floats
 from shipgym.ships import Structure, get_structure
 from shipgym.ships.linear import straight_running
 
-SIGNIFICANT = 2.0  # standard errors from which on a bias is one
-COMPANION = "norrbin-bias"  # tells the bias where a structure has no constant
-
 
 class RudderBias(NamedTuple):
     """Rudder angle of a straight course."""
@@ -39,7 +36,8 @@ class RudderBias(NamedTuple):
     @property
     def significant(self) -> bool:
         """True where its 95 % interval does not hold 0."""
-        return abs(self.angle_deg) > SIGNIFICANT * self.standard_error_deg
+        standard_errors = 2.0
+        return abs(self.angle_deg) > standard_errors * self.standard_error_deg
 
     def plain(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -103,12 +101,12 @@ def _of_companion(problem: Problem) -> RudderBias:
     The error is that by the trials left out in turn (jackknife), or where they are few
     by the residuals, widened for the error of the equation.
     """
-    table = get_structure(COMPANION)
+    table = get_structure("norrbin-bias")
     samples = problem.rows_of(table, problem.blank)
     estimators = fit_all(get_method("ls").make, samples)
     blank = ShipModel(
         name=problem.blank.name,
-        structure=COMPANION,
+        structure=table.name,
         particulars=problem.blank.particulars,
         steering=problem.blank.steering,
         coefficients=dict.fromkeys(table.coefficient_names, 0.0),
@@ -131,7 +129,8 @@ def _jackknife(left_out: Sequence[Floats]) -> Floats:
     """Covariance of coefficients from those without each of the trials."""
     n_trials = len(left_out)
     scatter = np.array(left_out) - np.mean(left_out, axis=0)
-    return (n_trials - 1) / n_trials * scatter.T @ scatter
+    inflation = (n_trials - 1) / n_trials
+    return np.asarray(inflation * (scatter.T @ scatter))
 
 
 def bias_sentences(bias: dict[str, Any] | None) -> list[str]:

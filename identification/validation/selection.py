@@ -1,6 +1,6 @@
 """Which structure and method predict held-out trials best, for `structure = "auto"`."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NamedTuple, Protocol
 
@@ -37,15 +37,15 @@ STRUCTURES = (*TABLES, GREY_BOX, MMG)
 RM_SVM = "rm-svm"
 #: Methods that a table that predicts best is also fitted by; quick ones.
 OTHERS = ("ls", "cv-lssvr")
-#: Structures of the same terms with a constant.
-WITH_BIAS = {"nomoto": "nomoto-bias", "norrbin": "norrbin-bias"}
 WHOLE_TRIALS = Refinement(segment_lengths=1e6, staggered=False)
 
 
 class Fitted(Protocol):
     """A structure fitted to trials."""
 
-    problem: Any
+    @property
+    def problem(self) -> Any:
+        """The problem that it was fitted to."""
 
     @property
     def model(self) -> ShipModel:
@@ -59,7 +59,7 @@ class Fitted(Protocol):
         """The model of the other trials, by their places."""
 
     def result(
-        self, options: Options, sea: dict[str, Any] | None = None
+        self, options: Options, sea: Mapping[str, Any] | None = None
     ) -> IdentificationResult:
         """The model with uncertainty and predictions."""
 
@@ -115,7 +115,7 @@ def select(
     if single:
         whole = fit(trials, own)
     found = Choice(own, whole, report)
-    with_bias = WITH_BIAS.get(best.structure)
+    with_bias = f"{best.structure}-bias"
     if with_bias in structures and options.method_is_default:
         return _with_bias(found, with_bias, fit, trials)
     return found
@@ -207,7 +207,7 @@ class HeldOut(NamedTuple):
 def _ranked(options: Options, fit: Fitted) -> RankedFit:
     """Rank of a fit, by what it predicts of trials held out."""
     trials = fit.problem.used
-    seen: dict[str, list[HeldOut]] = {trial.name: [] for trial in trials}
+    seen: dict[str, list[HeldOut | None]] = {trial.name: [] for trial in trials}
     for group in _groups(trials):
         model = fit.without(group.tolist())
         for place in group:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.validation.predicted import YAW_ALONE, predicted_channels
+from identification.validation.predicted import is_yaw_alone
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.ships.simulate import open_loop
@@ -25,7 +25,7 @@ def with_start(model: ShipModel, trial: Trial) -> Trial:
     """
     derived = [name for name in "uvr" if name in trial.derived]
     names = [name for name in derived if name in model.state_names]
-    if predicted_channels(model) == YAW_ALONE:
+    if is_yaw_alone(model):
         names = [name for name in names if name == "r"]
     if not names or "psi" not in trial:
         return trial
@@ -114,7 +114,7 @@ def _opening(
     heading = np.radians(0.1)
     floors = {"psi": heading}
     measured = trial.channels.keys() - trial.derived
-    if predicted_channels(model) == YAW_ALONE:
+    if is_yaw_alone(model):
         pass
     elif {"x", "y"} <= measured:
         position = 0.005 * model.particulars["length"]
