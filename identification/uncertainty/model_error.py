@@ -38,8 +38,6 @@ FEWEST_TRIALS = 3  # to leave one out and learn something from it
 # structure's
 DEFAULT = 2.5
 DRAWS = 20  # of each model that a trial was left out of
-#: Indices that need the speed or the track, which yaw alone does not predict.
-OF_TRACK = ("initial_turning_lengths", "advance_lengths", "tactical_diameter_lengths")
 
 
 class PredictionError(NamedTuple):
@@ -327,7 +325,11 @@ def index_errors(
 
     names = list(ZIGZAG)
     if predicts_track(own):
-        names += OF_TRACK
+        names += [
+            "initial_turning_lengths",
+            "advance_lengths",
+            "tactical_diameter_lengths",
+        ]
     found = []
     for name in names:
         truth = getattr(measured, name, None)

@@ -37,7 +37,6 @@ STRUCTURES = (*TABLES, GREY_BOX, MMG)
 RM_SVM = "rm-svm"
 #: Methods that a table that predicts best is also fitted by; quick ones.
 OTHERS = ("ls", "cv-lssvr")
-WHOLE_TRIALS = Refinement(segment_lengths=1e6, staggered=False)
 
 
 class Fitted(Protocol):
@@ -129,7 +128,7 @@ def _with_bias(
     By the standard error of the bias in the fit to all trials: in what is predicted
     from the start of a short piece it hardly shows.
     """
-    options = replace(choice.options, structure=structure, method=WHOLE_TRIALS)
+    options = replace(choice.options, structure=structure, method=whole_trials())
     other = fit(trials, options)
     bias = other.result(options).metrics.get("rudder_bias")
     report = choice.report | {"rudder_bias": bias}
@@ -162,7 +161,7 @@ class _Attempts:
             usual, *_ = methods_of(structure, self.options.method)
             self.add(structure, usual)
             if structure in RESPONSES:
-                self.add(structure, WHOLE_TRIALS)
+                self.add(structure, whole_trials())
         if not self.ranked:
             first_reason = next(iter(self.refused.values()))
             raise InputError(first_reason)
@@ -288,6 +287,11 @@ def _mean_error(found: Sequence[HeldOut | None]) -> float | None:
     if len(known) < len(found):
         return None
     return float(np.mean(known))
+
+
+def whole_trials() -> Refinement:
+    """Output error of whole trials, each a single segment."""
+    return Refinement(segment_lengths=1e6, staggered=False)
 
 
 def methods_of(structure: str, usual: str) -> tuple[str, ...]:
