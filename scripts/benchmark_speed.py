@@ -61,6 +61,9 @@ GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
         ),
         identification.recursive_updates,
         identification.refinement,
+        partial(identification.identification_of, "auto", "10 s"),
+        partial(identification.identification_of, "mmg", "3 s"),
+        identification.whole_chain,
     ],
     "start": [
         start.start_up,

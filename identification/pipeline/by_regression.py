@@ -2,28 +2,114 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from identification.estimators.estimator import FitTask
 from identification.estimators.methods import Method, get_method
 from identification.options import Options, name_of
 from identification.pipeline.evaluation import (
     MEMORY,
+    less_influence,
     provenance_of,
     with_uncertainty,
 )
-from identification.regression.problem import pose
+from identification.regression.problem import Problem, pose
 from identification.result import IdentificationResult
-from identification.validation.guard import GuardedFit, guarded_fit
+from identification.uncertainty.model_error import without_trials
+from identification.validation.guard import (
+    GuardedFit,
+    guarded_fit,
+    with_coefficients,
+)
 from shipgym import ShipModel, Trial
 
 if TYPE_CHECKING:
     from identification.simulation_error.refine import Refined
 
 
+@dataclass(frozen=True, eq=False)
+class RegressionFit:
+    """A structure fitted by regression, and what it would be without some trials."""
+
+    problem: Problem
+    task: FitTask
+    method: Method
+    fit: GuardedFit  # refined where the method asks for it
+    refined: Refined | None
+
+    @property
+    def model(self) -> ShipModel:
+        """The model of all trials."""
+        return self.fit.model
+
+    @property
+    def stable(self) -> bool:
+        """Whether the model of all trials passed the guard."""
+        return self.fit.stable
+
+    def without(self, trials: Sequence[int]) -> ShipModel:
+        """The model of the other trials, by their places.
+
+        By the normal equations less the rows of these. Of one that was refined, a trial
+        is taken out by its influence, and several are by a fit again from where that of
+        all ended.
+        """
+        refined = self.refined
+        if refined is None or refined.covariance is None:
+            estimators, _ = without_trials(
+                self.fit.estimators,
+                self.problem.samples,
+                trials,
+            )
+            return with_coefficients(self.fit.model, estimators)
+        if len(trials) == 1:
+            return less_influence(self.fit.model, refined.influences, trials[0])
+
+        others = np.setdiff1d(np.arange(len(self.problem.used)), trials)
+        of_others = np.isin(self.problem.samples.trial, others)
+        task = FitTask(
+            samples=self.problem.samples.select(of_others),
+            blank=self.task.blank,
+            trials=[self.task.trials[place] for place in others],
+        )
+        again = _refined(self.fit, task, self.method)
+        assert again is not None
+        return again.fit.model
+
+    def result(
+        self, options: Options, sea: Mapping[str, Any] | None = None
+    ) -> IdentificationResult:
+        """The model with provenance, uncertainty and predictions of all trials.
+
+        `sea`: what is known of current and wind, where it was taken out before.
+        """
+        problem = replace(self.problem, sea={**self.problem.sea, **(sea or {})})
+        provenance = provenance_of(options, self.method.name, self.fit, problem)
+        provenance |= _prior_report(options, self.fit)
+        if self.refined is not None:
+            provenance["refinement"] = self.refined.report
+        if options.uncertainty.covariance != "analytic":
+            provenance["uncertainty"] = options.uncertainty.covariance
+        return with_uncertainty(
+            self.fit,
+            self.refined,
+            problem,
+            provenance,
+            options,
+        )
+
+
 def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationResult:
     """Fit the regression of each equation, guard the model, and refine it if asked."""
+    return fit_regression(trials, options).result(options)
+
+
+def fit_regression(trials: Sequence[Trial], options: Options) -> RegressionFit:
+    """The fit of `by_regression`, before its uncertainty and predictions."""
     problem = pose(trials, options)
     task = FitTask(problem.samples, problem.blank, problem.used)
     method = _asked_method(options, task.blank)
@@ -31,14 +117,7 @@ def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationRe
     refined = _refined(fit, task, method)
     if refined is not None:
         fit = refined.fit
-
-    provenance = provenance_of(options, method.name, fit, problem)
-    provenance |= _prior_report(options, fit)
-    if refined is not None:
-        provenance["refinement"] = refined.report
-    if options.uncertainty.covariance != "analytic":
-        provenance["uncertainty"] = options.uncertainty.covariance
-    return with_uncertainty(fit, refined, problem, provenance, options)
+    return RegressionFit(problem, task, method, fit, refined)
 
 
 def _asked_method(options: Options, blank: ShipModel) -> Method:

@@ -36,6 +36,7 @@ from identification.uncertainty.uncertainty import Uncertainty
 from identification.validation.diagnostics import diagnose
 from identification.validation.guard import GuardedFit, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
+from identification.validation.rudder_bias import rudder_bias
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.ships import GreyBox
@@ -190,16 +191,25 @@ def _less_influences(model: ShipModel, influences: Sequence[Floats]) -> list[Shi
     n_trials = len(influences)
     inflation = n_trials / (n_trials - 1)
     covariance = inflation * np.asarray(model.covariance)
-    matrix = model.acceleration_matrix
-    values = np.array(list(model.coefficients.values()))
+    return [
+        replace(less_influence(model, influences, trial), covariance=covariance)
+        for trial in range(n_trials)
+    ]
 
-    models = []
-    for influence in influences:
-        by_trial = influence.sum(axis=0)
-        change = np.linalg.solve(matrix, by_trial)
-        others = model.with_coefficients(values - inflation * change)
-        models.append(replace(others, covariance=covariance))
-    return models
+
+def less_influence(
+    model: ShipModel, influences: Sequence[Floats], trial: int
+) -> ShipModel:
+    """The refined model less what a trial moved its coefficients by.
+
+    `influences`: by trial, of the coefficients of the accelerations.
+    """
+    n_trials = len(influences)
+    inflation = n_trials / (n_trials - 1)
+    by_trial = influences[trial].sum(axis=0)
+    change = np.linalg.solve(model.acceleration_matrix, by_trial)
+    values = np.array(list(model.coefficients.values()))
+    return model.with_coefficients(values - inflation * change)
 
 
 def _without(trial: int, fit: GuardedFit, problem: Problem) -> ShipModel:
@@ -235,8 +245,13 @@ def evaluated(
     complete["steering"] = "estimated" if options.steering is None else "given"
     if lost:
         complete |= {"stable": False, "runs_away_on": lost}
+    bias = rudder_bias(model, problem)
+    if bias is not None:
+        complete["rudder_bias"] = bias.plain()
     model = replace(model, provenance=complete)
     metrics = _stability(complete, lost)
+    if bias is not None:
+        metrics["rudder_bias"] = bias.plain()
     metrics |= _accuracy(model, problem, trials, predictions)
     return IdentificationResult(
         model=model,

@@ -1,7 +1,10 @@
 """Routes to a model other than the regression of a structure that is named."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from identification.estimators.estimator import Estimators
@@ -15,7 +18,11 @@ from identification.estimators.kernel_fit import (
 from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.rm_svm import RMSVM
 from identification.options import AUTO, MAP, Options, name_of, whole_call
-from identification.pipeline.by_regression import by_regression
+from identification.pipeline.by_regression import (
+    RegressionFit,
+    by_regression,
+    fit_regression,
+)
 from identification.pipeline.evaluation import (
     evaluated,
     provenance_of,
@@ -24,8 +31,10 @@ from identification.pipeline.evaluation import (
 from identification.regression.grey_box import explained_samples
 from identification.regression.preprocess import smoothed_channels
 from identification.regression.problem import Problem, held_out, pose
+from identification.regression.still_water import in_still_water
 from identification.result import IdentificationResult
 from identification.simulation_error.maximum_a_posteriori import (
+    MMGFit,
     checked_mmg,
     fit_mmg,
 )
@@ -55,12 +64,28 @@ def identified(trials: Sequence[Trial], options: Options) -> IdentificationResul
 
 
 def by_selection(trials: Sequence[Trial], options: Options) -> IdentificationResult:
-    """By the structure and method that predict trials to fit best, each held out."""
-    marked = held_out(trials, options.hold_out)
-    to_fit = [trial for trial in marked if trial.use == "fit"]
-    chosen, ranking = select(identified, to_fit, options)
-    best = identified(trials, chosen)
-    selection = {"selection": ranking}
+    """By the structure and method that predict trials to fit best, each held out.
+
+    Current and wind are taken out once, for all of them.
+    """
+    marked, sea = in_still_water(
+        held_out(trials, options.hold_out),
+        particulars=options.particulars,
+        current=options.current,
+        wind=options.wind,
+    )
+    calm = replace(options, current="none", hold_out=())
+    if options.wind != "constant":
+        calm = replace(calm, wind="none")
+    choice = select(fitted, marked, calm)
+    asked = replace(
+        choice.options,
+        current=options.current,
+        wind=options.wind,
+        hold_out=options.hold_out,
+    )
+    best = choice.fit.result(asked, sea)
+    selection = {"selection": choice.report}
     provenance = best.model.provenance or {}
     return replace(
         best,
@@ -68,6 +93,13 @@ def by_selection(trials: Sequence[Trial], options: Options) -> IdentificationRes
         metrics=best.metrics | selection,
         settings=whole_call(options, marked),
     )
+
+
+def fitted(trials: Sequence[Trial], options: Options) -> RegressionFit | SimulationFit:
+    """The fit of a structure that is named, before its uncertainty and predictions."""
+    if options.structure == MMG:
+        return fit_simulation(trials, options)
+    return fit_regression(trials, options)
 
 
 def by_kernel(
@@ -153,27 +185,75 @@ def reference_options(options: Options) -> Options:
     return replace(options, structure=structure, method=method, kernel=None)
 
 
-def by_simulation(trials: Sequence[Trial], options: Options) -> IdentificationResult:
-    """The MMG form by its simulation error.
+@dataclass(frozen=True, eq=False)
+class SimulationFit:
+    """The MMG form, and what it would be without some trials."""
 
-    The regression of the result is on the model's own accelerations.
-    """
+    problem: Problem
+    fit: MMGFit
+
+    @property
+    def model(self) -> ShipModel:
+        """The model of all trials."""
+        return self.fit.model
+
+    @cached_property
+    def reasons(self) -> list[str]:
+        """Simulations in which the model of all trials runs away."""
+        return reasons_unstable(self.model, self.problem.used)
+
+    @property
+    def stable(self) -> bool:
+        """Whether the model of all trials passes the guard."""
+        return not self.reasons
+
+    def without(self, trials: Sequence[int]) -> ShipModel:
+        """The model of the other trials, by their places."""
+        return self.fit.without(trials)
+
+    def result(
+        self, options: Options, sea: Mapping[str, Any] | None = None
+    ) -> IdentificationResult:
+        """The model with provenance and predictions; its regression is of the model.
+
+        On the model's own accelerations, that is. `sea`: what is known of current and
+        wind, where it was taken out before.
+        """
+        options = checked_mmg(options)
+        problem = self.problem
+        model = self.model
+        samples, estimators = explained_samples(problem.used, model, **problem.sampling)
+        problem = replace(problem, samples=samples, blank=model)
+        problem = replace(problem, sea={**problem.sea, **(sea or {})})
+        fit = _guard_report(model, estimators, self.reasons)
+        provenance = provenance_of(options, MAP, fit, problem)
+        provenance |= self.fit.report
+        return evaluated(model, fit, problem, provenance, options)
+
+
+def by_simulation(trials: Sequence[Trial], options: Options) -> IdentificationResult:
+    """The MMG form by its simulation error."""
+    return fit_simulation(trials, options).result(options)
+
+
+def fit_simulation(trials: Sequence[Trial], options: Options) -> SimulationFit:
+    """The fit of `by_simulation`, before its predictions."""
     options = checked_mmg(options)
     problem = pose(trials, options)
-    model, report = fit_mmg(problem, options)
-    samples, estimators = explained_samples(problem.used, model, **problem.sampling)
-    problem = replace(problem, samples=samples, blank=model)
-    fit = _unguarded(model, estimators, problem.used)
-    provenance = provenance_of(options, MAP, fit, problem)
-    provenance |= report
-    return evaluated(model, fit, problem, provenance, options)
+    return SimulationFit(problem, fit_mmg(problem, options))
 
 
 def _unguarded(
     model: ShipModel, estimators: Estimators, used: Sequence[Trial]
 ) -> GuardedFit:
     """A fit that was not guarded, and whether it runs away."""
-    reasons = reasons_unstable(model, used)
+    return _guard_report(model, estimators, reasons_unstable(model, used))
+
+
+def _guard_report(
+    model: ShipModel, estimators: Estimators, reasons: list[str]
+) -> GuardedFit:
+    """A fit that was not guarded, and the simulations in which it runs away."""
     report: dict[str, Any] = {"decision": "stable as fitted"}
     if reasons:
         report = {"decision": "runs away", "rejected": reasons}

@@ -165,16 +165,20 @@ def _blank(
         service_shaft_speed=shaft,
         coefficients=dict.fromkeys(dynamics.coefficient_names, 0.0),
         dynamics=dynamics,
-        envelope=_envelope(used),
+        envelope=_envelope(used, table, ship),
     )
 
 
-def _envelope(trials: Sequence[Trial]) -> Envelope:
-    samples = []
-    for channel in ("u", "v", "r", "delta"):
-        of_trials = [trial[channel] for trial in trials]
-        samples.append(np.concatenate(of_trials))
-    return Envelope.from_samples(*samples)
+def _envelope(trials: Sequence[Trial], table: Structure, ship: Particulars) -> Envelope:
+    """Envelope of the trials; a model of yaw alone keeps to the service speed."""
+    channels = {}
+    for name in ("u", "v", "r", "delta"):
+        of_trials = [trial[name] for trial in trials]
+        channels[name] = np.concatenate(of_trials)
+    if not {"u", "v"} & table.equations.keys():
+        channels["u"] = np.full_like(channels["r"], ship["speed"])
+        channels["v"] = np.zeros_like(channels["r"])
+    return Envelope.from_samples(**channels)
 
 
 def held_out(trials: Any, names: str | Sequence[str]) -> Sequence[Trial]:

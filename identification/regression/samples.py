@@ -206,7 +206,8 @@ class _Regression:
         pieces = between_gaps(trial, self.particulars, fewest)
         if window is None:
             longest = max(pieces, key=len)
-            window = default_window(longest, self.particulars)
+            moving = [q for q in "uvr" if q in self.structure.equations]
+            window = default_window(longest, self.particulars, moving)
         return [
             self._of_piece(piece, index, window)
             for piece in pieces
@@ -268,7 +269,8 @@ class _Regression:
             )
 
         delta = trial["delta"]
-        recorded = [trial[name] for name in channels if name != "delta"]
+        known = self.structure.channels | self.structure.equations.keys()
+        recorded = [trial[name] for name in channels if name in known - {"delta"}]
         if is_noisy(t, recorded):
             rudder = straight(t, delta)
         else:
@@ -328,7 +330,9 @@ def _without_reference(rows: Samples) -> Samples:
     return replace(rows, features=features, targets=targets)
 
 
-def default_window(trial: Trial, particulars: Particulars) -> int:
+def default_window(
+    trial: Trial, particulars: Particulars, velocities: Iterable[str] = "uvr"
+) -> int:
     """Sampling steps over which velocities change by much more than their noise.
 
     1 without noise; at most a third of the time to sail one ship length, and a
@@ -341,7 +345,7 @@ def default_window(trial: Trial, particulars: Particulars) -> int:
     longest = min(by_travel, by_trial)
 
     window = 1
-    for channel in "uvr":
+    for channel in velocities:
         values = trial[channel]
         ratio = noise_ratio(trial.t, values)
         while ratio > NOISY and window < longest:

@@ -26,6 +26,7 @@ from identification.report.tables import (
     trial_row,
 )
 from identification.validation.diagnostics import EquationDiagnostics
+from identification.validation.rudder_bias import bias_sentences
 from identification.validation.warnings import (
     EQUATIONS,
     heading_errors_deg,
@@ -65,7 +66,7 @@ class FitView:
     held_out: str  # the worst errors on trials held out
     guarded: bool  # whether a fit by itself ran away
     warnings: list[str]
-    sea: list[str]  # current and wind of the trials
+    sea: list[str]  # bias of the rudder, current and wind of the trials
     undetermined: list[str]  # terms that the data cannot separate
     trials: list[TrialRow]
     equations: dict[str, EquationDiagnostics]  # by their names in words
@@ -102,7 +103,10 @@ def fit_view(fit: Fit) -> FitView:
         held_out=held_out_error(fit),
         guarded="rejected" in provenance.get("guard", {}),
         warnings=model_warnings(fit),
-        sea=sea_sentences(provenance),
+        sea=[
+            *bias_sentences(provenance.get("rudder_bias")),
+            *sea_sentences(provenance),
+        ],
         undetermined=undetermined(fit),
         trials=[trial_row(trial, short[trial.name]) for trial in fit.trials],
         equations=equations,

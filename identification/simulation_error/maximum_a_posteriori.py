@@ -4,7 +4,7 @@ How much narrower the prior is made, the trials decide, each predicted from the 
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,7 +59,22 @@ def checked_mmg(options: Options) -> Options:
     return replace(options, method=MAP)
 
 
-def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, Any]]:
+@dataclass(frozen=True, eq=False)
+class MMGFit:
+    """The MMG form of greatest probability."""
+
+    model: ShipModel  # with its covariance
+    report: dict[str, Any]  # for the provenance
+    posterior: Posterior
+    estimate: Estimate
+
+    def without(self, trials: Sequence[int]) -> ShipModel:
+        """The model of the other trials, by their places."""
+        z = self.posterior.without_trials(trials, self.estimate)
+        return self.posterior.model(z)
+
+
+def fit_mmg(problem: Problem, options: Options) -> MMGFit:
     """The MMG form of greatest probability, with its covariance, and a report.
 
     Options by `checked_mmg`. The prior is that of the `reference_model`, or of `prior`:
@@ -79,7 +94,7 @@ def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, An
 
     model = _chosen_model(posterior, chosen)
     report = _report(posterior, candidates, chosen)
-    return model, report
+    return MMGFit(model, report, posterior, chosen.estimate)
 
 
 def _chosen_model(posterior: Posterior, chosen: _Candidate) -> ShipModel:

@@ -88,7 +88,7 @@ class Posterior:
             staggered=False,
             interval=sample_lengths,
         )
-        self._last: tuple[bytes, tuple[Floats, Floats]] | None = None
+        self._sailed: dict[bytes, dict[int, Floats]] = {}  # by coefficients and segment
 
     @property
     def all_segments(self) -> Integers:
@@ -107,26 +107,34 @@ class Posterior:
         Each times the root of the share that its step has of the time over which errors
         are one error; shapes (n_samples, n_channels) and (n_samples, n_channels, 41).
         """
-        key = z.tobytes() + which.tobytes()
-        if self._last is None or self._last[0] != key:
-            self._last = key, self._simulated(z, which)
-        return self._last[1]
-
-    def _simulated(self, z: Floats, which: Integers) -> tuple[Floats, Floats]:
-        """Errors and their slopes by forward differences."""
         step = 1e-4  # standard deviations of the prior
-        ships = self._lanes(z, step)
-        parts = []
-        for index in which:
-            part = self._weighted_errors(self.segments[index], ships)
-            parts.append(part)
-        lanes = np.concatenate(parts)
+        known = self._sailed_with(z)
+        missing = [index for index in which.tolist() if index not in known]
+        if missing:
+            ships = self._lanes(z, step)
+        for index in missing:
+            known[index] = self._weighted_errors(self.segments[index], ships)
+        lanes = np.concatenate([known[index] for index in which.tolist()])
 
         errors = lanes[:, :, 0]
         with np.errstate(invalid="ignore", over="ignore"):  # of ships that run away
             changes = lanes[:, :, 1:] - errors[:, :, None]
             slopes = changes / step
         return errors, slopes
+
+    def _sailed_with(self, z: Floats) -> dict[int, Floats]:
+        """Segments that were sailed with some coefficients, of the last few.
+
+        Fits without a group of segments begin where the fit of all ended.
+        """
+        key = z.tobytes()
+        known = self._sailed.pop(key, {})
+        self._sailed[key] = known
+        most_kept = 4
+        if len(self._sailed) > most_kept:
+            oldest = next(iter(self._sailed))
+            del self._sailed[oldest]
+        return known
 
     def _weighted_errors(self, segment: Segment, ships: Floats) -> Floats:
         """Errors of ships in a segment, by the root of their share."""
@@ -294,6 +302,13 @@ class Posterior:
             excess=float(errors @ errors) - n_errors,
             expected=float(variances.sum()),
         )
+
+    def without_trials(self, trials: Sequence[int], whole: Estimate) -> Floats:
+        """Coefficients fitted to the segments of the other trials."""
+        of_segments = np.array([segment.trial for segment in self.segments])
+        others = np.flatnonzero(~np.isin(of_segments, trials))
+        z, _ = self._without(others, whole)
+        return z
 
     def _without(self, others: Integers, whole: Estimate) -> tuple[Floats, Floats]:
         """Coefficients fitted to some segments, and their covariance.

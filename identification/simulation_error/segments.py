@@ -54,10 +54,18 @@ class Segment:
 
 
 def compared_channels(model: ShipModel, trials: Sequence[Trial]) -> tuple[str, ...]:
-    """Channels whose residuals count: velocities with equations, and heading."""
+    """Channels whose residuals count: velocities with equations, and heading.
+
+    Of yaw alone only the heading, where the yaw rate was derived from it.
+    """
     velocities = _velocities(model)
     heading = "r" in velocities and all("psi" in trial for trial in trials)
-    return (*velocities, "psi") if heading else velocities
+    if not heading:
+        return velocities
+    is_derived = all("r" in trial.derived for trial in trials)
+    if velocities == ("r",) and is_derived:
+        return ("psi",)
+    return (*velocities, "psi")
 
 
 def _velocities(model: ShipModel) -> tuple[str, ...]:

@@ -147,9 +147,10 @@ class Shooter:
         factors = weights[:, None] / scales
 
         channels, slopes = self._channels(coefficients, offset, segment)
-        errors = channels - segment.measured
-        errors = factors * averaged(errors, blocks, counts)
-        slopes = factors[:, :, None] * averaged(slopes, blocks, counts)
+        with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
+            errors = channels - segment.measured
+            errors = factors * averaged(errors, blocks, counts)
+            slopes = factors[:, :, None] * averaged(slopes, blocks, counts)
         return errors.ravel(), slopes.reshape(errors.size, -1)
 
     def _channels(

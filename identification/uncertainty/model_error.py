@@ -23,7 +23,12 @@ from identification.regression.preprocess.noise import noise_level
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
 from identification.validation.closed_loop import closed_loop
-from identification.validation.prediction import COMPARED, ZIGZAG, index_reader, predict
+from identification.validation.predicted import (
+    COMPARED,
+    predicted_channels,
+    predicts_track,
+)
+from identification.validation.prediction import ZIGZAG, index_reader, predict
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Flags, Floats
 from shipgym.trials.resampling import usual_step
@@ -33,12 +38,6 @@ FEWEST_TRIALS = 3  # to leave one out and learn something from it
 # structure's
 DEFAULT = 2.5
 DRAWS = 20  # of each model that a trial was left out of
-INDICES = (
-    "initial_turning_lengths",
-    *ZIGZAG,
-    "advance_lengths",
-    "tactical_diameter_lengths",
-)
 
 
 class PredictionError(NamedTuple):
@@ -62,13 +61,22 @@ def without_trial(
     samples: Samples,
     trial: int,
 ) -> tuple[Estimators, Samples]:
-    """Estimators as if fitted without a trial, and the rows of the others.
+    """Estimators as if fitted without a trial, and the rows of the others."""
+    return without_trials(estimators, samples, [trial])
+
+
+def without_trials(
+    estimators: Estimators,
+    samples: Samples,
+    trials: Sequence[int],
+) -> tuple[Estimators, Samples]:
+    """Estimators as if fitted without some trials, and the rows of the others.
 
     Exact for linear estimators that keep their directions and penalty: the normal
     equations less the rows left out.
     """
     errors = residuals(estimators, samples)
-    out = samples.trial == trial
+    out = np.isin(samples.trial, trials)
     found = {}
     for q, estimator in estimators.items():
         found[q] = _without_rows(
@@ -228,13 +236,17 @@ def motion_errors(
     trial: Trial,
     clean: Trial,
 ) -> list[PredictionError]:
-    """Mean square error of each channel; none where the model or most draws fail."""
+    """Mean square error of each channel that the model predicts.
+
+    None where the model or most draws fail. What a structure has no equation of, such
+    as the speed in a structure of yaw, is no error of its coefficients.
+    """
     predicted = predict(own, clean)
     runs = _runs([(draw, clean) for draw in drawn])
     if predicted is None or len(runs) < DRAWS / 2:
         return []
 
-    names = [name for name in COMPARED if name in trial]
+    names = [name for name in predicted_channels(own) if name in trial]
     levels = {name: noise_level(trial.t, trial[name]) for name in names}
     from_shifted = _from_shifted_starts(own, clean, levels)
     timing = _timing(trial)
@@ -302,7 +314,7 @@ def index_errors(
     trial: Trial,
     clean: Trial,
 ) -> list[PredictionError]:
-    """Error of each index of a zigzag or a turning circle."""
+    """Error of each index of a zigzag or a turning circle that the model predicts."""
     read = index_reader(own, clean)
     if read is None:
         return []
@@ -311,8 +323,15 @@ def index_errors(
     predicted = read(sail(own, clean))
     draws = [read(sail(draw, clean)) for draw in drawn]
 
+    names = list(ZIGZAG)
+    if predicts_track(own):
+        names += [
+            "initial_turning_lengths",
+            "advance_lengths",
+            "tactical_diameter_lengths",
+        ]
     found = []
-    for name in INDICES:
+    for name in names:
         truth = getattr(measured, name, None)
         mine = getattr(predicted, name, None)
         if truth is None or mine is None:

@@ -6,12 +6,12 @@ from typing import Any
 
 from identification.arrays import root_mean_square
 from identification.validation.closed_loop import closed_loop
+from identification.validation.predicted import COMPARED, predicted_channels
 from identification.validation.start import with_start
 from shipgym import InputError, ShipModel, Trial, UnstableModelError
 from shipgym.manoeuvres import switch_heading_deg, turning_indices, zigzag_indices
 from shipgym.ships.simulate import open_loop
 
-COMPARED = ("u", "v", "r", "psi")
 ZIGZAG = ("overshoot_1_deg", "overshoot_2_deg")
 
 #: From a run of a trial's manoeuvre, or None for one that ran away, to its indices.
@@ -35,16 +35,16 @@ def trial_metrics(
 ) -> dict[str, Any]:
     """Errors of a prediction, and indices of measurement and prediction.
 
-    Returns `use`, `diverged`, `rmse` (SI; by channel) and for each index, by the same
-    function, `measured` and `predicted`, of overshoots also `closed_loop` (the rudder
-    reversed at the measured headings), None where the manoeuvre has no such index or
-    never got there.
+    Returns `use`, `diverged`, `rmse` (SI; by channel, None for one that the model does
+    not predict) and for each index, by the same function, `measured` and `predicted`,
+    of overshoots also `closed_loop` (the rudder reversed at the measured headings),
+    None where the manoeuvre has no such index or never got there.
     """
     turning = ("advance_lengths", "transfer_lengths", "tactical_diameter_lengths")
     metrics: dict[str, Any] = {
         "use": trial.use,
         "diverged": prediction is None,
-        "rmse": _errors(trial, prediction),
+        "rmse": _errors(model, trial, prediction),
         **dict.fromkeys((*ZIGZAG, *turning)),
     }
     read = index_reader(model, trial)
@@ -67,12 +67,14 @@ def trial_metrics(
     return metrics
 
 
-def _errors(trial: Trial, prediction: Trial | None) -> dict[str, float | None]:
-    """Root mean square errors by channel; None for one that is not known."""
+def _errors(
+    model: ShipModel, trial: Trial, prediction: Trial | None
+) -> dict[str, float | None]:
+    """Root mean square errors by channel; None for one not known or not predicted."""
     errors: dict[str, float | None] = dict.fromkeys(COMPARED)
     if prediction is None:
         return errors
-    for name in COMPARED:
+    for name in predicted_channels(model):
         if name in trial:
             error = prediction[name] - trial[name]
             errors[name] = root_mean_square(error)

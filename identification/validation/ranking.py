@@ -30,6 +30,8 @@ class RankedFit:
     heading_deg: float | None
     yaw_rate_deg_s: float | None
     errors: dict[str, float | None]  # `error` of each trial
+    #: whether it explains half of the variance of the speed in trials held out
+    predicts_speed: bool = False
 
     @property
     def rank(self) -> tuple[Any, ...]:

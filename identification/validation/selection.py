@@ -1,29 +1,30 @@
 """Which structure and method predict held-out trials best, for `structure = "auto"`."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from identification.arrays import root_mean_square
 from identification.options import MAP, Options, name_of
 from identification.progress import counted
 from identification.result import IdentificationResult
+from identification.simulation_error.refinement import Refinement
 from identification.simulation_error.similarity import AUTO
-from identification.uncertainty.uncertainty import Uncertainty
 from identification.validation.folds import pieces
-from identification.validation.ranking import (
-    RankedFit,
-    fit_name,
-    in_turn,
-    ranked_fit,
-)
-from shipgym import InputError, Trial
+from identification.validation.predicted import predicts_track
+from identification.validation.prediction import predict
+from identification.validation.ranking import RankedFit, fit_name
+from shipgym import InputError, ShipModel, Trial
+from shipgym.arrays import Integers
 from shipgym.ships.structures import GREY_BOX, MMG
 
+#: Of few coefficients, those with the bias of the rudder last; by the simulated motion
+#: of whole trials, in which a small bias shows, too.
+RESPONSES = ("nomoto", "norrbin", "nomoto-bias", "norrbin-bias")
 TABLES = (
-    "nomoto",
-    "norrbin",
+    *RESPONSES,
     "nomoto2",
     "linear-steering",
     "steering7",
@@ -37,122 +38,260 @@ RM_SVM = "rm-svm"
 #: Methods that a table that predicts best is also fitted by; quick ones.
 OTHERS = ("ls", "cv-lssvr")
 
-#: From trials and options to a result, as `identify` without particulars and gear.
-Identify = Callable[[Sequence[Trial], Options], IdentificationResult]
+
+class Fitted(Protocol):
+    """A structure fitted to trials."""
+
+    @property
+    def problem(self) -> Any:
+        """The problem that it was fitted to."""
+
+    @property
+    def model(self) -> ShipModel:
+        """The model of all trials."""
+
+    @property
+    def stable(self) -> bool:
+        """Whether it passed the guard."""
+
+    def without(self, trials: Sequence[int]) -> ShipModel:
+        """The model of the other trials, by their places."""
+
+    def result(
+        self, options: Options, sea: Mapping[str, Any] | None = None
+    ) -> IdentificationResult:
+        """The model with uncertainty and predictions."""
+
+
+#: From trials and options of a structure that is named to its fit.
+Fit = Callable[[Sequence[Trial], Options], Fitted]
+
+
+class Choice(NamedTuple):
+    """The structure and method that predict best."""
+
+    options: Options
+    fit: Fitted  # of all trials
+    report: dict[str, Any]  # the ranking, for the provenance
 
 
 def select(
-    identify: Identify,
+    fit: Fit,
     trials: Sequence[Trial],
     options: Options,
     structures: Sequence[str] = STRUCTURES,
-) -> tuple[Options, dict[str, Any]]:
-    """The options with the structure and method that predict best, and the ranking.
+) -> Choice:
+    """The structure and method that predict the heading of trials held out best.
 
-    Every structure that trials and particulars allow is fitted by its usual method, a
-    table that comes first by others too, and each trial (each third of a single one)
-    predicted by fits without it. The choice is the one with the fewest coefficients
-    whose error exceeds the least by no more than one standard error of their difference
-    over the trials, or by 2 %. A method other than the default is the only one, and
-    what does not know a setting is refused; InputError where nothing can be fitted,
-    with the first reason. The ranking is for the provenance.
+    Every structure that trials and particulars allow is fitted by its usual method,
+    those of few coefficients by output error too, a table that comes first by others,
+    and each trial (each third of a single one) predicted by fits without it; those of
+    the largest rudder also by fits to the trials of less rudder. The choice is the one
+    with the fewest coefficients whose error exceeds the least by no more than one
+    standard error of their difference over the trials (a quarter at most), or by 2 %. A
+    method other than the default is the only one, and what does not know a setting is
+    refused; InputError where nothing can be fitted, with the first reason.
     """
-    parts = trials
+    to_fit = [trial for trial in trials if trial.use == "fit"]
+    parts = list(trials)
     held_out = "each trial in turn"
-    if len(trials) == 1:
-        parts = pieces(trials[0])
+    single = len(to_fit) == 1
+    if single:
+        parts = [part.with_(kind=None) for part in pieces(to_fit[0])]
         held_out = "each third of the only trial"
-    parts = [part.with_(kind=None) for part in parts]
-    attempts = _Attempts(identify, parts, options)
+    attempts = _Attempts(fit, parts, options)
     attempts.add_all(structures)
 
     ranked = attempts.by_rank()
     best = simplest(ranked)
-    others = [fit for fit in ranked if fit is not best]
+    others = [other for other in ranked if other is not best]
     report = {
         "held_out": held_out,
-        "ranking": [asdict(fit) for fit in (best, *others)],
+        "ranking": [asdict(one) for one in (best, *others)],
         "refused": attempts.refused,
     }
-    return _chosen(options, best), report
+    own, whole = attempts.fits[fit_name(best.structure, best.method)]
+    if single:
+        whole = fit(trials, own)
+    found = Choice(own, whole, report)
+    with_bias = f"{best.structure}-bias"
+    if with_bias in structures and options.method_is_default:
+        return _with_bias(found, with_bias, fit, trials)
+    return found
+
+
+def _with_bias(
+    choice: Choice, structure: str, fit: Fit, trials: Sequence[Trial]
+) -> Choice:
+    """The same structure with the bias of the rudder, where that differs from 0.
+
+    By the standard error of the bias in the fit to all trials: in what is predicted
+    from the start of a short piece it hardly shows.
+    """
+    options = replace(choice.options, structure=structure, method=whole_trials())
+    other = fit(trials, options)
+    bias = other.result(options).metrics.get("rudder_bias")
+    report = choice.report | {"rudder_bias": bias}
+    if bias is None or not bias["significant"] or not other.stable:
+        return choice._replace(report=report)
+    return Choice(options, other, report)
 
 
 @dataclass(frozen=True, eq=False)
 class _Attempts:
     """Structures and methods that were tried on the same trials."""
 
-    identify: Identify
+    fit: Fit
     trials: Sequence[Trial]
     options: Options
     ranked: list[RankedFit] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)  # why, by name
+    fits: dict[str, tuple[Options, Fitted]] = field(default_factory=dict)  # by name
 
     def add_all(self, structures: Sequence[str]) -> None:
-        """Try structures, each by its usual method, the best table by others too.
+        """Try structures, each by its usual methods, the best table by others too.
 
         Raises InputError where none can be fitted.
         """
         free = self.options.method_is_default
         for structure in counted("structures", structures):
-            method = self.options.method
-            if free:
-                method, *_ = methods_of(structure, method)
-            self.add(structure, method)
+            if not free:
+                self.add(structure, self.options.method)
+                continue
+            usual, *_ = methods_of(structure, self.options.method)
+            self.add(structure, usual)
+            if structure in RESPONSES:
+                self.add(structure, whole_trials())
         if not self.ranked:
             first_reason = next(iter(self.refused.values()))
             raise InputError(first_reason)
 
         best, *_ = self.by_rank()
-        if free and best.structure in TABLES:
+        if free and best.structure in TABLES and best.structure not in RESPONSES:
             for method in OTHERS:
                 self.add(best.structure, method)
 
     def add(self, structure: str, method: Any) -> None:
         """Try a structure and a method, or remember why it cannot be fitted."""
+        reference = reference_of(structure, self.options.reference_model)
         own = replace(
             self.options,
             structure=structure,
             method=method,
-            reference_model=reference_of(structure, self.options.reference_model),
-            hold_out=(),
-            uncertainty=Uncertainty(model_error=False),
+            reference_model=reference,
         )
+        name = fit_name(structure, MAP if structure == MMG else name_of(method))
         try:
-            self.ranked.append(self._predicted(own))
+            found = self.fit(self.trials, own)
+            self.ranked.append(_ranked(own, found))
         except InputError as error:
-            name = fit_name(structure, MAP if structure == MMG else name_of(method))
             self.refused[name] = str(error)
-
-    def _predicted(self, options: Options) -> RankedFit:
-        """The fit of some options, ranked by what it predicts of trials held out."""
-
-        def without(held: list[str]) -> IdentificationResult:
-            return self.identify(self.trials, replace(options, hold_out=held))
-
-        most_groups = 5
-        seen, results = in_turn(without, self.trials, most_groups)
-        if not all(result.stable for result in results):
-            # the fit of all trials is what would be used
-            results = [self.identify(self.trials, options)]
-        return ranked_fit(results, seen, self.trials)
+        else:
+            self.fits[name] = own, found
 
     def by_rank(self) -> list[RankedFit]:
         """The fits, the best first."""
         return sorted(self.ranked, key=lambda fit: fit.rank)
 
 
-def _chosen(options: Options, best: RankedFit) -> Options:
-    """The options of the best fit; the method stays where one was named."""
-    structure = best.structure
-    method = options.method
-    if options.method_is_default and structure != MMG:
-        method = best.method
-    return replace(
-        options,
-        structure=structure,
+class HeldOut(NamedTuple):
+    """Errors of the prediction of a trial held out."""
+
+    relative: float  # of the heading, by its standard deviation; without one, of r
+    heading: float  # root mean square, rad
+    yaw_rate: float  # rad/s
+    speed: float  # of the surge speed, by its standard deviation
+
+
+def _ranked(options: Options, fit: Fitted) -> RankedFit:
+    """Rank of a fit, by what it predicts of trials held out."""
+    trials = fit.problem.used
+    seen: dict[str, list[HeldOut | None]] = {trial.name: [] for trial in trials}
+    for group in _groups(trials):
+        model = fit.without(group.tolist())
+        for place in group:
+            trial = trials[place]
+            seen[trial.name].append(_held_out(model, trial))
+
+    every = [error for errors in seen.values() for error in errors]
+    ran_away = [error for error in every if error is None]
+    known = [error for error in every if error is not None]
+    errors = {name: _mean_error(found) for name, found in seen.items()}
+    mean_error = None
+    heading = None
+    yaw_rate = None
+    if known:
+        heading = float(np.degrees(np.mean([error.heading for error in known])))
+        yaw_rate = float(np.degrees(np.mean([error.yaw_rate for error in known])))
+    if known and not ran_away:
+        mean_error = float(np.mean(list(errors.values())))
+    method = MAP if options.structure == MMG else name_of(options.method)
+    return RankedFit(
+        structure=name_of(options.structure),
         method=method,
-        reference_model=reference_of(structure, options.reference_model),
+        coefficients=len(fit.model.coefficients),
+        stable=fit.stable,
+        ran_away=len(ran_away),
+        error=mean_error,
+        heading_deg=heading,
+        yaw_rate_deg_s=yaw_rate,
+        errors=errors,
+        predicts_speed=_predicts_speed(fit.model, known),
     )
+
+
+def _predicts_speed(model: ShipModel, known: Sequence[HeldOut]) -> bool:
+    """Whether the speed in trials held out is better predicted than by a constant."""
+    if not known or not predicts_track(model):
+        return False
+    most = np.sqrt(0.5)
+    return bool(np.mean([error.speed for error in known]) < most)
+
+
+def _groups(trials: Sequence[Trial]) -> list[Integers]:
+    """Places of the trials that are held out together: each, and the largest rudders.
+
+    These are what a hard turn is to trials of less rudder.
+    """
+    groups = [np.array([place]) for place in range(len(trials))]
+    reached = np.array([np.abs(trial["delta"]).max() for trial in trials])
+    largest = np.flatnonzero(reached > 0.9 * reached.max())
+    n_left = len(trials) - len(largest)
+    if n_left > 1:
+        groups.append(largest)
+    return groups
+
+
+def _held_out(model: ShipModel, trial: Trial) -> HeldOut | None:
+    """Errors of the prediction of a trial; None where the model runs away."""
+    run = predict(model, trial)
+    if run is None:
+        return None
+    errors = {}
+    relative = {}
+    for name in ("psi", "r", "u"):
+        if name in trial:
+            errors[name] = root_mean_square(run[name] - trial[name])
+            relative[name] = errors[name] / max(float(np.std(trial[name])), 1e-12)
+    return HeldOut(
+        relative=next(iter(relative.values())),
+        heading=errors.get("psi", np.nan),
+        yaw_rate=errors["r"],
+        speed=relative.get("u", np.inf),
+    )
+
+
+def _mean_error(found: Sequence[HeldOut | None]) -> float | None:
+    """Mean relative error of a trial; None where a model ran away on it."""
+    known = [error.relative for error in found if error is not None]
+    if len(known) < len(found):
+        return None
+    return float(np.mean(known))
+
+
+def whole_trials() -> Refinement:
+    """Output error of whole trials, each a single segment."""
+    return Refinement(segment_lengths=1e6, staggered=False)
 
 
 def methods_of(structure: str, usual: str) -> tuple[str, ...]:
@@ -174,7 +313,10 @@ def reference_of(structure: str, named: Any) -> Any:
 
 
 def simplest(ranked: Sequence[RankedFit]) -> RankedFit:
-    """The fit of fewest coefficients whose errors differ from the first's by chance."""
+    """The fit of fewest coefficients whose errors differ from the first's by chance.
+
+    Of those with no larger error than it has, one that predicts the speed, too.
+    """
     first = ranked[0]
     if first.error is None:
         return first
@@ -183,15 +325,29 @@ def simplest(ranked: Sequence[RankedFit]) -> RankedFit:
         sails = fit.stable and not fit.ran_away
         if sails and _differs_by_chance(fit, first):
             as_good.append(fit)
-    return min(
-        as_good,
-        key=lambda fit: (fit.coefficients, fit.method in OTHERS),
-        default=first,
-    )
+    if not as_good:
+        return first
+
+    fewest = min(as_good, key=_coefficients)
+    most = fewest.error or 0.0
+    with_speed = []
+    for fit in as_good:
+        if fit.predicts_speed and (fit.error or 0.0) <= most:
+            with_speed.append(fit)
+    return min(with_speed, key=_coefficients, default=fewest)
+
+
+def _coefficients(fit: RankedFit) -> tuple[int, bool]:
+    """Number of coefficients, of methods of one structure the usual first."""
+    return fit.coefficients, fit.method in OTHERS
 
 
 def _differs_by_chance(fit: RankedFit, first: RankedFit) -> bool:
-    """Tell whether errors exceed the first's by one standard error, or 2 %, at most."""
+    """Tell whether errors exceed the first's by no more than chance.
+
+    By one standard error of the difference, but no more than a quarter of the first's:
+    of few trials a single one that goes wrong makes that error large. 2 % are nothing.
+    """
     differences = []
     for name, error in first.errors.items():
         own = fit.errors[name] or 0.0
@@ -201,5 +357,7 @@ def _differs_by_chance(fit: RankedFit, first: RankedFit) -> bool:
     excess = np.mean(differences)
     deviation = float(np.std(differences, ddof=1))
     standard_error = deviation / np.sqrt(n_trials)
-    nothing = 0.02 * (first.error or 0.0)
-    return bool(excess <= max(standard_error, nothing))
+    least = first.error or 0.0
+    by_chance = min(standard_error, 0.25 * least)
+    nothing = 0.02 * least
+    return bool(excess <= max(by_chance, nothing))

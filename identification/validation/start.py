@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.validation.predicted import is_yaw_alone
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.ships.simulate import open_loop
@@ -18,11 +19,14 @@ def with_start(model: ShipModel, trial: Trial) -> Trial:
     certain, the more so as the rudder moves there. Instead the start is that from which
     the model comes nearest to the measured heading and track (velocities where there is
     no track) over the first 1.5 ship lengths (output error with the initial state among
-    the unknowns, Maine & Iliff 1985, NASA RP-1138). A trial whose velocities were
+    the unknowns, Maine & Iliff 1985, NASA RP-1138). A model of yaw alone is compared
+    with the heading, and only its yaw rate is estimated. A trial whose velocities were
     measured stays as it is.
     """
     derived = [name for name in "uvr" if name in trial.derived]
     names = [name for name in derived if name in model.state_names]
+    if is_yaw_alone(model):
+        names = [name for name in names if name == "r"]
     if not names or "psi" not in trial:
         return trial
 
@@ -107,23 +111,25 @@ def _opening(
     model: ShipModel, trial: Trial, window: Floats, names: list[str]
 ) -> _Opening:
     """Heading, and track or velocities, in the first part of a trial."""
-    measured = trial.channels.keys() - trial.derived
-    if {"x", "y"} <= measured:
-        channels = ("psi", "x", "y")
-        floor = 0.005 * model.particulars["length"]
-    else:
-        channels = ("psi", "u", "v")
-        floor = 0.02 * model.particulars["speed"]
     heading = np.radians(0.1)
-    floors = np.array([[heading], [floor], [floor]])
+    floors = {"psi": heading}
+    measured = trial.channels.keys() - trial.derived
+    if is_yaw_alone(model):
+        pass
+    elif {"x", "y"} <= measured:
+        position = 0.005 * model.particulars["length"]
+        floors |= {"x": position, "y": position}
+    else:
+        velocity = 0.02 * model.particulars["speed"]
+        floors |= {"u": velocity, "v": velocity}
 
     samples = {name: values[window] for name, values in trial.channels.items()}
     return _Opening(
         model=model,
         trial=Trial(trial.t[window], samples),
         names=names,
-        channels=channels,
-        floors=floors,
+        channels=tuple(floors),
+        floors=np.array(list(floors.values()))[:, None],
     )
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
 import numpy as np
 from numpy.typing import NDArray
 from papers.dense_dual import dense_dual_solution
 
 import shipgym
+from agents.verification.chain import build_autopilot
 from identification import (
     ArtificialBeeColony,
     RecursiveLeastSquares,
@@ -124,3 +128,82 @@ def refinement() -> Row:
         start / refined,
         "10 s",
     )
+
+
+def five_zigzags() -> tuple[shipgym.ShipModel, list[shipgym.Trial]]:
+    """KVLCC2 and her noisy zigzags: every structure without roll can be tried."""
+    ship = shipgym.load_model("kvlcc2")
+    plan = ((10, False), (10, True), (20, False), (20, True), (15, False))
+    trials = [
+        Sensors(sampling_s=1.0)
+        .measure(zigzag(ship, angle, angle, port, 1200.0, 0.25), seed)
+        .with_(name=f"zigzag {seed}")
+        for seed, (angle, port) in enumerate(plan)
+    ]
+    return ship, trials
+
+
+def identification_of(structure: str, aim: str) -> Row:
+    """A structure on five zigzags, against Abkowitz' by TLS-SVM on the same."""
+    ship, trials = five_zigzags()
+
+    def fit(name: str) -> float:
+        return best_time(
+            lambda: identify(
+                trials,
+                structure=name,
+                particulars=ship.particulars,
+                steering=ship.steering,
+            ),
+            2,
+        )
+
+    own, plain = fit(structure), fit("abkowitz")
+    return Row(
+        f"identify, structure {structure}, 5 zigzags",
+        f"{own:.1f} s",
+        f"abkowitz by TLS-SVM {plain:.2f} s",
+        plain / own,
+        aim,
+    )
+
+
+def whole_chain() -> Row:
+    """`shipgym autopilot` on five zigzags, against the identification in it."""
+    ship, trials = five_zigzags()
+    with TemporaryDirectory() as folder:
+        path = write_ship_file(ship, trials, Path(folder))
+        report = Path(folder) / "report"
+        whole = best_time(lambda: build_autopilot(path, report), 2)
+    alone = best_time(
+        lambda: identify(
+            trials,
+            structure="auto",
+            particulars=ship.particulars,
+            steering=ship.steering,
+        ),
+        1,
+    )
+    return Row(
+        "shipgym autopilot, 5 zigzags, 200 draws",
+        f"{whole:.1f} s",
+        f"identification in it {alone:.1f} s",
+        alone / whole,
+        "30 s",
+    )
+
+
+def write_ship_file(
+    ship: shipgym.ShipModel, trials: list[shipgym.Trial], folder: Path
+) -> Path:
+    """A ship file with trials as CSV files."""
+    lines = ["[ship]", f'name = "{ship.name}"']
+    known = ("length", "beam", "draught", "mass", "block_coefficient", "speed", "xg")
+    lines += [f"{key} = {ship.particulars[key]}" for key in known]
+    for trial in trials:
+        file = f"{trial.name.replace(' ', '_')}.csv"
+        trial.to_csv(folder / file)
+        lines += ["[[trials]]", f'file = "{file}"', 'kind = "zigzag"']
+    path = folder / "ship.toml"
+    path.write_text("\n".join(lines))
+    return path

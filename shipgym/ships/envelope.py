@@ -5,6 +5,7 @@ in every manoeuvre, the smallest ellipsoid around the data.
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -42,7 +43,7 @@ class Envelope:
         high = samples.max(axis=0)
         width = np.maximum(high - low, 1e-6)
         scaled = (samples - low) / width
-        scaled_centre, quadratic = smallest_ellipsoid(scaled)
+        scaled_centre, quadratic = _ellipsoid_of(scaled.tobytes())
 
         centre = low + scaled_centre * width
         factor = np.linalg.cholesky(quadratic).T / width
@@ -95,6 +96,13 @@ class Envelope:
             numbers = table.get(name)
             arrays[name] = check_array(numbers, shape, f"{where}.{name}")
         return cls(**arrays)
+
+
+@lru_cache(maxsize=8)  # structures that are compared have the same trials
+def _ellipsoid_of(samples: bytes) -> tuple[Floats, Floats]:
+    """Smallest ellipsoid around samples, as their bytes."""
+    points = np.frombuffer(samples).reshape(-1, len(ENVELOPE_CHANNELS))
+    return smallest_ellipsoid(points)
 
 
 def smallest_ellipsoid(

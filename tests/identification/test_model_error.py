@@ -283,3 +283,29 @@ def test_a_ship_whose_roll_is_not_recorded_sails_no_zigzag_in_closed_loop(
 ) -> None:
     run = zigzag(mariner, 10, 10, duration=300, dt=1.0)
     assert closed_loop(load_model("container"), run) is None
+
+
+def test_a_log_with_positions_tells_of_yaw_what_the_log_without_tells(
+    mariner: ShipModel,
+) -> None:
+    """Noise of speed and drift, which a structure of yaw does not predict."""
+    rng = np.random.default_rng(0)
+    particulars = {"length": 160.93, "speed": 7.0}
+    with_speed, without = [], []
+    for angle in (10, -10, 20):
+        run = zigzag(mariner, abs(angle), abs(angle), angle < 0, 400.0, 1.0)
+        rate = run["r"] + 1e-4 * rng.standard_normal(len(run))
+        kept = {"psi": run["psi"], "r": rate, "delta": run["delta"]}
+        moving = {q: run[q] + 0.3 * rng.standard_normal(len(run)) for q in "uv"}
+        settings = {"kind": "zigzag", "name": str(angle)}
+        without.append(Trial(run.t, kept, **settings))
+        with_speed.append(Trial(run.t, kept | moving, **settings))
+
+    one, other = (
+        identify(trials, "norrbin", particulars=particulars)
+        for trials in (with_speed, without)
+    )
+    assert one.coefficients == other.coefficients
+    np.testing.assert_allclose(one.model.covariance, other.model.covariance)
+    assert one.model.envelope.to_dict() == other.model.envelope.to_dict()
+    assert one.metrics["trials"]["10"]["rmse"]["u"] is None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -13,8 +13,9 @@ import pytest
 from identification import LSSVM, IdentificationResult, Options, identify
 from identification.validation.ranking import RankedFit
 from identification.validation.selection import select, simplest
-from shipgym import InputError, ShipModel, Trial
+from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
+from shipgym.trials.derivatives import time_derivative
 
 Auto = Callable[..., IdentificationResult]
 
@@ -112,34 +113,93 @@ def test_a_method_or_setting_that_is_named_is_kept(
 
 
 @pytest.mark.parametrize(
-    ("count", "sizes"), [(7, [2, 1, 2, 1, 1]), (2, [1, 1]), (10, [2] * 5)]
+    ("rudders", "groups"),
+    [((10, 10, 20), [[0], [1], [2], [2]]), ((10, 20, 20), [[0], [1], [2]])],
 )
-def test_trials_are_held_out_in_no_more_than_five_groups(
-    count: int, sizes: list[int]
+def test_each_trial_is_held_out_and_those_of_the_largest_rudder_together(
+    rudders: tuple[int, ...], groups: list[list[int]]
 ) -> None:
-    held, t = list[Any](), np.arange(6.0)
-    metrics = {"use": "validate", "diverged": False, "rmse": {"psi": 0.1, "r": None}}
-    trials = [Trial(t, {"psi": np.sin(t)}, name=f"run {k}") for k in range(count)]
+    """Together only where two trials of less rudder are left."""
+    ship = nomoto_ship(0.0)
+    trials = [
+        zigzag(ship, angle, 10, duration=60, dt=0.5).with_(name=f"run {k}")
+        for k, angle in enumerate(rudders)
+    ]
+    asked = []
 
-    def identified(parts: list[Trial], options: Options) -> Any:
-        held.append(options.hold_out)
-        model = SimpleNamespace(
-            provenance={"structure": options.structure, "method": options.method}
-        )
-        told = {"trials": {trial.name: metrics for trial in parts}}
+    def fitted(parts: Sequence[Trial], options: Options) -> Any:
+        def without(places: list[int]) -> ShipModel:
+            asked.append(places)
+            return ship
+
+        problem = SimpleNamespace(used=parts)
         return SimpleNamespace(
-            model=model, metrics=told, stable=True, coefficients={"c_r": 1.0}
+            problem=problem, model=ship, stable=True, without=without
         )
 
     options = Options(structure="auto", method="ls")  # no other method is tried
-    _, told = select(identified, trials, options, structures=("nomoto",))
-    assert [len(names) for names in held] == sizes
-    assert [name for names in held for name in names] == [
-        trial.name for trial in trials
-    ]
-    assert told["held_out"] == "each trial in turn"
-    assert told["ranking"][0]["error"] == pytest.approx(0.1 / np.std(np.sin(t)))
-    assert told["ranking"][0]["heading_deg"] == pytest.approx(np.degrees(0.1))
+    choice = select(fitted, trials, options, structures=("nomoto",))
+    assert asked == groups
+    assert choice.report["held_out"] == "each trial in turn"
+    assert choice.report["ranking"][0]["error"] == pytest.approx(0.0, abs=1e-3)
+
+
+def nomoto_ship(bias_deg: float) -> ShipModel:
+    """A ship of the first order whose rudder is off."""
+    K, T = 0.08, 25.0
+    constant = -K / T * np.radians(bias_deg)
+    coefficients = {"c_0": constant, "c_r": -1.0 / T, "c_d": K / T}
+    particulars = Particulars(length=150.0, speed=7.0)
+    return ShipModel(
+        "made", "nomoto-bias", particulars, SteeringGear(35.0, 2.5), coefficients
+    )
+
+
+def logged(ship: ShipModel, *angles: float) -> list[Trial]:
+    """Heading and rudder of zigzags, as a bridge has them."""
+    rng = np.random.default_rng(1)
+    trials = []
+    for angle in angles:
+        run = zigzag(ship, abs(angle), abs(angle), angle < 0, 400, 1.0)
+        psi = run["psi"] + np.radians(0.1) * rng.standard_normal(len(run))
+        rate = time_derivative(run.t, psi)
+        trial = Trial(
+            run.t,
+            {"psi": psi, "r": rate, "delta": run["delta"]},
+            name=f"{angle:g}",
+            kind="zigzag",
+            derived=frozenset("r"),
+        )
+        trials.append(trial)
+    return trials
+
+
+@pytest.mark.parametrize(
+    ("bias_deg", "angles"), [(0.0, (10.0, -10.0, 20.0)), (-1.5, (20.0,))]
+)
+def test_few_parameters_and_the_bias_of_the_rudder_are_found(
+    bias_deg: float, angles: tuple[float, ...]
+) -> None:
+    """Of a ship of the first order, by three zigzags and by a single one."""
+    trials = logged(nomoto_ship(bias_deg), *angles)
+    result = identify(trials, "auto", particulars={"length": 150.0, "speed": 7.0})
+    c = result.coefficients
+    assert len(c) == (3 if bias_deg else 2)
+    assert -c["c_d"] / c["c_r"] == pytest.approx(0.08, rel=0.03)
+    bias = result.metrics["rudder_bias"]
+    assert abs(bias["angle_deg"] - bias_deg) < 3.0 * bias["standard_error_deg"]
+    assert bias["in_model"] == bool(bias_deg)
+    assert (f"{abs(bias_deg):.2g} ±" in result.summary()) == bool(bias_deg)
+
+
+def test_a_structure_without_a_constant_tells_the_bias_all_the_same() -> None:
+    trials = logged(nomoto_ship(2.0), 10.0, -10.0, 20.0)
+    particulars = {"length": 150.0, "speed": 7.0}
+    result = identify(trials, "nomoto", particulars=particulars)
+    found = result.metrics["rudder_bias"]
+    assert found["angle_deg"] == pytest.approx(2.0, abs=0.2)
+    assert not found["in_model"]
+    assert "take structure 'norrbin-bias'" in result.summary()
 
 
 def test_nothing_to_fit_is_refused(auto: Auto, trials: list[Trial]) -> None:

@@ -94,6 +94,13 @@ def own(name: str) -> dict[str, float]:
             "e_d": 0.185 / (118.0 * 7.8),
         },
         "norrbin": {"c_r": -1 / 30.0, "c_r3": -4000.0 / 30.0, "c_d": 0.05 / 30.0},
+        "nomoto-bias": {"c_0": 1e-4, "c_r": -1 / 30.0, "c_d": 0.05 / 30.0},
+        "norrbin-bias": {
+            "c_0": 1e-4,
+            "c_r": -1 / 30.0,
+            "c_r3": -4000.0 / 30.0,
+            "c_d": 0.05 / 30.0,
+        },
         "linear-steering": PRIME,
         "linear": {"a_0": -2e-3, "a_du": -0.05, "b_0": 1e-3, "c_0": 5e-4} | PRIME,
         "cubic": CUBIC,

@@ -1,5 +1,7 @@
 """Filters of single channels: running median, Savitzky-Golay and smoothing splines."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import solveh_banded
@@ -92,8 +94,16 @@ def smooth(t: ArrayLike, values: ArrayLike) -> Floats:
     (n_samples,) as the values, which are returned as they are where they are free of
     noise (`NOISY`) or fewer than five.
     """
-    t = np.asarray(t, dtype=float)
-    values = np.asarray(values, dtype=float)
+    times = np.ascontiguousarray(t, dtype=float)
+    samples = np.ascontiguousarray(values, dtype=float)
+    return _smoothed(times.tobytes(), samples.tobytes()).copy()
+
+
+@lru_cache(maxsize=256)  # structures that are compared smooth the same channels
+def _smoothed(times: bytes, samples: bytes) -> Floats:
+    """Smooth a channel, both as the bytes of their samples."""
+    t = np.frombuffer(times)
+    values = np.frombuffer(samples)
     if len(t) < 5 or noise_ratio(t, values) < NOISY:
         return values
 
