@@ -95,8 +95,10 @@ def abandoned_drafts(folder: Path) -> list[Path]:
             name = DRAFT.fullmatch(path.name)
             if name is None:
                 continue
-            age = time.time() - path.lstat().st_mtime
-            if _is_dead(*name.groups()) or age > abandoned_s:
+            written = path.lstat().st_mtime
+            age = time.time() - written
+            is_dead = _is_dead(*name.groups())
+            if is_dead or age > abandoned_s:
                 found.append(path)
     return found
 

@@ -200,7 +200,8 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     """Parse TOML within the limits of `check_content`; messages begin with `where`."""
     # on a dotted key that nests deeper `tomllib` spends time and memory by the square
     part = r"""\.[ \t]*(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*"""
-    if re.search(rf"(?:{part}){{{DEEPEST}}}", text):
+    too_deep = rf"(?:{part}){{{DEEPEST}}}"
+    if re.search(too_deep, text):
         raise InputError(
             f"{where} expected dotted keys of at most {DEEPEST} parts, got a longer one"
         )

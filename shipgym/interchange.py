@@ -191,7 +191,8 @@ def _rebuild(
 ) -> Trial | Episode:
     """Trial or episode of `_series` and `_facts`; padding is cut off."""
     try:
-        facts = check_table(json.loads(attributes[ATTRIBUTE]), ATTRIBUTE)
+        written = json.loads(attributes[ATTRIBUTE])
+        facts = check_table(written, ATTRIBUTE)
     except (KeyError, TypeError, ValueError):
         raise InputError(
             f"attribute '{ATTRIBUTE}': expected what shipgym wrote, got none; {remedy}"

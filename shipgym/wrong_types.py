@@ -104,10 +104,14 @@ def _fits(value: Any, expected: Any) -> bool:
 
 
 def _is_instance(value: Any, expected: type) -> bool:
-    if getattr(expected, "_is_protocol", False):
-        members = [name for name in vars(expected) if not name.startswith("_")]
-        return all(hasattr(value, name) for name in members)
-    return isinstance(value, expected)
+    is_protocol = getattr(expected, "_is_protocol", False)
+    if not is_protocol:
+        return isinstance(value, expected)
+    for name in vars(expected):
+        is_public = not name.startswith("_")
+        if is_public and not hasattr(value, name):
+            return False
+    return True
 
 
 def _is_numeric(value: Any) -> bool:
@@ -116,5 +120,6 @@ def _is_numeric(value: Any) -> bool:
         numbers = np.asarray(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
         return False
-    kinds = "fiu"
-    return bool(np.isfinite(numbers).all()) and np.asarray(value).dtype.kind in kinds
+    kind = np.asarray(value).dtype.kind
+    is_finite = np.isfinite(numbers)
+    return kind in "fiu" and bool(is_finite.all())

@@ -35,8 +35,9 @@ def look_page(
     are the decisions that the log leaves to its reader.
     """
     nothing_said: list[Mapping[str, str]] = [{}] * len(trials)
+    readings = readings or nothing_said
     records = []
-    for trial, reading in zip(trials, readings or nothing_said, strict=True):
+    for trial, reading in zip(trials, readings, strict=True):
         records.append(_record(trial, reading))
     return render(
         "shipgym.pages/look.html", name=name, records=records, to_decide=to_decide

@@ -205,7 +205,8 @@ def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
     shape = jonswap(omega, 1.0, waves.peak_period, waves.gamma)
     Sc = shape * draught_attenuation(omega, draught)
     mean = trapezoid(Sc, omega)
-    time_constant = pi * trapezoid(Sc**2, omega) / mean**2
+    squares = trapezoid(Sc**2, omega)
+    time_constant = pi * squares / mean**2
     return GaussMarkov(
         time_constant=float(time_constant),
         standard_deviation=1.0,

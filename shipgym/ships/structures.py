@@ -61,7 +61,8 @@ def printed_tables() -> dict[str, dict[str, Any]]:
 @cache
 def printed_structure(name: str) -> Structure:
     """Structure of `structures.toml`, given by formulas, letters or shares."""
-    table = dict(printed_tables()[name])
+    tables = printed_tables()
+    table = dict(tables[name])
     if "shares" in table:
         from shipgym.ships.shared_structure import read_shares, shared_structure
 
@@ -105,7 +106,8 @@ def get_structure(name: str) -> Structure:
     if name in NO_TABLES:
         expected = NO_TABLES[name]
         raise InputError(f"structure: expected {expected}")
-    check_choice(name, list_structures(), "structure")
+    known = list_structures()
+    check_choice(name, known, "structure")
     return printed_structure(name)
 
 

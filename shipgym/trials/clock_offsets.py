@@ -231,20 +231,26 @@ def reverses(values: Floats, least: float = 0.0) -> bool:
     A single step shows no delay.
     """
     low, high = _usual_range(values)
-    if high - low <= least:
+    span = high - low
+    if span <= least:
         return False
     sides = _sides(values)
-    changes = np.diff(sides[sides != 0.0])
-    return bool(np.count_nonzero(changes) >= 3)
+    far = sides[sides != 0.0]
+    changes = np.diff(far)
+    count = np.count_nonzero(changes)
+    return bool(count >= 3)
 
 
 def cycle_time(t: Floats, values: Floats) -> float:
     """Usual time from there and back to there of a channel that reverses, s."""
     sides = _sides(values)
     is_far = sides != 0.0
-    has_changed = np.diff(sides[is_far]) != 0.0
-    changes = t[is_far][1:][has_changed]
-    return 2.0 * float(np.median(np.diff(changes)))
+    times = t[is_far]
+    changes = np.diff(sides[is_far])
+    reversals = times[1:][changes != 0.0]
+    between = np.diff(reversals)
+    half_cycle = float(np.median(between))
+    return 2.0 * half_cycle
 
 
 def _usual_range(values: Floats) -> tuple[float, float]:
@@ -256,6 +262,9 @@ def _usual_range(values: Floats) -> tuple[float, float]:
 def _sides(values: Floats) -> Floats:
     """Side of the middle on which values are: 1, -1, or 0 near the middle."""
     low, high = _usual_range(values)
-    from_middle = values - 0.5 * (low + high)
-    is_far = np.abs(from_middle) > 0.25 * (high - low)
-    return np.where(is_far, np.sign(from_middle), 0.0)
+    middle = 0.5 * (low + high)
+    near = 0.25 * (high - low)
+    from_middle = values - middle
+    is_far = np.abs(from_middle) > near
+    sides = np.sign(from_middle)
+    return np.where(is_far, sides, 0.0)

@@ -90,16 +90,27 @@ def _suspects(log: Log) -> list[LateChannel]:
 
     needed = CERTAIN if log.has("r") else CERTAIN_DERIVED
     if rudder is not None and rudder.certainty >= needed:
-        # by which slow ships of other dynamics seem late
-        cycle = cycle_time(log.t, log.channels["delta"])
-        suspect = _late("delta", rudder, dynamics_s=max(1.0, cycle / 300.0))
-        # an early rudder looks like that of a ship which answers slowly
-        longest = cycle / 18.0 if suspect.delay > 0.0 else cycle / 30.0
-        if abs(suspect.delay) <= min(longest, 0.9 * LONGEST_DELAY_S):
+        suspect = _late_rudder(log, rudder)
+        if suspect is not None:
             late.append(suspect)
 
     significant = 2.5  # standard errors
     return [one for one in late if abs(one.delay) >= significant * one.error]
+
+
+def _late_rudder(log: Log, offset: ClockOffset) -> LateChannel | None:
+    """Delay of the rudder; None where it is long against the rudder's cycle."""
+    delta = log.channels["delta"]
+    cycle = cycle_time(log.t, delta)
+    # by which slow ships of other dynamics seem late
+    dynamics_s = max(1.0, cycle / 300.0)
+
+    # an early rudder looks like that of a ship which answers slowly
+    cycles = 1.0 / 18.0 if offset.late > 0.0 else 1.0 / 30.0
+    longest = min(cycles * cycle, 0.9 * LONGEST_DELAY_S)
+    if abs(offset.late) > longest:
+        return None
+    return _late("delta", offset, dynamics_s)
 
 
 def _late(channel: str, offset: ClockOffset, dynamics_s: float) -> LateChannel:
@@ -115,13 +126,16 @@ def _holds(suspect: LateChannel, delays: Floats) -> bool:
     extrapolation: Cook & Stefanski 1994), so the delay without noise is the first one
     less the change.
     """
-    found = delays[np.isfinite(delays)]
-    if found.size < 0.75 * delays.size:
+    is_found = np.isfinite(delays)
+    if is_found.mean() < 0.75:
         return False
+    found = delays[is_found]
     middle = float(np.median(found))
-    change = middle - suspect.delay
     spread = float(np.std(found))
-    return math.hypot(change, spread) < 0.4 * abs(suspect.delay)
+    change = middle - suspect.delay
+    noise = math.hypot(change, spread)
+    size = abs(suspect.delay)
+    return noise < 0.4 * size
 
 
 def _delays_with_more_noise(log: Log, channel: str) -> Floats:
@@ -159,10 +173,11 @@ def _offset_of(log: Log, channel: str) -> ClockOffset | None:
 
 def white_noise(values: Floats) -> float:
     """Standard deviation of white noise on a smooth signal, by fourth differences."""
-    of_one = 1.4826  # standard deviation of a normal number by its median magnitude
-    gain = math.sqrt(1.0 + 16.0 + 36.0 + 16.0 + 1.0)
     differences = np.diff(values, n=4)
-    return of_one * float(np.median(np.abs(differences))) / gain
+    magnitude = np.median(np.abs(differences))
+    of_differences = 1.4826 * magnitude  # if they are normally distributed
+    gain = math.sqrt(70.0)  # 1 + 16 + 36 + 16 + 1
+    return float(of_differences / gain)
 
 
 def is_corrected(
@@ -227,10 +242,14 @@ def _rudder_offset(log: Log, rate: ClockOffset | None) -> ClockOffset | None:
 
 def _window_mean(t: Floats, total: Floats) -> Floats:
     """Mean over windows of 5 s of what adds up to a total, about each sample."""
-    half = 2.5  # s
-    before = np.interp(t - half, t, total)
-    after = np.interp(t + half, t, total)
-    mean: Floats = (after - before) / (2.0 * half)
+    length = 5.0  # s
+    half = 0.5 * length
+    begin = t - half
+    end = t + half
+    before = np.interp(begin, t, total)
+    after = np.interp(end, t, total)
+    added = after - before
+    mean: Floats = added / length
     return mean
 
 
@@ -239,8 +258,9 @@ def _rate_on_heading_clock(log: Log, rate: ClockOffset | None) -> Floats:
     r = log.channels["r"]
     if rate is None:
         return r
-    on_time = log.t + rate.late
-    return np.interp(on_time, log.t, r)
+    t = log.t
+    on_time = t + rate.late
+    return np.interp(on_time, t, r)
 
 
 def _is_against(offset: ClockOffset | None) -> bool:

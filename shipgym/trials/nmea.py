@@ -190,8 +190,9 @@ def steering_numbers(sentence: Sentence) -> dict[str, float]:
         value = _number(place, fields, needed)
         if value is None:
             continue
+        size = abs(value)
         quantity = NMEA_QUANTITIES[name]
-        if abs(value) <= quantity.largest:
+        if size <= quantity.largest:
             numbers[name] = value
     return numbers
 
@@ -279,4 +280,5 @@ def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float
     if place.side is None:
         return value
     side = fields[place.side]
-    return copysign(value, _SIGNS[side])
+    sign = _SIGNS[side]
+    return copysign(value, sign)

@@ -89,13 +89,18 @@ def _are_compact(cells: list[str]) -> bool:
 
     Numbers that only look so count beyond 59, or do not pass a minute.
     """
-    known = [cell for cell in cells if cell]
-    matches = [_COMPACT.fullmatch(cell) for cell in known]
-    if not known or None in matches:
-        return False
-    minutes = {match["time"][:4] for match in matches if match}
-    has_date = all(match["date"] for match in matches if match)
-    return has_date or len(minutes) > 1
+    minutes = set()
+    dated = []
+    for cell in filter(None, cells):
+        match = _COMPACT.fullmatch(cell)
+        if match is None:
+            return False
+        hours_and_minutes = match["time"][:4]
+        minutes.add(hours_and_minutes)
+        dated.append(bool(match["date"]))
+
+    have_date = bool(dated) and all(dated)
+    return have_date or len(minutes) > 1
 
 
 def _parted(cell: str) -> str:

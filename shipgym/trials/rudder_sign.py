@@ -210,16 +210,23 @@ def _response(t: Floats, values: Floats, damping: float) -> Floats:
     """Heading of a ship with r' = -damping r + values from rest, by trapezoids."""
     steps = np.diff(t, axis=1)
     decays = np.exp(-damping * steps)
-    before = values[:, :-1]
-    after = values[:, 1:]
-    gains = 0.5 * (before + after) * (1.0 - decays) / damping
+    held = _means(values)
+    gains = held * (1.0 - decays) / damping
     r = np.zeros_like(t)
     last = steps.shape[1]
     for k in range(last):
         kept = decays[:, k] * r[:, k]
         r[:, k + 1] = kept + gains[:, k]
 
-    mean = 0.5 * (r[:, :-1] + r[:, 1:])
+    turned = steps * _means(r)
     psi = np.zeros_like(t)
-    psi[:, 1:] = np.cumsum(steps * mean, axis=1)
+    psi[:, 1:] = np.cumsum(turned, axis=1)
     return psi
+
+
+def _means(values: Floats) -> Floats:
+    """Means of each value and the next one in its row."""
+    before = values[:, :-1]
+    after = values[:, 1:]
+    means: Floats = 0.5 * (before + after)
+    return means

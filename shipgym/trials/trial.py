@@ -455,7 +455,8 @@ def _check_time(t: Floats, where: str) -> None:
         raise InputError(
             f"{where}: expected at least {FEWEST_SAMPLES} samples, got {t.size}"
         )
-    stands_still = np.diff(t) <= 0.0
+    steps = np.diff(t)
+    stands_still = steps <= 0.0
     if stands_still.any():
         sample = np.argmax(stands_still) + 1
         before = t[sample - 1]

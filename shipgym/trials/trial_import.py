@@ -75,7 +75,8 @@ def import_tables(
     _check_agreement(log, first.locator, conventions)
 
     is_magnetic = any(table.magnetic for table in tables)
-    log.magnetic = is_magnetic and conventions.installation.heading_offset == 0.0
+    offset = conventions.installation.heading_offset
+    log.magnetic = is_magnetic and offset == 0.0
     if log.magnetic:
         remarks.append(_MAGNETIC)
     log.notes = remarks + log.notes + motion_remarks
@@ -178,8 +179,9 @@ def _complete(log: Log, recordings: Sequence[Recording]) -> None:
     """Order the channels, and add the clock and the counts of values filled in."""
     ordered = {}
     for name in QUANTITIES:
-        if name in log.channels:
-            ordered[name] = log.channels[name]
+        values = log.channels.get(name)
+        if values is not None:
+            ordered[name] = values
     log.channels = ordered
 
     for recording in recordings:

@@ -35,8 +35,9 @@ def take_undecided(data: dict[str, Any], path: Path) -> tuple[str, ...]:
             continue
         key, choices = match.groups("a value as in docs/ship_file.md")
         where = f"{path}: line {number}: {key}"
+        answers = choices.strip()
         messages.append(
-            f'{where}: expected a decision, got "{_DECIDE}"; write {choices.strip()}'
+            f'{where}: expected a decision, got "{_DECIDE}"; write {answers}'
         )
     if not messages:
         names = quoted(sorted(keys))

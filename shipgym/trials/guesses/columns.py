@@ -155,23 +155,23 @@ def _settle_rudder(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
     for channel in ("delta", "delta_command"):
         guess = guesses.get(channel)
         heading = guesses.get("psi")
-        if (
-            guess is None
-            or heading is None
-            or not guess.reason.startswith("from its s")
-        ):
+        if guess is None or heading is None:
             continue
+        by_size = guess.reason.startswith("from its s")
+        units = (guess.unit, heading.unit)
         psi = _numbers(table, heading.column)
-        if guess.unit == "rad" and heading.unit == "deg" and psi is not None:
-            known = psi[np.isfinite(psi)]
-            heading_deg = np.unwrap(known, period=360.0)
-            turned = np.ptp(heading_deg) if known.size else 0.0
-            if turned < 10.0:
-                reason = (
-                    f"{guess.reason}, with a heading in deg that changes by"
-                    f" {turned:.3g} alone"
-                )
-                guesses[channel] = guess._replace(unit="deg", reason=reason)
+        if not by_size or units != ("rad", "deg") or psi is None:
+            continue
+
+        known = psi[np.isfinite(psi)]
+        heading_deg = np.unwrap(known, period=360.0)
+        turned = np.ptp(heading_deg) if known.size else 0.0
+        if turned < 10.0:
+            reason = (
+                f"{guess.reason}, with a heading in deg that changes by"
+                f" {turned:.3g} alone"
+            )
+            guesses[channel] = guess._replace(unit="deg", reason=reason)
 
 
 def _first_match(
@@ -260,7 +260,8 @@ def _with_date(
     """The time with the column of its date or of the GPS week, where there is one."""
     first = _first_text(table, time.column)
     is_of_day = _TIME_OF_DAY.fullmatch(first) is not None
-    is_of_week = _matches(_forms(time.column, "t"), ["*tow", "*timeofweek*"])
+    forms = _forms(time.column, "t")
+    is_of_week = _matches(forms, ["*tow", "*timeofweek*"])
     if is_of_week:
         unit = "gps tow ms" if time.unit == "ms" else "gps tow"
         reason = "seconds of the GPS week, by its name"
@@ -273,10 +274,14 @@ def _with_date(
         return time
     for pattern in names.known["date"]:
         for column in free:
-            if not _matches(_forms(column, "t"), [pattern]):
+            forms = _forms(column, "t")
+            if not _matches(forms, [pattern]):
                 continue
             date = _first_text(table, column)
-            if date.isdigit() if is_of_week else _DATE.fullmatch(date):
+            is_date = _DATE.fullmatch(date) is not None
+            if is_of_week:
+                is_date = date.isdigit()
+            if is_date:
                 free.remove(column)
                 return time._replace(extra=(("date", column),))
     return time

@@ -93,7 +93,8 @@ def _speed_by_positions(
 
 def _chord_speeds(t: Floats, x: Floats, y: Floats) -> Floats:
     """Speed over stretches of some 10 s."""
-    rows = max(1, round(10.0 / usual_step(t)))
+    step = usual_step(t)
+    rows = max(1, round(10.0 / step))
     if t.size < 3 * rows:
         rows = max(1, t.size // 3)
 

@@ -131,9 +131,8 @@ def _servo(numbers: dict[str, Floats]) -> SteeringGuess | None:
         f"steering command: a pulse width in us, neutral at {_NEUTRAL:g}, of which"
         f" {_SPAN:g} counts as {FULL_RUDDER_DEG:g} deg of a nominal rudder"
     )
-    return SteeringGuess(
-        column, "deg", reason, (("neutral", _NEUTRAL), ("full", _SPAN))
-    )
+    pulses = (("neutral", _NEUTRAL), ("full", _SPAN))
+    return SteeringGuess(column, "deg", reason, pulses)
 
 
 def _mirrored(servos: dict[str, Floats]) -> tuple[str, str] | None:

@@ -211,7 +211,9 @@ def _read(
     decisions: list[Decision],
 ) -> Trial:
     """Read a log with the guesses so far."""
-    columns = {channel: guess.as_column for channel, guess in guesses.items()}
+    columns = {}
+    for channel, guess in guesses.items():
+        columns[channel] = guess.as_column
     words: dict[str, Any] = {"where": f"{table.path}:"}
     for one in conventions.values():
         words[one.name] = one.value

@@ -30,19 +30,23 @@ def without_spikes(psi: Floats) -> tuple[Floats, int]:
     before = psi[:-2]
     inside = psi[1:-1]
     after = psi[2:]
-    from_before = np.abs(_wrapped(inside - before))
-    to_after = np.abs(_wrapped(after - inside))
+    from_before = _wrapped(inside - before)
+    to_after = _wrapped(after - inside)
     across = _wrapped(after - before)
-    is_outlier = np.minimum(from_before, to_after) > _LARGEST_JUMP
-    is_outlier &= np.abs(across) < _LARGEST_JUMP
+    is_outlier = (
+        (np.abs(from_before) > _LARGEST_JUMP)
+        & (np.abs(to_after) > _LARGEST_JUMP)
+        & (np.abs(across) < _LARGEST_JUMP)
+    )
 
-    count = int(np.count_nonzero(is_outlier))
-    if not count or count > 0.01 * psi.size:
+    outliers = np.flatnonzero(is_outlier)
+    most = 0.01 * psi.size
+    if not 0 < outliers.size <= most:
         return psi, 0
+    between = before + 0.5 * across
     filled = psi.copy()
-    rows = 1 + np.flatnonzero(is_outlier)
-    filled[rows] = (before + 0.5 * across)[is_outlier]
-    return filled, count
+    filled[1 + outliers] = between[outliers]
+    return filled, outliers.size
 
 
 def _wrapped(angle: Floats) -> Floats:

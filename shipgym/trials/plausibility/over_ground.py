@@ -22,8 +22,9 @@ def velocity_over_ground(log: Log) -> npt.NDArray[np.complex128]:
         north = channels["ground_north"]
         east = channels["ground_east"]
     else:
-        north = time_derivative(log.t, channels["x"])
-        east = time_derivative(log.t, channels["y"])
+        t = log.t
+        north = time_derivative(t, channels["x"])
+        east = time_derivative(t, channels["y"])
     return north + 1j * east
 
 
@@ -118,14 +119,17 @@ def constant_offset(psi: Floats, drift: Floats) -> float | None:
         Heading and course over ground less heading, rad, without jumps.
     """
     turning = np.gradient(psi)
-    fastest = np.quantile(np.abs(turning), 0.95)
-    is_straight = np.abs(turning) <= 0.2 * fastest
-    to_starboard = np.mean(turning > 0.2 * fastest)
-    to_port = np.mean(turning < -0.2 * fastest)
-    turns_both_ways = min(to_starboard, to_port) > 0.1
+    rate = np.abs(turning)
+    fastest = np.quantile(rate, 0.95)
+    slow = 0.2 * fastest
+    is_straight = rate <= slow
     if fastest == 0.0 or is_straight.mean() > 0.1:
-        return -float(np.median(drift[is_straight]))
-    if not turns_both_ways:
+        when_straight = drift[is_straight]
+        return -float(np.median(when_straight))
+
+    to_starboard = np.mean(turning > slow)
+    to_port = np.mean(turning < -slow)
+    if min(to_starboard, to_port) <= 0.1:
         return None
     _, offset = np.polyfit(turning, drift, deg=1)
     return -float(offset)

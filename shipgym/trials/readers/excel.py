@@ -66,7 +66,8 @@ def _layout(frame: Any) -> Layout:
     most_rows = min(100, len(frame))
     for number in range(most_rows):
         row = frame.iloc[number]
-        rows[number] = _texts(row)
+        texts = _texts(row)
+        rows[number] = texts
     first_row = Layout("", header=0, units=())
     return layout_of_rows(rows) or first_row
 

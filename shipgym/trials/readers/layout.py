@@ -67,7 +67,8 @@ def _likely_delimiters(lines: Iterable[str]) -> list[str]:
     counts = Counter[str]()
     for line in lines:
         unquoted = re.sub('"[^"]*"', "", line)
-        present = set(delimiters) & set(unquoted)
+        characters = set(unquoted)
+        present = characters.intersection(delimiters)
         counts.update(present)
     likely = [one for one in delimiters if counts[one]]
     likely.sort(key=lambda one: -counts[one])
@@ -136,7 +137,8 @@ def unit_texts(
         for name, cell in zip(header, cells, strict=False):
             bare = cell.strip("[]() \t")
             is_first = name not in units
-            if is_first and not is_missing(bare):
+            is_known = not is_missing(bare)
+            if is_first and is_known:
                 units[name] = bare
     return units
 

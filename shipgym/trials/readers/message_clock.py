@@ -207,9 +207,12 @@ def _spread(lines: Floats, clock: Clock) -> Floats:
         return np.interp(lines, clock.lines, clock.t)
     moments = np.searchsorted(clock.lines, lines, side="right")
     _, counts = np.unique(moments, return_counts=True)
-    usual = max(1, round(float(np.median(counts))))
-    if moments[0] == 0 and counts[0] >= usual and clock.leads:
-        moments = 1 + np.searchsorted(clock.lines, lines, side="left")
+    median = float(np.median(counts))
+    usual = max(1, round(median))
+    begins_before = moments[0] == 0 and counts[0] >= usual
+    if begins_before and clock.leads:
+        following = np.searchsorted(clock.lines, lines, side="left")
+        moments = 1 + following
     return _evenly(moments, usual, clock.t)
 
 
@@ -226,10 +229,13 @@ def _evenly(moments: npt.NDArray[np.intp], usual: int, t: Floats) -> Floats:
     pauses = np.append(np.diff(begins), step)
 
     _, first, counts = np.unique(moments, return_index=True, return_counts=True)
-    place = np.arange(moments.size) - np.repeat(first, counts)
-    if moments[0] == 0:  # the last ones before the first moment
-        place[: counts[0]] += usual - counts[0]
-    count = np.maximum(np.repeat(counts, counts), usual)
+    begin = np.repeat(first, counts)
+    place = np.arange(moments.size) - begin
+    n_before = counts[0] if moments[0] == 0 else 0
+    if n_before:  # the last ones before the first moment
+        place[:n_before] += usual - n_before
+    own_count = np.repeat(counts, counts)
+    count = np.maximum(own_count, usual)
     # the clock goes on later after a pause of the recorder
     longest = step * np.ceil(count / usual)
     pause = np.minimum(pauses[moments], longest)

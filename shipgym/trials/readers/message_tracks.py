@@ -53,7 +53,8 @@ def choose_tracks(heard: Heard, clock: Clock) -> Tracks:
     for channel, sources in heard.channels.items():
         of_source = _tracks_of(sources, clock)
         for track in of_source.values():
-            longest = max(longest, _covered(track))
+            covered = _covered(track)
+            longest = max(longest, covered)
         if channel == "delta":
             tracks[channel], chosen[channel] = _rudder(of_source, sources, notes)
             continue
@@ -70,9 +71,10 @@ def choose_tracks(heard: Heard, clock: Clock) -> Tracks:
     tracks.pop("variation", None)
     notes += _leave_out_rare(tracks, chosen, longest)
     read = _read_from(tracks, chosen)
+    origins = f"{read}; time from {clock.source}"
     return Tracks(
         by_channel=tracks,
-        notes=[f"{read}; time from {clock.source}", *notes],
+        notes=[origins, *notes],
         magnetic=is_magnetic,
     )
 
@@ -95,10 +97,12 @@ def _leave_out_rare(
     """Leave out channels with hardly any values; notes of them."""
     notes = []
     for channel, track in list(tracks.items()):
-        is_rare = _covered(track) < 0.1 * longest and channel not in ("psi", "delta")
-        if is_rare or track.t.size < FEWEST_SAMPLES:
+        count = track.t.size
+        is_needed = channel in ("psi", "delta")
+        is_rare = _covered(track) < 0.1 * longest
+        is_left_out = is_rare and not is_needed
+        if is_left_out or count < FEWEST_SAMPLES:
             del tracks[channel]
-            count = track.t.size
             notes.append(
                 f"{channel} of {chosen[channel]} left out: only {count} values"
             )
@@ -183,8 +187,9 @@ def _rudder(
     track = tracks[best]
     second = port_source(best)
     port = tracks.get(second)
-    if best == port_source(best.split()[0]):
-        notes.append(f"delta is the rudder in the port field of {best.split()[0]}")
+    speaker, *_ = best.split()
+    if best == port_source(speaker):
+        notes.append(f"delta is the rudder in the port field of {speaker}")
     if port is None:
         return track, best
 

@@ -59,13 +59,18 @@ def _delta(line: str) -> dict[str, Any]:
 
     A recorder of OpenCPN writes it as a cell, its quotes doubled.
     """
-    text = line[line.index("{") : line.rindex("}") + 1]
+    begin = line.index("{")
+    end = line.rindex("}") + 1
+    text = line[begin:end]
     if '""updates""' in text:
         text = text.replace('""', '"')
+
     delta = json.loads(text)
-    if isinstance(delta, dict) and isinstance(delta.get("updates"), list):
-        return delta
-    raise ValueError(f"expected a delta, got {text[:40]!r}")
+    updates = delta.get("updates") if isinstance(delta, dict) else None
+    if not isinstance(updates, list):
+        beginning = text[:40]
+        raise ValueError(f"expected a delta, got {beginning!r}")
+    return dict(delta)
 
 
 def _own_context(lines: Sequence[str], deltas: Any) -> str:
