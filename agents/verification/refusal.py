@@ -93,7 +93,8 @@ def rudder_effect(trials: Sequence[Trial], model: ShipModel) -> float:
     parts = [_changes(trial, window) for trial in trials]
     X = np.concatenate([part.features for part in parts])
     y = np.concatenate([part.changes for part in parts])
-    return _t_statistic(X, y, RUDDER)
+    rudder = 1  # column of `_Changes.features`
+    return _t_statistic(X, y, rudder)
 
 
 def _t_statistic(X: Floats, y: Floats, column: int) -> float:
@@ -117,9 +118,6 @@ class _Changes(NamedTuple):
 
     features: Floats  # yaw rate, rudder and 1, shape (n_windows, 3)
     changes: Floats  # shape (n_windows,)
-
-
-RUDDER = 1  # column of `_Changes.features`
 
 
 def _changes(trial: Trial, window: float) -> _Changes:

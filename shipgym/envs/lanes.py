@@ -21,8 +21,6 @@ from shipgym.sea.weather_column import weather_column
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 
-ANSWER = ("reward", "terminated", "truncated")  # outcomes before those of `info`
-
 
 class Lanes:
     """The arrays that loops work on; `Engine` steps them.
@@ -146,7 +144,8 @@ class Lanes:
         observed = []
         for quantity in self.task.observed(self.model):
             observed.append(rows["observation"].row(quantity.path))
-        answer = [rows["outcome"].row(name) for name in ANSWER]
+        outcomes = ("reward", "terminated", "truncated")
+        answer = [rows["outcome"].row(name) for name in outcomes]
         info = [self.program.info_row(name) for name in self.task.info_names]
         flags = [self.program.info_row(name) for name in self.flag_names]
         return {

@@ -19,8 +19,6 @@ if TYPE_CHECKING:  # few models have equations
 
 GREY_BOX = "grey-box"
 MMG = "mmg"  # the MMG method in its general form
-#: Files of this package that define a ship with equations of her own, by her name.
-SHIPPED_EQUATIONS = ("container", "tanker", "kvlcc2", MMG)
 #: The grey box stands on a reference ship, which only a user can name; the MMG form is
 #: no table.
 NO_TABLES = {
@@ -113,7 +111,8 @@ def get_structure(name: str) -> Structure:
 
 def list_equations() -> list[str]:
     """Names of ships with equations of their own, registered ones included."""
-    return [*SHIPPED_EQUATIONS, *REGISTERED_EQUATIONS]
+    shipped = ("container", "tanker", "kvlcc2", MMG)  # each in a file of that name
+    return [*shipped, *REGISTERED_EQUATIONS]
 
 
 def get_equations(name: str) -> ShipEquations:

@@ -21,7 +21,6 @@ from shipgym.trials.resampling import Log
 from shipgym.trials.units import DEGREE
 
 CERTAIN = 6.0  # standard errors by which a channel must explain the other
-CERTAIN_DERIVED = 10.0  # where the yaw rate is the derivative of a heading with noise
 
 
 class _Comparison(NamedTuple):
@@ -88,7 +87,9 @@ def _suspects(log: Log) -> list[LateChannel]:
     if rate is not None and rate.certainty >= CERTAIN:
         late.append(_late("r", rate, dynamics_s=0.25))
 
-    needed = CERTAIN if log.has("r") else CERTAIN_DERIVED
+    # where the yaw rate is the derivative of a heading with noise
+    certain_derived = 10.0
+    needed = CERTAIN if log.has("r") else certain_derived
     if rudder is not None and rudder.certainty >= needed:
         suspect = _late_rudder(log, rudder)
         if suspect is not None:

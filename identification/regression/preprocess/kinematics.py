@@ -13,7 +13,6 @@ from shipgym.arrays import Floats
 
 HEADING = ("psi", "r")
 PLANE = ("x", "y", "u", "v")
-LONGEST_SEARCH = 500  # samples, from which the roughness of the motion is found
 #: Covariance of position, velocity and acceleration after a step h of a twice
 #: integrated random walk: factors times powers of h.
 WALK_FACTORS = np.array(
@@ -174,8 +173,10 @@ def _smoothed(
             process=roughness * unit.process[steps],
         )
 
+    longest = 500  # samples, which are enough
+
     def unlikelihood(decade: float) -> float:
-        first = measured[:LONGEST_SEARCH]
+        first = measured[:longest]
         filtered = system(decade, len(first)).filtered(first)
         return -filtered.log_likelihood
 
