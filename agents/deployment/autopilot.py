@@ -335,12 +335,12 @@ class Autopilot:
         self.dt = self.parameters.dt
         self.limit = self.parameters.limit
         self.largest = self.limit
-        self.transfer: Transfer | None = None
         self.switch_on()
         self._given: Any = None
 
     def switch_on(self) -> None:
-        """Forget what was before."""
+        """Forget what was before; the order is that of the law at once."""
+        self.transfer: Transfer | None = None
         guidance: Any = Nothing()
         if isinstance(self.agent, Guided):
             guidance = _no_memory(self.agent)
