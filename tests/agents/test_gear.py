@@ -94,7 +94,7 @@ def test_orders_reach_only_the_gear_and_the_last_one_is_invalid(pilot):
     assert b",M,N," in heard[-1]
     assert ": the rudder follows orders" in sailed
     assert ": no valid rudder orders: rudder amidships" in sailed
-    assert simulate.returncode == 0
+    assert simulate.returncode == 143
 
 
 def test_a_rudder_goes_amidships_when_orders_stop():
