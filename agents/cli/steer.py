@@ -114,8 +114,8 @@ def steer_command(
 ) -> None:
     """Steer over NMEA 0183.
 
-    Reads HDT/THS, HDG/HDM, ROT, RSA, VBW, VTG/RMC, APB, XTE, BWC, BWR, HSC, HTC, ACN;
-    writes ROR, HTD, ALR, ALF, ALC.
+    Reads HDT/THS, HDG/HDM, ROT, RSA, VBW, VTG/RMC, GLL, APB, XTE, BWC, BWR, HSC, HTC,
+    ACN; writes ROR, HTD, ALR, ALF, ALC.
 
     It begins when everything that the autopilot reads is available. If a sensor falls
     silent, two disagree, the rudder does not follow or the computer is late, it raises
