@@ -229,6 +229,11 @@ async def simulate_ship(
         Called with a line when her rudder is steered and when it is released.
     """
     check_number(speed_up, "speed_up", above=0.0)
+    if gear == address and address.startswith("udp:"):
+        raise InputError(
+            "--gear: expected another address than that of the instruments, at which"
+            f" she receives rudder orders, got {gear} for both"
+        )
     dropped = dict(drop or {})
     lines = ship.sentences().splitlines()
     types = {_type(line) for line in lines}
