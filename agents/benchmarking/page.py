@@ -38,7 +38,6 @@ from shipgym.pages.numbers import counted
 from shipgym.plots.style import Figure
 
 PAGE = "index.html"
-N_WORST = 3  # episodes of each controller in each task that may be replayed
 
 
 class PageFigure(NamedTuple):
@@ -54,7 +53,7 @@ def write_page(
     result: BenchmarkResult,
     path: str | Path,
     controllers: Any = None,
-    worst: int = N_WORST,
+    worst: int = 3,
     workers: int | None = 1,
     progress: Progress | None = None,
 ) -> None:

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from agents.training.training import TrainingProgress
     from identification.progress import Progress
 
-WIDTH_WITHOUT_TERMINAL = 110
 #: Control characters but tab and newline, and those that turn the direction of writing.
 CONTROL_CODES = (
     *range(9),
@@ -47,7 +46,7 @@ class PlainConsole(Console):
 
 
 AS_JSON: ContextVar[bool] = ContextVar("as_json", default=False)
-console = PlainConsole(width=None if sys.stdout.isatty() else WIDTH_WITHOUT_TERMINAL)
+console = PlainConsole(width=None if sys.stdout.isatty() else 110)
 err = PlainConsole(stderr=True)
 
 

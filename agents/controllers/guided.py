@@ -34,7 +34,6 @@ from shipgym.tasks.task import Task
 Observations = NDArray[np.float32]
 
 N_HEADING = len(OBSERVATION_NAMES)  # observations of a heading autopilot
-UNLIMITED = Margins(np.inf, np.inf, np.inf, np.inf)
 COURSE_ERROR = ("course_error_sin", "course_error_cos")
 #: Observations of the turns ahead, in the order of `Turns`.
 TURNS = (
@@ -97,7 +96,7 @@ class Guided(Controller):
             margins = autopilot.margins
         else:
             like = LQ.from_model(model, dt=dt)
-            margins = UNLIMITED
+            margins = Margins(np.inf, np.inf, np.inf, np.inf)
         like.check_fits_model(model)
 
         scales = _scales_of(task, model, cls.observes)

@@ -155,10 +155,11 @@ class Helm(HelmCommands):
             self.stand_by()
         for reading in self.compass.true(heard, now):
             self.sensors.take(reading, now)
-            is_steered_by = self.sensors.value(reading.quantity, now) == reading.value
+            quantity = reading.quantity
+            is_steered_by = self.sensors.value(quantity, now) == reading.value
             if is_steered_by:
                 self.belief.take(reading, now)
-            if reading.quantity == "commanded":
+            if quantity == "commanded":
                 self.commanded = reading.value
         with suppress(ValueError, IndexError):
             self.alerts.hear(line, now)

@@ -82,7 +82,8 @@ def readings(line: str, address: str = "") -> list[NmeaReading] | None:
     found = []
     sender = (sentence.talker, sentence.kind, address)
     for quantity, value in numbers.items():
-        found.append(NmeaReading(quantity, value, *sender))
+        reading = NmeaReading(quantity, value, *sender)
+        found.append(reading)
     return found
 
 
