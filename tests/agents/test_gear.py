@@ -86,14 +86,14 @@ def test_orders_reach_only_the_gear_and_the_last_one_is_invalid(pilot):
         for text in heard:
             hears.sendto(text, ("127.0.0.1", ship))
         assert list(rest_of(plotter)) == []
+    assert ": the rudder follows orders" in simulate.stdout.readline()
+    assert ": no valid rudder orders: rudder amidships" in simulate.stdout.readline()
     simulate.terminate()
-    sailed, _ = simulate.communicate(timeout=60)
+    simulate.communicate(timeout=60)
     assert helm.returncode == 143
     assert "ended by SIGTERM: the last order is marked invalid" in told
     assert b"$AGROR,0.0,V,,V,B*" in heard[-1]
     assert b",M,N," in heard[-1]
-    assert ": the rudder follows orders" in sailed
-    assert ": no valid rudder orders: rudder amidships" in sailed
     assert simulate.returncode == 143
 
 
