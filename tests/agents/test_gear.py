@@ -222,12 +222,13 @@ def test_a_serial_line_that_vanishes_is_named_once():
     told = []
 
     async def sails():
-        asyncio.get_running_loop().call_later(0.3, os.close, ours)
-        words = {"gear": f"serial:{device}", "heading": 0.0, "duration": 20.0}
+        asyncio.get_running_loop().call_later(1.5, os.close, ours)
+        words = {"gear": f"serial:{device}", "heading": 0.0, "duration": 2.5}
         address = f"udp:127.0.0.1:{ports(1)[0]}"
-        await steer(PID_MARINER, address, log=told.append, speed_up=20.0, **words)
+        await steer(PID_MARINER, address, log=told.append, **words)
 
-    asyncio.run(sails())
+    with asyncio.Runner(loop_factory=no_waiting) as runner:
+        runner.run(sails())
     vanished = f"serial:{device}: closed (it has vanished)"
     assert [vanished in line for line in told] == [False, True]
 
