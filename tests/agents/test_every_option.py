@@ -194,9 +194,8 @@ def test_processes_of_a_command_take_no_modules_from_the_folder_of_data(
     data, monkeypatch
 ):
     monkeypatch.chdir(data)
-    words = (
-        "benchmark --controllers pid,lq --suite small.toml --tasks calm --episodes 2"
-    )
-    answer = run(*shlex.split(words), "--workers=2", "--out=in-processes")
+    words = "benchmark --controllers pid,lq --suite small.toml --tasks calm"
+    more = "--episodes 1 --workers 2 --no-page --out in-processes"
+    answer = run(*shlex.split(words), *shlex.split(more))
     assert answer.returncode == 0, answer.stderr
     assert not (data / "RAN").exists(), (data / "RAN").read_text()
