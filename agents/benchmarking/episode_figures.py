@@ -16,11 +16,6 @@ from shipgym.tasks.guidance import wrapped
 MOST_SAMPLES = 240  # of a line
 GREEN, LIGHT_GREEN = "#2f6b3c", "#e3efe5"  # of the path to follow
 GAP = np.full(2, np.nan)  # between outlines
-HISTORIES_GRID = {
-    "shared_xaxes": True,
-    "vertical_spacing": 0.05,
-    "row_heights": [0.58, 0.42],
-}
 
 
 def tracks_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figure:
@@ -131,7 +126,12 @@ def histories_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> F
     quantity = "cross-track error, m" if has_path else "heading, deg"
     upper = Panel(courses, "", quantity)
     lower = Panel(rudders, "time, s", axis("rudder, deg", zero=True))
-    figure = page_panels([upper, lower], height=480, grid=HISTORIES_GRID)
+    grid = {
+        "shared_xaxes": True,
+        "vertical_spacing": 0.05,
+        "row_heights": [0.58, 0.42],
+    }
+    figure = page_panels([upper, lower], height=480, grid=grid)
     if has_path and longest.corridor:
         _add_bounds(figure, longest.corridor)
     return figure

@@ -132,7 +132,8 @@ def _simulate(model: ShipModel, manoeuvres: Mapping[str, Manoeuvre]) -> _Nominal
         try:
             run = manoeuvre.sail(model)
             nominal.runs[name] = run
-            nominal.indices[name] = asdict(manoeuvre.indices(run))
+            indices = manoeuvre.indices(run)
+            nominal.indices[name] = asdict(indices)
         except (InputError, ManoeuvreError, UnstableModelError) as error:
             nominal.refused[name] = str(error)
             last_error = error

@@ -114,8 +114,8 @@ def steer_command(
 ) -> None:
     """Steer over NMEA 0183.
 
-    Reads HDT/THS, HDG/HDM, ROT, RSA, VBW, VTG/RMC, APB, XTE, BWC, BWR, HSC, HTC, ACN;
-    writes ROR, HTD, ALR, ALF, ALC.
+    Reads HDT/THS, HDG/HDM, ROT, RSA, VBW, VTG/RMC, GLL, APB, XTE, BWC, BWR, HSC, HTC,
+    ACN; writes ROR, HTD, ALR, ALF, ALC.
 
     It begins when everything that the autopilot reads is available. If a sensor falls
     silent, two disagree, the rudder does not follow or the computer is late, it raises
@@ -181,11 +181,17 @@ def _report_end(helm: Any) -> None:
     answer({"state": helm.state, "alarm": helm.alarm, **helm.counts})
     if helm.alarm:
         fail(f"handed over: {helm.alarm}", FAILED)
-    if helm.ended_by.startswith("SIG"):
-        code = INTERRUPTED if helm.ended_by == "SIGINT" else TERMINATED
-        fail(f"ended by {helm.ended_by}: the last order is marked invalid", code)
     by = helm.ended_by or "--duration"
-    say(f"ended by {by}: the last order is marked invalid")
+    end = f"ended by {by}: the last order is marked invalid"
+    _fail_by_signal(helm.ended_by, end)
+    say(end)
+
+
+def _fail_by_signal(signal: str, message: str) -> None:
+    """End with the exit code of a signal, if it is one."""
+    if signal.startswith("SIG"):
+        code = INTERRUPTED if signal == "SIGINT" else TERMINATED
+        fail(message, code)
 
 
 def simulate_command(
@@ -223,6 +229,8 @@ def simulate_command(
 
     Over TCP it waits for connections; the autopilot and a chart plotter may connect at
     once. Over UDP it sends to --nmea and listens for orders at --gear.
+
+    Exits with 130 after Ctrl-C and 143 after SIGTERM.
     """
     import asyncio
 
@@ -236,7 +244,7 @@ def simulate_command(
     for kind, after in named_values(drop or (), "--drop", "HDT=60").items():
         dropped[kind.upper()] = check_number(after, f"--drop {kind}", at_least=0.0)
     ship = SimulatedShip(load_model(model), radians(leg), sea, seed)
-    asyncio.run(
+    ended_by = asyncio.run(
         simulate_ship(
             ship,
             nmea,
@@ -255,4 +263,6 @@ def simulate_command(
             "state": ship.now,
         }
     )
-    say(f"{ship.model.name}: sailed for {seconds:.1f} s")
+    sailed = f"{ship.model.name}: sailed for {seconds:.1f} s"
+    _fail_by_signal(ended_by, f"{sailed}, ended by {ended_by}")
+    say(sailed)

@@ -42,10 +42,13 @@ def warm_command(
     from agents.cli.terminal import answer, say
     from shipgym.engine.cache_folder import usable_folder
     from shipgym.errors import InputError
+    from shipgym.ships import load_model
 
     folder = usable_folder()
     if folder is None:
         raise InputError("there is no cache to fill, for the reason above")
+    if model is not None:
+        load_model(model)
     jobs: dict[str, Callable[[], Any]] = {}
     for name in warm_names(wanted, everything):
         jobs |= warm_jobs(name, model)

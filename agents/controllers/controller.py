@@ -33,6 +33,7 @@ from shipgym import ShipModel
 from shipgym.arrays import Flags, Floats, finite
 from shipgym.engine.records import Record, leaves
 from shipgym.files import write_json
+from shipgym.ships.linear import linearise, nomoto_of
 from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 
 Action = NDArray[np.float32]
@@ -139,11 +140,13 @@ class Controller:
         gains : dict of str to float
             By the names of `feedback`.
         design : dict of str to float
-            How they were found.
+            How they were found; Nomoto's K and T are added.
         **more
             Further fields of the class.
         """
         scales = observation_scales(model).tolist()
+        response = nomoto_of(*linearise(model, ship.about))
+        answer = {"nomoto_K": response.K, "nomoto_T": response.T}
         made = cls(
             gains=gains,
             neutral_rudder=ship.about.rudder,
@@ -152,7 +155,7 @@ class Controller:
             observation_scales=tuple(scales),
             model_name=model.name,
             model_sha256=model_hash(model),
-            design={"dt": ship.dt, **design},
+            design={"dt": ship.dt, **design, **answer},
             **more,
         )
         return replace(made, margins=made._margins(ship, model))

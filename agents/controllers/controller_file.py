@@ -32,7 +32,6 @@ REMEDY = "design the controller again or take another copy"
 #: The kind of file that `agents.policies.policy_file` reads.
 LEARNED = "learned"
 RUDDER = Bounds(-np.pi, np.pi)  # rad
-SCALE = Bounds(1e-9, 1e9)
 FINITE = Bounds(-np.inf, np.inf)
 FIELDS = (
     "format",
@@ -214,10 +213,11 @@ def read_scales(value: Any, names: tuple[str, ...]) -> tuple[float, ...]:
     if len(value) != len(names):
         raise InputError(f"{where}: {expected}, got {len(value)}")
 
+    bounds = Bounds(1e-9, 1e9)
     scales = []
     for i, name in enumerate(names):
         place = f"{where}[{i}] ('{name}')"
-        scale = _number(value[i], SCALE, place)
+        scale = _number(value[i], bounds, place)
         scales.append(scale)
     return tuple(scales)
 

@@ -99,8 +99,6 @@ class PID(Controller):
             "damping": float(damping),
             "integral_lengths": float(integral_lengths),
             "lag": lag,
-            "nomoto_K": response.K,
-            "nomoto_T": response.T,
         }
         return cls.designed(model, ship, gains, design)
 

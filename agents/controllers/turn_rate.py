@@ -174,12 +174,11 @@ class TurnRate(Controller):
             "heading_time": slower / frequency,
             "rate": rate,
         }
-        design = {"frequency": frequency, "nomoto_K": form.K, "nomoto_T": form.T}
         return cls.designed(
             model,
             ship,
             gains,
-            design,
+            {"frequency": frequency},
             rates=turns.rates,
             rudders=turns.rudders,
         )

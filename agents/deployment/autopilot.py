@@ -32,9 +32,6 @@ from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.scales import rounded_interval
 from shipgym.tasks.steering import Extras, SteeringSignals
 
-#: Inputs that show a signal or an observation of another name.
-SHOWN_BY = {"drift": "course", **dict.fromkeys(COURSE_ERROR, "course")}
-
 
 class BridgeInput(NamedTuple):
     """Input of an autopilot, with units and signs as in `AUTOPILOT_INPUTS`."""
@@ -330,17 +327,19 @@ class Autopilot:
     def __init__(self, agent: Any) -> None:
         self.agent = agent
         self.inputs = needed_inputs(agent)
-        self.pilot: Any = agent.autopilot if isinstance(agent, Guided) else agent
+        self.pilot: Any = agent
+        if isinstance(agent, Guided):
+            self.pilot = agent.autopilot
         self.parameters = bridge_parameters(agent)
         self.dt = self.parameters.dt
         self.limit = self.parameters.limit
         self.largest = self.limit
-        self.transfer: Transfer | None = None
         self.switch_on()
         self._given: Any = None
 
     def switch_on(self) -> None:
-        """Forget what was before."""
+        """Forget what was before; the order is that of the law at once."""
+        self.transfer: Transfer | None = None
         guidance: Any = Nothing()
         if isinstance(self.agent, Guided):
             guidance = _no_memory(self.agent)
@@ -497,7 +496,8 @@ def _needed(agent: Any) -> set[str]:
         names = set(agent.needed_signals)
     else:
         names = set(agent.observation_names)
-    shown = {SHOWN_BY.get(name, name) for name in names}
+    by_course = ("drift", *COURSE_ERROR)  # which the course over ground shows
+    shown = {"course" if name in by_course else name for name in names}
 
     inner = getattr(agent, "autopilot", None) or getattr(agent, "base", None)
     if inner is not None:

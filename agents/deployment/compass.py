@@ -33,6 +33,8 @@ class Compass:
             "magnetic_leg": "leg",
             "magnetic_to_steer": "to_steer",
             "magnetic_commanded": "commanded",
+            "magnetic_course": "course",
+            "magnetic_waypoint_bearing": "waypoint_bearing",
         }
         values = {reading.quantity: reading.value for reading in readings}
         if "variation" in values:

@@ -147,7 +147,9 @@ class HelmView:
             ready = f"cannot steer: {self.obstacle}"
         if not self.alarm:
             return [ready]
-        return [self.alarm] if self.alarm == self.obstacle else [self.alarm, ready]
+        if self.alarm == self.obstacle:
+            return [self.alarm]
+        return [self.alarm, ready]
 
     @property
     def gauges(self) -> dict[str, str]:

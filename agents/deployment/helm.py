@@ -18,7 +18,7 @@ from agents.deployment.helm_commands import (
     STEERING,
     HelmCommands,
 )
-from agents.deployment.nmea import readings, sentences
+from agents.deployment.nmea import gives_up_steering, readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.sensors import HelmSensors, Limits
 from shipgym import InputError
@@ -151,12 +151,15 @@ class Helm(HelmCommands):
             self.counts["damaged"] += 1
             return
         self.counts["sentences"] += 1
+        if gives_up_steering(line):
+            self.stand_by()
         for reading in self.compass.true(heard, now):
             self.sensors.take(reading, now)
-            is_steered_by = self.sensors.value(reading.quantity, now) == reading.value
+            quantity = reading.quantity
+            is_steered_by = self.sensors.value(quantity, now) == reading.value
             if is_steered_by:
                 self.belief.take(reading, now)
-            if reading.quantity == "commanded":
+            if quantity == "commanded":
                 self.commanded = reading.value
         with suppress(ValueError, IndexError):
             self.alerts.hear(line, now)

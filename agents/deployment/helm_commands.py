@@ -113,7 +113,8 @@ class HelmCommands:
             return
         if self.obstacle:
             raise InputError(f"cannot steer: {self.obstacle}")
-        if self.heading is not None and self.has_steered:
+        has_own = self.heading is not None
+        if has_own and self.has_steered:
             self.heading = self.sensors.value("heading", self.now)
         self.begin()
 

@@ -67,18 +67,36 @@ def readings(line: str, address: str = "") -> list[NmeaReading] | None:
     """Numbers of a sentence that came from an address; None if it is damaged.
 
     A sentence of another kind, or that is marked as invalid, has no numbers. One
-    without a checksum counts as damaged, as one with a wrong one.
+    without a checksum counts as damaged, as one with a wrong one. The rudder is the
+    starboard or single one, or the port one if that alone is valid.
     """
     try:
         sentence = parse_sentence(line)
         numbers = steering_numbers(sentence)
     except (ValueError, IndexError, KeyError):
         return None
+    port_rudder = numbers.pop("port_rudder", None)
+    if port_rudder is not None:
+        numbers.setdefault("rudder", port_rudder)
+
     found = []
     sender = (sentence.talker, sentence.kind, address)
     for quantity, value in numbers.items():
-        found.append(NmeaReading(quantity, value, *sender))
+        reading = NmeaReading(quantity, value, *sender)
+        found.append(reading)
     return found
+
+
+def gives_up_steering(line: str) -> bool:
+    """True for a command (HTC) to steer by hand, or one that overrides autopilots."""
+    try:
+        sentence = parse_sentence(line)
+    except ValueError:
+        return False
+    if sentence.kind != "HTC":
+        return False
+    override, _, _, mode, *_ = [*sentence.fields, "", "", "", ""]
+    return override == "A" or mode in ("M", "R")
 
 
 def sentences(text: str) -> str:

@@ -22,7 +22,8 @@ class Constants:
                 return node.value
             case ast.Name():
                 value = self.globals.get(node.id)
-                return None if isinstance(value, type | FunctionType) else value
+                is_code = isinstance(value, type | FunctionType)
+                return None if is_code else value
             case ast.Attribute():
                 owner = self.value(node.value)
                 return None if owner is None else getattr(owner, node.attr, None)

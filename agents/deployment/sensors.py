@@ -162,7 +162,8 @@ class HelmSensors:
         instrument = sources[first]
         if now - instrument.time > patience_s:
             for source, other in sources.items():
-                if source.host == first.host and other.time > instrument.time:
+                is_same = source.host == first.host
+                if is_same and other.time > instrument.time:
                     instrument = other
         return instrument
 
@@ -283,7 +284,8 @@ class HelmSensors:
         low, high = self.reachable
         off = max(low - rudder, rudder - high)
         tolerance = radians(self.limits.rudder_deg)
-        if self.lasts("order", off > tolerance, now):
+        is_off = off > tolerance
+        if self.lasts("order", is_off, now):
             return "the rudder does not follow its order"
         return ""
 

@@ -205,8 +205,8 @@ async def simulate_ship(
     speed_up: float = 1.0,
     drop: Mapping[str, float] | None = None,
     log: Callable[[str], None] | None = None,
-) -> None:
-    """Simulate a ship over NMEA 0183.
+) -> str:
+    """Simulate a ship over NMEA 0183; the signal that ended it, empty without one.
 
     Over TCP others connect to the address, over UDP she sends there. Raises InputError
     for an address that cannot be opened, or a type of sentence that she does not send.
@@ -229,6 +229,11 @@ async def simulate_ship(
         Called with a line when her rudder is steered and when it is released.
     """
     check_number(speed_up, "speed_up", above=0.0)
+    if gear == address and address.startswith("udp:"):
+        raise InputError(
+            "--gear: expected another address than that of the instruments, at which"
+            f" she receives rudder orders, got {gear} for both"
+        )
     dropped = dict(drop or {})
     lines = ship.sentences().splitlines()
     types = {_type(line) for line in lines}
@@ -239,7 +244,7 @@ async def simulate_ship(
     orders = Link(ship.hear)
     begin = loop.time()
     steered = False
-    with closing(link), closing(orders), interruptions():
+    with closing(link), closing(orders), interruptions() as signals:
         await link.open(address, serve=True, sends=True)
         if gear not in (None, address):
             await orders.open(gear, serve=True)
@@ -255,6 +260,7 @@ async def simulate_ship(
             steered = ship.ordered_at is not None
             if log is not None and steered != steered_before:
                 log(f"{ship.time:.1f} s: {_GEAR[steered]}")
+    return signals[0] if signals else ""
 
 
 _GEAR = {

@@ -168,7 +168,8 @@ class Bridge:
                     command(helm)
 
             late_s = (now - due) / self.speed_up
-            helm.watch(tick, now, self.fault(late_s))
+            fault = self.fault(late_s)
+            helm.watch(tick, now, fault)
             if number % ticks_per_step == 0:
                 helm.steer(now)
             self.send(helm.sentences())
@@ -226,7 +227,8 @@ class Bridge:
     def check_heard(self) -> None:
         """Refuse a closed connection from which nothing ever came."""
         problem = self.data.problem
-        if problem and not self.helm.ended_by and not any(self.helm.counts.values()):
+        has_heard = any(self.helm.counts.values())
+        if problem and not self.helm.ended_by and not has_heard:
             raise InputError(
                 f"{problem}; no data received for {self.seconds:g} s; is the other end"
                 " running?"

@@ -34,9 +34,6 @@ from shipgym.files import LARGEST_TENSORS, parse_json, read_bytes
 from shipgym.tasks.task import Task
 
 REMEDY = "save the agent again"
-POLICIES = re.compile(
-    r"stable_baselines3\.(common|sac|td3)\.policies|sb3_contrib\.tqc\.policies"
-)
 #: Entries of `policy_kwargs` with which a network is as its weights say.
 KWARGS = {
     ":type:",
@@ -162,7 +159,8 @@ def _activation(about: Mapping[str, Any]) -> str | None:
     """Name of the activation, None for the usual; refuses a user's own policy."""
     policy_class = check_table(about.get("policy_class"), "data: policy_class")
     module = policy_class.get("__module__")
-    if not POLICIES.fullmatch(str(module)):
+    known = r"stable_baselines3\.(common|sac|td3)\.policies|sb3_contrib\.tqc\.policies"
+    if not re.fullmatch(known, str(module)):
         raise InputError(
             "expected 'MlpPolicy' of stable-baselines3 or sb3-contrib, got a policy of"
             f" {module!r}"

@@ -136,6 +136,11 @@ def _task(request: TrainingRequest, stored: TrainingPlan | None) -> BenchmarkTas
                 " leave one of them out"
             )
         return find_task(request.task, request.suite, request.allow_code)
+    if request.suite != DEFAULT_SUITE:
+        raise InputError(
+            f"--suite: expected together with --task, got {request.suite!r} alone; name"
+            " one of its tasks"
+        )
     if stored is not None:
         return _changed_task(request, stored.task) if options else stored.task
     return _changed_task(request, BenchmarkTask("", "course-keeping", "mariner"))

@@ -63,6 +63,8 @@ def steer(
         silent = () if now < LOST_S else lost
         show(helm, measured, silent, now)
         helm.watch(dt, now)
+        if not rows:
+            helm.pilot.switch_on()  # nobody had the wheel before
         helm.steer(now)
         if helm.alarm:
             break

@@ -57,7 +57,7 @@ class SentenceKind:
     """Contents of a kind of sentence; `nmea.toml` explains the names."""
 
     fields: Mapping[str, NumberField]  # by quantity
-    log_fields: Mapping[str, NumberField]  # of logs: the same, and more
+    log_fields: Mapping[str, NumberField]  # the same, with the statuses of logs
     valid: Letters = field(default_factory=dict)
     mode: Letters = field(default_factory=dict)
     degraded: Letters = field(default_factory=dict)
@@ -92,12 +92,11 @@ def _with_letters(entry: Mapping[str, Any]) -> dict[str, Any]:
 def _sentence_kind(entry: Mapping[str, Any]) -> SentenceKind:
     kind = _with_letters(entry)
     fields = _number_fields(entry.get("fields", {}))
-    of_logs = _number_fields(entry.get("log_fields", {}))
     valid = kind.get("valid", {})
     degraded = kind.get("degraded", {})
 
     log_fields = {}
-    for quantity, place in (fields | of_logs).items():
+    for quantity, place in fields.items():
         statuses = dict(place.valid or valid)
         for at, letters in degraded.items():
             statuses[at] |= letters
@@ -182,7 +181,7 @@ def steering_numbers(sentence: Sentence) -> dict[str, float]:
         return {}
     numbers = {}
     for name, place in kind.fields.items():
-        needed = {**kind.valid, **place.letters, **place.only_if}
+        needed = {**(place.valid or kind.valid), **place.letters, **place.only_if}
         fields = sentence.fields
         if place.optional:
             fields = _padded(sentence)

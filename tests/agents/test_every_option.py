@@ -37,13 +37,16 @@ TASK_OF_OWN = (
     "--env course-keeping --model mariner --sea calm --option episode_steps=20"
 )
 LEARNING = "--settings ppo.toml --total-steps 32"
-PILOT = "--nmea udp:127.0.0.1:9 --duration 0.5 --speed-up 10 --limit silence_s=2"
+PILOT = (
+    "--nmea udp:127.0.0.1:0 --gear udp:127.0.0.1:9 --duration 0.5 --speed-up 10 --limit"
+    " silence_s=2"
+)
 
 #: Command lines in their order (later ones use what earlier ones wrote), each with its
 #: exit code; every command also takes --json and --quiet.
 LINES = (
-    ("new-ship zigzag_15_15.csv --length 160.9 --out new.toml", 0),
-    ("look ship.toml --out look.html", 0),
+    ("new-ship zigzag_15_15.csv --length 160.9 --strict --out new.toml", 0),
+    ("look ship.toml --strict --out look.html", 0),
     (f"identify ship.toml {LINEAR} --out linear", 0),
     (f"identify ship.toml {GREY} --kernel rbf --out grey", 0),
     ("identify ship.toml --compare --structures abkowitz --methods ls --out ls", 0),
@@ -60,14 +63,19 @@ LINES = (
     ),
     (f"autopilot ship.toml {WRONG} --out report2", 2),
     ("autopilot ship.toml --address 127.0.0.1:9 --out report2", 2),
-    ("export report/lq.json --c c --fmu lq.fmu --fmi 2.0 --name lq", 0),
+    ("export report/lq.json --c c --fmu lq.fmu --fmi 2.0 --name lq --float", 0),
     ("export sharp-turns-ppo-s1 --onnx policy.onnx", 0),
     ("export tanker --c tanker --depth 25", 0),
     (f"steer report/turn-rate.json {PILOT} --heading 45 --rate-of-turn 10", 0),
-    (f"steer report/lq.json {PILOT} --route route.csv", 2),
     (
-        "simulate mariner --nmea udp:127.0.0.1:9 --leg 30 --sea slight --seed 1 --drop"
-        " HDT=1 --duration 0.2 --speed-up 10",
+        f"steer report/lq.json {PILOT} --variation -2 --no-rudder-feedback --page 0"
+        " --log steer.nmea",
+        0,
+    ),
+    (f"steer report/lq.json {PILOT} --rudder-feedback --route route.csv", 2),
+    (
+        "simulate mariner --nmea udp:127.0.0.1:9 --gear udp:127.0.0.1:0 --leg 30 --sea"
+        " slight --seed 1 --drop HDT=1 --duration 0.2 --speed-up 10",
         0,
     ),
     (
@@ -186,9 +194,8 @@ def test_processes_of_a_command_take_no_modules_from_the_folder_of_data(
     data, monkeypatch
 ):
     monkeypatch.chdir(data)
-    words = (
-        "benchmark --controllers pid,lq --suite small.toml --tasks calm --episodes 2"
-    )
-    answer = run(*shlex.split(words), "--workers=2", "--out=in-processes")
+    words = "benchmark --controllers pid,lq --suite small.toml --tasks calm"
+    more = "--episodes 1 --workers 2 --no-page --out in-processes"
+    answer = run(*shlex.split(words), *shlex.split(more))
     assert answer.returncode == 0, answer.stderr
     assert not (data / "RAN").exists(), (data / "RAN").read_text()

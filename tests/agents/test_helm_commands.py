@@ -14,6 +14,7 @@ from agents.deployment.sensors import Limits
 from shipgym.errors import InputError
 from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER
+from tests.agents.steering import sentence
 
 PID_MARINER = PID.from_model(MARINER)
 ROUTE = np.array([[54.0, 7.5], [54.1, 7.5], [54.1, 7.7]])
@@ -50,6 +51,23 @@ def test_on_stand_by_orders_are_invalid_until_the_helmsman_steers_again():
     helm.steer(3.0)
     assert helm.order == pytest.approx(0.2, abs=0.01)
     assert ",A,,V" in helm.sentences()
+
+
+@pytest.mark.parametrize(
+    ("override", "mode", "state"),
+    [
+        ("V", "M", STANDBY),
+        ("V", "R", STANDBY),
+        ("A", "H", STANDBY),
+        ("V", "H", STEERING),
+        ("V", "", STEERING),
+    ],
+)
+def test_a_command_to_steer_by_hand_is_obeyed(override, mode, state):
+    helm = steering()
+    helm.hear(sentence("IIHTC", override, "", "", mode, "N"), "a:1", 1.0)
+    tell(helm, 1.0)
+    assert helm.state == state
 
 
 def test_the_heading_of_the_start_is_kept_until_it_has_been_steered():

@@ -87,6 +87,16 @@ from tests.agents.steering import free_port, sentence
         (sentence("IIHTC", "V", "", "", "M", "N", *[""] * 4, 90.0, "", "", "T"), []),
         (sentence("IIHTC", "A", "", "", "S", "N", *[""] * 4, 90.0, "", "", "T"), []),
         (sentence("GPGLL", "5400.0", "N", "00700.0", "E"), []),
+        (
+            sentence("GPGLL", "0000.0", "N", "18000.0", "E", "", "A", "D"),
+            [("latitude", 0.0, "GP"), ("longitude", np.pi, "GP")],
+        ),
+        (sentence("GPGLL", "0000.0", "N", "18000.0", "E", "", "A", "E"), []),
+        (sentence("IIRSA", "", "V", 18.0, "A"), [("rudder", np.pi / 10.0, "II")]),
+        (
+            sentence("GPVTG", "", "T", 90.0, "M", "", "N"),
+            [("magnetic_course", np.pi / 2.0, "GP")],
+        ),
         (sentence("HEHDT", "", "T"), []),
         (sentence("HEHDT", 999.0, "T"), []),
         ("$PGRME,15.0,M*1A", []),

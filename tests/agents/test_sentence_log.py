@@ -61,7 +61,7 @@ def test_what_is_logged_is_read_as_the_ship_sailed_and_orders_disturb_nothing(tm
     helm = Helm(PID.from_model(MARINER), 0.5, Limits())
     log = SentenceLog(tmp_path / "log.nmea", 0.0)
     panel = HelmPanel(log)
-    for step in range(300):
+    for step in range(600):
         now = 0.1 * step
         for line in ship.sentences().splitlines():
             helm.hear(line, "10.0.0.1:10110", now)
