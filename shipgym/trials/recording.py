@@ -13,6 +13,7 @@ from shipgym.trials.angle_texts import read_angles
 from shipgym.trials.column_values import (
     column_numbers,
     no_positions,
+    two_rudders_note,
     without_sentinels,
 )
 from shipgym.trials.columns import Column, Locator, choose_columns
@@ -143,6 +144,8 @@ def _read_numbers(locator: Locator, notes: list[str]) -> dict[str, Floats]:
         numbers = column_numbers(locator.table, column)
         factor = si_factor(channel, column.unit)
         values, words = without_sentinels(channel, numbers, factor)
+        if column.mean_with is not None:
+            notes.append(two_rudders_note(locator.table, column))
         notes += [f"column '{column.name}': {word}" for word in words]
         channels[channel] = factor * values
     return channels
