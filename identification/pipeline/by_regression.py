@@ -13,7 +13,6 @@ from identification.estimators.methods import Method, get_method
 from identification.options import Options, name_of
 from identification.pipeline.evaluation import (
     MEMORY,
-    less_influence,
     provenance_of,
     with_uncertainty,
 )
@@ -54,9 +53,9 @@ class RegressionFit:
     def without(self, trials: Sequence[int]) -> ShipModel:
         """The model of the other trials, by their places.
 
-        By the normal equations less the rows of these. Of one that was refined, a trial
-        is taken out by its influence, and several are by a fit again from where that of
-        all ended.
+        By the normal equations less the rows of these; one that was refined is fitted
+        again from where that of all ended. The influence of a trial would not do: a
+        turn that all but determines a fit hardly seems to move it.
         """
         refined = self.refined
         if refined is None or refined.covariance is None:
@@ -66,9 +65,6 @@ class RegressionFit:
                 trials,
             )
             return with_coefficients(self.fit.model, estimators)
-        if len(trials) == 1:
-            return less_influence(self.fit.model, refined.influences, trials[0])
-
         others = np.setdiff1d(np.arange(len(self.problem.used)), trials)
         of_others = np.isin(self.problem.samples.trial, others)
         task = FitTask(
