@@ -202,7 +202,7 @@ def refused_designs(
     if not lost:
         return Refusals({}, None)
 
-    remedy = _remedy(fit)
+    remedy = helpful_trial(fit)
     refused = {key: f"{why}; run {remedy}" for key, why in lost.items()}
     if len(lost) < len(designed):
         return Refusals(refused, None)
@@ -212,14 +212,3 @@ def refused_designs(
     names = ", ".join([key.upper() for key in lost])
     of_first = refused[designed[0].key]
     return Refusals(refused, f"{names}: {of_first}")
-
-
-def _remedy(fit: Fit) -> str:
-    """A trial to run, and where the structure was chosen, a simpler one."""
-    remedy = helpful_trial(fit)
-    ranking = fit.metrics.get("selection", {}).get("ranking", ())
-    structure = (fit.model.provenance or {}).get("structure", "")
-    simpler = " or ".join(simpler_structures(ranking, structure))
-    if simpler:
-        remedy += f", or try --structure {simpler}"
-    return remedy
