@@ -123,21 +123,23 @@ RUDDER = 1  # column of `_Changes.features`
 
 
 def _changes(trial: Trial, window: float) -> _Changes:
-    """Changes and means over windows of a length, s."""
+    """Changes and means over windows of a length, s, that have samples."""
     t = trial.t
     edges = np.arange(t[0], t[-1], window)
     first = np.searchsorted(t, edges)
     counts = np.diff(first)[:-1]
 
+    filled = counts > 0  # none in a gap of the log
+
     def means(channel: str) -> Floats:
         sums = np.add.reduceat(trial[channel], first[:-1])[:-1]
-        return np.asarray(sums / counts)
+        return np.asarray(sums[filled] / counts[filled])
 
-    constant = np.ones(len(counts))
+    constant = np.ones(np.count_nonzero(filled))
     features = np.column_stack([means("r"), means("delta"), constant])
     rates = np.interp(edges, t, trial["r"])
-    changes = np.diff(rates)
-    return _Changes(features, changes[: len(counts)])
+    changes = np.diff(rates)[: len(counts)]
+    return _Changes(features, changes[filled])
 
 
 def helpful_trial(fit: Fit) -> str:

@@ -247,8 +247,6 @@ def motion_errors(
         return []
 
     names = [name for name in predicted_channels(own) if name in trial]
-    if "psi" in names and "r" in trial.derived:
-        names.remove("r")
     levels = {name: noise_level(trial.t, trial[name]) for name in names}
     from_shifted = _from_shifted_starts(own, clean, levels)
     timing = _timing(trial)

@@ -37,6 +37,17 @@ def test_nothing_is_refused_that_steers_as_in_the_trials(fit):
     assert rudder_effect([t for t in fit.trials if t.use == "fit"], fit.model) > 10.0
 
 
+def test_a_gap_in_a_log_has_no_say_in_the_effect_of_the_rudder(fit):
+    fitted = [trial for trial in fit.trials if trial.use == "fit"]
+    whole = rudder_effect(fitted, fit.model)
+    gap = 5.0 * fit.model.travel_time
+    parted = []
+    for trial in fitted:
+        later = np.where(trial.t > trial.t[len(trial) // 2], gap, 0.0)
+        parted.append(Trial(trial.t + later, trial.channels, name=trial.name))
+    assert rudder_effect(parted, fit.model) == pytest.approx(whole, rel=0.3)
+
+
 def test_steering_to_the_other_side_than_in_the_trials_is_refused(fit):
     turned = {
         name: -value if name in ("N_d", "Y_d") else value
