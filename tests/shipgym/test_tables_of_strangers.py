@@ -315,6 +315,24 @@ def test_the_side_of_the_rudder_is_told_by_a_zigzag_alone(noise):
 NOT_READ = {"csv_dst": "line 303", "ais_marinecadastre": None}
 
 
+@pytest.mark.parametrize("is_gap", [False, True])
+def test_a_clock_that_was_set_forward_is_told_from_a_gap(tmp_path, is_gap):
+    path = tmp_path / "log.csv"
+
+    def edit(k, row):
+        moment = BEGIN + timedelta(seconds=k + 40 * (k > 120) * (not is_gap))
+        return [moment.isoformat(), *row[1:]]
+
+    text = written(path, edit).splitlines(keepends=True)
+    if is_gap:
+        path.write_text("".join(text[:121] + text[161:]))
+    guess = guess_trial(path)
+    notes = " ".join(guess.trial.notes)
+    assert ("the clock was set forward by 40 s after 120 s" in notes) is not is_gap
+    if not is_gap:
+        check(guess)
+
+
 def test_two_rudders_are_read_as_their_mean_with_the_bias_of_each(tmp_path):
     path = tmp_path / "log.csv"
     names = [*NAMES[:6], "Rudder Port", "Rudder Stbd"]
