@@ -72,7 +72,7 @@ class RegressionFit:
             blank=self.task.blank,
             trials=[self.task.trials[place] for place in others],
         )
-        again = _refined(self.fit, task, self.method)
+        again = _refined(self.fit, task, self.method, rounds=1)
         assert again is not None
         return again.fit.model
 
@@ -127,7 +127,9 @@ def _asked_method(options: Options, blank: ShipModel) -> Method:
     return with_prior(method, options.prior, blank)
 
 
-def _refined(fit: GuardedFit, task: FitTask, method: Method) -> Refined | None:
+def _refined(
+    fit: GuardedFit, task: FitTask, method: Method, rounds: int = 3
+) -> Refined | None:
     """The fit refined as the method asks for; None where it does not."""
     if method.refinement is None:
         return None
@@ -135,7 +137,7 @@ def _refined(fit: GuardedFit, task: FitTask, method: Method) -> Refined | None:
     from identification.simulation_error.refine import refine
 
     memory = MEMORY * task.blank.travel_time
-    return refine(fit, task, method.refinement, memory)
+    return refine(fit, task, method.refinement, memory, rounds)
 
 
 def _prior_report(options: Options, fit: GuardedFit) -> dict[str, Any]:
