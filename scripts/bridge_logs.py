@@ -3,9 +3,11 @@
     python scripts/bridge_logs.py [--seeds 8] [--models 2] [--ships kcs,tanker]
     python scripts/bridge_logs.py --wind
     python scripts/bridge_logs.py --parts [--seeds 8]
+    python scripts/bridge_logs.py --structures auto,nomoto,cubic [--ships kcs]
 
 prints the tables of docs/logs.md; the second needs the data of docs/real_ships.md, the
-third has logs of single trials, with a current and with none.
+third has logs of single trials, with a current and with none, and the fourth the turn
+not seen by structures with their usual methods.
 
 Every reference ship, and two ships by the MMG standard method (tests/ships/mmg.py),
 sails zigzags 10/10 and 20/20, a 35 degree turn to starboard and a 25 degree turn to
@@ -333,6 +335,30 @@ def model_table(names: Sequence[str], seeds: range, recipes: Sequence[str]) -> s
     return table(head, rows)
 
 
+def structures_table(
+    names: Sequence[str], seeds: range, structures: Sequence[str]
+) -> str:
+    """Heading error of the unseen turn by structures with their usual methods."""
+    rows = []
+    for name in names:
+        ship = ship_of(name)
+        for seed in seeds:
+            logs, _ = logs_of(ship, seed)
+            row = [name, str(seed)]
+            for structure in structures:
+                result = identify(
+                    logs,
+                    structure=structure,
+                    particulars=ship.particulars,
+                    steering=ship.steering,
+                )
+                chosen = result.model.structure if structure == "auto" else ""
+                row.append(f"{heading_error(result):.1f} {chosen}".strip())
+                print(row, file=sys.stderr, flush=True)
+            rows.append(row)
+    return table(["ship", "seed", *structures], rows)
+
+
 #: Trials of a log, by their places in `sailed`.
 PARTS = {
     "zigzag 10/10": [0],
@@ -487,6 +513,7 @@ def main() -> None:
     parser.add_argument("--recipes", help="with semicolons between; by default all")
     parser.add_argument("--wind", action="store_true", help="Esso Osaka only")
     parser.add_argument("--parts", action="store_true", help="logs of few trials")
+    parser.add_argument("--structures", help="names with commas between")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
     every = ESSO_OSAKA if given.wind else RECIPES
@@ -495,6 +522,10 @@ def main() -> None:
         print(wind_table(recipes))
         return
     names = given.ships.split(",")
+    if given.structures:
+        seeds = range(given.first, given.first + given.models)
+        print(structures_table(names, seeds, given.structures.split(",")))
+        return
     if given.parts:
         print(parts_table(names, range(given.first, given.first + given.seeds)))
         return

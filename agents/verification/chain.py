@@ -15,12 +15,17 @@ from agents.identifying import identification_settings, trials_of
 from agents.jobs import HERE, EngineError, JobEngine
 from agents.output import whole_folder
 from agents.rollouts.rollout import check_fits
-from agents.verification.refusal import refused_designs, why_refused
+from agents.verification.refusal import (
+    refused_designs,
+    simpler_structures,
+    why_refused,
+)
 from agents.verification.result import AutopilotResult, Pilot, Verification
 from agents.verification.tracks import Track
 from agents.verification.verify import DESIGNS, verify
 from identification import IdentificationResult, identify
 from identification.progress import PROGRESS, Progress
+from identification.validation.selection import RESPONSES, whole_trials
 from identification.validation.warnings import why_unstable
 from shipgym.checks import check_number, placed, quoted
 from shipgym.errors import InputError, UnstableModelError
@@ -86,13 +91,20 @@ def build_autopilot(
         with stage(tell, "identifying"), placed(str(ship.path)):
             fit = identify(trials, **arguments)
 
-        def verified() -> Verification:
+        def examined_fit(fit: IdentificationResult) -> AutopilotResult:
             others = [guest for _, guest in guests]
-            return verify(
-                fit.model, int(draws), int(seed), tell, where, others, designs
-            )
+            work = int(draws), int(seed), tell, where, others, designs
+            return examined(ship, fit, guests, lambda: verify(fit.model, *work))
 
-        result = examined(ship, fit, guests, verified)
+        def of_structure(structure: str) -> AutopilotResult:
+            named = arguments | {"structure": structure}
+            if structure in RESPONSES:
+                named["method"] = whole_trials()
+            with stage(tell, f"identifying by {structure}"), placed(str(ship.path)):
+                simpler = identify(trials, **named)
+            return examined_fit(simpler)
+
+        result = or_simpler(examined_fit(fit), of_structure)
         write_agents(result, draft)
         try:
             result = reported(result, draft, standards, tell)
@@ -155,6 +167,35 @@ def examined(
     refusals = refused_designs(found, fit)
     refused = {**found.refused, **refusals.by_design}
     return result(None, replace(found, refused=refused), refusals.of_all)
+
+
+def or_simpler(
+    result: AutopilotResult, of_structure: Callable[[str], AutopilotResult]
+) -> AutopilotResult:
+    """The result, or where no autopilot is given on it, that of a simpler structure.
+
+    Of the next best of an automatic choice the first that is given one; `of_structure`
+    finds the result of a structure.
+    """
+    fit = result.identification
+    ranking = fit.metrics.get("selection", {}).get("ranking", ())
+    if result.refusal is None or not ranking:
+        return result
+    chosen = fit.model.structure
+    refused = []
+    for structure in simpler_structures(ranking, chosen):
+        simpler = of_structure(structure)
+        if simpler.stable and simpler.refusal is None:
+            reason = (
+                f"{chosen} predicts best, but no autopilot is given on it"
+                f" ({result.refusal}): the model and the autopilots are {structure}'s"
+            )
+            return replace(simpler, remark=reason)
+        refused.append(structure)
+    if not refused:
+        return result
+    tried = " and ".join(refused)
+    return replace(result, refusal=f"{result.refusal}; nor is one given on {tried}")
 
 
 def _measured(found: Verification, fit: IdentificationResult) -> Verification:

@@ -121,21 +121,23 @@ class _Changes(NamedTuple):
 
 
 def _changes(trial: Trial, window: float) -> _Changes:
-    """Changes and means over windows of a length, s."""
+    """Changes and means over windows of a length, s, that have samples."""
     t = trial.t
     edges = np.arange(t[0], t[-1], window)
     first = np.searchsorted(t, edges)
     counts = np.diff(first)[:-1]
 
+    filled = counts > 0  # none in a gap of the log
+
     def means(channel: str) -> Floats:
         sums = np.add.reduceat(trial[channel], first[:-1])[:-1]
-        return np.asarray(sums / counts)
+        return np.asarray(sums[filled] / counts[filled])
 
-    constant = np.ones(len(counts))
+    constant = np.ones(np.count_nonzero(filled))
     features = np.column_stack([means("r"), means("delta"), constant])
     rates = np.interp(edges, t, trial["r"])
-    changes = np.diff(rates)
-    return _Changes(features, changes[: len(counts)])
+    changes = np.diff(rates)[: len(counts)]
+    return _Changes(features, changes[filled])
 
 
 def helpful_trial(fit: Fit) -> str:
@@ -200,7 +202,7 @@ def refused_designs(
     if not lost:
         return Refusals({}, None)
 
-    remedy = _remedy(fit)
+    remedy = helpful_trial(fit)
     refused = {key: f"{why}; run {remedy}" for key, why in lost.items()}
     if len(lost) < len(designed):
         return Refusals(refused, None)
@@ -210,14 +212,3 @@ def refused_designs(
     names = ", ".join([key.upper() for key in lost])
     of_first = refused[designed[0].key]
     return Refusals(refused, f"{names}: {of_first}")
-
-
-def _remedy(fit: Fit) -> str:
-    """A trial to run, and where the structure was chosen, a simpler one."""
-    remedy = helpful_trial(fit)
-    ranking = fit.metrics.get("selection", {}).get("ranking", ())
-    structure = (fit.model.provenance or {}).get("structure", "")
-    simpler = " or ".join(simpler_structures(ranking, structure))
-    if simpler:
-        remedy += f", or try --structure {simpler}"
-    return remedy

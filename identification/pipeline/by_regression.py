@@ -13,7 +13,6 @@ from identification.estimators.methods import Method, get_method
 from identification.options import Options, name_of
 from identification.pipeline.evaluation import (
     MEMORY,
-    less_influence,
     provenance_of,
     with_uncertainty,
 )
@@ -54,9 +53,9 @@ class RegressionFit:
     def without(self, trials: Sequence[int]) -> ShipModel:
         """The model of the other trials, by their places.
 
-        By the normal equations less the rows of these. Of one that was refined, a trial
-        is taken out by its influence, and several are by a fit again from where that of
-        all ended.
+        By the normal equations less the rows of these; one that was refined is fitted
+        again from where that of all ended. The influence of a trial would not do: a
+        turn that all but determines a fit hardly seems to move it.
         """
         refined = self.refined
         if refined is None or refined.covariance is None:
@@ -66,9 +65,6 @@ class RegressionFit:
                 trials,
             )
             return with_coefficients(self.fit.model, estimators)
-        if len(trials) == 1:
-            return less_influence(self.fit.model, refined.influences, trials[0])
-
         others = np.setdiff1d(np.arange(len(self.problem.used)), trials)
         of_others = np.isin(self.problem.samples.trial, others)
         task = FitTask(
@@ -76,7 +72,7 @@ class RegressionFit:
             blank=self.task.blank,
             trials=[self.task.trials[place] for place in others],
         )
-        again = _refined(self.fit, task, self.method)
+        again = _refined(self.fit, task, self.method, rounds=1)
         assert again is not None
         return again.fit.model
 
@@ -131,7 +127,9 @@ def _asked_method(options: Options, blank: ShipModel) -> Method:
     return with_prior(method, options.prior, blank)
 
 
-def _refined(fit: GuardedFit, task: FitTask, method: Method) -> Refined | None:
+def _refined(
+    fit: GuardedFit, task: FitTask, method: Method, rounds: int = 3
+) -> Refined | None:
     """The fit refined as the method asks for; None where it does not."""
     if method.refinement is None:
         return None
@@ -139,7 +137,7 @@ def _refined(fit: GuardedFit, task: FitTask, method: Method) -> Refined | None:
     from identification.simulation_error.refine import refine
 
     memory = MEMORY * task.blank.travel_time
-    return refine(fit, task, method.refinement, memory)
+    return refine(fit, task, method.refinement, memory, rounds)
 
 
 def _prior_report(options: Options, fit: GuardedFit) -> dict[str, Any]:

@@ -131,17 +131,19 @@ def _checked_ship(
 
 
 def _at_service_speed(trial: Trial, particulars: Given) -> Trial:
-    """A trial of heading and rudder alone, as if sailed at the service speed."""
-    if particulars is None or {"u", "v"} & trial.channels.keys():
+    """A trial without sway as if it had none, without surge as if at service speed."""
+    known = trial.channels.keys()
+    aside = {"v": np.zeros(len(trial))}
+    if "v" in known:
         return trial
-    speed = particulars.get("speed")
+    if "u" in known:
+        return trial.with_channels(aside)
+    speed = None if particulars is None else particulars.get("speed")
     if speed is None:
         return trial
 
-    n_samples = len(trial)
-    ahead = np.full(n_samples, float(speed))
-    aside = np.zeros(n_samples)
-    return trial.with_channels({"u": ahead, "v": aside})
+    ahead = np.full(len(trial), float(speed))
+    return trial.with_channels({"u": ahead, **aside})
 
 
 def _blank(

@@ -101,18 +101,16 @@ class OutputError:
         weights[n_terms:] = 1.0 / one_degree
         return weights
 
-    def solve(self, scales: Floats, pull: float) -> Solution:
+    def solve(self, scales: Floats, pull: float, rounds: int) -> Solution:
         """Fit, renew scales and starts of the segments, and fit again.
 
-        `scales`: to begin with.
+        `scales`: to begin with; `rounds`: of fits, between which scales of the
+        residuals and starts of the segments are renewed.
         """
         weights = self.pull_weights(pull)
         parameters = self.start
         segments = [*self.fitted, *self.further]
         evaluations = 0
-        # of fits, between which scales of the residuals and starts of the segments are
-        # renewed
-        rounds = 3
         for _ in range(rounds):
             last_scales, last_segments = scales, segments
             fit = self._fit(parameters, segments, scales, weights)

@@ -37,16 +37,21 @@ class Refined:
 
 
 def refine(
-    start: GuardedFit, task: FitTask, settings: Refinement, memory: float
+    start: GuardedFit,
+    task: FitTask,
+    settings: Refinement,
+    memory: float,
+    rounds: int = 3,
 ) -> Refined:
     """Refine a fit by the errors of what its model simulates in segments of the trials.
 
     `start`: the fit to start from; `task`: its regression, which shows how large the
     terms are in the trials, and the trials; `memory`: time over which residuals are
-    taken to be correlated, s. A refined model that runs away is pulled ten times harder
-    to the start, up to three times. Returns the start itself where its model runs away
-    already, or the refined ones do however hard they are pulled. Raises InputError for
-    extra trials that lack channels.
+    taken to be correlated, s; `rounds`: of fits, between which scales and starts of the
+    segments are renewed, of which one does from near the end. A refined model that runs
+    away is pulled ten times harder to the start, up to three times. Returns the start
+    itself where its model runs away already, or the refined ones do however hard they
+    are pulled. Raises InputError for extra trials that lack channels.
     """
     _check_refinable(start.model, settings.extra_trials)
     problem = _posed(start, task, settings)
@@ -59,7 +64,7 @@ def refine(
     rejected = list[dict[str, Any]]()
     pull = settings.pull
     for _ in range(4):
-        solution = problem.solve(scales, pull)
+        solution = problem.solve(scales, pull, rounds)
         model = _model(start.model, problem, solution.parameters)
         reasons = reasons_unstable(model, task.trials)
         if not reasons:

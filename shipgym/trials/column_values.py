@@ -21,8 +21,10 @@ _COMMON = (-32768.0, 32767.0, 65535.0, 2147483647.0, -2147483648.0, 4294967295.0
 
 
 def column_numbers(table: LogTable, column: Column) -> Floats:
-    """Numbers of a column, of a steering command as degrees of a nominal rudder."""
+    """Numbers of a column; of two rudders the mean, of a command degrees of rudder."""
     numbers = table.numbers(column.name, sided=True)
+    if column.mean_with is not None:
+        numbers = 0.5 * (numbers + table.numbers(column.mean_with, sided=True))
     if column.full is None:
         return numbers
     if column.minus is not None:
@@ -31,6 +33,18 @@ def column_numbers(table: LogTable, column: Column) -> Floats:
     from_neutral = numbers - column.neutral
     deflection = from_neutral / column.full
     return deflection * FULL_RUDDER_DEG
+
+
+def two_rudders_note(table: LogTable, column: Column) -> str:
+    """Mean difference of two rudders, and what it says of the bias of each."""
+    first = table.numbers(column.name, sided=True)
+    second = table.numbers(str(column.mean_with), sided=True)
+    half = 0.5 * float(np.nanmean(first - second))
+    return (
+        f"the rudder is the mean of '{column.name}' and '{column.mean_with}'; if both"
+        f" are laid alike, the bias of the first is that of the mean {half:+.2g}"
+        f" {column.unit}, that of the second {-half:+.2g} {column.unit}"
+    )
 
 
 def without_sentinels(

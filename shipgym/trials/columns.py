@@ -31,6 +31,7 @@ class Column:
     nanoseconds: str | None = None  # column of what is to be added to whole seconds
     minus: str | None = None  # column that is subtracted: of the other propeller
     neutral: float = 0.0  # number of a steering command that steers straight
+    mean_with: str | None = None  # column of the other rudder
     full: float | None = None  # change of the command that counts as 35 deg of rudder
 
 
@@ -73,8 +74,9 @@ def parse_columns(
     Each entry is the name of a column or ``{"column": name, "unit": unit}``. That of
     the time may also have ``"date"``, the column of the date, ``"nanoseconds"`` and
     ``"zone"``, that of the rudder ``"full"``, ``"neutral"`` and ``"minus"``, which make
-    a steering command. `where` begins the messages. Raises InputError for an unknown
-    channel, key or unit, and for a unit of another quantity.
+    a steering command, or ``"mean_with"``, the column of a second rudder. `where`
+    begins the messages. Raises InputError for an unknown channel, key or unit, and for
+    a unit of another quantity.
     """
     check_table(columns, where)
     parsed = {}
@@ -91,7 +93,7 @@ def _parse_column(channel: str, entry: Any, where: str) -> Column:
     if channel == "t":
         keys += ["date", "zone", "nanoseconds"]
     if channel in ("delta", "delta_command"):
-        keys += ["minus", "neutral", "full"]
+        keys += ["mean_with", "minus", "neutral", "full"]
     check_keys(fields, keys, where)
     name = fields.pop("column", None)
     if not isinstance(name, str):

@@ -13,11 +13,13 @@ from shipgym.trials.angle_texts import read_angles
 from shipgym.trials.column_values import (
     column_numbers,
     no_positions,
+    two_rudders_note,
     without_sentinels,
 )
 from shipgym.trials.columns import Column, Locator, choose_columns
 from shipgym.trials.missing_values import check_time, fill_missing
 from shipgym.trials.navigation import local_metres
+from shipgym.trials.plausibility.clock_jumps import without_clock_jumps
 from shipgym.trials.plausibility.headings import check_heading, without_spikes
 from shipgym.trials.plausibility.positions import (
     check_outliers,
@@ -106,7 +108,11 @@ def read_recording(
         chosen["x"] = replace(chosen["lat"], unit="m")
         chosen["y"] = replace(chosen["lon"], unit="m")
 
-    signals, locator, filled = _signals(times.t, channels, locator, repair)
+    t = times.t
+    if {"x", "y"} <= channels.keys():
+        t, jumps = without_clock_jumps(t, channels["x"], channels["y"])
+        notes += jumps
+    signals, locator, filled = _signals(t, channels, locator, repair)
     if outliers:
         filled |= {"x": outliers, "y": outliers}
     if "sog" in signals:
@@ -143,6 +149,8 @@ def _read_numbers(locator: Locator, notes: list[str]) -> dict[str, Floats]:
         numbers = column_numbers(locator.table, column)
         factor = si_factor(channel, column.unit)
         values, words = without_sentinels(channel, numbers, factor)
+        if column.mean_with is not None:
+            notes.append(two_rudders_note(locator.table, column))
         notes += [f"column '{column.name}': {word}" for word in words]
         channels[channel] = factor * values
     return channels

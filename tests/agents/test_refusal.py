@@ -9,7 +9,7 @@ import pytest
 from agents import PID
 from agents.cli.standard_trials import standard_trials
 from agents.identifying import identification_settings, identify_ship
-from agents.verification.chain import write_agents, write_findings
+from agents.verification.chain import or_simpler, write_agents, write_findings
 from agents.verification.refusal import (
     Steering,
     helpful_trial,
@@ -35,6 +35,17 @@ def fit(chain):
 def test_nothing_is_refused_that_steers_as_in_the_trials(fit):
     assert why_refused(fit) is None
     assert rudder_effect([t for t in fit.trials if t.use == "fit"], fit.model) > 10.0
+
+
+def test_a_gap_in_a_log_has_no_say_in_the_effect_of_the_rudder(fit):
+    fitted = [trial for trial in fit.trials if trial.use == "fit"]
+    whole = rudder_effect(fitted, fit.model)
+    gap = 5.0 * fit.model.travel_time
+    parted = []
+    for trial in fitted:
+        later = np.where(trial.t > trial.t[len(trial) // 2], gap, 0.0)
+        parted.append(Trial(trial.t + later, trial.channels, name=trial.name))
+    assert rudder_effect(parted, fit.model) == pytest.approx(whole, rel=0.3)
 
 
 def test_steering_to_the_other_side_than_in_the_trials_is_refused(fit):
@@ -178,13 +189,22 @@ def test_designs_that_lose_control_are_not_written(chain, tmp_path):
     assert "No autopilot is given: " in (tmp_path / "report.html").read_text()
 
 
-def test_a_refusal_of_a_structure_that_was_chosen_names_another(chain):
+def test_where_no_autopilot_is_given_the_next_best_structure_is_tried(chain):
     result, fit = chain[1], chain[1].identification
-    own = fit.model.provenance["structure"]
-    ranking = {"ranking": [stood(own, 40), stood("nomoto", 2)]}
+    own = fit.model.structure
+    ranking = {"ranking": [stood(own, 40), stood("norrbin", 3), stood("nomoto", 2)]}
     chosen = replace(fit, metrics=fit.metrics | {"selection": ranking})
-    why = refused_designs(result.verification, chosen, most_lost=-1.0).of_all
-    assert why.endswith(" to both sides, or try --structure nomoto")
+    refused = replace(result, identification=chosen, refusal="it is lost")
+
+    by_structure = {"norrbin": refused, "nomoto": result}
+    given = or_simpler(refused, by_structure.__getitem__)
+    assert given.refusal is None
+    assert given.remark.startswith(f"{own} predicts best, but no autopilot is given")
+    assert "(it is lost): the model and the autopilots are nomoto's" in given.remark
+
+    of_none = or_simpler(refused, lambda _: refused)
+    assert of_none.refusal == "it is lost; nor is one given on norrbin and nomoto"
+    assert or_simpler(result, by_structure.__getitem__) is result
 
 
 def test_a_model_that_is_refused_gives_a_report_that_says_why(chain, tmp_path):

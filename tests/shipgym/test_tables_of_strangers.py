@@ -315,6 +315,62 @@ def test_the_side_of_the_rudder_is_told_by_a_zigzag_alone(noise):
 NOT_READ = {"csv_dst": "line 303", "ais_marinecadastre": None}
 
 
+@pytest.mark.parametrize("is_gap", [False, True])
+def test_a_clock_that_was_set_forward_is_told_from_a_gap(tmp_path, is_gap):
+    path = tmp_path / "log.csv"
+
+    def edit(k, row):
+        moment = BEGIN + timedelta(seconds=k + 40 * (k > 120) * (not is_gap))
+        return [moment.isoformat(), *row[1:]]
+
+    text = written(path, edit).splitlines(keepends=True)
+    if is_gap:
+        path.write_text("".join(text[:121] + text[161:]))
+    guess = guess_trial(path)
+    notes = " ".join(guess.trial.notes)
+    assert ("the clock was set forward by 40 s after 120 s" in notes) is not is_gap
+    if not is_gap:
+        check(guess)
+
+
+def test_two_rudders_are_read_as_their_mean_with_the_bias_of_each(tmp_path):
+    path = tmp_path / "log.csv"
+    names = [*NAMES[:6], "Rudder Port", "Rudder Stbd"]
+    written(
+        path,
+        lambda k, row: [*row[:6], f"{float(row[6]) + 1}", f"{float(row[6]) - 1}"],
+        names,
+    )
+    guess = guess_trial(path)
+    check(guess)
+    assert guess.unused == []
+    assert "'Rudder Stbd', which shows 2 deg less" in guess.reading["delta"]
+    notes = " ".join(guess.trial.notes)
+    assert "of the first is that of the mean +1 deg, that of the second -1" in notes
+
+
+@pytest.mark.parametrize(
+    ("names", "layouts"),
+    [
+        ("Year,Month,Day,Hour,Minute,Second", "%Y %m %d %H %M %S"),
+        ("Jahr Monat Tag Stunde Minute Sekunde".replace(" ", ","), "%y %m %d %H %M %S"),
+        ("hh,mi,ss", "%H %M %S"),
+    ],
+)
+def test_parts_of_a_time_in_columns_are_one_time(tmp_path, names, layouts):
+    path = tmp_path / "log.csv"
+    text = clock(layouts)
+
+    def edit(k, row):
+        parts, *others = text(k, row)
+        return [*parts.split(), *others]
+
+    written(path, edit, [*names.split(","), *NAMES[1:]])
+    guess = guess_trial(path)
+    check(guess)
+    assert guess.unused == []
+
+
 @pytest.mark.skipif(not CASES.exists(), reason="the cases are not here")
 @pytest.mark.parametrize(
     "name", sorted(path.stem for path in CASES.glob("*.csv") if "_" in path.stem)

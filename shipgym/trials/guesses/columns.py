@@ -13,7 +13,7 @@ from shipgym.errors import InputError
 from shipgym.files import shipped_toml
 from shipgym.trials.column_values import without_sentinels
 from shipgym.trials.columns import Column
-from shipgym.trials.guesses.steering import steering_command
+from shipgym.trials.guesses.steering import other_rudder, steering_command
 from shipgym.trials.guesses.units import (
     UnitGuess,
     named_unit,
@@ -147,6 +147,9 @@ def guess_columns(table: LogTable) -> list[ColumnGuess]:
         if command is not None:
             guesses["delta"] = ColumnGuess("delta", *command)
     _settle_rudder(table, guesses)
+    for channel in ("delta", "delta_command"):
+        if channel in guesses:
+            guesses[channel] = _with_other_rudder(table, guesses[channel], free)
     return [guesses[channel] for channel in names.known if channel in guesses]
 
 
@@ -172,6 +175,24 @@ def _settle_rudder(table: LogTable, guesses: dict[str, ColumnGuess]) -> None:
                 f" {turned:.3g} alone"
             )
             guesses[channel] = guess._replace(unit="deg", reason=reason)
+
+
+def _with_other_rudder(
+    table: LogTable, guess: ColumnGuess, free: list[str]
+) -> ColumnGuess:
+    """The mean with the rudder of the other side, where that has a column."""
+    other = other_rudder(table, guess.column, free)
+    if other is None:
+        return guess
+    free.remove(other)
+    between = table.numbers(guess.column, sided=True)
+    between = between - table.numbers(other, sided=True)
+    difference = float(np.nanmean(between))
+    reason = (
+        f"{guess.reason}; the mean with '{other}', which shows {abs(difference):.2g}"
+        f" {guess.unit} {'less' if difference > 0.0 else 'more'} in the mean"
+    )
+    return guess._replace(reason=reason, extra=(("mean_with", other),))
 
 
 def _first_match(

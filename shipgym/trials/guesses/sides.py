@@ -35,7 +35,7 @@ def rudder_side(
     if "delta" not in trial or not has_turning:
         return None
     if column is not None and _has_sides(table, column.column):
-        return RudderSide("starboard", "by the letters S and P of its values")
+        return RudderSide("starboard", "the letters S and P of its values")
     psi = trial["psi"]
     delta = trial["delta"]
     found = rudder_sign(trial.t, psi, delta)

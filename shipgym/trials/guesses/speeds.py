@@ -37,11 +37,12 @@ def settle_speeds(
     if not speeds:
         return settled
     by_positions = _speed_by_positions(table, settled)
+    is_si = any(guess.unit in ("rad", "rad/s") for guess in guesses.values())
     known = None
     if by_positions is not None:
         known = _Known(by_positions, "the positions, which change by")
     for channel in sorted(speeds, key=lambda name: not _is_known(settled[name])):
-        guess = settled[channel] = _settled(table, settled[channel], known)
+        guess = settled[channel] = _settled(table, settled[channel], known, is_si=is_si)
         if known is None and _is_known(guess):
             speed = _magnitudes(table, guess) * _UNITS.get(guess.unit, 1.0)
             known = _Known(speed, f"the column '{guess.column}', which shows")
@@ -107,7 +108,9 @@ def _chord_speeds(t: Floats, x: Floats, y: Floats) -> Floats:
     return speeds
 
 
-def _settled(table: LogTable, guess: ColumnGuess, known: _Known | None) -> ColumnGuess:
+def _settled(
+    table: LogTable, guess: ColumnGuess, known: _Known | None, *, is_si: bool
+) -> ColumnGuess:
     """The guess with the unit in which a speed agrees best with a known one."""
     try:
         values = _magnitudes(table, guess)
@@ -115,7 +118,7 @@ def _settled(table: LogTable, guess: ColumnGuess, known: _Known | None) -> Colum
         return guess
     is_named = _is_known(guess)
     if known is None:
-        return guess if is_named else _guessed(guess, values)
+        return guess if is_named else _guessed(guess, values, is_si=is_si)
     speed = float(np.median(known.speed)) if known.speed.size else 0.0
     number = float(np.median(values)) if values.size else 0.0
     if not speed > 0.0 or not number > 0.0:
@@ -133,12 +136,14 @@ def _settled(table: LogTable, guess: ColumnGuess, known: _Known | None) -> Colum
     return guess._replace(unit=nearest, reason=reason)
 
 
-def _guessed(guess: ColumnGuess, values: Floats) -> ColumnGuess:
+def _guessed(guess: ColumnGuess, values: Floats, *, is_si: bool) -> ColumnGuess:
     """The usual unit of a speed, said to be a guess."""
     largest = float(values.max(initial=0.0))
-    unit = "knots" if largest > 3.0 else "m/s"
+    is_slow = largest <= 3.0
+    unit = "m/s" if is_slow or (is_si and largest < 15.0) else "knots"
+    beside = ", with angles in rad" if is_si else ""
     reason = (
-        f"is a guess: there are no positions that tell, up to {largest:.4g}; knots,"
-        " m/s or km/h"
+        f"is a guess: there are no positions that tell, up to {largest:.4g}{beside};"
+        " knots, m/s or km/h"
     )
     return guess._replace(unit=unit, reason=reason)

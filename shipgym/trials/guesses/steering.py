@@ -107,6 +107,30 @@ def _side(column: str) -> tuple[str, str] | None:
     return None
 
 
+def other_rudder(table: LogTable, column: str, free: list[str]) -> str | None:
+    """Column of a second rudder, that of the other side or number; None without one.
+
+    One that stands still is none.
+    """
+    for other in free:
+        here = _side(column)
+        there = _side(other)
+        if here is not None and there is not None:
+            are_sides = here[0] != there[0] and here[1] == there[1]
+        else:
+            are_sides = column.replace("1", "2", 1) == other != column
+        if not are_sides:
+            continue
+        try:
+            values = [table.numbers(name, sided=True) for name in (column, other)]
+        except InputError:
+            continue
+        moved = [np.ptp(one[np.isfinite(one)]) for one in values]
+        if min(moved) > 0.1 * max(moved):
+            return other
+    return None
+
+
 def _servo(numbers: dict[str, Floats]) -> SteeringGuess | None:
     """The first pulse width that a servo of radio control gets."""
     servos = {}

@@ -164,6 +164,13 @@ def _check_header(path: Path, header: list[str], line: int) -> None:
             f"{where}: expected at most {most} columns, got {len(header)};"
             " leave out those that are not needed"
         )
+    numbers = [name for name in header if is_number(name.replace(",", "."))]
+    if 2 * len(numbers) > len(header):
+        beginning = ", ".join(numbers[:4])
+        raise InputError(
+            f"{where}: expected a header with column names such as t,psi,u,v,r,delta,"
+            f" got only numbers ({beginning}); write the names in a line above"
+        )
     for name, count in Counter(header).items():
         if not name.isprintable():
             raise InputError(
@@ -175,8 +182,3 @@ def _check_header(path: Path, header: list[str], line: int) -> None:
                 f"{where}: expected each column once, got '{name}' {count} times;"
                 " rename or remove one"
             )
-    if all(is_number(name) for name in header):
-        raise InputError(
-            f"{where}: expected a header with column names such as t,psi,u,v,r,delta,"
-            " got only numbers"
-        )

@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from shipgym.trials.readers.calendar_columns import with_one_time
 from shipgym.trials.readers.csv_file import read_csv
 from shipgym.trials.readers.excel import read_excel
 from shipgym.trials.readers.foreign import kind_by_content, refuse_foreign
@@ -81,4 +82,5 @@ def read_log(path: str | Path | LogTable, *, checksums: str = "optional") -> Log
     if kind == "messages":
         return _read_messages(path, checksums)
     read = READERS[kind]
-    return read(path)
+    table = read(path)
+    return with_one_time(table)

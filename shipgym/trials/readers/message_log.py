@@ -63,6 +63,7 @@ def read_messages(path: Path, *, strict: bool = False) -> LogTable:
             winds[name] = tracks.pop(name)
     if winds and "psi" in tracks:
         tracks |= _wind_over_ground(winds, tracks)
+    notes += _settle_speed(tracks)
     notes += _note_speed(tracks)
     return _table(path, tracks, notes, magnetic=chosen.magnetic)
 
@@ -85,6 +86,25 @@ def _check_damage(path: Path, heard: Heard, *, strict: bool) -> list[str]:
             " fields left out"
         ]
     return []
+
+
+def _settle_speed(tracks: dict[str, Track]) -> list[str]:
+    """Leave out a course alone, and a speed over ground alone where more is known.
+
+    Such a speed is else taken as through the water.
+    """
+    if "sog" not in tracks or "cog" not in tracks:
+        tracks.pop("cog", None)
+    if "sog" not in tracks or "cog" in tracks:
+        return []
+    alone = tracks.pop("sog")
+    if {"lat", "stw"} & tracks.keys():
+        return ["the speed over ground has no course beside it and is left out"]
+    tracks["stw"] = alone
+    return [
+        "the speed over ground is taken as through the water, as there is no course"
+        " over ground"
+    ]
 
 
 def _note_speed(tracks: dict[str, Track]) -> list[str]:
