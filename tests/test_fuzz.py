@@ -176,7 +176,7 @@ def test_helm_survives_valid_sentences_that_lie():
     for _ in range(100):
         helm = Helm(pid(), 0.5, Limits(silence_s=1e9))
         for now in range(20):
-            helm.hear(lie(draw), float(now))
+            helm.hear(lie(draw), "bus", float(now))
             helm.watch(1.0, float(now))
             helm.steer(float(now))
         use_helm(helm)

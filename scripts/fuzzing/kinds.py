@@ -109,7 +109,7 @@ def use_plan(plan: TrainingPlan) -> None:
 
 def use_ship(trials: list[Trial]) -> None:
     """All channels are finite."""
-    for trial in trials:
+    for trial in filter(None, trials):  # none where a decision is needed
         if not all(
             np.isfinite(values).all() for values in (trial.t, *trial.channels.values())
         ):

@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Iterable
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -339,8 +340,13 @@ def _first_text(table: LogTable, column: str) -> str:
     return next(filter(None, table.texts(column)), "")
 
 
+@lru_cache(maxsize=10_000)
 def _forms(column: str, channel: str) -> list[str]:
-    """The name of a column without blanks: whole, without its unit, its last part."""
+    """The name of a column without blanks: whole, without its unit, its last part.
+
+    Only the beginning of one that is longer than any name.
+    """
+    column = column[:200]
     text = column.lower().replace("_", " ")
     bare, units = split_unit(text)
     forms = [_plain(text)]

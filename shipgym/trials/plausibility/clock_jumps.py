@@ -18,11 +18,13 @@ def without_clock_jumps(t: Floats, x: Floats, y: Floats) -> tuple[Floats, list[s
     usual = float(np.median(steps))
     shifts = np.zeros_like(t)
     notes = []
-    for row in np.flatnonzero(steps > max(5.0 * usual, 5.0)):
+    longest_usual = max(5.0 * usual, 5.0)
+    for row in np.flatnonzero(steps > longest_usual):
         around = np.r_[max(row - 10, 0) : row, row + 1 : min(row + 11, steps.size)]
         speed = float(np.median(moved[around] / steps[around]))
         as_usual = moved[row] < 2.0 * float(np.max(moved[around]))
-        is_far_too_short = moved[row] < 0.2 * speed * steps[row]
+        with np.errstate(over="ignore"):
+            is_far_too_short = moved[row] < 0.2 * speed * steps[row]
         if speed < 1.0 or not as_usual or not is_far_too_short:
             continue
         surplus = float(steps[row]) - usual

@@ -25,7 +25,7 @@ def without_spikes(psi: Floats) -> tuple[Floats, int]:
     psi : array of shape (n_samples,)
         As logged, rad; it may jump at north.
     """
-    if psi.size < 3:
+    if psi.size < 3 or np.isinf(psi).any():
         return psi, 0
     before = psi[:-2]
     inside = psi[1:-1]
