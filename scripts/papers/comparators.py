@@ -19,13 +19,14 @@ from scipy.integrate import cumulative_trapezoid
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPRegressor
 
-from papers import cao2015, song2020
+from papers import cao2015, song2020, song2020_nomoto
 from papers.mei2019 import HARD, WORDS
 from papers.mei2019_targets import STEPS_PER_SAMPLE, TURN, our_way, same_hull, virtual
 from papers.row import Conclusion, Paper, Row
 from papers.zhu2018 import recursive_start
-from papers.zhu2018.container_ship import EQUATIONS, UNITS, best_errors, zigzag_trial
+from papers.zhu2018.container_ship import EQUATIONS, UNITS, best_errors
 from papers.zhu2018.fits import every, mean_square
+from papers.zhu2018.ships import zigzag_trial
 from shipgym.manoeuvres import turning_circle, turning_indices
 from shipgym.ships import load_model
 from shipgym.trials.trial import Trial
@@ -140,7 +141,7 @@ def nomoto_history(structure: str, start: float = START) -> Floats:
             [yaw, sum(c * term for c, term in zip(theta, terms, strict=True))]
         )
 
-    noise = np.array([song2020.NOISE["psi"], song2020.NOISE["r"]])
+    noise = np.array([song2020_nomoto.NOISE["psi"], song2020_nomoto.NOISE["r"]])
     size = np.sqrt(np.mean((0.1 * r) ** 2))  # a yaw rate that changes in 10 s
     deviation = start * size / np.sqrt(np.mean(np.square(columns), axis=1))
     measured = np.column_stack([np.unwrap(trial["psi"]), r])

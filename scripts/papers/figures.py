@@ -27,6 +27,7 @@ from papers.zhu2018 import (
     sample_counts,
     steering_forms,
 )
+from papers.zhu2018.ships import zigzag_trial
 from shipgym.ships import load_model
 
 WIDTH, DPI = 9.0, 100  # of a figure, inches; dots an inch
@@ -107,7 +108,7 @@ def recursion(axes: Any) -> None:
 
 def container(axes: Any) -> None:
     """Sway and yaw rate of the 20/20 zigzag."""
-    trial = container_ship.zigzag_trial(20)
+    trial = zigzag_trial(20, by_euler=True)
     seven, four = (
         container_ship.as_printed("ABC"),
         steering_forms.as_printed(steering_forms.CHOSEN),
@@ -159,7 +160,7 @@ def samples(axes: Any) -> None:
 def nomoto(axes: Any) -> None:
     """K and T sample by sample."""
     run, names = song2020.trial("nomoto"), tuple(song2020.TRUTH["nomoto"])
-    X, y = song2020.regression("nomoto")
+    X, y = song2020.regression("nomoto", run)
     least = coefficient_history(
         run, "nomoto", song2020.PARTICULARS, MultiInnovationLeastSquares()
     )

@@ -7,6 +7,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 AGREEMENT = 0.1  # relative difference from print that still agrees
+#: What a row's number rests on: data; a truth that was put in and is read back, or an
+#: identity; a setting picked because it comes near print. The printed figure of a row
+#: that is `ELSEWHERE` is that of another row, which counts.
+COMPUTED, PUT_IN, PICKED = "computed", "put in", "picked"
+ELSEWHERE = "counted elsewhere"
 CONFIRMED, CONTRADICTED, NOT_TESTABLE = "confirmed", "contradicted", "not testable"
 
 
@@ -33,6 +38,9 @@ class Row:
     note : str
         Why a row cannot be reproduced, a stand-in for data that are not published, or a
         slip of the paper.
+    basis : str
+        What `as_paper` rests on: `computed`, `put in`, `picked` or `counted elsewhere`;
+        only what is computed can agree or not.
     """
 
     case: str
@@ -43,6 +51,7 @@ class Row:
     aim: str = ""
     met: bool | None = None
     note: str = ""
+    basis: str = COMPUTED
 
     @property
     def agrees(self) -> bool | None:
