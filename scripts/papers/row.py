@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 AGREEMENT = 0.1  # relative difference from print that still agrees
 #: What a row's number rests on: data; a truth that was put in and is read back, or an
 #: identity; a setting picked because it comes near print. The printed figure of a row
@@ -86,7 +88,15 @@ class Row:
 
     def to_dict(self) -> dict[str, Any]:
         """The row for JSON."""
-        return asdict(self) | {"agrees": self.agrees}
+        agrees = None if self.agrees is None else bool(self.agrees)
+        met = None if self.met is None else bool(self.met)
+        fields = asdict(self) | {"met": met, "agrees": agrees}
+        return {key: _plain(value) for key, value in fields.items()}
+
+
+def number(value: float | None) -> str:
+    """A number to four digits; none where it is absent."""
+    return "" if value is None else f"{value:.4g}"
 
 
 def aims(rows: Iterable[Row]) -> tuple[int, int]:
@@ -96,6 +106,11 @@ def aims(rows: Iterable[Row]) -> tuple[int, int]:
         if row.met is not None:
             met[row.figure] = met.get(row.figure, True) and bool(row.met)
     return sum(met.values()), len(met)
+
+
+def _plain(value: Any) -> Any:
+    """A number of Python for one of numpy."""
+    return value.item() if isinstance(value, np.generic) else value
 
 
 @dataclass(frozen=True)
@@ -180,6 +195,8 @@ class Paper:
         That the rows measure; of the tables of a paper none.
     conclusions : tuple of Conclusion
         Of the paper.
+    differences : tuple of str
+        Where print and recomputation differ, and why.
     figures : tuple of (str, str)
         File name in `docs/images` and caption; `papers.figures` draws them.
     ours : str
@@ -192,5 +209,6 @@ class Paper:
     rows: Callable[[], Iterator[Row]]
     requirements: tuple[Requirement, ...] = ()
     conclusions: tuple[Conclusion, ...] = ()
+    differences: tuple[str, ...] = ()
     figures: tuple[tuple[str, str], ...] = ()
     ours: str = "as the paper"
