@@ -15,6 +15,7 @@ from papers.page import ALL, chosen, missed, papers_of, reproduce, terminal_tabl
 
 from agents.cli.command import FAILED, fail, shared_options
 from agents.cli.terminal import answer, console, err
+from identification.estimators.threads import single_threaded
 from shipgym.files import write_text
 
 app = typer.Typer(
@@ -50,7 +51,8 @@ def main(
 ) -> None:
     """Run the papers' tables: printed, their way, at best, and aims met."""
     names = papers_of(paper)
-    with err.status("starting") as status:
+    # more threads wait for each other: three times the processor's time for the same
+    with err.status("starting") as status, single_threaded():
         results = reproduce(names, tell=status.update)
     results = chosen(results, table, row)
     if markdown is not None:

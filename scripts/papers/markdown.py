@@ -15,6 +15,7 @@ from papers.row import (
     number,
 )
 
+DIGITS = 3  # of our own figures
 VERDICTS = (CONFIRMED, CONTRADICTED, NOT_TESTABLE)
 INTRODUCTION = """# The papers' tables, run again
 
@@ -31,7 +32,8 @@ same data, reaches what was asked of it.
 """
 LEGEND = (
     "`printed = ours` agrees, `printed ≠ ours` does not, `printed ≡ ours` by"
-    " construction, a number alone has nothing printed; in brackets: at best."
+    " construction, a number alone has nothing printed or is printed above; in"
+    " brackets: at best."
 )
 
 
@@ -135,8 +137,8 @@ def _conclusions(conclusions: Sequence[Conclusion], rows: Sequence[Row]) -> list
 
 def _found(row: Row) -> str:
     """Ours by the paper's method and, in brackets, at best."""
-    best = "" if row.best is None else f"({number(row.best)})"
-    return " ".join(filter(None, (number(row.as_paper), best)))
+    best = "" if row.best is None else f"({number(row.best, DIGITS)})"
+    return " ".join(filter(None, (number(row.as_paper, DIGITS), best)))
 
 
 def _requirements(requirements: Sequence[Requirement]) -> list[str]:
@@ -156,10 +158,10 @@ def _requirements(requirements: Sequence[Requirement]) -> list[str]:
 
 def _fold(paper: Paper, rows: Sequence[Row]) -> list[str]:
     """The rows, those that differ only in their first words in one line, folded."""
-    groups: dict[tuple[str, str], list[Row]] = {}
+    cases: dict[str, list[Row]] = {}
     for row in rows:
-        groups.setdefault((row.case, _measure(row)), []).append(row)
-    notes = list(dict.fromkeys(row.note for row in rows if row.note))
+        cases.setdefault(row.case, []).append(row)
+    notes = list(dict.fromkeys(filter(None, map(_note, rows))))
 
     lines = [
         '<details markdown="1">',
@@ -167,39 +169,56 @@ def _fold(paper: Paper, rows: Sequence[Row]) -> list[str]:
         "",
         f"Ours: {paper.ours}. {LEGEND}",
         "",
-        "| case | measure | figures | note |",
-        "| --- | --- | --- | --- |",
+        "| case | figures | note |",
+        "| --- | --- | --- |",
     ]
-    case_before = ""
-    for (case, measure), group in groups.items():
-        figures = "; ".join(_figure(row) for row in group)
-        numbers = dict.fromkeys(notes.index(row.note) + 1 for row in group if row.note)
-        cells = (
-            "" if case == case_before else case,
-            measure,
-            figures,
-            ", ".join(map(str, numbers)),
+    for case, shown in cases.items():
+        numbers = dict.fromkeys(
+            notes.index(_note(row)) + 1 for row in shown if _note(row)
         )
+        cells = (case, "<br>".join(_grouped(shown)), ", ".join(map(str, numbers)))
         lines.append("| " + " | ".join(map(_escaped, cells)) + " |")
-        case_before = case
     lines.append("")
     lines += [f"{k}. {note}" for k, note in enumerate(notes, start=1)]
     return [*lines, "", "</details>"]
 
 
-def _measure(row: Row) -> str:
-    """What the quantity measures: the words after its first colon."""
-    return row.quantity.partition(": ")[2]
+def _note(row: Row) -> str:
+    """The note of a printed figure that does not simply agree; none of the others."""
+    agrees = row.agrees and row.basis == COMPUTED
+    if row.printed is None or row.basis == ELSEWHERE or agrees:
+        return ""
+    return row.note
 
 
-def _figure(row: Row) -> str:
+def _grouped(rows: Sequence[Row]) -> list[str]:
+    """Figures of a case, those with the same words before or after a colon together."""
+    parts = [row.quantity.partition(": ") for row in rows]
+    before, after = ({part[k] for part in parts} for k in (0, 2))
+    common, own = (2, 0) if len(after) <= len(before) else (0, 2)
+    groups: dict[str, list[str]] = {}
+    for row, part in zip(rows, parts, strict=True):
+        if part[2]:
+            groups.setdefault(part[common], []).append(_figure(row, part[own]))
+        else:
+            groups.setdefault("", []).append(_figure(row, part[0]))
+    return [
+        f"{words}: {'; '.join(figures)}" if words else "; ".join(figures)
+        for words, figures in groups.items()
+    ]
+
+
+def _figure(row: Row, subject: str) -> str:
     """What is measured, printed and found, at best in brackets."""
-    subject = row.quantity.partition(": ")[0]
     sign = {True: "=", False: "≠", None: ""}[row.agrees]
     if row.agrees and row.basis not in (COMPUTED, ELSEWHERE):
         sign = "≡"
-    best = "" if row.best is None else f"({number(row.best)})"
-    parts = (subject, number(row.printed), sign, number(row.as_paper), best)
+    best = "" if row.best is None else f"({number(row.best, 2)})"
+    ours = number(row.as_paper, DIGITS)
+    printed = number(row.printed)
+    if row.basis == ELSEWHERE:
+        printed = sign = ""
+    parts = (subject, printed, sign, ours, best)
     return " ".join(filter(None, parts))
 
 

@@ -94,9 +94,11 @@ class Row:
         return {key: _plain(value) for key, value in fields.items()}
 
 
-def number(value: float | None) -> str:
-    """A number to four digits; none where it is absent."""
-    return "" if value is None else f"{value:.4g}"
+def number(value: float | None, digits: int = 4) -> str:
+    """A number to some digits, those before the point all; none where it is absent."""
+    if value is None:
+        return ""
+    return f"{value:.0f}" if 1000 <= abs(value) < 10_000 else f"{value:.{digits}g}"
 
 
 def aims(rows: Iterable[Row]) -> tuple[int, int]:

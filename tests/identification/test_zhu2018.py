@@ -42,7 +42,9 @@ def test_as_the_source_integrates_the_ship_its_coefficients_come_out(
 ):
     """Tables 7.4.9 and 7.4.10."""
     case = f"Table {steering_forms.TABLES[equation]}"
-    rows = [row for row in steering_forms.coefficient_rows() if row.case == case]
+    rows = [
+        row for row in steering_forms.coefficient_rows() if row.case.startswith(case)
+    ]
     for basis, count in (("computed", agree), ("counted elsewhere", exact)):
         compared = [row.agrees for row in rows if row.basis == basis]
         assert len(compared) == 40

@@ -297,8 +297,8 @@ def coefficient_rows() -> Iterator[Row]:
                 if k in NEAR_ONE[q]:
                     name, expected, found = f"1 - {name}", 1.0 - value, 1.0 - found
                 yield Row(
-                    f"Table {table}",
-                    f"{method}: {name}{SHIP[by_euler]}",
+                    f"Table {table}{SHIP[by_euler]}",
+                    f"{method}: {name}",
                     expected,
                     found,
                     None,
@@ -332,9 +332,9 @@ def prediction_rows() -> Iterator[Row]:
                 ),
             )
             yield Row(
-                "Table 7.4.4",
+                f"Table 7.4.4{SHIP[False]}",
                 f"{method}, {EQUATIONS[q]}: mean squared error of prediction,"
-                f" {UNITS[q]}{SHIP[False]}",
+                f" {UNITS[q]}",
                 value,
                 exact[q],
                 None,

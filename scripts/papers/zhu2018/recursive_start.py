@@ -286,8 +286,8 @@ def figure_rows() -> Iterator[Row]:
             )
             yield Row(
                 "Figure 7.3.2",
-                f"{'noisy' if noisy else 'clean'} record, {count} samples at interval"
-                f" {interval}: largest error of the six, %",
+                f"{'noisy' if noisy else 'clean'} {count} by {interval}: largest error"
+                " of the six from so many samples at that interval, %",
                 None,
                 ours,
                 best,

@@ -275,8 +275,8 @@ def coefficient_rows() -> Iterator[Row]:
         for by_euler in (True, False):
             for row, term, printed, found in accelerations(q, by_euler):
                 yield Row(
-                    f"Table {TABLES[q]}",
-                    f"row {row}: {PREFIX[q]} of {term}{SHIP[by_euler]}",
+                    f"Table {TABLES[q]}{SHIP[by_euler]}",
+                    f"row {row}: {PREFIX[q]} of {term}",
                     printed,
                     found,
                     None,
@@ -291,13 +291,12 @@ def agreement_rows() -> Iterator[Row]:
             shown = [
                 row
                 for row in coefficient_rows()
-                if row.case == f"Table {TABLES[q]}"
-                and (row.basis == COMPUTED) == by_euler
+                if row.case == f"Table {TABLES[q]}{SHIP[by_euler]}"
             ]
             agree = sum(bool(row.agrees) for row in shown)
             yield Row(
-                f"Table {TABLES[q]}",
-                f"of {len(shown)} coefficients those that agree{SHIP[by_euler]}",
+                f"Table {TABLES[q]}{SHIP[by_euler]}",
+                f"of {len(shown)} coefficients those that agree",
                 None,
                 agree,
                 None,
