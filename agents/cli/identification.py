@@ -52,7 +52,8 @@ def identify_command(
     chosen. With --compare, structures and methods are ranked on the held-out trials,
     and comparison and models are written instead.
 
-    Exits with 1 if the identified model is unstable.
+    Exits with 1 if the identified model is unstable, or errs on a held-out trial by
+    more than --accept allows.
     """
     read, settings = _chosen(ship, options)
     if compare or methods is not None or structures is not None:
@@ -116,6 +117,8 @@ def _check_stable(result: IdentificationResult) -> None:
             f"the identified model is unstable: {instability}; it must not be used",
             FAILED,
         )
+    if unaccepted := result.metrics.get("unaccepted"):
+        fail(f"the model is not accepted: {'; '.join(unaccepted)}", FAILED)
     notes = [f"{trial.name}: {note}" for trial in result.trials for note in trial.notes]
     for warning in [*notes, *model_warnings(result)]:
         warn(warning)

@@ -467,10 +467,10 @@ PAPER = Paper(
             " errors, is not printed."
         ),
         (
-            "In a sea between states 2 and 3 differences of the logged rate are useless; by"
-            " simulation K and T come within 1.3 %, alpha and beta within 9 %, and within"
-            " 0.4 and 2 % where current and wind, which shipgym knows from log and ship,"
-            " are removed."
+            "In a sea between states 2 and 3 differences of the logged rate are"
+            " useless; by simulation K and T come within 1.3 %, alpha and beta within"
+            " 9 %, and within 0.4 and 2 % where current and wind, which shipgym knows"
+            " from log and ship, are removed."
         ),
         ("Yukun's trials are not published; the container ship stands in."),
     ),
