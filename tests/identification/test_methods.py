@@ -256,7 +256,7 @@ def test_a_name_stands_for_the_default_object_of_a_method() -> None:
         "de-lssvr"
     )
     guarded = [get_method(one).regularised for one in (LSSVM(), "rls", Ridge())]
-    assert guarded == [True, False, False]
+    assert guarded == [True, False, True]
 
 
 def test_methods_have_the_settings_of_their_estimators() -> None:
@@ -276,7 +276,9 @@ def test_an_estimator_object_is_a_method(
 ) -> None:
     """Scikit-learn's ridge regression has a constant, which the equations do not."""
     ship = {"particulars": mariner.particulars, "steering": mariner.steering}
-    named = identify(noisy_trials, method=RidgeRegression(alpha=1e-9), **ship)
+    named = identify(
+        noisy_trials, method=RidgeRegression(alpha=1e-9, scale=True), **ship
+    )
     own = identify(noisy_trials, method=Ridge(alpha=1e-9, solver="svd"), **ship)
     assert own.stable
     for name, value in named.coefficients.items():
