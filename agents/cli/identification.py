@@ -9,6 +9,7 @@ from typer import Option
 
 from agents.cli.command import FAILED, ShipFileArgument, fail
 from agents.cli.identify_options import with_identify_options
+from shipgym.files import toml_value
 
 if TYPE_CHECKING:
     from identification import IdentificationResult
@@ -23,6 +24,13 @@ def identify_command(
     out: Out,
     *,
     options: dict[str, Any],
+    accept: Annotated[
+        str | None,
+        Option(
+            metavar="TABLE",
+            help="Largest errors on held-out trials: { heading_deg = 3.0, ... }.",
+        ),
+    ] = None,
     compare: Annotated[
         bool,
         Option(
@@ -55,6 +63,8 @@ def identify_command(
     Exits with 1 if the identified model is unstable, or errs on a held-out trial by
     more than --accept allows.
     """
+    if accept is not None:
+        options["accept"] = toml_value(accept)
     read, settings = _chosen(ship, options)
     if compare or methods is not None or structures is not None:
         _compare(read, settings, out, (structures, methods))

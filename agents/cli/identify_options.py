@@ -54,13 +54,6 @@ def identify_options(
         float | None,
         Option(help="Strength of that pull; default: by cross-validation."),
     ] = None,
-    accept: Annotated[
-        str | None,
-        Option(
-            metavar="TABLE",
-            help="Largest errors on held-out trials: { heading_deg = 3.0, ... }.",
-        ),
-    ] = None,
     set_: Annotated[
         list[str] | None,
         Option(
@@ -84,7 +77,6 @@ def identify_options(
         "kernel": kernel,
         "prior": prior,
         "prior_strength": prior_strength,
-        "accept": accept,
     }
     found = named_values(set_ or (), "--set", "seed=3")
     for name, value in by_flag.items():

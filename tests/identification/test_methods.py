@@ -348,3 +348,18 @@ def test_an_estimator_of_others_is_copied_without_constant_with_a_covariance() -
     np.testing.assert_allclose(
         few.covariance_, np.sum(([1.0, 3.0] - few.coef_) ** 2) * np.eye(2)
     )
+
+
+@pytest.mark.parametrize("name", ["lasso", "ard", "gp"])
+def test_comparators_of_libraries_do_not_depend_on_the_units_of_columns(name) -> None:
+    """Raw columns of regressions span 5e-3 to 300."""
+    rng = np.random.default_rng(1)
+    X = rng.standard_normal((200, 3))
+    truth = np.array([1.0, -2.0, 0.5])
+    y = X @ truth + 0.01 * rng.standard_normal(200)
+    units = np.array([5e-3, 1.0, 300.0])
+    estimator = make_method(name)
+    found = estimator.fit(X * units, y).coef_ * units
+    np.testing.assert_allclose(found, truth, rtol=0.02)
+    assert np.all(np.diag(estimator.covariance_) > 0.0)
+    assert get_method(name).regularised
