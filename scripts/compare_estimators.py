@@ -10,8 +10,6 @@ from pathlib import Path
 from identification import compare_methods
 from shipgym import ShipFile
 
-ROOT = Path(__file__).parents[1]
-METHODS = ("tls-svm", "lasso", "ard", "gp")
 #: Ship files, the structure, the runs to fit, by default those marked so, and those
 #: held out.
 SHIPS = (
@@ -33,8 +31,9 @@ SHIPS = (
 
 def main() -> None:
     """Print the errors of each method on each ship."""
+    root = Path(__file__).parents[1]
     for file, structure, fitted, held in SHIPS:
-        ship = ShipFile.load(ROOT / file)
+        ship = ShipFile.load(root / file)
         named = (*fitted, *held)
         trials = [
             trial
@@ -44,7 +43,7 @@ def main() -> None:
         unseen = [trial.name for trial in trials if Path(trial.name).name in held]
         found = compare_methods(
             trials,
-            METHODS,
+            ("tls-svm", "lasso", "ard", "gp"),
             [structure],
             particulars=ship.particulars,
             steering=ship.steering,

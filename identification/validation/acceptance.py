@@ -17,12 +17,12 @@ INDICES = {
     "transfer_lengths": ("transfer_lengths",),
     "tactical_diameter_lengths": ("tactical_diameter_lengths",),
 }
-LIMITS = ("heading_deg", *INDICES)
 
 
 def check_accept(accept: Any) -> None:
     """Refuse limits of acceptance that are no table of known names and numbers."""
-    for name, limit in check_table(accept, "accept", LIMITS).items():
+    known = ("heading_deg", *INDICES)
+    for name, limit in check_table(accept, "accept", known).items():
         check_number(limit, f"accept {name}", above=0.0)
 
 

@@ -15,8 +15,6 @@ from papers.row import (
     number,
 )
 
-DIGITS = 3  # of our own figures
-VERDICTS = (CONFIRMED, CONTRADICTED, NOT_TESTABLE)
 INTRODUCTION = """# The papers' tables, run again
 
 `shipgym reproduce all --markdown docs/reproduction.md` wrote this page. For each paper:
@@ -58,7 +56,8 @@ def by_construction(rows: Sequence[Row]) -> int:
 
 def _overview(results: Mapping[str, Sequence[Row]]) -> list[str]:
     """Verdicts, agreement and aims of each paper, a line each."""
-    headings = (*VERDICTS, "agree with print", "by construction", "aims met")
+    words = (CONFIRMED, CONTRADICTED, NOT_TESTABLE)
+    headings = (*words, "agree with print", "by construction", "aims met")
     lines = [
         "| | " + " | ".join(headings) + " |",
         "| --- " + "| ---: " * len(headings) + "|",
@@ -66,7 +65,7 @@ def _overview(results: Mapping[str, Sequence[Row]]) -> list[str]:
     for name, rows in results.items():
         paper = get_paper(name)
         verdicts = [one.verdict(rows) for one in paper.conclusions]
-        counts = [str(verdicts.count(word)) if verdicts else "" for word in VERDICTS]
+        counts = [str(verdicts.count(word)) if verdicts else "" for word in words]
         cells = (
             f"[{name}](#{name})",
             *counts,
@@ -137,8 +136,8 @@ def _conclusions(conclusions: Sequence[Conclusion], rows: Sequence[Row]) -> list
 
 def _found(row: Row) -> str:
     """Ours by the paper's method and, in brackets, at best."""
-    best = "" if row.best is None else f"({number(row.best, DIGITS)})"
-    return " ".join(filter(None, (number(row.as_paper, DIGITS), best)))
+    best = "" if row.best is None else f"({number(row.best, 3)})"
+    return " ".join(filter(None, (number(row.as_paper, 3), best)))
 
 
 def _requirements(requirements: Sequence[Requirement]) -> list[str]:
@@ -214,7 +213,7 @@ def _figure(row: Row, subject: str) -> str:
     if row.agrees and row.basis not in (COMPUTED, ELSEWHERE):
         sign = "≡"
     best = "" if row.best is None else f"({number(row.best, 2)})"
-    ours = number(row.as_paper, DIGITS)
+    ours = number(row.as_paper, 3)
     printed = number(row.printed)
     if row.basis == ELSEWHERE:
         printed = sign = ""

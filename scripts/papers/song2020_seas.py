@@ -36,14 +36,12 @@ from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 
-WIND, FROM_DEG = 5.3, 45.0  # m/s; deg, of wind and waves
 SEA = Weather(
     Current(0.3, 90.0),
-    Wind(WIND, FROM_DEG),
-    Waves(0.5, 6.5, FROM_DEG),
+    Wind(5.3, 45.0),
+    Waves(0.5, 6.5, 45.0),
     name="sea state 2 to 3",
 )
-START_VARIANCE = 1e6  # of scaled coefficients
 
 
 @cache
@@ -59,7 +57,7 @@ def trial_in_seas(structure: str) -> Trial:
         weather=SEA,
         seed=SEED,
     )
-    wind = {"wind_speed": WIND, "wind_from": np.radians(FROM_DEG)}
+    wind = {"wind_speed": 5.3, "wind_from": np.radians(45.0)}
     return logged(run, f"zigzag {angle}/{angle}", wind)
 
 
@@ -119,7 +117,7 @@ def multi_innovation(structure: str, is_odd: bool) -> dict[str, float]:
     X, y = regression(structure, trial(structure))
     size = np.sqrt(np.mean(X**2, axis=0))
     theta = np.zeros(X.shape[1])
-    P = START_VARIANCE * np.eye(X.shape[1])
+    P = 1e6 * np.eye(X.shape[1])
     for phi, target in zip(X / size, y.tolist(), strict=True):
         error = target - float(phi @ theta)
         bend = np.tanh(OMEGA * error)
