@@ -10,18 +10,21 @@ from identification.fit import Fit
 from shipgym import InputError
 from shipgym.checks import check_number, check_table, quoted
 
-#: Limits by name, and the indices of a trial's metrics that each holds for.
-INDICES = {
-    "overshoot_deg": ("overshoot_1_deg", "overshoot_2_deg"),
-    "advance_lengths": ("advance_lengths",),
-    "transfer_lengths": ("transfer_lengths",),
-    "tactical_diameter_lengths": ("tactical_diameter_lengths",),
-}
+
+def indices_by_limit() -> dict[str, tuple[str, ...]]:
+    """Limits by name, and the indices of a trial's metrics that each holds for."""
+    return {
+        "heading_deg": (),
+        "overshoot_deg": ("overshoot_1_deg", "overshoot_2_deg"),
+        "advance_lengths": ("advance_lengths",),
+        "transfer_lengths": ("transfer_lengths",),
+        "tactical_diameter_lengths": ("tactical_diameter_lengths",),
+    }
 
 
 def check_accept(accept: Any) -> None:
     """Refuse limits of acceptance that are no table of known names and numbers."""
-    known = ("heading_deg", *INDICES)
+    known = indices_by_limit()
     for name, limit in check_table(accept, "accept", known).items():
         check_number(limit, f"accept {name}", above=0.0)
 
@@ -80,7 +83,7 @@ def errors_of(metrics: Mapping[str, Any], limit: str) -> list[float]:
         return [] if error is None else [float(np.degrees(error))]
 
     errors = []
-    for index in INDICES[limit]:
+    for index in indices_by_limit()[limit]:
         values = metrics[index] or {}
         measured = values.get("measured")
         if measured is None:

@@ -130,7 +130,7 @@ def _advanced(rate: Rate, points: Floats, m: int, delta: Floats, h: float) -> Fl
 @cache
 def nomoto_history(structure: str, start: float = START) -> Floats:
     """Hual Trooper's coefficients from measured yaw rate and heading."""
-    trial = song2020.trial(structure, noisy=True)
+    trial = song2020_nomoto.trial(structure, noisy=True)
     r, delta = trial["r"], trial["delta"]
     columns = [r, delta] if structure == "nomoto" else [r, r**3, delta]
 
@@ -145,7 +145,9 @@ def nomoto_history(structure: str, start: float = START) -> Floats:
     size = np.sqrt(np.mean((0.1 * r) ** 2))  # a yaw rate that changes in 10 s
     deviation = start * size / np.sqrt(np.mean(np.square(columns), axis=1))
     measured = np.column_stack([np.unwrap(trial["psi"]), r])
-    return kalman_history(rate, measured, delta, song2020.INTERVAL, noise, deviation)
+    return kalman_history(
+        rate, measured, delta, song2020_nomoto.INTERVAL, noise, deviation
+    )
 
 
 @cache
@@ -307,10 +309,12 @@ def filter_rows() -> Iterator[Row]:
         )
     worst = [float(np.abs(end).max()) for end in ends]
     yield from _start_rows("zhu2018, Table 7.3.2", worst, float(np.abs(best).max()))
-    for structure, truth in song2020.TRUTH.items():
-        best_found = song2020.errors(song2020.at_best(structure, noisy=True), truth)
+    for structure, truth in song2020_nomoto.TRUTH.items():
+        best_found = song2020_nomoto.errors(
+            song2020.at_best(structure, noisy=True), truth
+        )
         errors = [
-            song2020.errors(
+            song2020_nomoto.errors(
                 dict(
                     zip(
                         truth,

@@ -18,6 +18,7 @@ from papers import (
     mei2019,
     mei2019_targets,
     song2020,
+    song2020_nomoto,
     xu2020_rank,
 )
 from papers.zhu2018 import (
@@ -159,16 +160,16 @@ def samples(axes: Any) -> None:
 
 def nomoto(axes: Any) -> None:
     """K and T sample by sample."""
-    run, names = song2020.trial("nomoto"), tuple(song2020.TRUTH["nomoto"])
-    X, y = song2020.regression("nomoto", run)
+    run, names = song2020_nomoto.trial("nomoto"), tuple(song2020_nomoto.TRUTH["nomoto"])
+    X, y = song2020_nomoto.regression("nomoto", run)
     least = coefficient_history(
-        run, "nomoto", song2020.PARTICULARS, MultiInnovationLeastSquares()
+        run, "nomoto", song2020_nomoto.PARTICULARS, MultiInnovationLeastSquares()
     )
     paths = {
         "SG": (run.t[1:], song2020.gradient_history(X, y)[0], OTHER),
         "NISG": (
             run.t[1:],
-            song2020.gradient_history(X, y, omega=song2020.OMEGA)[0],
+            song2020.gradient_history(X, y, omega=song2020_nomoto.OMEGA)[0],
             THEIRS,
         ),
         "TMILS": (least.t, np.column_stack([least[name] for name in names]), OURS),
@@ -186,7 +187,7 @@ def nomoto(axes: Any) -> None:
         for axis, values in zip(axes, indices, strict=True):
             axis.plot(t, values, label=label, **style)
     for axis, value, name in zip(
-        axes, (song2020.K, song2020.T), ("K, 1/s", "T, s"), strict=True
+        axes, (song2020_nomoto.K, song2020_nomoto.T), ("K, 1/s", "T, s"), strict=True
     ):
         axis.axhline(value, color="black", lw=1.0, label="truth", **DASHED)
         axis.set(title=name, xlabel="t, s", ylim=(0.0, 2.0 * value))

@@ -71,13 +71,14 @@ def by_differences(structure: str) -> dict[str, float]:
 @cache
 def identified(structure: str, knows_seas: bool) -> Mapping[str, float]:
     """Coefficients by simulation, with current and wind removed or left in."""
-    options = {} if knows_seas else {"current": "none", "wind": "none"}
+    removed = "auto" if knows_seas else "none"
     found = identify(
         [trial_in_seas(structure)],
         structure,
         "output-error",
         particulars=PARTICULARS,
-        **options,
+        current=removed,
+        wind=removed,
     )
     return found.coefficients
 
