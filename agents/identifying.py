@@ -133,7 +133,7 @@ def compare_ship(
     others = {}
     for name, value in settings.items():
         stage, _, _ = name.partition(".")
-        if stage != "method":
+        if stage not in ("method", "accept"):
             others[name] = value
     trials, arguments = trials_of(ship, others)
     if EXTRA_TRIALS in settings:

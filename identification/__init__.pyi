@@ -30,6 +30,15 @@ from .estimators.comparators import (
 )
 from .estimators.comparators import RidgeRegression as RidgeRegression
 from .estimators.kernel_residual import KernelResidual as KernelResidual
+from .estimators.library import (
+    GaussianProcess as GaussianProcess,
+)
+from .estimators.library import (
+    LassoRegression as LassoRegression,
+)
+from .estimators.library import (
+    RelevanceRegression as RelevanceRegression,
+)
 from .estimators.lssvm import (
     LSSVM as LSSVM,
 )

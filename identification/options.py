@@ -17,6 +17,7 @@ from identification.regression.wind import check_wind
 from identification.simulation_error.prior_knowledge import PriorKnowledge
 from identification.simulation_error.refinement import Refinement
 from identification.uncertainty.uncertainty import Uncertainty
+from identification.validation.acceptance import check_accept
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.checks import check_flag, check_number, check_text
 from shipgym.ships import Structure
@@ -84,6 +85,11 @@ class Options:
     guarded : bool
         Whether a model that runs away in a hard turn is fitted again, with the weakest
         sufficient penalty on terms that are large there and invisible in the data.
+    accept : table or None
+        Largest errors on held-out trials with which the model is accepted, such as
+        `{ heading_deg = 3.0, overshoot_deg = 2.0 }`: root mean square of the heading,
+        and of the indices overshoot_deg, advance_lengths, transfer_lengths and
+        tactical_diameter_lengths.
     name : str or None
         Of the model; by default that of the ship.
     service_shaft_speed : float or None, above 0
@@ -104,6 +110,7 @@ class Options:
     wind: str | Mapping[str, Any] = "auto"
     hold_out: str | Sequence[str] = ()
     guarded: bool = True
+    accept: Mapping[str, float] | None = None
     name: str | None = None
     service_shaft_speed: float | None = None
 
@@ -122,6 +129,8 @@ class Options:
         if self.prior is not None and self.prior.source is None:
             self._check_prior_is_implied()
         check_flag(self.guarded, "guarded")
+        if self.accept is not None:
+            check_accept(self.accept)
         if self.name is not None:
             check_text(self.name, "name")
         speed = self.service_shaft_speed

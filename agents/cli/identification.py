@@ -9,6 +9,7 @@ from typer import Option
 
 from agents.cli.command import FAILED, ShipFileArgument, fail
 from agents.cli.identify_options import with_identify_options
+from shipgym.files import toml_value
 
 if TYPE_CHECKING:
     from identification import IdentificationResult
@@ -23,6 +24,13 @@ def identify_command(
     out: Out,
     *,
     options: dict[str, Any],
+    accept: Annotated[
+        str | None,
+        Option(
+            metavar="TABLE",
+            help="Largest errors on held-out trials: { heading_deg = 3.0, ... }.",
+        ),
+    ] = None,
     compare: Annotated[
         bool,
         Option(
@@ -52,8 +60,11 @@ def identify_command(
     chosen. With --compare, structures and methods are ranked on the held-out trials,
     and comparison and models are written instead.
 
-    Exits with 1 if the identified model is unstable.
+    Exits with 1 if the identified model is unstable, or errs on a held-out trial by
+    more than --accept allows.
     """
+    if accept is not None:
+        options["accept"] = toml_value(accept)
     read, settings = _chosen(ship, options)
     if compare or methods is not None or structures is not None:
         _compare(read, settings, out, (structures, methods))
@@ -116,6 +127,8 @@ def _check_stable(result: IdentificationResult) -> None:
             f"the identified model is unstable: {instability}; it must not be used",
             FAILED,
         )
+    if unaccepted := result.metrics.get("unaccepted"):
+        fail(f"the model is not accepted: {'; '.join(unaccepted)}", FAILED)
     notes = [f"{trial.name}: {note}" for trial in result.trials for note in trial.notes]
     for warning in [*notes, *model_warnings(result)]:
         warn(warning)

@@ -28,6 +28,13 @@ def reproduce_command(
     markdown: Annotated[
         Path | None, Option(metavar="PAGE.MD", help="Write the tables to this file.")
     ] = None,
+    table: Annotated[
+        str | None,
+        Option(metavar="NAME", help='One table or figure, such as "Table 2".'),
+    ] = None,
+    row: Annotated[
+        str | None, Option(metavar="NAME", help='One row, such as "X_uu: error, %".')
+    ] = None,
 ) -> None:
     """Reproduce the papers' tables.
 
@@ -43,8 +50,10 @@ def reproduce_command(
             WRONG_INPUT,
         )
     arguments = [sys.executable, str(SCRIPT), paper]
-    if markdown is not None:
-        arguments += ["--markdown", str(markdown)]
+    options = {"--markdown": markdown, "--table": table, "--row": row}
+    for option, value in options.items():
+        if value is not None:
+            arguments += [option, str(value)]
     as_json = AS_JSON.get()
     if as_json:
         arguments.append("--json")

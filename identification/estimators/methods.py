@@ -3,15 +3,15 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from sklearn.base import clone
 
 import identification
+from identification.estimators.adapted import Adapted
 from identification.estimators.estimator import Estimator, Estimators, FitTask
-from identification.estimators.linear import LinearRegressor, validated
+from identification.estimators.linear import LinearRegressor
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.regression.samples import Samples
 from identification.simulation_error.refinement import Refinement
@@ -31,6 +31,9 @@ METHODS: dict[str, tuple[str, dict[str, Any]]] = {
     "abc-lssvr": ("TunedLSSVM", {"optimiser": "abc"}),
     "de-lssvr": ("TunedLSSVM", {"optimiser": "de"}),
     "svr": ("LinearSupportVectorMachine", {}),
+    "lasso": ("LassoRegression", {}),
+    "ard": ("RelevanceRegression", {}),
+    "gp": ("GaussianProcess", {}),
     "rls": ("RecursiveLeastSquares", {}),
     "sg": ("StochasticGradient", {}),
     "nisg": ("StochasticGradient", {"omega": 0.5}),
@@ -113,7 +116,6 @@ def get_method(method: str | Any) -> Method:
     return Method(
         name=type(method).__name__,
         make=make,
-        regularised=False,
     )
 
 
@@ -137,50 +139,6 @@ def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Est
         )
         estimators[q] = ridge.fit(X, y)
     return estimators
-
-
-class Adapted(LinearRegressor):
-    """An estimator with scikit-learn's interface, given moment and covariance.
-
-    These are those of least squares on the features whose coefficients are not 0: an
-    approximation for an estimator that shrinks its coefficients. `inner` has a `fit(X,
-    y)` that sets `coef_`.
-    """
-
-    def __init__(self, inner: Any) -> None:
-        self.inner = inner
-
-    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit; InputError unless that sets a finite `coef_` for each feature."""
-        features, targets = validated(self, X, y)
-        n_features = features.shape[1]
-        self.inner.fit(features, targets)
-        coefficients = getattr(self.inner, "coef_", np.nan)
-        self.coef_ = np.asarray(coefficients, dtype=float).ravel()
-        if self.coef_.shape != (n_features,) or not np.isfinite(self.coef_).all():
-            raise InputError(
-                "method: expected a linear estimator whose fit sets coef_, a finite"
-                f" coefficient for each of the {n_features} terms, got {self.inner!r}"
-            )
-
-        self._set_covariance(features, targets)
-        return self
-
-    def _set_covariance(self, features: Floats, targets: Floats) -> None:
-        """Set moment and covariance as of least squares on the features in use."""
-        is_used = self.coef_ != 0.0
-        used = features[:, is_used]
-        n_features = len(is_used)
-        inverse = np.zeros((n_features, n_features))
-        block = np.ix_(is_used, is_used)
-        inverse[block] = np.linalg.pinv(used.T @ used, hermitian=True)
-
-        residuals = targets - features @ self.coef_
-        n_used = int(is_used.sum())
-        freedom = max(len(targets) - n_used, 1)
-        variance = float(residuals @ residuals) / freedom
-        self.inverse_moment_ = inverse
-        self.covariance_ = variance * inverse
 
 
 def without_constant(estimator: Any) -> Estimator:

@@ -41,7 +41,7 @@ RAN_AWAY = 1e3  # error, relative to the motion, of a ship that ran away
 class TunedLSSVM(LinearRegressor):
     """LS-SVM with a linear kernel and C found by a search over its logarithm.
 
-    Source: Zhu 2018, section 5.3.
+    Source: Zhu 2018, sections 5.2.1, 5.2.2 (bee colony) and 7.4.4 (the others).
 
     Parameters
     ----------

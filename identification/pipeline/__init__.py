@@ -12,6 +12,7 @@ from identification.regression.samples import Sampling
 from identification.result import IdentificationResult
 from identification.simulation_error.prior_knowledge import PriorKnowledge
 from identification.uncertainty.uncertainty import Uncertainty
+from identification.validation.acceptance import unaccepted
 from shipgym import ShipModel, SteeringGear, Trial
 from shipgym.ships import Structure
 from shipgym.ships.structures import MMG
@@ -37,6 +38,7 @@ def identify(
     wind: str | Mapping[str, Any] = "auto",
     hold_out: str | Sequence[str] = (),
     guarded: bool = True,
+    accept: Mapping[str, float] | None = None,
     name: str | None = None,
     service_shaft_speed: float | None = None,
 ) -> IdentificationResult:
@@ -51,6 +53,12 @@ def identify(
         Those with `use` "fit" are fitted; they need the channels u, v, r and delta, and
         n for structures that know the shaft speed. Those marked "validate" are
         predicted, and influence no coefficient.
+
+    Returns
+    -------
+    IdentificationResult
+        Its `metrics` have why the model is not accepted as `unaccepted`, where `accept`
+        sets limits; empty for a model that is.
 
     Raises
     ------
@@ -73,13 +81,17 @@ def identify(
         wind=wind,
         hold_out=hold_out,
         guarded=guarded,
+        accept=accept,
         name=name,
         service_shaft_speed=service_shaft_speed,
     )
     named = options.kernel is None and options.structure not in (AUTO, MMG)
     if named:
-        return by_regression(trials, options)
+        result = by_regression(trials, options)
+    else:
+        from identification.pipeline.routes import identified
 
-    from identification.pipeline.routes import identified
-
-    return identified(trials, options)
+        result = identified(trials, options)
+    if options.accept is not None:
+        result.metrics["unaccepted"] = unaccepted(result, options.accept)
+    return result

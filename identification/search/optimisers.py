@@ -17,7 +17,7 @@ class GridSearch(Optimiser):
     """Evenly spaced candidates, then finer ones around the best.
 
     With the logarithm of C as the variable this is cross-validation over a logarithmic
-    grid (Zhu 2018, section 5.3.1).
+    grid (Zhu 2018, section 7.4.4).
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class GridSearch(Optimiser):
 class ParticleSwarm(Optimiser):
     """Particle swarm optimisation with inertia.
 
-    Source: Shi & Eberhart 1998; Zhu 2018, section 5.3.2.
+    Source: Shi & Eberhart 1998; Zhu 2018, section 7.4.4.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ class DifferentialEvolution(Optimiser):
 
 @dataclass(frozen=True)
 class ArtificialBeeColony(Optimiser):
-    """Artificial bee colony (Karaboga 2005; Zhu 2018, section 5.3.3).
+    """Artificial bee colony (Karaboga 2005; Zhu 2018, sections 5.2.1 and 5.2.2).
 
     Employed bees move each food source along one dimension towards or away from
     another; onlookers do the same to sources drawn by their fitness; a source that did

@@ -19,13 +19,14 @@ from scipy.integrate import cumulative_trapezoid
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPRegressor
 
-from papers import cao2015, song2020
+from papers import cao2015, song2020, song2020_nomoto
 from papers.mei2019 import HARD, WORDS
 from papers.mei2019_targets import STEPS_PER_SAMPLE, TURN, our_way, same_hull, virtual
 from papers.row import Conclusion, Paper, Row
 from papers.zhu2018 import recursive_start
-from papers.zhu2018.container_ship import EQUATIONS, UNITS, best_errors, zigzag_trial
+from papers.zhu2018.container_ship import EQUATIONS, UNITS, best_errors
 from papers.zhu2018.fits import every, mean_square
+from papers.zhu2018.ships import zigzag_trial
 from shipgym.manoeuvres import turning_circle, turning_indices
 from shipgym.ships import load_model
 from shipgym.trials.trial import Trial
@@ -129,7 +130,7 @@ def _advanced(rate: Rate, points: Floats, m: int, delta: Floats, h: float) -> Fl
 @cache
 def nomoto_history(structure: str, start: float = START) -> Floats:
     """Hual Trooper's coefficients from measured yaw rate and heading."""
-    trial = song2020.trial(structure, noisy=True)
+    trial = song2020_nomoto.trial(structure, noisy=True)
     r, delta = trial["r"], trial["delta"]
     columns = [r, delta] if structure == "nomoto" else [r, r**3, delta]
 
@@ -140,11 +141,13 @@ def nomoto_history(structure: str, start: float = START) -> Floats:
             [yaw, sum(c * term for c, term in zip(theta, terms, strict=True))]
         )
 
-    noise = np.array([song2020.NOISE["psi"], song2020.NOISE["r"]])
+    noise = np.array([song2020_nomoto.NOISE["psi"], song2020_nomoto.NOISE["r"]])
     size = np.sqrt(np.mean((0.1 * r) ** 2))  # a yaw rate that changes in 10 s
     deviation = start * size / np.sqrt(np.mean(np.square(columns), axis=1))
     measured = np.column_stack([np.unwrap(trial["psi"]), r])
-    return kalman_history(rate, measured, delta, song2020.INTERVAL, noise, deviation)
+    return kalman_history(
+        rate, measured, delta, song2020_nomoto.INTERVAL, noise, deviation
+    )
 
 
 @cache
@@ -306,10 +309,12 @@ def filter_rows() -> Iterator[Row]:
         )
     worst = [float(np.abs(end).max()) for end in ends]
     yield from _start_rows("zhu2018, Table 7.3.2", worst, float(np.abs(best).max()))
-    for structure, truth in song2020.TRUTH.items():
-        best_found = song2020.errors(song2020.at_best(structure, noisy=True), truth)
+    for structure, truth in song2020_nomoto.TRUTH.items():
+        best_found = song2020_nomoto.errors(
+            song2020.at_best(structure, noisy=True), truth
+        )
         errors = [
-            song2020.errors(
+            song2020_nomoto.errors(
                 dict(
                     zip(
                         truth,

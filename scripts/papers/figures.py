@@ -18,6 +18,7 @@ from papers import (
     mei2019,
     mei2019_targets,
     song2020,
+    song2020_nomoto,
     xu2020_rank,
 )
 from papers.zhu2018 import (
@@ -27,6 +28,7 @@ from papers.zhu2018 import (
     sample_counts,
     steering_forms,
 )
+from papers.zhu2018.ships import zigzag_trial
 from shipgym.ships import load_model
 
 WIDTH, DPI = 9.0, 100  # of a figure, inches; dots an inch
@@ -107,7 +109,7 @@ def recursion(axes: Any) -> None:
 
 def container(axes: Any) -> None:
     """Sway and yaw rate of the 20/20 zigzag."""
-    trial = container_ship.zigzag_trial(20)
+    trial = zigzag_trial(20, by_euler=True)
     seven, four = (
         container_ship.as_printed("ABC"),
         steering_forms.as_printed(steering_forms.CHOSEN),
@@ -158,16 +160,16 @@ def samples(axes: Any) -> None:
 
 def nomoto(axes: Any) -> None:
     """K and T sample by sample."""
-    run, names = song2020.trial("nomoto"), tuple(song2020.TRUTH["nomoto"])
-    X, y = song2020.regression("nomoto")
+    run, names = song2020_nomoto.trial("nomoto"), tuple(song2020_nomoto.TRUTH["nomoto"])
+    X, y = song2020_nomoto.regression("nomoto", run)
     least = coefficient_history(
-        run, "nomoto", song2020.PARTICULARS, MultiInnovationLeastSquares()
+        run, "nomoto", song2020_nomoto.PARTICULARS, MultiInnovationLeastSquares()
     )
     paths = {
         "SG": (run.t[1:], song2020.gradient_history(X, y)[0], OTHER),
         "NISG": (
             run.t[1:],
-            song2020.gradient_history(X, y, omega=song2020.OMEGA)[0],
+            song2020.gradient_history(X, y, omega=song2020_nomoto.OMEGA)[0],
             THEIRS,
         ),
         "TMILS": (least.t, np.column_stack([least[name] for name in names]), OURS),
@@ -185,7 +187,7 @@ def nomoto(axes: Any) -> None:
         for axis, values in zip(axes, indices, strict=True):
             axis.plot(t, values, label=label, **style)
     for axis, value, name in zip(
-        axes, (song2020.K, song2020.T), ("K, 1/s", "T, s"), strict=True
+        axes, (song2020_nomoto.K, song2020_nomoto.T), ("K, 1/s", "T, s"), strict=True
     ):
         axis.axhline(value, color="black", lw=1.0, label="truth", **DASHED)
         axis.set(title=name, xlabel="t, s", ylim=(0.0, 2.0 * value))

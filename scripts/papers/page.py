@@ -1,4 +1,4 @@
-"""The papers' tables beside ours, for terminal, programs and documentation."""
+"""The papers' tables beside ours: run, chosen, and shown in the terminal."""
 
 from __future__ import annotations
 
@@ -8,27 +8,13 @@ from itertools import groupby
 from rich.table import Table
 
 from agents.cli.tables import plain_table
-from papers import CASES, Conclusion, Paper, Requirement, Row, get_paper
-from papers.row import CONFIRMED, CONTRADICTED, NOT_TESTABLE, aims
+from papers import CASES, Row, get_paper
+from papers.row import COMPUTED, number
 from shipgym.checks import check_choice
 
 ALL = "all"
 HEADINGS = ("case", "quantity", "printed", "{ours}", "agrees", "at best", "aim", "met")
 NUMBERS = ("printed", "{ours}", "at best")
-INTRODUCTION = """# The papers' tables, run again
-
-Written by `python scripts/reproduce.py all --markdown docs/reproduction.md`. *Printed*
-is the paper's number; *as the paper* is our number by the paper's method on the same
-case; *at best* is ours by the best method in shipgym, on the same data. A cell is empty
-where the paper shows only a picture or does not publish its data; the note, whose
-number is in the last column, then says what is used instead.
-
-*Agrees* says whether *as the paper* equals the printed number within 10 % or within the
-rounding of the printed digits. *Met* is a different question: whether *at best* reaches
-the aim. An aim is counted once, even if several rows show the same number. The
-conclusions of each paper come before its tables, each with the rows that confirm or
-contradict it and with what "accurate" or "better" was taken to mean.
-"""
 
 
 def papers_of(name: str) -> tuple[str, ...]:
@@ -68,6 +54,33 @@ def reproduce(
     return results
 
 
+def chosen(
+    results: Mapping[str, Sequence[Row]], table: str | None, quantity: str | None
+) -> dict[str, list[Row]]:
+    """Rows of one table or figure, or of one quantity, or all of them.
+
+    Raises
+    ------
+    InputError
+        If no paper that was run has such a table or row; names the nearest.
+    """
+    rows = [row for of_paper in results.values() for row in of_paper]
+    if table is not None:
+        check_choice(table, dict.fromkeys(row.case for row in rows), "table")
+        rows = [row for row in rows if row.case == table]
+    if quantity is not None:
+        check_choice(quantity, dict.fromkeys(row.quantity for row in rows), "row")
+        rows = [row for row in rows if row.quantity == quantity]
+
+    kept = {id(row) for row in rows}
+    found = {}
+    for name, of_paper in results.items():
+        left = [row for row in of_paper if id(row) in kept]
+        if left:
+            found[name] = left
+    return found
+
+
 def missed(results: Mapping[str, Sequence[Row]]) -> list[str]:
     """The rows whose aim is not met, as paper, case and quantity."""
     return [
@@ -94,149 +107,18 @@ def terminal_table(name: str, rows: Sequence[Row]) -> Table:
     return table
 
 
-def page(results: Mapping[str, Sequence[Row]]) -> str:
-    """The page of the documentation, Markdown."""
-    sections = (_section(name, rows) for name, rows in results.items())
-    return "\n".join([INTRODUCTION, *_overview(results), *sections])
-
-
-def _overview(results: Mapping[str, Sequence[Row]]) -> list[str]:
-    """Verdicts, agreement and aims of each paper, a line each."""
-    words = (CONFIRMED, CONTRADICTED, NOT_TESTABLE)
-    headings = (*words, "agree with print", "aims met")
-    lines = [
-        "| | " + " | ".join(headings) + " |",
-        "| --- " + "| ---: " * len(headings) + "|",
-    ]
-    for name, rows in results.items():
-        paper = get_paper(name)
-        verdicts = [one.verdict(rows) for one in paper.conclusions]
-        cells = [f"[{name}](#{name})"]
-        for word in words:
-            count = verdicts.count(word)
-            cells.append(str(count) if verdicts else "")
-        cells.append(_share(*_agreement(rows)))
-        cells.append(_share(*aims(rows)))
-        lines.append("| " + " | ".join(cells) + " |")
-    return [*lines, ""]
-
-
-def _agreement(rows: Sequence[Row]) -> tuple[int, int]:
-    """How many rows agree with print, and how many can."""
-    agree = [row.agrees for row in rows if row.agrees is not None]
-    return sum(agree), len(agree)
-
-
-def _share(part: int, whole: int) -> str:
-    return f"{part} of {whole}" if whole else ""
-
-
-def _section(name: str, rows: Sequence[Row]) -> str:
-    paper = get_paper(name)
-    counts = (("Aims met", aims(rows)), ("Agree with print", _agreement(rows)))
-    told = "".join(f"{word}: {_share(*count)}. " for word, count in counts if count[1])
-    lines = [
-        f"## {name}",
-        "",
-        f"{paper.citation}. {paper.what}",
-        "",
-        *_requirements(paper.requirements),
-        f"{told}`python scripts/reproduce.py {name}`",
-        "",
-        *_conclusions(paper.conclusions, rows),
-        *(
-            line
-            for file, caption in paper.figures
-            for line in (f"![{name}](images/{file})", "", f"*{caption}*", "")
-        ),
-        *_table(paper, rows),
-    ]
-    return "\n".join([*lines, ""])
-
-
-def _table(paper: Paper, rows: Sequence[Row]) -> list[str]:
-    """The rows, and below them each note once."""
-    lines = [
-        "| " + " | ".join((*HEADINGS, "note")).format(ours=paper.ours) + " |",
-        "| --- | --- | ---: | ---: | --- | ---: | --- | --- | --- |",
-    ]
-    notes = {
-        note: k
-        for k, note in enumerate(
-            dict.fromkeys(row.note for row in rows if row.note), start=1
-        )
-    }
-    for row in rows:
-        number = str(notes[row.note]) if row.note else ""
-        lines.append("| " + " | ".join((*map(_escaped, _cells(row)), number)) + " |")
-    return [*lines, "", *(f"{k}. {note}" for note, k in notes.items())]
-
-
-def _conclusions(conclusions: Sequence[Conclusion], rows: Sequence[Row]) -> list[str]:
-    """What the paper concludes, what became of it, and the rows that show it."""
-    if not conclusions:
-        return []
-    verdicts = [one.verdict(rows) for one in conclusions]
-    counts = ", ".join(
-        f"{verdicts.count(word)} {word}"
-        for word in (CONFIRMED, CONTRADICTED, NOT_TESTABLE)
-    )
-    lines = [
-        f"Conclusions: {counts}.",
-        "",
-        "| the paper concludes | here | shown by |",
-        "| --- | --- | --- |",
-    ]
-    for one, verdict in zip(conclusions, verdicts, strict=True):
-        shown = [f"{row.name} = {_found(row)}" for row in one.rows(rows)]
-        cells = (
-            one.statement,
-            verdict,
-            "<br>".join([*shown, *([one.remark] if one.remark else [])]),
-        )
-        lines.append("| " + " | ".join(map(_escaped, cells)) + " |")
-    return [*lines, ""]
-
-
-def _found(row: Row) -> str:
-    """Ours by the paper's method and, after a semicolon, at best."""
-    best = "" if row.best is None else f"at best {_number(row.best)}"
-    return "; ".join(filter(None, (_number(row.as_paper), best))) or "not at hand"
-
-
-def _requirements(requirements: Sequence[Requirement]) -> list[str]:
-    """Requirement, reason, and the tests and tables that show it; none for a paper."""
-    if not requirements:
-        return []
-    lines = [
-        "| | requirement | why it holds | tests | tables |",
-        "| --- | --- | --- | --- | --- |",
-    ]
-    for one in requirements:
-        tests = "<br>".join(f"`{test}`" for test in one.tests)
-        cells = (one.name, one.statement, one.argument, tests, "<br>".join(one.tables))
-        lines.append("| " + " | ".join(map(_escaped, cells)) + " |")
-    return [*lines, ""]
-
-
 def _cells(row: Row) -> tuple[str, ...]:
     yes = {True: "yes", False: "no", None: ""}
-    ours, agrees = _number(row.as_paper), yes[row.agrees]
+    agrees = yes[row.agrees]
+    if agrees and row.basis != COMPUTED:
+        agrees = row.basis
     return (
         row.case,
         row.quantity,
-        _number(row.printed),
-        ours,
+        number(row.printed),
+        number(row.as_paper),
         agrees,
-        _number(row.best),
+        number(row.best),
         row.aim,
         yes[row.met],
     )
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.4g}"
-
-
-def _escaped(text: str) -> str:
-    return text.replace("|", "\\|")

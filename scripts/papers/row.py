@@ -6,7 +6,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 AGREEMENT = 0.1  # relative difference from print that still agrees
+#: What a row's number rests on: data; a truth that was put in and is read back, or an
+#: identity; a setting picked because it comes near print. The printed figure of a row
+#: that is `ELSEWHERE` is that of another row, which counts.
+COMPUTED, PUT_IN, PICKED = "computed", "put in", "picked"
+ELSEWHERE = "counted elsewhere"
 CONFIRMED, CONTRADICTED, NOT_TESTABLE = "confirmed", "contradicted", "not testable"
 
 
@@ -33,6 +40,9 @@ class Row:
     note : str
         Why a row cannot be reproduced, a stand-in for data that are not published, or a
         slip of the paper.
+    basis : str
+        What `as_paper` rests on: `computed`, `put in`, `picked` or `counted elsewhere`;
+        only what is computed can agree or not.
     """
 
     case: str
@@ -43,6 +53,7 @@ class Row:
     aim: str = ""
     met: bool | None = None
     note: str = ""
+    basis: str = COMPUTED
 
     @property
     def agrees(self) -> bool | None:
@@ -77,7 +88,17 @@ class Row:
 
     def to_dict(self) -> dict[str, Any]:
         """The row for JSON."""
-        return asdict(self) | {"agrees": self.agrees}
+        agrees = None if self.agrees is None else bool(self.agrees)
+        met = None if self.met is None else bool(self.met)
+        fields = asdict(self) | {"met": met, "agrees": agrees}
+        return {key: _plain(value) for key, value in fields.items()}
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """A number to some digits, those before the point all; none where it is absent."""
+    if value is None:
+        return ""
+    return f"{value:.0f}" if 1000 <= abs(value) < 10_000 else f"{value:.{digits}g}"
 
 
 def aims(rows: Iterable[Row]) -> tuple[int, int]:
@@ -87,6 +108,11 @@ def aims(rows: Iterable[Row]) -> tuple[int, int]:
         if row.met is not None:
             met[row.figure] = met.get(row.figure, True) and bool(row.met)
     return sum(met.values()), len(met)
+
+
+def _plain(value: Any) -> Any:
+    """A number of Python for one of numpy."""
+    return value.item() if isinstance(value, np.generic) else value
 
 
 @dataclass(frozen=True)
@@ -171,6 +197,8 @@ class Paper:
         That the rows measure; of the tables of a paper none.
     conclusions : tuple of Conclusion
         Of the paper.
+    differences : tuple of str
+        Where print and recomputation differ, and why.
     figures : tuple of (str, str)
         File name in `docs/images` and caption; `papers.figures` draws them.
     ours : str
@@ -183,5 +211,6 @@ class Paper:
     rows: Callable[[], Iterator[Row]]
     requirements: tuple[Requirement, ...] = ()
     conclusions: tuple[Conclusion, ...] = ()
+    differences: tuple[str, ...] = ()
     figures: tuple[tuple[str, str], ...] = ()
     ours: str = "as the paper"

@@ -30,7 +30,7 @@ from papers.dense_dual import (
     dense_dual_solution,
     dense_truncated_solution,
 )
-from papers.row import Conclusion, Paper, Row
+from papers.row import PUT_IN, Conclusion, Paper, Row
 from papers.xu2020_tank import (
     NOISE,
     SEED,
@@ -274,6 +274,7 @@ def table_2_rows() -> Iterator[Row]:
         note=(
             f"with C = {HUGE:g} that is y itself, whatever w is: no measure of the fit"
         ),
+        basis=PUT_IN,
     )
     yield Row(
         "Table 2",
@@ -426,6 +427,7 @@ def coefficient_rows() -> Iterator[Row]:
             found.joint[name],
             f"within {WITHIN:g} %",
             off < WITHIN,
+            basis=PUT_IN,
         )
 
 
@@ -444,6 +446,7 @@ def kept_rows() -> Iterator[Row]:
         len(whole & same),
         "18",
         len(stepwise & same) == len(whole & same) == len(same),
+        basis=PUT_IN,
     )
     yield Row(
         "Tables 3 to 10",
@@ -453,6 +456,7 @@ def kept_rows() -> Iterator[Row]:
         len(whole - same),
         "0",
         not (stepwise - same) and not (whole - same),
+        basis=PUT_IN,
     )
     counts = repeated(NOISE * noise_sizes(), REPEATED)
     yield Row(
@@ -496,6 +500,7 @@ def validation_rows() -> Iterator[Row]:
             "at least the printed",
             best[force] > printed,
             "the paper's is for a real ship, which 18 terms cannot fully describe",
+            PUT_IN,
         )
 
 
@@ -629,8 +634,7 @@ CONCLUSIONS = (
     Conclusion(
         "The simplified model, 18 terms of 38, is as accurate",
         tuple(f"Table {table}: R2 lost by dropping terms" for table in (4, 7, 10)),
-        lambda *found: all(row.as_paper < LOSS for row in found),
-        f"less than {LOSS:g} of R2; in a tank whose truth has these 18",
+        remark="a tank whose truth has these 18 terms loses nothing with the others",
     ),
     Conclusion(
         "Small deviations indicate that the values found are very near the true ones",
@@ -667,6 +671,22 @@ PAPER = Paper(
     f" tests; noise of {100 * NOISE:g} % of each force's root mean square.",
     rows,
     conclusions=CONCLUSIONS,
+    differences=(
+        (
+            "The tests are not published. A tank whose truth is Table 11 gives "
+            "Table 11 back: put in, no agreement. It cannot test whether 18 terms "
+            "are as accurate as 38, nor Table 12."
+        ),
+        (
+            "Table 2: with C = 1e20, y - alpha/C is y itself, so R2 in training "
+            "agrees by construction; that of the w found is negative, as in "
+            "validation."
+        ),
+        (
+            "The standard errors are a tenth of those printed: the tank has white "
+            "noise and no model error."
+        ),
+    ),
     figures=(
         (
             "reproduction_xu2020.png",

@@ -607,3 +607,25 @@ def test_a_current_that_is_known_is_given_as_its_help_shows(demo, tmp_path):
     assert "current: " in result.output
     assert "'nort'" in result.output
     assert not (tmp_path / "not").exists()
+
+
+@pytest.mark.parametrize(
+    ("limits", "code", "told"),
+    [
+        ("{ heading_deg = 3.0, overshoot_deg = 2.0 }", 0, ""),
+        ("{ heading_deg = 0.01 }", 1, "not accepted: heading_deg is"),
+        ("{ transfer_lengths = 1.0 }", 2, "which have none; hold out a manoeuvre"),
+        ("{ heading = 1.0 }", 2, "Did you mean 'heading_deg'"),
+        ("{ overshoot_deg = 0.0 }", 2, "accept overshoot_deg: expected a number > 0"),
+    ],
+)
+def test_the_user_sets_what_is_accepted(ship, demo, tmp_path, limits, code, told):
+    held = f"{demo.parent}/zigzag_15_15.csv"
+    path = ship(
+        'structure = "abkowitz"', f'hold_out = ["{held}"]', f"accept = {limits}"
+    )
+    turn_fitted = path.read_text().replace('circle"\nuse = "validate"', 'circle"')
+    path.write_text(turn_fitted)
+    answer = shipgym("identify", path, "--out", tmp_path / "out")
+    assert answer.exit_code == code
+    assert told in answer.stderr

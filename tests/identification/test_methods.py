@@ -256,7 +256,7 @@ def test_a_name_stands_for_the_default_object_of_a_method() -> None:
         "de-lssvr"
     )
     guarded = [get_method(one).regularised for one in (LSSVM(), "rls", Ridge())]
-    assert guarded == [True, False, False]
+    assert guarded == [True, False, True]
 
 
 def test_methods_have_the_settings_of_their_estimators() -> None:
@@ -276,7 +276,9 @@ def test_an_estimator_object_is_a_method(
 ) -> None:
     """Scikit-learn's ridge regression has a constant, which the equations do not."""
     ship = {"particulars": mariner.particulars, "steering": mariner.steering}
-    named = identify(noisy_trials, method=RidgeRegression(alpha=1e-9), **ship)
+    named = identify(
+        noisy_trials, method=RidgeRegression(alpha=1e-9, scale=True), **ship
+    )
     own = identify(noisy_trials, method=Ridge(alpha=1e-9, solver="svd"), **ship)
     assert own.stable
     for name, value in named.coefficients.items():
@@ -346,3 +348,18 @@ def test_an_estimator_of_others_is_copied_without_constant_with_a_covariance() -
     np.testing.assert_allclose(
         few.covariance_, np.sum(([1.0, 3.0] - few.coef_) ** 2) * np.eye(2)
     )
+
+
+@pytest.mark.parametrize("name", ["lasso", "ard", "gp"])
+def test_comparators_of_libraries_do_not_depend_on_the_units_of_columns(name) -> None:
+    """Raw columns of regressions span 5e-3 to 300."""
+    rng = np.random.default_rng(1)
+    X = rng.standard_normal((200, 3))
+    truth = np.array([1.0, -2.0, 0.5])
+    y = X @ truth + 0.01 * rng.standard_normal(200)
+    units = np.array([5e-3, 1.0, 300.0])
+    estimator = make_method(name)
+    found = estimator.fit(X * units, y).coef_ * units
+    np.testing.assert_allclose(found, truth, rtol=0.02)
+    assert np.all(np.diag(estimator.covariance_) > 0.0)
+    assert get_method(name).regularised

@@ -68,7 +68,7 @@ def test_the_printed_gradient_is_the_one_of_the_package_on_scaled_columns():
     """The package's tanh(omega e) / omega, of omega 0, is the plain innovation."""
     from identification.estimators.recursive import StochasticGradient
 
-    X, y = song2020.regression("norrbin")
+    X, y = song2020.regression("norrbin", song2020.trial("norrbin"))
     ours, _ = song2020.gradient(X[:500], y[:500])
     np.testing.assert_allclose(
         StochasticGradient().fit(X[:500], y[:500]).coef_, ours, rtol=1e-9
@@ -77,7 +77,7 @@ def test_the_printed_gradient_is_the_one_of_the_package_on_scaled_columns():
 
 def test_the_printed_innovation_only_shortens_the_steps():
     """tanh(omega e) of an acceleration is omega e: the path of SG with longer steps."""
-    X, y = song2020.regression("nomoto")
+    X, y = song2020.regression("nomoto", song2020.trial("nomoto"))
     bent, largest = song2020.gradient(X[:2000], y[:2000], omega=0.5)
     short, _ = song2020.gradient(X[:2000], y[:2000], gain=0.5)
     assert largest < 1e-3
@@ -173,3 +173,22 @@ def test_propeller_and_rudder_come_out_near_the_container_ship_s(rows):
         row = next(row for row in rows if row.quantity == name)
         assert row.best == pytest.approx(true, rel=0.12), name
         assert row.as_paper == pytest.approx(true, rel=0.12), name
+
+
+def test_the_printed_innovation_is_even_and_fails_where_the_odd_one_converges(rows):
+    found = {
+        row.quantity: row.as_paper
+        for row in rows
+        if row.case == "Equations 4-9 to 4-12"
+    }
+    assert len(found) == 4
+    for quantity, error in found.items():
+        assert (abs(error) < 2.0) == ("odd" in quantity)
+
+
+def test_knowing_the_seas_halves_every_error_at_least(rows):
+    seas = [row for row in rows if row.case == "Sea state 2 to 3"]
+    assert len(seas) == 8
+    for known, left_in in zip(seas[::2], seas[1::2], strict=True):
+        assert known.met
+        assert known.best < 0.5 * left_in.best

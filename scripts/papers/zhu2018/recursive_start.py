@@ -23,7 +23,7 @@ from identification.estimators.recursive import RecursiveLeastSquares
 from identification.pipeline import identify
 from identification.regression.samples import build_samples
 from identification.validation.prediction import predict
-from papers.row import Row
+from papers.row import ELSEWHERE, Row
 from papers.zhu2018.fits import every
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import ShipModel, get_structure
@@ -264,6 +264,7 @@ def euler_rows() -> Iterator[Row]:
                     if name == "a22"
                     else ""
                 ),
+                basis=ELSEWHERE,
             )
     for euler, case in ((False, "Table 7.3.2"), (True, EULER_CASE)):
         for method in PRINTED:
@@ -285,8 +286,8 @@ def figure_rows() -> Iterator[Row]:
             )
             yield Row(
                 "Figure 7.3.2",
-                f"{'noisy' if noisy else 'clean'} record, {count} samples at interval"
-                f" {interval}: largest error of the six, %",
+                f"{'noisy' if noisy else 'clean'} {count} by {interval}: largest error"
+                " of the six from so many samples at that interval, %",
                 None,
                 ours,
                 best,

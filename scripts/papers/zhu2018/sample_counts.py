@@ -24,11 +24,8 @@ from papers.zhu2018.container_ship import (
     SURGE_ALONE,
     SURGE_IN_TURNS,
     UNITS,
-    ship,
-    straight_line,
     surge,
     surge_fit,
-    zigzag_trial,
 )
 from papers.zhu2018.fits import (
     SEARCHES,
@@ -42,6 +39,7 @@ from papers.zhu2018.fits import (
     steering_terms,
     term_columns,
 )
+from papers.zhu2018.ships import ship, straight_line, zigzag_trial
 from papers.zhu2018.steering_forms import CHOSEN, MOST_C, structure_of
 
 Floats = NDArray[np.float64]
@@ -66,8 +64,8 @@ REPEATS, FINE_REPEATS = 5, 100
 def fits_of(count: int, method: str) -> dict[str, Difference]:
     """The three equations from the first samples by one of the thesis' methods."""
     line, turns = (
-        first_samples(straight_line("learned"), count),
-        first_samples(zigzag_trial(10), count),
+        first_samples(straight_line("learned", by_euler=True), count),
+        first_samples(zigzag_trial(10, by_euler=True), count),
     )
     structure = structure_of(CHOSEN)
     return {"u": surge_fit(line, search(method, "u"))} | {
@@ -81,7 +79,8 @@ def learned(
     count: int, method: str = "ABC"
 ) -> tuple[dict[str, float], dict[str, list[float]]]:
     """Prediction errors and coefficients by equation: Figures 7.4.9 to 7.4.13."""
-    line, turns = straight_line("verified"), zigzag_trial(20)
+    line = straight_line("verified", by_euler=True)
+    turns = zigzag_trial(20, by_euler=True)
     fits = fits_of(count, method)
     steered = steer(fits["v"], fits["r"], turns)
     errors = {"u": mean_square(surge(fits["u"], line), line, "u")}

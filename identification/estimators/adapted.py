@@ -1,0 +1,61 @@
+"""Estimators of other libraries, made to fit among ours."""
+
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from identification.arrays import column_rms, root_mean_square
+from identification.estimators.decomposition import scales_of
+from identification.estimators.linear import LinearRegressor, validated
+from shipgym import InputError
+from shipgym.arrays import Floats
+
+
+class Adapted(LinearRegressor):
+    """An estimator with scikit-learn's interface, given one scale, and a covariance.
+
+    It sees columns and targets of root mean square 1: raw columns span 5e-3 to 300, and
+    a penalty, or a prior, that is the same for all of them would mean nothing. Moment
+    and covariance are those of least squares on the features whose coefficients are not
+    0: an approximation for an estimator that shrinks its coefficients. `inner` has a
+    `fit(X, y)` that sets `coef_`.
+    """
+
+    def __init__(self, inner: Any) -> None:
+        self.inner = inner
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Fit; InputError unless that sets a finite `coef_` for each feature."""
+        features, targets = validated(self, X, y)
+        n_features = features.shape[1]
+        scale = scales_of(column_rms(features), True)
+        unit = root_mean_square(targets) or 1.0
+        self.inner.fit(features / scale, targets / unit)
+        coefficients = getattr(self.inner, "coef_", np.nan)
+        self.coef_ = np.array(coefficients, dtype=float).ravel()
+        if self.coef_.shape != (n_features,) or not np.isfinite(self.coef_).all():
+            raise InputError(
+                "method: expected a linear estimator whose fit sets coef_, a finite"
+                f" coefficient for each of the {n_features} terms, got {self.inner!r}"
+            )
+        self.coef_ *= unit / scale
+
+        self._set_covariance(features, targets)
+        return self
+
+    def _set_covariance(self, features: Floats, targets: Floats) -> None:
+        """Set moment and covariance as of least squares on the features in use."""
+        is_used = self.coef_ != 0.0
+        used = features[:, is_used]
+        n_features = len(is_used)
+        inverse = np.zeros((n_features, n_features))
+        block = np.ix_(is_used, is_used)
+        inverse[block] = np.linalg.pinv(used.T @ used, hermitian=True)
+
+        residuals = targets - features @ self.coef_
+        n_used = int(is_used.sum())
+        freedom = max(len(targets) - n_used, 1)
+        variance = float(residuals @ residuals) / freedom
+        self.inverse_moment_ = inverse
+        self.covariance_ = variance * inverse
