@@ -305,7 +305,8 @@ def _direct_loop(angles: Floats, rates: Floats) -> SpiralIndices:
         )
     falling = there
     rising = back
-    if angles[turn] >= angles[0]:
+    begins_upwards = angles[turn] >= angles[0]
+    if begins_upwards:
         falling = back
         rising = there
 
@@ -315,9 +316,10 @@ def _direct_loop(angles: Floats, rates: Floats) -> SpiralIndices:
     middle = 0.5 * (to_starboard + to_port)
     upper = np.interp(middle, falling.angles, falling.rates)
     lower = np.interp(middle, rising.angles, rising.rates)
+    height = float(upper - lower)
     return SpiralIndices(
         loop_width_deg=max(width, 0.0),
-        loop_height_deg_s=max(float(upper - lower), 0.0),
+        loop_height_deg_s=max(height, 0.0),
         loop_middle_deg=middle,
     )
 

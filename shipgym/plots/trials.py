@@ -128,13 +128,16 @@ def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
         part = thinned(trial)
         north = trial["x"][part]
         east = trial["y"][part]
-        track = line(east, north, label, **styles[label])
+        style = styles[label]
+        track = line(east, north, label, **style)
         tracks.append(track)
     if not tracks:
         raise InputError("figure: expected a trial with the channels x and y, got none")
+    to_east = CHANNEL_AXES["y"].title
+    to_north = CHANNEL_AXES["x"].title
     panel = Panel(
         tracks,
-        x=CHANNEL_AXES["y"].title,
-        y=axis(CHANNEL_AXES["x"].title, scaleanchor="x", scaleratio=1),
+        x=to_east,
+        y=axis(to_north, scaleanchor="x", scaleratio=1),
     )
     return panels([panel], height, hovermode="closest")

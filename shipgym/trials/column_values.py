@@ -24,12 +24,14 @@ def column_numbers(table: LogTable, column: Column) -> Floats:
     """Numbers of a column; of two rudders the mean, of a command degrees of rudder."""
     numbers = table.numbers(column.name, sided=True)
     if column.mean_with is not None:
-        numbers = 0.5 * (numbers + table.numbers(column.mean_with, sided=True))
+        others = table.numbers(column.mean_with, sided=True)
+        numbers = 0.5 * (numbers + others)
     if column.full is None:
         return numbers
     if column.minus is not None:
-        other = table.numbers(column.minus)
-        numbers = numbers - other
+        others = table.numbers(column.minus)
+        numbers = numbers - others
+
     from_neutral = numbers - column.neutral
     deflection = from_neutral / column.full
     return deflection * FULL_RUDDER_DEG

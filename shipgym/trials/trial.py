@@ -186,7 +186,8 @@ class Trial:
         names = sorted(self.channels)
         for name in ("t", *names):
             values = self[name].astype("<f8")
-            digest.update(name.encode())
+            encoded = name.encode()
+            digest.update(encoded)
             digest.update(b"\0")
             digest.update(values.tobytes())
         return digest.hexdigest()

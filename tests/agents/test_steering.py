@@ -321,7 +321,7 @@ def test_the_command_steers_with_what_it_is_told_and_fails_after_an_alarm(
             state=state, alarm=alarm, counts={"damaged": 2}, ended_by=ended_by
         )
 
-    monkeypatch.setattr("agents.deployment.steering.steer", stand_in)
+    monkeypatch.setattr("agents.deployment.panel.steer", stand_in)
     PID_MARINER.save(tmp_path / "pid.json")
     WHEEL_OVER.save(tmp_path / "guide.json")
     (tmp_path / "route.csv").write_text(ROUTE)

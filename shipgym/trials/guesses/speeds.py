@@ -139,8 +139,8 @@ def _settled(
 def _guessed(guess: ColumnGuess, values: Floats, *, is_si: bool) -> ColumnGuess:
     """The usual unit of a speed, said to be a guess."""
     largest = float(values.max(initial=0.0))
-    is_slow = largest <= 3.0
-    unit = "m/s" if is_slow or (is_si and largest < 15.0) else "knots"
+    fastest = 15.0 if is_si else 3.0  # that is likelier in m/s
+    unit = "m/s" if largest <= fastest else "knots"
     beside = ", with angles in rad" if is_si else ""
     reason = (
         f"is a guess: there are no positions that tell, up to {largest:.4g}{beside};"

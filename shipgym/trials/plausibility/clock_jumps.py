@@ -20,9 +20,15 @@ def without_clock_jumps(t: Floats, x: Floats, y: Floats) -> tuple[Floats, list[s
     notes = []
     longest_usual = max(5.0 * usual, 5.0)
     for row in np.flatnonzero(steps > longest_usual):
-        around = np.r_[max(row - 10, 0) : row, row + 1 : min(row + 11, steps.size)]
-        speed = float(np.median(moved[around] / steps[around]))
-        as_usual = moved[row] < 2.0 * float(np.max(moved[around]))
+        first = max(int(row) - 10, 0)
+        last = min(int(row) + 11, steps.size)
+        before = np.arange(first, int(row))
+        after = np.arange(int(row) + 1, last)
+        around = np.concatenate([before, after])
+        usual_moves = moved[around]
+        speeds = usual_moves / steps[around]
+        speed = float(np.median(speeds))
+        as_usual = moved[row] < 2.0 * usual_moves.max()
         with np.errstate(over="ignore"):
             is_far_too_short = moved[row] < 0.2 * speed * steps[row]
         if speed < 1.0 or not as_usual or not is_far_too_short:

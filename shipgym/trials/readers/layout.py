@@ -71,7 +71,7 @@ def _likely_delimiters(lines: Iterable[str]) -> list[str]:
         present = characters.intersection(delimiters)
         counts.update(present)
     likely = [one for one in delimiters if counts[one]]
-    likely.sort(key=lambda one: -counts[one])
+    likely.sort(key=counts.__getitem__, reverse=True)
     if "\t" not in likely:
         likely.append(_BLANKS)
     return likely
