@@ -34,6 +34,9 @@ from .estimators.library import (
     GaussianProcess as GaussianProcess,
 )
 from .estimators.library import (
+    KalmanRegression as KalmanRegression,
+)
+from .estimators.library import (
     LassoRegression as LassoRegression,
 )
 from .estimators.library import (

@@ -43,7 +43,7 @@ def main() -> None:
         unseen = [trial.name for trial in trials if Path(trial.name).name in held]
         found = compare_methods(
             trials,
-            ("tls-svm", "lasso", "ard", "gp"),
+            ("tls-svm", "lasso", "ard", "gp", "ekf"),
             [structure],
             particulars=ship.particulars,
             steering=ship.steering,

@@ -80,6 +80,8 @@ def _fits(value: Any, expected: Any) -> bool:
         if set(get_args(ArrayLike)) <= set(inner):
             return _is_numeric(value) or (value is None and type(None) in inner)
         return any(_fits(value, one) for one in inner)
+    if expected is Any:
+        return True
     if expected is None or expected is type(None):
         return value is None
     if origin is Literal:

@@ -1,4 +1,4 @@
-"""Comparators that users ask for, each a few lines on scikit-learn."""
+"""Comparators that users ask for, each a few lines on scikit-learn or plain."""
 
 import warnings
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from sklearn.exceptions import ConvergenceWarning
 from identification.estimators.adapted import Adapted
 from identification.estimators.linear import LinearRegressor
 from shipgym.arrays import Floats
-from shipgym.checks import check_whole
+from shipgym.checks import check_number, check_whole
 
 
 class LibraryRegressor(LinearRegressor):
@@ -129,3 +129,58 @@ class _LinearProcess:
         process.fit(X[::every], y[::every])
         strength = process.kernel_.k1.k1.constant_value
         self.coef_ = strength * process.X_train_.T @ np.ravel(process.alpha_)
+
+
+@dataclass(eq=False, repr=False)
+class KalmanRegression(LibraryRegressor):
+    """Extended Kalman filter whose states are the coefficients, one sample at a time.
+
+    The motion is measured and smoothed beforehand, so that the coefficients alone are
+    left to estimate: constant, with a wide prior. The filter that estimates the motion
+    too is in `shipgym reproduce comparators`.
+
+    Parameters
+    ----------
+    noise : float, above 0
+        Standard deviation of the measurements, in parts of their root mean square.
+    start : float, above 0
+        That of the coefficients at the start, at which they are 0, for columns and
+        targets of root mean square 1.
+    """
+
+    name: ClassVar[str] = "ekf"
+    options: ClassVar[tuple[str, ...]] = ("noise", "start")
+
+    noise: float = 0.05
+    start: float = 10.0
+
+    def check(self) -> None:
+        """Refuse settings that cannot be, by an InputError that names the setting."""
+        check_number(self.noise, "noise", above=0.0)
+        check_number(self.start, "start", above=0.0)
+
+    def inner(self) -> Any:
+        """The filter."""
+        return _CoefficientFilter(self.noise, self.start)
+
+
+class _CoefficientFilter:
+    """A Kalman filter of constant coefficients."""
+
+    def __init__(self, noise: float, start: float) -> None:
+        self.noise = noise
+        self.start = start
+
+    def fit(self, X: Floats, y: Floats) -> None:
+        """Filter sample by sample, and set `coef_`."""
+        n_features = X.shape[1]
+        coefficients = np.zeros(n_features)
+        covariance = self.start**2 * np.eye(n_features)
+        for row, measured in zip(X, y, strict=True):
+            innovation = measured - row @ coefficients
+            spread = covariance @ row
+            variance = row @ spread + self.noise**2
+            gain = spread / variance
+            coefficients = coefficients + gain * innovation
+            covariance = covariance - np.outer(gain, spread)
+        self.coef_ = coefficients

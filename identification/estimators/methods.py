@@ -34,6 +34,7 @@ METHODS: dict[str, tuple[str, dict[str, Any]]] = {
     "lasso": ("LassoRegression", {}),
     "ard": ("RelevanceRegression", {}),
     "gp": ("GaussianProcess", {}),
+    "ekf": ("KalmanRegression", {}),
     "rls": ("RecursiveLeastSquares", {}),
     "sg": ("StochasticGradient", {}),
     "nisg": ("StochasticGradient", {"omega": 0.5}),

@@ -350,7 +350,7 @@ def test_an_estimator_of_others_is_copied_without_constant_with_a_covariance() -
     )
 
 
-@pytest.mark.parametrize("name", ["lasso", "ard", "gp"])
+@pytest.mark.parametrize("name", ["lasso", "ard", "gp", "ekf"])
 def test_comparators_of_libraries_do_not_depend_on_the_units_of_columns(name) -> None:
     """Raw columns of regressions span 5e-3 to 300."""
     rng = np.random.default_rng(1)
