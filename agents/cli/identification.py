@@ -9,7 +9,6 @@ from typer import Option
 
 from agents.cli.command import FAILED, ShipFileArgument, fail
 from agents.cli.identify_options import with_identify_options
-from shipgym.files import toml_value
 
 if TYPE_CHECKING:
     from identification import IdentificationResult
@@ -64,6 +63,8 @@ def identify_command(
     more than --accept allows.
     """
     if accept is not None:
+        from shipgym.files import toml_value
+
         options["accept"] = toml_value(accept)
     read, settings = _chosen(ship, options)
     if compare or methods is not None or structures is not None:

@@ -438,7 +438,7 @@ class Structure:
 def structure_fields(table: Mapping[str, Any], where: str) -> dict[str, Any]:
     """Fields of a `Structure` from a model file."""
     place = f"{where}.equations"
-    lists = check_table(table["equations"], place, EQUATION_NAMES)
+    lists = check_table(table.get("equations"), place, EQUATION_NAMES)
     equations = {}
     for equation, terms in lists.items():
         equations[equation] = read_term_list(terms, f"{place}.{equation}")

@@ -415,6 +415,7 @@ def built(monkeypatch):
         stable=True,
         instability=None,
         refusal=None,
+        remark=None,
         identification=None,
         calls=[],
     )

@@ -103,6 +103,8 @@ LINES = (
     ),
     ("benchmark --controllers pid --address 127.0.0.1:9 --out results2", 2),
     ("reproduce nobody --markdown tables.md", 2),
+    ("reproduce cao2015 --table nothing --row nothing", 2),
+    (f"identify ship.toml {LINEAR} --accept '{{heading_deg=1e3}}' --out accepted", 0),
     ("warm mariner --model mariner", 0),
     ("replay recordings/episode-00000.json --out replay.html", 0),
     ("doctor", 0),

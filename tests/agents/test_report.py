@@ -160,6 +160,7 @@ def test_limits_that_are_not_kept_and_designs_that_are_refused_are_warned_of(
         metrics=chain[1].metrics,
         stable=True,
         refusal=None,
+        remark=None,
         identification=chain[1].identification,
         verification=SimpleNamespace(
             manoeuvres=found, standards=rows, refused={"lqg": "no such sensor"}

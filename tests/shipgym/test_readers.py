@@ -320,7 +320,7 @@ def test_the_table_of_sentences_names_quantities_units_and_channels_that_are_kno
         ("HETHS,90.0,V", {}, {}),
         (
             "GPGLL,5400.0,N,00700.0,W,,A",
-            {},
+            {"latitude": 54.0 * DEGREE, "longitude": -7.0 * DEGREE},
             {"latitude": 54.0 * DEGREE, "longitude": -7.0 * DEGREE},
         ),
         ("ECXTE,A,A,0.5,R,N,A", {"cross_track": -926.0}, None),
