@@ -52,50 +52,60 @@ def new_ship_command(
         )
     checksums = "required" if strict else "optional"
     guessed = _guess_trials(logs, checksums)
-    conventions = _conventions(guessed)
-    side = _rudder_side(guessed)
-    first, *_ = guessed
-    shared = _shared_columns(guessed)
-    decisions = _decisions(guessed)
-    facts: dict[str, Any] = {
-        "out": out,
-        "length": length,
-        "checksums": checksums,
-        "guessed": guessed,
-        "shared": shared,
-        "decisions": decisions,
-        "to_decide": _to_decide(guessed, side),
-        "side": side,
-        "no_rudder": not any(_has_rudder(one) for one in guessed),
-        "conventions": conventions,
-        "trial": first.trial,
-        "trial_columns": first.columns,
-        "unused": first.unused_names,
-        "speed": _service_speed(guessed),
-        "files": [_entry(one, shared, out.parent) for one in guessed],
-    }
+    facts = _facts(guessed, out)
+    facts |= {"length": length, "checksums": checksums}
     ship_file = render("shipgym.pages/ship.toml.jinja", **facts)
     write_text(ship_file, out)
 
-    notes = []
-    for one in guessed:
-        if one.trial is not None:
-            notes += [note for note in one.trial.notes if note not in notes]
+    first, *_ = guessed
+    side = facts["side"]
+    notes = _notes(guessed)
     answer(
         {
             "written": str(out),
             "columns": _columns(first),
             "unused": first.unused,
             "rudder_positive": side.side if side else None,
-            **conventions,
+            **facts["conventions"],
             "to_decide": facts["to_decide"],
-            "notes": [*notes],
+            "notes": notes,
         }
     )
     summary = render("shipgym.pages/new_ship.txt.jinja", **facts)
     say(summary.strip())
     for note in notes:
         warn(note)
+
+
+def _facts(guessed: list[TrialGuess], out: Path) -> dict[str, Any]:
+    """What the templates of ship file and summary say of the logs."""
+    first, *_ = guessed
+    side = _rudder_side(guessed)
+    shared = _shared_columns(guessed)
+    return {
+        "out": out,
+        "guessed": guessed,
+        "shared": shared,
+        "decisions": _decisions(guessed),
+        "to_decide": _to_decide(guessed, side),
+        "side": side,
+        "no_rudder": not any(_has_rudder(one) for one in guessed),
+        "conventions": _conventions(guessed),
+        "trial": first.trial,
+        "trial_columns": first.columns,
+        "unused": first.unused_names,
+        "speed": _service_speed(guessed),
+        "files": [_entry(one, shared, out.parent) for one in guessed],
+    }
+
+
+def _notes(guessed: list[TrialGuess]) -> list[str]:
+    """Notes of all trials that could be read, each once."""
+    notes: list[str] = []
+    for one in guessed:
+        if one.trial is not None:
+            notes += [note for note in one.trial.notes if note not in notes]
+    return notes
 
 
 def _conventions(guessed: list[TrialGuess]) -> dict[str, str]:

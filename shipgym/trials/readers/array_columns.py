@@ -1,8 +1,13 @@
 """Columns of arrays that have a name as a whole, as MATLAB's and numpy's have."""
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from shipgym.errors import InputError
+from shipgym.trials.readers.log_table import LogTable
 
 
 def array_columns(name: str, array: Any) -> dict[str, Any]:
@@ -27,3 +32,23 @@ def array_columns(name: str, array: Any) -> dict[str, Any]:
         key = f"{name}(:,{number})"
         columns[key] = np.ascontiguousarray(column)
     return columns
+
+
+def table_of_vectors(path: Path, vectors: Mapping[str, Any], expected: str) -> LogTable:
+    """Table of the vectors of the commonest length.
+
+    InputError for none; `expected` says what, and what to do.
+    """
+    lengths = [values.size for values in vectors.values()]
+    length = max(lengths, key=lengths.count, default=0)
+    if not length:
+        raise InputError(f"{path}: expected {expected}")
+    cells = {}
+    for name, values in vectors.items():
+        if values.size == length:
+            cells[name] = values
+    return LogTable(
+        path=path,
+        cells=cells,
+        rows=range(1, length + 1),
+    )

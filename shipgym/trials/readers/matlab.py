@@ -5,7 +5,7 @@ MathWorks, MAT-File Format, "Level 5 MAT-File Format".
 
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +15,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.files import read_bytes
-from shipgym.trials.readers.array_columns import array_columns
+from shipgym.trials.readers.array_columns import array_columns, table_of_vectors
 from shipgym.trials.readers.damage import (
     LARGEST_PACKED,
     LARGEST_UNPACKED,
@@ -74,26 +74,11 @@ def read_matlab(path: Path) -> LogTable:
         vectors: dict[str, Floats] = {}
         for matrix in _matrices(path, content[_HEADER_BYTES:], order):
             vectors |= _vectors(path, matrix, order)
-    return _table(path, vectors)
-
-
-def _table(path: Path, vectors: Mapping[str, Floats]) -> LogTable:
-    """Table of the vectors of the commonest length; InputError for none."""
-    lengths = [values.size for values in vectors.values()]
-    length = max(lengths, key=lengths.count, default=0)
-    if not length:
-        raise InputError(
-            f"{path}: expected a numeric vector for each channel, got none; a struct is"
-            " not read: save('run.mat', '-struct', 'data', '-v7')"
-        )
-    columns = {}
-    for name, values in vectors.items():
-        if values.size == length:
-            columns[name] = values
-    return LogTable(
-        path=path,
-        cells=columns,
-        rows=range(1, length + 1),
+    return table_of_vectors(
+        path,
+        vectors,
+        "a numeric vector for each channel, got none; a struct is not read:"
+        " save('run.mat', '-struct', 'data', '-v7')",
     )
 
 

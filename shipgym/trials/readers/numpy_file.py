@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from shipgym.errors import InputError
-from shipgym.trials.readers.array_columns import array_columns
+from shipgym.trials.readers.array_columns import array_columns, table_of_vectors
 from shipgym.trials.readers.damage import (
     LARGEST_UNPACKED,
     check_unpacked,
@@ -44,25 +43,14 @@ def _table(path: Path, arrays: Mapping[str, Any]) -> LogTable:
             columns |= {field: array[field] for field in array.dtype.names}
         else:
             columns |= array_columns(name, array)
-    lengths = []
     for name, values in columns.items():
-        lengths.append(values.size)
         is_clock = values.dtype.kind == "M"
         if is_clock:
             since_1970 = values.astype("datetime64[ns]")
             columns[name] = since_1970.astype(np.int64)
-    length = max(lengths, key=lengths.count, default=0)
-    if not length:
-        raise InputError(
-            f"{path}: expected a structured array or arrays of one length, got none;"
-            " save the table by pandas: frame.to_csv('log.csv')"
-        )
-    cells = {}
-    for name, values in columns.items():
-        if values.size == length:
-            cells[name] = values
-    return LogTable(
-        path=path,
-        cells=cells,
-        rows=range(1, length + 1),
+    return table_of_vectors(
+        path,
+        columns,
+        "a structured array or arrays of one length, got none; save the table by"
+        " pandas: frame.to_csv('log.csv')",
     )
