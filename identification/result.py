@@ -1,18 +1,21 @@
 """What `identify` returns: a fit with its summary, figures and files."""
 
+from __future__ import annotations
+
 import warnings
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from identification.fit import Fit
-from identification.report.figures import all_figures
-from identification.report.page import report_page
 from identification.report.summary import summary_table
 from shipgym import InputError
 from shipgym.drafts import draft_folder
 from shipgym.files import write_json, write_text
-from shipgym.plots.style import Figure
 
-#: Files of a saved result.
+if TYPE_CHECKING:
+    from shipgym.plots.style import Figure
+
+#: Files of a saved result; the last one on request.
 FILES = ("model.json", "metrics.json", "settings.json", "report.html")
 
 
@@ -39,13 +42,14 @@ class IdentificationResult(Fit):
             "l-curve" and "search" for methods that have one, "coefficients", "trials",
             and "prediction: NAME" for each trial held out.
         """
+        from identification.report.figures import all_figures
+
         return all_figures(self)
 
-    def save(self, folder: str | Path) -> None:
-        """Write model.json, metrics.json, settings.json and report.html, all or none.
+    def save(self, folder: str | Path, report: bool = False) -> None:
+        """Write model.json, metrics.json and settings.json, all or none.
 
-        The same call on the same data gives the same files, byte for byte. Without
-        plotly there is no report, and a warning says so.
+        The same call on the same data gives the same files, byte for byte.
 
         Raises InputError where it cannot be written.
 
@@ -53,12 +57,15 @@ class IdentificationResult(Fit):
         ----------
         folder : str or Path
             Created where it does not exist.
+        report : bool
+            Write report.html too, a page with the figures. Without plotly there is
+            none, and a warning says so.
         """
         folder = Path(folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with draft_folder(folder / "identification") as draft:
-                self._write(draft)
+                self._write(draft, report)
                 for name in FILES:
                     if (draft / name).exists():
                         (draft / name).replace(folder / name)
@@ -70,10 +77,12 @@ class IdentificationResult(Fit):
                 f" {error.strerror!r}; choose another folder"
             ) from error
 
-    def _write(self, folder: Path) -> None:
+    def _write(self, folder: Path, report: bool) -> None:
         self.model.save(folder / "model.json")
         write_json(self.metrics, folder / "metrics.json")
         write_json(self.settings, folder / "settings.json")
+        if not report:
+            return
         try:
             import plotly  # noqa: F401
         except ModuleNotFoundError:
@@ -83,4 +92,7 @@ class IdentificationResult(Fit):
                 stacklevel=3,
             )
             return
+
+        from identification.report.page import report_page
+
         write_text(report_page(self), folder / "report.html")

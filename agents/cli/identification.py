@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from shipgym.trials.ship_file import ShipFile
 
 Out = Annotated[Path, Option(metavar="FOLDER", help="Folder for the results.")]
+Report = Annotated[
+    bool, Option("--report", help="Write report.html too, a page with the figures.")
+]
 
 
 @with_identify_options
@@ -49,10 +52,11 @@ def identify_command(
             metavar="NAMES", help="Structures to compare, separated by commas, or auto."
         ),
     ] = None,
+    report: Report = False,
 ) -> None:
     """Identify a manoeuvring model from recorded trials.
 
-    Writes the model, its metrics, the settings and a report.
+    Writes the model, its metrics and the settings.
 
     Options not given here are taken from the ship file's table [identify]; if neither
     names a structure, the structure and method that best predict held-out trials are
@@ -70,7 +74,7 @@ def identify_command(
     if compare or methods is not None or structures is not None:
         _compare(read, settings, out, (structures, methods))
     else:
-        _identify(read, settings, out)
+        _identify(read, settings, out, report)
 
 
 def _chosen(
@@ -87,7 +91,9 @@ def _chosen(
     return read, identification_settings(read, options, *unnamed)
 
 
-def _identify(read: ShipFile, settings: dict[str, Any], out: Path) -> None:
+def _identify(
+    read: ShipFile, settings: dict[str, Any], out: Path, report: bool
+) -> None:
     from agents.cli.tables import prediction_table, selection_table
     from agents.cli.terminal import answer, console, identifying, say
     from agents.identifying import identify_ship
@@ -97,7 +103,8 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path) -> None:
 
     with whole_folder(out, FILES) as draft, identifying("identifying"):
         result = identify_ship(read, settings)
-        result.save(draft)
+        result.save(draft, report)
+        written = [name for name in FILES if (draft / name).exists()]
     instability = why_unstable(result)
     answer(
         {
@@ -114,7 +121,7 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path) -> None:
         say(result.summary())
         console.print(prediction_table(result))
         say(held_out_error(result))
-    say(f"\nwritten to {out}: {', '.join(FILES)}")
+    say(f"\nwritten to {out}: {', '.join(written)}")
     _check_stable(result)
 
 
@@ -217,6 +224,7 @@ def reduce_command(
     tolerance: Annotated[
         float, Option(min=0.0, help="How far R2 on held-out stretches may fall.")
     ] = 1e-3,
+    report: Report = False,
     *,
     options: dict[str, Any],
 ) -> None:
@@ -241,7 +249,7 @@ def reduce_command(
     ):
         found = reduce_ship(read, settings, direction, tolerance)
         fields = found.to_dict()
-        found.reduced.save(draft)
+        found.reduced.save(draft, report)
         write_json(fields, draft / "reduction.json")
     answer(fields)
     for q, reduction in found.reductions.items():
