@@ -39,9 +39,7 @@ def model_to_autopilot(folder):
 
 
 def cell(folder):
-    arguments = (
-        "--tasks sharp-turns --controllers lq --episodes 1 --workers 1 --no-page --out"
-    )
+    arguments = "--tasks sharp-turns --controllers lq --episodes 1 --workers 1 --out"
     run("benchmark", *arguments.split(), folder / "results")
 
 

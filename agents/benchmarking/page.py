@@ -37,8 +37,6 @@ from shipgym.pages import render
 from shipgym.pages.numbers import counted
 from shipgym.plots.style import Figure
 
-PAGE = "index.html"
-
 
 class PageFigure(NamedTuple):
     """Figure of the page, which its script draws when it comes into sight."""

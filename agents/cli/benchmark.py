@@ -47,7 +47,10 @@ Resume = Annotated[
 Page = Annotated[
     bool,
     Option(
-        "--page/--no-page", help="Write index.html, with the worst episodes to replay."
+        "--page/--no-page",
+        help=(
+            "Write index.html, with the worst episodes to replay; later with --resume."
+        ),
     ),
 ]
 
@@ -62,13 +65,13 @@ def benchmark_command(
     address: Address = None,
     resume: Resume = False,
     episodes: Episodes = 100,
-    page: Page = True,
+    page: Page = False,
     allow_code: AllowCode = None,
 ) -> None:
     """Rank controllers on the tasks of a suite. All run the same episodes."""
     from agents.benchmarking.run import benchmark
     from agents.cli.terminal import progress_bars
-    from agents.controllers.designs import CLASSICAL
+    from agents.controllers.registry import CLASSICAL
 
     try:
         with progress_bars() as progress:
@@ -102,17 +105,19 @@ def _write_page(
     progress: Progress | None,
 ) -> None:
     """Write the page, or remove that of other results in the folder."""
-    from agents.benchmarking.page import PAGE, write_page
+    path = out / "index.html"
+    path.unlink(missing_ok=True)
+    if not page:
+        return
+
+    from agents.benchmarking.page import write_page
     from agents.cli.terminal import warn
     from shipgym.errors import InputError
 
-    (out / PAGE).unlink(missing_ok=True)
-    if not page:
-        return
     try:
-        write_page(result, out / PAGE, workers=workers, progress=progress)
+        write_page(result, path, workers=workers, progress=progress)
     except InputError as error:  # the results are there even without plotly
-        warn(f"there is no {PAGE}: {error}")
+        warn(f"there is no {path.name}: {error}")
 
 
 def _print_result(result: BenchmarkResult, out: Path) -> None:

@@ -857,7 +857,7 @@ def test_the_command_goes_on_where_it_was_interrupted(suite, tmp_path, monkeypat
 
     monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
     sys.modules["interrupted_pilot"].INTERRUPTED = False
-    answer = shipgym(*words, "--resume")
+    answer = shipgym(*words, "--resume", "--page")
     assert answer.exit_code == 0
     assert "warning: there is no index.html: plotly" in answer.stderr
     assert "warning: 2 of 100 episodes: for a quick look" in answer.stderr

@@ -175,7 +175,7 @@ def test_the_command_writes_the_page_where_plotly_is_there(
     out = tmp_path / "results"
     words = ["benchmark", "--controllers", "pid", "--suite", str(suite)]
     words += ["--tasks", "calm", "--episodes", "2", "--workers", "1"]
-    answer = CliRunner().invoke(app, [*words, "--out", str(out)])
+    answer = CliRunner().invoke(app, [*words, "--page", "--out", str(out)])
     assert answer.exit_code == 0, answer.stderr
     assert (out / "results.json").exists()
     assert (out / "index.html").exists() == there

@@ -163,7 +163,7 @@ def test_identify_writes_model_and_metrics(demo, tmp_path):
     assert "N_vvr" in answer.stdout
     assert "zigzag_15_15.csv" in answer.stdout
     assert "estimated, not given in the ship file: N_rdot" in answer.stderr
-    names = ["metrics.json", "model.json", "report.html", "settings.json"]
+    names = ["metrics.json", "model.json", "settings.json"]
     assert sorted(path.name for path in (tmp_path / "ship").iterdir()) == names
     assert load_model(tmp_path / "ship" / "model.json").coefficients["N_d"] > 0.0
     metrics = json.loads((tmp_path / "ship" / "metrics.json").read_text())

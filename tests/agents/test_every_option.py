@@ -52,7 +52,7 @@ LINES = (
     ("identify ship.toml --compare --structures abkowitz --methods ls --out ls", 0),
     (f"advise ship.toml {LINEAR} --criterion c --coefficient N_d --number 1", 0),
     (f"advise ship.toml {WRONG}", 2),
-    (f"reduce ship.toml {LINEAR} --direction forward --tolerance 0.1 --out reduced", 0),
+    (f"reduce ship.toml {LINEAR} --direction forward --tolerance 0.1 --report --out reduced", 0),
     (f"reduce ship.toml {WRONG} --out reduced", 2),
     ("trials linear/model.json --draws 2 --seed 1 --out trials.html", 0),
     ("trials tanker --draws 0 --depth 25", 0),
@@ -104,7 +104,11 @@ LINES = (
     ("benchmark --controllers pid --address 127.0.0.1:9 --out results2", 2),
     ("reproduce nobody --markdown tables.md", 2),
     ("reproduce cao2015 --table nothing --row nothing", 2),
-    (f"identify ship.toml {LINEAR} --accept '{{heading_deg=1e3}}' --out accepted", 0),
+    (
+        f"identify ship.toml {LINEAR} --accept '{{heading_deg=1e3}}' --report"
+        " --out accepted",
+        0,
+    ),
     ("warm mariner --model mariner", 0),
     ("replay recordings/episode-00000.json --out replay.html", 0),
     ("doctor", 0),

@@ -39,7 +39,7 @@ def test_a_method_and_a_reference_ship_are_enough(ship_file):
         f'method = "rm-svm"\nreference_model = "container-own.json"\n{QUICK}'
     )
     shipgym.load_model("tanker").save(ship.parent / "container-own.json")
-    answer = identified(ship)
+    answer = identified(ship, "--report")
     assert answer.exit_code == 0, answer.stderr
     assert "bare reference ship 'tanker'" in " ".join(answer.stdout.split())
     model = shipgym.load_model(ship.parent / "out" / "model.json")

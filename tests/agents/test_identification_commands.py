@@ -423,7 +423,7 @@ def test_without_a_structure_it_is_auto_but_for_what_needs_a_table(
     assert identification_settings(read, {}, "abkowitz")["structure"] == "abkowitz"
     monkeypatch.setattr(selection, "STRUCTURES", ("nomoto", "linear-steering", "mmg"))
     monkeypatch.setattr(selection, "OTHERS", ())
-    answer = shipgym("identify", ship(), "--out", tmp_path / "out")
+    answer = shipgym("identify", ship(), "--report", "--out", tmp_path / "out")
     assert answer.exit_code == 0, answer.stderr
     assert (
         "Structures and methods by how they predict each trial in turn" in answer.stdout
@@ -556,7 +556,8 @@ def test_advise_tells_information_and_what_to_run_next(demo):
 
 def test_reduce_writes_the_smaller_model_and_its_path(ship, tmp_path):
     path = ship('structure = "norrbin"')
-    answer = shipgym("reduce", path, "--out", tmp_path / "out", "--tolerance", "0.5")
+    out = ("--out", tmp_path / "out")
+    answer = shipgym("reduce", path, *out, "--tolerance", "0.5", "--report")
     assert answer.exit_code == 0, answer.stderr
     told = json.loads((tmp_path / "out" / "reduction.json").read_text())
     assert (

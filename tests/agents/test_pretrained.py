@@ -5,8 +5,8 @@ import pytest
 
 from agents import load_agent
 from agents.benchmarking.sources import pretrained
-from agents.controllers.interface import model_hash
-from agents.rollouts.rollout import check_fits, episode_costs
+from agents.controllers.interface import check_fits, model_hash
+from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import load_suite
 from agents.training.request import TrainingRequest, make_plan
 

@@ -228,7 +228,7 @@ def test_an_unstable_model_is_kept_and_marked_and_no_environment_takes_it(
     assert not result.stable
     assert "runs away" in (why_unstable(result) or "")
     assert "NOT STABLE" in result.summary()
-    result.save(tmp_path / "ship")
+    result.save(tmp_path / "ship", report=True)
     page = (tmp_path / "ship" / "report.html").read_text(encoding="utf-8")
     assert "The identified model is unstable" in page
     kept = ShipModel.load(tmp_path / "ship" / "model.json")

@@ -431,7 +431,7 @@ def test_its_result_is_saved_and_loaded_like_any_other(
 ) -> None:
     _, found = fitted
     assert "mmg by map" in found.summary()
-    found.save(tmp_path)
+    found.save(tmp_path, report=True)
     again = shipgym.load_model(tmp_path / "model.json")
     state, command = [0, 0, 0, 1.0, -0.1, 0.05, 0.2], [0.2, 11.0]
     np.testing.assert_array_equal(

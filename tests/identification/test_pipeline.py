@@ -228,7 +228,7 @@ def test_summary_is_a_table_with_errors_and_marks_estimates(
 def test_result_is_saved_whole_and_read_back(
     noisy_fit: IdentificationResult, tmp_path: Path
 ) -> None:
-    noisy_fit.save(tmp_path / "ship")
+    noisy_fit.save(tmp_path / "ship", report=True)
     names = ["metrics.json", "model.json", "report.html", "settings.json"]
     assert sorted(path.name for path in (tmp_path / "ship").iterdir()) == names
     loaded = ShipModel.load(tmp_path / "ship" / "model.json")
@@ -247,7 +247,7 @@ def test_without_plotly_an_earlier_report_does_not_stay(
     monkeypatch.setitem(sys.modules, "plotly", None)
     told = r"plotly is not installed, so report.html .*'shipgym\[report\]'"
     with pytest.warns(UserWarning, match=told) as warned:
-        noisy_fit.save(tmp_path)
+        noisy_fit.save(tmp_path, report=True)
     assert warned[0].filename == __file__  # where it was asked for
     assert {path.name for path in tmp_path.iterdir()} == {
         "metrics.json",

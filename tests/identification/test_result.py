@@ -61,7 +61,7 @@ identify(
     ship.trials(), method="abc-lssvr",
     particulars=ship.particulars, steering=ship.steering,
     hold_out=["zigzag_10_10.csv"], uncertainty="bootstrap",
-).save(sys.argv[1])
+).save(sys.argv[1], report=True)
 """
 
 
@@ -96,7 +96,7 @@ def test_the_same_call_on_the_same_data_writes_the_same_bytes(tmp_path: Path) ->
     result = identify(
         ship.trials(), particulars=ship.particulars, steering=ship.steering, **settings
     )
-    result.save(tmp_path / "here")
+    result.save(tmp_path / "here", report=True)
     for name in FILES:
         assert (tmp_path / "here" / name).read_bytes() == (
             tmp_path / "there" / name
@@ -201,7 +201,7 @@ def test_a_grey_box_tells_of_its_search_where_it_searched(
             "x2",
             "x2",
         ]  # one search, a band for each equation
-    result.save(tmp_path)
+    result.save(tmp_path, report=True)
     assert "Mariner" in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "beside the bare reference ship 'tanker" in " ".join(
         result.summary().split()
