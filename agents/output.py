@@ -21,7 +21,6 @@ from shipgym.drafts import (
     remove_drafts,
 )
 from shipgym.errors import InputError
-from shipgym.plots import graph_objects
 
 ASIDE = ".old"  # ending of a folder that is about to be replaced
 PROCESS = "process"  # the first word of a lock of ours
@@ -80,6 +79,8 @@ def check_page(path: Path, plots: bool = False) -> None:
     missing.
     """
     if plots:
+        from shipgym.plots import graph_objects
+
         graph_objects()
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{path}: expected a file that ends in .html, got another")

@@ -10,7 +10,6 @@ import numpy as np
 from agents.benchmarking.entries import Entry
 from agents.benchmarking.sources import BEST_KNOWN, file_hash, names_code, policy_hash
 from agents.controllers.interface import Policy
-from agents.rollouts.metrics import evaluate
 from agents.suites.reference import best_costs
 from agents.suites.suite import BenchmarkTask
 from shipgym.arrays import Floats
@@ -129,6 +128,8 @@ def run_cell(entry: Entry, task: BenchmarkTask, n_episodes: int) -> Cell:
 
 
 def _run(policy: Policy, task: BenchmarkTask, n_episodes: int) -> ScoredRun:
+    from agents.rollouts.metrics import evaluate  # whoever shares work out does without
+
     evaluation = evaluate(policy, task, task.seeds[:n_episodes])
     return ScoredRun(
         figures=evaluation.figures,

@@ -34,8 +34,7 @@ from agents.benchmarking.sources import (
     names_code,
     source_files,
 )
-from agents.controllers.interface import Policy, model_hash
-from agents.rollouts.rollout import check_fits
+from agents.controllers.interface import Policy, check_fits, model_hash
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError

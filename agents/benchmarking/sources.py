@@ -10,11 +10,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from agents.agent_file import PRETRAINED, load_agent
-from agents.controllers.controller import Controller
-from agents.controllers.designs import CLASSICAL, design, tuned
 from agents.controllers.interface import Policy
 from agents.controllers.registry import (
+    CLASSICAL,
     controller_class,
     controller_kinds,
     register_controller,
@@ -59,7 +57,11 @@ def import_code(text: str) -> Any:
             f"controllers: expected module:function, got '{text}', which cannot be"
             f" imported ({error})"
         ) from None
+    from agents.controllers.controller import Controller
+
     if isinstance(function, type) and issubclass(function, Controller):
+        from agents.controllers.designs import design
+
         kind = register_controller(function).kind
         return partial(design, kind)
     check_object(function, text)
@@ -85,6 +87,8 @@ def make_policies(source: Any, task: BenchmarkTask) -> list[Policy]:
     if source in controller_kinds():
         return [_designed(source, task)]
     if source.startswith(TUNED):
+        from agents.controllers.designs import tuned
+
         kind = source.removeprefix(TUNED)
         return [tuned(kind, task, task.suite)]
     if names_code(source):
@@ -105,6 +109,8 @@ def make_policies(source: Any, task: BenchmarkTask) -> list[Policy]:
 
 def _designed(kind: str, task: BenchmarkTask) -> Policy:
     """Design a controller; without a path, the LQ that guidance leads."""
+    from agents.controllers.designs import design
+
     needs_path = controller_class(kind).has_autopilot
     if needs_path and not task.task.follows_path:
         kind = "lq"
@@ -128,6 +134,8 @@ def make_policy(source: Source, task: BenchmarkTask) -> Policy:
 def load_source(path: Path) -> Source:
     """Read a policy; of a zip, a function that makes one for a task."""
     if path.suffix != ".zip":
+        from agents.agent_file import load_agent
+
         return load_agent(path)
 
     from agents.policies.sb3_zip import read_sb3
@@ -166,6 +174,8 @@ def pretrained(task: str, algorithm: str) -> list[Path]:
 
     TASK-ALGORITHM.json, or one for each training run, TASK-ALGORITHM-RUN.json.
     """
+    from agents.agent_file import PRETRAINED
+
     folder = glob.escape(str(PRETRAINED))
     name = f"{folder}/{task}-{algorithm}"
     return [*matching_files(f"{name}.json"), *matching_files(f"{name}-*.json")]
@@ -179,6 +189,8 @@ def file_hash(path: str | Path) -> str:
 
 def policy_hash(policy: Policy) -> str | None:
     """Return the SHA-256 of a controller's file; None for one that has no file."""
+    from agents.controllers.controller import Controller
+
     if not isinstance(policy, Controller):
         return None
     try:

@@ -9,14 +9,12 @@ from typing import Any
 from agents.agent_file import load_agent
 from agents.controllers.controller import Controller
 from agents.controllers.interface import model_hash
-from agents.controllers.registry import BUILT_IN, controller_class
+from agents.controllers.registry import controller_class
 from agents.suites.reference import load_tuned
 from agents.suites.suite import BenchmarkTask
 from shipgym import InputError, ShipModel
 from shipgym.checks import quoted
 
-#: Those first that others build on; the suites know no rate of turn to steer.
-CLASSICAL = tuple(kind for kind in BUILT_IN if kind != "turn-rate")
 #: Of these, no bases for policies unless asked for by name: MPC simulates, an action
 #: takes it 97 us where wheel-over needs 2.
 NO_BASES = ("mpc",)

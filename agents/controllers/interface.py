@@ -1,11 +1,17 @@
 """Interface of all that steers, and the checks that it fits an environment."""
 
+from __future__ import annotations
+
 import hashlib
 import json
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-from shipgym import InputError, ShipModel
+from shipgym.errors import InputError
+
+if TYPE_CHECKING:
+    from shipgym import ShipModel
+    from shipgym.tasks.task import Task
 
 
 class Policy(Protocol):
@@ -44,6 +50,21 @@ class Policy(Protocol):
         state : Any
             For the next call: all that is remembered is in it.
         """
+
+
+def check_fits(policy: Any, task: Task, ship: ShipModel, where: str) -> None:
+    """Refuse a policy made for other observations than a task shows of a ship.
+
+    `policy`: without a method `check_fits` it steers by anything; `where`: start of the
+    message. Raises InputError naming the first difference.
+    """
+    check = getattr(policy, "check_fits", None)
+    if check is None:
+        return
+    shown = task.observed(ship)
+    names = [quantity.name for quantity in shown]
+    scales = [quantity.scale for quantity in shown]
+    check(names, scales, where)
 
 
 def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> None:

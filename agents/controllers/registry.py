@@ -1,12 +1,16 @@
 """Controllers by their names in `--controllers`, files and the setting `base`."""
 
-from importlib import import_module
-from typing import TypeVar
+from __future__ import annotations
 
-from agents.controllers.controller import Controller
-from shipgym import InputError
+from importlib import import_module
+from typing import TYPE_CHECKING, TypeVar
+
 from shipgym.checks import check_choice
+from shipgym.errors import InputError
 from shipgym.wrong_types import typed
+
+if TYPE_CHECKING:
+    from agents.controllers.controller import Controller
 
 #: Module and class of the controllers of this package by kind; they are imported when
 #: they are first used.
@@ -22,7 +26,9 @@ _HOMES = {
     "mpc": "agents.controllers.mpc:MPC",
 }
 BUILT_IN = tuple(_HOMES)
-C = TypeVar("C", bound=Controller)
+#: Those first that others build on; the suites know no rate of turn to steer.
+CLASSICAL = tuple(kind for kind in BUILT_IN if kind != "turn-rate")
+C = TypeVar("C", bound="Controller")
 
 #: Controllers that users registered.
 _REGISTERED: dict[str, type[Controller]] = {}
@@ -47,6 +53,8 @@ def register_controller(controller: type[C]) -> type[C]:
     type
         The same, so that this may be a decorator.
     """
+    from agents.controllers.controller import Controller
+
     where = "register_controller"
     if not (isinstance(controller, type) and issubclass(controller, Controller)):
         raise InputError(

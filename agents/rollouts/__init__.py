@@ -1,5 +1,5 @@
-"""The page that replays episodes."""
+"""Episodes steered by a policy: rollouts, their figures, and the replay page."""
 
-from agents.rollouts.replay_page import write_replay
+from lazy_loader import attach_stub
 
-__all__ = ["write_replay"]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

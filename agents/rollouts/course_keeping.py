@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.interface import Policy
+from agents.controllers.interface import Policy, check_fits
 from agents.controllers.law import gathered
 from agents.controllers.memory import on_course
 from agents.rollouts.metrics import costs, mean, steering
-from agents.rollouts.rollout import Rollout, check_fits, rollout
+from agents.rollouts.rollout import Rollout, rollout
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats, Integers
 from shipgym.checks import check_number, unexpected

@@ -126,21 +126,6 @@ def episode_costs(policy: Policy, engine: Engine, seeds: NDArray[np.int64]) -> F
     return rollout(policy, engine, seeds).costs
 
 
-def check_fits(policy: Any, task: Task, ship: ShipModel, where: str) -> None:
-    """Refuse a policy made for other observations than a task shows of a ship.
-
-    `policy`: without a method `check_fits` it steers by anything; `where`: start of the
-    message. Raises InputError naming the first difference.
-    """
-    check = getattr(policy, "check_fits", None)
-    if check is None:
-        return
-    shown = task.observed(ship)
-    names = [quantity.name for quantity in shown]
-    scales = [quantity.scale for quantity in shown]
-    check(names, scales, where)
-
-
 class _Command(NamedTuple):
     """Answer of a policy for all ships."""
 

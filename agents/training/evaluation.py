@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from agents.controllers.designs import design
-from agents.controllers.interface import Policy
-from agents.rollouts.rollout import check_fits, episode_costs
+from agents.controllers.interface import Policy, check_fits
+from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
 from shipgym.errors import InputError
 

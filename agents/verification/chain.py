@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from agents.agent_file import load_agent
 from agents.controllers.controller import Controller
+from agents.controllers.interface import check_fits
 from agents.controllers.registry import controller_class, controller_kinds
 from agents.identifying import identification_settings, trials_of
 from agents.jobs import HERE, EngineError, JobEngine
 from agents.output import whole_folder
-from agents.rollouts.rollout import check_fits
 from agents.verification.refusal import (
     refused_designs,
     simpler_structures,

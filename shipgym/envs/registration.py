@@ -8,7 +8,6 @@ import gymnasium
 
 from shipgym.checks import check_choice, check_text, data_only
 from shipgym.errors import InputError
-from shipgym.tasks.source import kept_source
 from shipgym.wrong_types import typed
 
 ENTRY_POINT = "shipgym.envs.ship_env:ShipEnv"  # of every environment
@@ -85,6 +84,7 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     from shipgym.envs.engine import fault_in_python
     from shipgym.envs.environment import DEFAULT_MODEL, read_options
     from shipgym.envs.ship_env import ShipEnv
+    from shipgym.tasks.source import kept_source
     from shipgym.tasks.task import ENV_OPTIONS
 
     given = {"task": kept_source(task), **options}

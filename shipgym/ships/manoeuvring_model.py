@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, quoted
 from shipgym.engine.compiled_ship import CompiledShip
-from shipgym.engine.loops import ship_loop
 from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
@@ -192,6 +191,8 @@ class ManoeuvringModel:
         water_depth : float
             In m; only deep water is known to identified structures.
         """
+        from shipgym.engine.loops import ship_loop  # a linear design does without
+
         depth = np.asarray(water_depth, dtype=float)
         self.check_depth(float(depth.min()))
         states = _with_last_axis("state", state, self.state_names)

@@ -1,0 +1,1 @@
+from .replay_page import write_replay as write_replay
