@@ -12,8 +12,7 @@ from identification.estimators.linear import LinearRegressor
 from identification.estimators.methods import METHODS, make_method
 from identification.regression.preprocess import Preprocessing
 from identification.regression.samples import Sampling
-from identification.regression.still_water import check_current
-from identification.regression.wind import check_wind
+from identification.regression.still_water import check_current, check_wind
 from identification.simulation_error.prior_knowledge import PriorKnowledge
 from identification.simulation_error.refinement import Refinement
 from identification.uncertainty.uncertainty import Uncertainty

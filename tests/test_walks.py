@@ -4,6 +4,7 @@ names, in their order."""
 import asyncio
 import re
 import sys
+from contextlib import suppress
 from pathlib import Path
 from threading import Thread
 
@@ -48,14 +49,25 @@ def helm(folder):
     LQ.from_model(model).save(folder / "lq.json")
     address = f"tcp:127.0.0.1:{free_port()}"
     passage = simulate_ship(
-        SimulatedShip(model), address, duration=200.0, speed_up=20.0
+        SimulatedShip(model), address, duration=3600.0, speed_up=20.0
     )
-    ship = Thread(target=asyncio.run, args=(passage,))
+    loop = asyncio.new_event_loop()
+    sailing = loop.create_task(passage)
+
+    def sail():
+        with suppress(asyncio.CancelledError):
+            loop.run_until_complete(sailing)
+
+    ship = Thread(target=sail)
     ship.start()
     options = ["--heading", 5, "--duration", 40, "--speed-up", 20]
     options += ["--limit", "late_s=60"]  # whatever else the computer does
-    run("steer", folder / "lq.json", "--nmea", address, *options)
-    ship.join()
+    try:
+        run("steer", folder / "lq.json", "--nmea", address, *options)
+    finally:
+        loop.call_soon_threadsafe(sailing.cancel)
+        ship.join()
+        loop.close()
 
 
 WALKS = {

@@ -15,7 +15,6 @@ from identification.options import (
     provenance_settings,
     whole_call,
 )
-from identification.regression.grey_box import bare_metrics
 from identification.regression.problem import Problem
 from identification.regression.samples import Samples
 from identification.result import IdentificationResult
@@ -280,6 +279,8 @@ def _accuracy(
         for trial in trials
     }
     if isinstance(problem.table, GreyBox):
+        from identification.regression.grey_box import bare_metrics
+
         metrics["reference"] = bare_metrics(model, trials)
     return metrics
 

@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 
 from identification.options import Given, Options, name_of
-from identification.regression.grey_box import chosen_box
 from identification.regression.preprocess import repaired
 from identification.regression.rudder import estimated_gear
 from identification.regression.samples import Samples, build_samples
 from identification.regression.still_water import in_still_water
-from identification.regression.wind import constant_wind, with_constant_wind
 from identification.validation.checks import check_samples, check_trials
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.checks import check_choice
@@ -84,6 +82,8 @@ def pose(trials: Sequence[Trial], options: Options) -> Problem:
     }
     samples = build_samples(used, **regression)
     if options.wind == "constant":
+        from identification.regression.wind import constant_wind, with_constant_wind
+
         constants = constant_wind(used, samples, options.structure)
         used = [with_constant_wind(trial, constants) for trial in used]
         everything = [with_constant_wind(trial, constants) for trial in everything]
@@ -226,6 +226,8 @@ def _table(
     if structure == MMG:
         return MMG_CHANNELS, {}
     if structure == GREY_BOX:
+        from identification.regression.grey_box import chosen_box
+
         steering = get_structure("linear-steering")
         check_trials(used, steering)
         ship = _ship(options.particulars, used, steering)

@@ -6,9 +6,14 @@ from typing import Any
 import numpy as np
 
 from identification.regression.velocities import CURRENT_COLUMNS, over_ground
-from identification.regression.wind import measured_wind
 from shipgym import InputError, Particulars, Trial
-from shipgym.checks import check_choice, check_keys, check_number
+from shipgym.checks import (
+    check_choice,
+    check_flag,
+    check_keys,
+    check_number,
+    check_text,
+)
 
 
 def check_current(option: Any) -> None:
@@ -20,6 +25,15 @@ def check_current(option: Any) -> None:
     check_keys(option, ("north", "east"), "current", ("north", "east"))
     for name, value in option.items():
         check_number(value, f"current {name}", hint="in m/s")
+
+
+def check_wind(option: Any) -> None:
+    """Refuse a wind that is neither a word nor a table of coefficients."""
+    if not isinstance(option, Mapping):
+        check_text(option, "wind")
+        return
+    check_keys(option, ("coefficients", "relative"), "wind")
+    check_flag(option.get("relative", False), "wind relative")
 
 
 def in_still_water(
@@ -127,6 +141,9 @@ def _with_wind(
     """The trials by name, with the accelerations by their wind."""
     if option in ("none", "constant"):
         return dict(trials)
+
+    from identification.regression.wind import measured_wind
+
     found = {}
     try:
         for name, trial in trials.items():

@@ -6,25 +6,16 @@ from typing import Any
 import numpy as np
 
 from identification.regression.samples import Samples
+from identification.regression.still_water import check_wind
 from identification.regression.velocities import CURRENT_COLUMNS
 from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Floats
-from shipgym.checks import check_flag, check_keys, check_text
 from shipgym.sea.wind import AIR_DENSITY, WindCurves, wind_curves
 from shipgym.sea.wind_coefficients import WindTable
 from shipgym.ships.inertia import particulars_inertia
 from shipgym.ships.simulate import WIND
 from shipgym.ships.structures import MMG
 from shipgym.trials.navigation import rotate_to_body
-
-
-def check_wind(option: Any) -> None:
-    """Refuse a wind that is neither a word nor a table of coefficients."""
-    if not isinstance(option, Mapping):
-        check_text(option, "wind")
-        return
-    check_keys(option, ("coefficients", "relative"), "wind")
-    check_flag(option.get("relative", False), "wind relative")
 
 
 def measured_wind(

@@ -52,7 +52,11 @@ LINES = (
     ("identify ship.toml --compare --structures abkowitz --methods ls --out ls", 0),
     (f"advise ship.toml {LINEAR} --criterion c --coefficient N_d --number 1", 0),
     (f"advise ship.toml {WRONG}", 2),
-    (f"reduce ship.toml {LINEAR} --direction forward --tolerance 0.1 --report --out reduced", 0),
+    (
+        f"reduce ship.toml {LINEAR} --direction forward --tolerance 0.1 --report"
+        " --out reduced",
+        0,
+    ),
     (f"reduce ship.toml {WRONG} --out reduced", 2),
     ("trials linear/model.json --draws 2 --seed 1 --out trials.html", 0),
     ("trials tanker --draws 0 --depth 25", 0),

@@ -61,7 +61,7 @@ def threads(job):
 def loaded(job):
     import joblib
 
-    return ["lz4" in sys.modules, os.getcwd()]
+    return [spectrum(job), "lz4" in sys.modules, os.getcwd()]
 
 
 def sleeps(job):
@@ -100,13 +100,6 @@ def test_results_are_the_same_wherever_they_are_computed(functions, tmp_path):
     assert result_to_json(resumed) == result_to_json(here)
 
 
-@needs_ray
-def test_ray_gives_the_same_results(functions):
-    jobs = [{"seed": seed} for seed in range(5)]
-    on_ray = run_jobs(functions.spectrum, jobs, JobEngine("ray", workers=2))
-    assert result_to_json(on_ray) == result_to_json(run_jobs(functions.spectrum, jobs))
-
-
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_job_has_one_thread_and_the_environment_stays(
     workers, functions, monkeypatch
@@ -122,16 +115,19 @@ def test_a_job_has_one_thread_and_the_environment_stays(
 
 
 @pytest.mark.parametrize("engine", ["local", pytest.param("ray", marks=needs_ray)])
-def test_workers_import_nothing_from_the_working_folder(
+def test_workers_give_the_same_and_import_nothing_from_the_working_folder(
     engine, functions, tmp_path, monkeypatch
 ):
     """joblib imports lz4 where it is installed; a file of that name is somebody's
     results."""
     (tmp_path / "lz4.py").touch()
     monkeypatch.chdir(tmp_path)
-    ((is_loaded, folder),) = run_jobs(functions.loaded, [{}], JobEngine(engine, 2))
-    assert not is_loaded
-    assert folder == str(tmp_path)
+    jobs = [{"seed": seed} for seed in range(5)]
+    results = run_jobs(functions.loaded, jobs, JobEngine(engine, 2))
+    for (spectrum, is_loaded, folder), job in zip(results, jobs, strict=True):
+        assert result_to_json(spectrum) == result_to_json(functions.spectrum(job))
+        assert not is_loaded
+        assert folder == str(tmp_path)
 
 
 def test_progress_counts_equal_jobs_each(functions):
