@@ -19,9 +19,6 @@ from typing import Any
 
 from shipgym.errors import InputError
 
-NOT_PLAIN = (
-    CO_VARARGS | CO_VARKEYWORDS | CO_GENERATOR | CO_COROUTINE | CO_ASYNC_GENERATOR
-)
 #: Where code is that is not a user's own.
 LIBRARIES = (
     str(Path(__file__).parent),
@@ -90,7 +87,10 @@ def check_function(value: Any, count: int, where: str, what: str) -> None:
     if not isinstance(value, FunctionType):
         raise InputError(f"{where}: expected {what}, got no plain function")
     code = value.__code__
-    if code.co_flags & NOT_PLAIN:
+    not_plain = (
+        CO_VARARGS | CO_VARKEYWORDS | CO_GENERATOR | CO_COROUTINE | CO_ASYNC_GENERATOR
+    )
+    if code.co_flags & not_plain:
         raise InputError(
             f"{where}: expected {what}, got one with variable arguments, a generator or"
             " a coroutine"

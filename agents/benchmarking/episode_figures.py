@@ -15,7 +15,6 @@ from shipgym.tasks.guidance import wrapped
 
 MOST_SAMPLES = 240  # of a line
 GREEN, LIGHT_GREEN = "#2f6b3c", "#e3efe5"  # of the path to follow
-GAP = np.full(2, np.nan)  # between outlines
 
 
 def tracks_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figure:
@@ -89,17 +88,18 @@ def _corridor(path: Floats, half_width: float) -> Floats:
     Returns north and east, m, shape (2, n); NaN parts one outline from the next.
     """
     outlines = []
+    gap = np.full(2, np.nan)  # between outlines
     for begin, end in pairwise(path):
         north, east = end - begin
         length = np.hypot(north, east)
         if length > 0.0:
             side = half_width / length * np.array([-east, north])
-            outlines += [begin + side, end + side, end - side, begin - side, GAP]
+            outlines += [begin + side, end + side, end - side, begin - side, gap]
 
     angles = np.linspace(0.0, 2.0 * np.pi, 25)
     circle = half_width * np.column_stack([np.cos(angles), np.sin(angles)])
     for point in path[1:-1]:
-        outlines += [*(point + circle), GAP]
+        outlines += [*(point + circle), gap]
     return np.array(outlines).T
 
 

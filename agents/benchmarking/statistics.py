@@ -26,7 +26,6 @@ from scipy.stats import trim_mean
 from agents.suites.reference import ScoreScale
 from shipgym.arrays import Floats, Integers, finite
 
-N_DRAWS = 2000
 TRIMMED = 0.25  # of the scores at each end
 
 
@@ -65,7 +64,7 @@ class Draws:
     """
 
     def __init__(
-        self, n_tasks: int, n_episodes: int, seed: int = 0, n_draws: int = N_DRAWS
+        self, n_tasks: int, n_episodes: int, seed: int = 0, n_draws: int = 2000
     ) -> None:
         self.n_episodes = n_episodes
         self.n_draws = n_draws

@@ -22,8 +22,6 @@ from agents.suites.reference import ScoreScale, reference_costs
 from agents.suites.suite import N_EPISODES, SETS, BenchmarkTask
 from shipgym.arrays import Floats, finite
 
-THRESHOLDS = np.arange(-20, 31) / 20.0  # scores of the performance profile
-
 
 def summarise(
     tasks: Sequence[BenchmarkTask],
@@ -227,12 +225,13 @@ class _Costs:
     def profiles(self) -> dict[str, Any]:
         """Return the share of episodes whose score is above each threshold."""
         shares = {}
+        thresholds = np.arange(-20, 31) / 20.0  # scores of the performance profile
         for controller, name in enumerate(self.names):
             scores = self._episode_scores(controller)
             if len(scores):
-                profile = statistics.performance_profile(scores, THRESHOLDS)
+                profile = statistics.performance_profile(scores, thresholds)
                 shares[name] = profile.tolist()
-        return {"thresholds": THRESHOLDS.tolist(), "shares": shares}
+        return {"thresholds": thresholds.tolist(), "shares": shares}
 
     def _episode_scores(self, controller: int) -> Floats:
         """Scores of all episodes on the ship that have one, shape (n,)."""

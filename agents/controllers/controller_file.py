@@ -31,7 +31,6 @@ from shipgym.checks import (
 REMEDY = "design the controller again or take another copy"
 #: The kind of file that `agents.policies.policy_file` reads.
 LEARNED = "learned"
-RUDDER = Bounds(-np.pi, np.pi)  # rad
 FINITE = Bounds(-np.inf, np.inf)
 FIELDS = (
     "format",
@@ -58,10 +57,11 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
     names = _names(content["observation_names"], where)
     check_names(names, design.observes, f"{where}: observation_names")
 
+    rudder = Bounds(-np.pi, np.pi)  # rad
     with placed(where):
         return design(
             gains=_gains(content["gains"], design),
-            neutral_rudder=_number(content["neutral_rudder"], RUDDER, "neutral_rudder"),
+            neutral_rudder=_number(content["neutral_rudder"], rudder, "neutral_rudder"),
             neutral_sway=_number(content["neutral_sway"], ANY_NUMBER, "neutral_sway"),
             margins=_margins(content["margins"]),
             observation_scales=read_scales(content["observation_scales"], names),

@@ -27,8 +27,6 @@ from shipgym.tasks.scales import RATE_WEIGHT, control_interval
 SIGNALS = Gains._fields
 SWAY, YAW_RATE, ERROR, RUDDER, INTEGRAL = range(len(SIGNALS))
 ORDER = RUDDER + 1  # of the rudder, in a flow that holds it over an interval
-# heading error that costs as much as the rudder moving at full rate
-FULL_RATE_ERROR = np.radians(7.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +65,15 @@ def rate_weight(model: ShipModel) -> float:
 
     That of the squared heading error is 1. It is the environment's own, and as much
     again as makes the rudder's full rate cost like a heading error of
-    `FULL_RATE_ERROR`. A linear design knows no largest rate; with a slow gear it would
+    7 degrees. A linear design knows no largest rate; with a slow gear it would
     ask for far more and swing. The figure is measured: with it both designs cost at
     most 1.06 times the best gains of a direct search on stable and unstable ships whose
     gears need 0.3 to 6 ship lengths for 35 degrees.
     """
     of_environment = RATE_WEIGHT * model.travel_time**2
-    of_gear = (FULL_RATE_ERROR / model.steering.rate) ** 2
+    # heading error that costs as much as the rudder moving at full rate
+    full_rate_error = np.radians(7.0)
+    of_gear = (full_rate_error / model.steering.rate) ** 2
     return float(of_environment + of_gear)
 
 

@@ -30,8 +30,6 @@ from shipgym.wrong_types import typed
 GRID = np.arange(0.02, 0.81, 0.02)  # rates of the feed-forward, times length over speed
 # share of the rudder limit beyond which no steady turn is tabulated
 LARGEST_RUDDER = 0.6
-# share of it that the steady turn has at whose rate courses are changed
-COURSE_RUDDER = 0.3
 # of the pair of poles: damping ratio, frequency times lag, and times length over speed
 DAMPING, PER_LAG, PER_LENGTH = 0.9, 0.3, 2.0
 
@@ -264,8 +262,9 @@ def _turns_to_one_side(
 
 
 def course_rate(model: ShipModel, turns: SteadyTurns, neutral: float) -> float:
-    """Rate, rad/s, of a steady turn with `COURSE_RUDDER`: that of course changes."""
-    largest = COURSE_RUDDER * model.steering.limit
+    """Rate, rad/s, of a steady turn by which courses are changed."""
+    part_of_limit = 0.3  # of the rudder
+    largest = part_of_limit * model.steering.limit
     off_neutral = np.abs(turns.rudders - neutral)
     reached = off_neutral <= largest
     gentle = SteadyTurns(

@@ -38,12 +38,6 @@ from agents.policies.policy import ORDERS, LearnedPolicy, combined, toward
 from shipgym import InputError
 from shipgym.checks import quoted
 
-#: In C, the output of a layer y[i] after its activation.
-ACTIVATIONS = {
-    "relu": "y[i] > 0.0f ? y[i] : 0.0f",
-    "tanh": "tanhf(y[i])",
-    "linear": "",
-}
 #: State of a policy beside what its base remembers.
 POLICY_STATE = record_kind(
     "PolicyState",
@@ -288,6 +282,12 @@ def observation_rows(policy: LearnedPolicy) -> list[dict[str, Any]]:
 def layer_activations(policy: LearnedPolicy) -> list[str]:
     """Activation of each layer's output in C; empty where there is none."""
     network = policy.network
-    hidden = ACTIVATIONS[network.activation]
+    # In C, the output of a layer y[i] after its activation.
+    written = {
+        "relu": "y[i] > 0.0f ? y[i] : 0.0f",
+        "tanh": "tanhf(y[i])",
+        "linear": "",
+    }
+    hidden = written[network.activation]
     n_hidden = len(network.layers) - 1
-    return [hidden] * n_hidden + [ACTIVATIONS[network.output]]
+    return [hidden] * n_hidden + [written[network.output]]

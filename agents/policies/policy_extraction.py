@@ -37,37 +37,8 @@ class Actor(NamedTuple):
         return f"{self.head or self.body + '.0'}.weight"
 
 
-ACTORS = (
-    Actor("mlp_extractor.policy_net", "action_net", "linear", "Tanh"),  # PPO, A2C
-    Actor("actor.latent_pi", "actor.mu", "tanh", "ReLU"),  # SAC, TQC
-    Actor("actor.mu", "", "tanh", "ReLU"),  # TD3, DDPG
-)
-NOT_ACTING = (
-    "mlp_extractor.value_net.",
-    "value_net.",
-    "log_std",
-    "actor.log_std.",
-    "actor_target.",
-    "critic",
-)
-#: Keywords of a vector environment that say how it runs, not what is asked.
-RUNNING = (
-    "model",
-    "num_envs",
-    "threads",
-    "autoreset_mode",
-    "vectorization_mode",
-    "render_mode",
-)
 #: Wrappers that change observations.
 REFUSED = ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs")
-#: Attributes of the wrapper that adds to a controller, and their types.
-RESIDUAL = {
-    "authority": float,
-    "frame_stack": int,
-    "action_repeat": int,
-    "rate_limit": float,
-}
 
 
 def sb3_fields(agent: Any, env: Any = None) -> dict[str, Any]:
@@ -126,8 +97,15 @@ def _check_wrapper(wrapper: Any) -> None:
 
 def _residual(stack: Sequence[Any]) -> dict[str, Any]:
     """Base and other settings of the wrapper that adds to a controller, if any."""
+    # Attributes of the wrapper that adds to a controller, and their types.
+    residual = {
+        "authority": float,
+        "frame_stack": int,
+        "action_repeat": int,
+        "rate_limit": float,
+    }
     for wrapper in stack:
-        if not vars(wrapper).keys() >= {"base", *RESIDUAL}:
+        if not vars(wrapper).keys() >= {"base", *residual}:
             continue
         base = wrapper.base
         if base is not None and not isinstance(base, Controller):
@@ -136,7 +114,7 @@ def _residual(stack: Sequence[Any]) -> dict[str, Any]:
                 f" {type(base).__name__}"
             )
         settings = {
-            name: kind(getattr(wrapper, name)) for name, kind in RESIDUAL.items()
+            name: kind(getattr(wrapper, name)) for name, kind in residual.items()
         }
         return {"base": base, **settings}
     return {}
@@ -169,9 +147,18 @@ def _environment(ships: Any) -> dict[str, Any]:
 def _options(keywords: Mapping[str, Any]) -> dict[str, Any]:
     """Keywords that say what is asked of the ships, as JSON has them."""
     options = {}
+    # Keywords of a vector environment that say how it runs, not what is asked.
+    running = (
+        "model",
+        "num_envs",
+        "threads",
+        "autoreset_mode",
+        "vectorization_mode",
+        "render_mode",
+    )
     for name, value in keywords.items():
         is_of_package = name == "task" and value in TASKS
-        if name in RUNNING or is_of_package:
+        if name in running or is_of_package:
             continue
         options[name] = as_json(value)
     return options
@@ -218,7 +205,12 @@ def actor_network(
     `what`: whose they are. Raises InputError for those of another algorithm, and for
     layers that are not dense.
     """
-    known = [actor for actor in ACTORS if actor.first_weight in weights]
+    actors = (
+        Actor("mlp_extractor.policy_net", "action_net", "linear", "Tanh"),  # PPO, A2C
+        Actor("actor.latent_pi", "actor.mu", "tanh", "ReLU"),  # SAC, TQC
+        Actor("actor.mu", "", "tanh", "ReLU"),  # TD3, DDPG
+    )
+    known = [actor for actor in actors if actor.first_weight in weights]
     if not known:
         raise InputError(
             "agent: expected PPO, A2C, SAC, TD3, DDPG or TQC with 'MlpPolicy', got"
@@ -232,7 +224,15 @@ def actor_network(
         raise InputError(f"agent: expected {dense}, got {between} as layer 1")
 
     names = _dense_layers(actor, weights)
-    acting = {name for name in weights if not name.startswith(NOT_ACTING)}
+    not_acting = (
+        "mlp_extractor.value_net.",
+        "value_net.",
+        "log_std",
+        "actor.log_std.",
+        "actor_target.",
+        "critic",
+    )
+    acting = {name for name in weights if not name.startswith(not_acting)}
     used = set()
     for name in names:
         used |= {f"{name}.weight", f"{name}.bias"}

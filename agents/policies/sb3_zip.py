@@ -34,22 +34,6 @@ from shipgym.files import LARGEST_TENSORS, parse_json, read_bytes
 from shipgym.tasks.task import Task
 
 REMEDY = "save the agent again"
-#: Entries of `policy_kwargs` with which a network is as its weights say.
-KWARGS = {
-    ":type:",
-    ":serialized:",
-    "net_arch",
-    "activation_fn",
-    "log_std_init",
-    "ortho_init",
-    "use_sde",
-    "n_critics",
-    "n_quantiles",
-    "optimizer_class",
-    "optimizer_kwargs",
-    "share_features_extractor",
-    "normalize_images",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +151,23 @@ def _activation(about: Mapping[str, Any]) -> str | None:
         )
     keywords = check_table(about.get("policy_kwargs"), "data: policy_kwargs")
     check_exploration(about.get("use_sde") or keywords.get("use_sde"))
-    other = keywords.keys() - KWARGS
+    # Entries of `policy_kwargs` with which a network is as its weights say.
+    known_kwargs = {
+        ":type:",
+        ":serialized:",
+        "net_arch",
+        "activation_fn",
+        "log_std_init",
+        "ortho_init",
+        "use_sde",
+        "n_critics",
+        "n_quantiles",
+        "optimizer_class",
+        "optimizer_kwargs",
+        "share_features_extractor",
+        "normalize_images",
+    }
+    other = keywords.keys() - known_kwargs
     if other:
         raise InputError(
             "expected 'MlpPolicy' as it is, got one with policy_kwargs"

@@ -14,8 +14,6 @@ from shipgym.arrays import Floats
 from shipgym.envs.engine import Engine
 from shipgym.envs.recording import SUCCESS, plain
 
-SAMPLES = 300  # of a history at most
-
 
 class Recorded(NamedTuple):
     """Episodes of one policy."""
@@ -25,7 +23,7 @@ class Recorded(NamedTuple):
 
 
 def recorded(
-    policy: Policy, task: BenchmarkTask, seeds: Sequence[int], samples: int = SAMPLES
+    policy: Policy, task: BenchmarkTask, seeds: Sequence[int], samples: int = 300
 ) -> Recorded:
     """Sail episodes of a task side by side and keep their histories.
 

@@ -26,14 +26,6 @@ from shipgym.tasks.task import Task
 
 DEAD_BAND = np.radians(0.5)  # the rudder has turned round once it came back by so much
 SETTLED_SHARE, SETTLED_LEAST = 0.05, np.radians(1.0)  # of the change of course, and rad
-#: Entries of `info` from which the figures of paths are computed.
-PATH_INFO = (
-    "cross_track",
-    "in_corridor",
-    "distance_made_good",
-    "grounded",
-    "success",
-)
 
 
 class CourseChange(NamedTuple):
@@ -57,7 +49,15 @@ def worst_step_cost(task: Task) -> float:
 
 
 def _on_path(task: Task) -> bool:
-    return set(PATH_INFO) <= set(task.info_names)
+    # Entries of `info` from which the figures of paths are computed.
+    path_info = (
+        "cross_track",
+        "in_corridor",
+        "distance_made_good",
+        "grounded",
+        "success",
+    )
+    return set(path_info) <= set(task.info_names)
 
 
 def _keeps_course(task: Task) -> bool:

@@ -17,8 +17,6 @@ COURSE_ORDERS = (
     "los_course",
 )
 CROSS_TRACK = ("cross_track_error", "cross_track")
-#: What is not listed under `other`, because a series shows it.
-SHOWN = ("x", "y", "psi", "r", "phi", "delta", "n", "heading_error")
 
 
 class ReplayQuantity(NamedTuple):
@@ -102,7 +100,9 @@ def _other(episode: Episode) -> dict[str, Floats]:
     recorded = {**episode.info, **episode.states}
     order = _first(COURSE_ORDERS, recorded)
     cross_track = _first(CROSS_TRACK, recorded)
-    shown = {*SHOWN, order, cross_track}
+    # What is not listed under `other`, because a series shows it.
+    usual = ("x", "y", "psi", "r", "phi", "delta", "n", "heading_error")
+    shown = {*usual, order, cross_track}
     other = {}
     for name, values in recorded.items():
         if name not in shown:

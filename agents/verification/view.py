@@ -23,23 +23,6 @@ from shipgym.pages import NONE, fixed, number, percent
 if TYPE_CHECKING:
     from agents.verification.standards import Requirement
 
-#: What a controller feeds back: name, and unit of the gain on it.
-SIGNALS = {
-    "heading_error": ("heading error", "rad/rad"),
-    "yaw_rate": ("yaw rate", "s"),
-    "heading_error_integral": ("integral of heading error", "1/s"),
-    "sway": ("sway speed", "rad s/m"),
-    "rudder": ("rudder", "rad/rad"),
-}
-#: Name and unit of each margin.
-MARGINS = {
-    "gain_margin": ("gain margin, upwards", "factor"),
-    "lowest_gain": ("gain margin, downwards", "factor"),
-    "phase_margin_deg": ("phase margin", "deg"),
-    "delay_margin_s": ("delay margin", "s"),
-    "bandwidth_rad_s": ("bandwidth", "rad/s"),
-}
-
 
 @dataclass(frozen=True)
 class GainRow:
@@ -292,7 +275,15 @@ def _gain_rows(designs: Sequence[Controller]) -> list[GainRow]:
             own[signal] = gain, design.gains[gain]
         by_signal.append(own)
     rows = []
-    for signal, (name, unit) in SIGNALS.items():
+    # What a controller feeds back: name, and unit of the gain on it.
+    signals = {
+        "heading_error": ("heading error", "rad/rad"),
+        "yaw_rate": ("yaw rate", "s"),
+        "heading_error_integral": ("integral of heading error", "1/s"),
+        "sway": ("sway speed", "rad s/m"),
+        "rudder": ("rudder", "rad/rad"),
+    }
+    for signal, (name, unit) in signals.items():
         gains = [own.get(signal) for own in by_signal]
         if any(gains):
             row = GainRow(name, unit, gains)
@@ -320,7 +311,15 @@ def _design_notes(designed: Mapping[str, Controller]) -> list[str]:
 
 def _margin_rows(designs: Sequence[Controller]) -> list[MarginRow]:
     rows = []
-    for field, (name, unit) in MARGINS.items():
+    # Name and unit of each margin.
+    margins_shown = {
+        "gain_margin": ("gain margin, upwards", "factor"),
+        "lowest_gain": ("gain margin, downwards", "factor"),
+        "phase_margin_deg": ("phase margin", "deg"),
+        "delay_margin_s": ("delay margin", "s"),
+        "bandwidth_rad_s": ("bandwidth", "rad/s"),
+    }
+    for field, (name, unit) in margins_shown.items():
         shown = []
         for design in designs:
             value = getattr(design.margins, field)

@@ -32,11 +32,6 @@ from shipgym.ships.kernel_boxes import (
     kernel_inputs,
 )
 
-#: Lengths of the functions tried, in root mean squares of the inputs; the smoothest
-#: first.
-LENGTHS = (2.8, 2.0, 1.4, 1.0, 0.7)
-#: Weights tried, of squared errors over a ship length.
-WEIGHTS = tuple(np.geomspace(0.1, 1e4, 6).tolist())
 MIRROR = np.array([-1.0, -1.0, -1.0, 1.0])  # of the inputs, port to starboard
 INPUT_CHANNELS = ("u", "v", "r", "delta")
 
@@ -135,10 +130,12 @@ def fit_kernel(
         build_rows=build_rows,
         folds=asked.folds,
     )
-    lengths: Sequence[float] = LENGTHS
+    # lengths in root mean squares of the inputs, the smoothest first
+    lengths: Sequence[float] = (2.8, 2.0, 1.4, 1.0, 0.7)
     if asked.length is not None:
         lengths = (float(asked.length),)
-    weights: Sequence[float] = WEIGHTS
+    # weights of squared errors over a ship length
+    weights: Sequence[float] = np.geomspace(0.1, 1e4, 6).tolist()
     if asked.C is not None:
         weights = (float(asked.C),)
     kernels = _kernels(inputs, asked.centres, lengths)

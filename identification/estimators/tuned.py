@@ -27,13 +27,6 @@ from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_flag, check_whole
 
-#: Names of the methods by their search.
-METHOD_NAMES = {
-    "abc": "abc-lssvr",
-    "pso": "pso-lssvr",
-    "de": "de-lssvr",
-    "grid": "cv-lssvr",
-}
 RAN_AWAY = 1e3  # error, relative to the motion, of a ship that ran away
 
 
@@ -101,9 +94,16 @@ class TunedLSSVM(LinearRegressor):
     def method_name(self) -> str:
         """Name of the method by its search."""
         kind = type(get_optimiser(self.optimiser))
+        # Names of the methods by their search.
+        method_names = {
+            "abc": "abc-lssvr",
+            "pso": "pso-lssvr",
+            "de": "de-lssvr",
+            "grid": "cv-lssvr",
+        }
         for name, known in OPTIMISERS.items():
             if kind is known:
-                return METHOD_NAMES[name]
+                return method_names[name]
         return super().method_name
 
     def check(self) -> None:

@@ -48,8 +48,6 @@ from shipgym.ships.structures import GREY_BOX, MMG
 
 #: The structure beneath a kernel where none is named.
 BLACK_BOX = "linear"
-#: Methods that an identification with a kernel may have; those of its reference ship.
-KERNEL_METHODS = ("tls-svm", "ls-svm", "rm-svm", "output-error", MAP)
 
 
 def identified(trials: Sequence[Trial], options: Options) -> IdentificationResult:
@@ -163,9 +161,12 @@ def reference_options(options: Options) -> Options:
     A grey box names hers.
     """
     method = options.method
-    if name_of(method) not in KERNEL_METHODS:
+    # Methods that an identification with a kernel may have; those of its reference
+    # ship.
+    kernel_methods = ("tls-svm", "ls-svm", "rm-svm", "output-error", MAP)
+    if name_of(method) not in kernel_methods:
         raise InputError(
-            f"method: expected one of {quoted(KERNEL_METHODS)} with a kernel, got"
+            f"method: expected one of {quoted(kernel_methods)} with a kernel, got"
             f" {name_of(method)!r}; choose 'rm-svm' or 'ls-svm', or leave the kernel"
             " out"
         )

@@ -25,7 +25,6 @@ from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
 from shipgym.wrong_types import typed
 
 FORCES = ("X", "Y", "N")
-NEEDED = ("u", "v", "r", *FORCES)
 FEWEST = 4  # samples between jumps
 #: How each method chooses the directions that it keeps.
 METHODS = {"ls": "full", "tls-svm": "l-curve"}
@@ -152,10 +151,11 @@ def _pieces(
 
 
 def _check_channels(trial: Trial, structure: SharedStructure) -> None:
-    for name in NEEDED:
+    needed = ("u", "v", "r", *FORCES)
+    for name in needed:
         if name not in trial:
             raise InputError(
-                f"trial {trial.name!r}: expected the channels {', '.join(NEEDED)} for"
+                f"trial {trial.name!r}: expected the channels {', '.join(needed)} for"
                 f" structure {structure.name!r}, got no {name!r}; give captive tests"
             )
 

@@ -29,9 +29,6 @@ from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES
 from shipgym.ships.mmg import IDENTIFIED
 
-#: Least scales of the errors: velocities by service speed U0, yaw rate by U0 / L,
-#: heading in rad.
-FLOORS = {"u": 0.0017, "v": 0.0017, "r": 0.0021, "psi": np.radians(0.1)}
 LARGEST = 1e3  # residual of a ship that runs away, in scales
 
 
@@ -76,7 +73,10 @@ class Posterior:
         self.prior = prior
         self.mean = np.array([prior.mean[name] for name in IDENTIFIED])
         self.channels = compared_channels(blank, trials)
-        floors = np.array([FLOORS[name] for name in self.channels])
+        # Least scales of the errors: velocities by service speed U0, yaw rate by U0 /
+        # L, heading in rad.
+        least = {"u": 0.0017, "v": 0.0017, "r": 0.0021, "psi": np.radians(0.1)}
+        floors = np.array([least[name] for name in self.channels])
         self.floors = floors * channel_units(blank, self.channels)
         segment_lengths = 1.7  # of a segment, ship lengths at service speed
         sample_lengths = 0.067  # between the samples that are compared

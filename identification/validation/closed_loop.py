@@ -19,8 +19,6 @@ from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.orders import checked_orders, two_commands
 from shipgym.ships.simulate import Conditions, Passage
 
-STEP = 0.02  # of the time to sail one ship length
-
 
 class ZigzagLeg(NamedTuple):
     """Part of a zigzag between two reversals of the rudder."""
@@ -79,7 +77,8 @@ def _sail_legs(model: ShipModel, trial: Trial) -> _Sailed | None:
     """Sail all legs from the start of a trial; None where a target is not reached."""
     begun = with_start(model, trial)
     start = [begun[name][0] if name in begun else 0.0 for name in model.state_names]
-    passage = Passage(model, Conditions(), STEP * model.travel_time)
+    step = 0.02 * model.travel_time
+    passage = Passage(model, Conditions(), step)
     times = [trial.t[:1]]
     states = [np.array([start])]
     orders = list[float]()

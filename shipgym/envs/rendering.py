@@ -22,28 +22,27 @@ Colour = tuple[int, int, int]
 SIZE = 600  # pixels of a side
 FINER = 2  # pixels drawn for one that is shown, so that edges are smooth
 
-WATER = (234, 241, 245)
-GRID = (213, 224, 231)
-INK = (28, 40, 48)
-FAINT = (104, 122, 134)
-PANEL = (250, 252, 253)
-HULL = (42, 62, 80)
-WAKE = (120, 160, 190)
-RUDDER = (200, 60, 40)
-PATH = (60, 110, 70)
-CORRIDOR = (222, 236, 224)
-ORDER = (200, 120, 10)
-WIND = (120, 90, 160)
-CURRENT = (0, 140, 150)
 
-#: Colours of read-outs whose quantity is drawn too.
-LEGEND = {
-    "heading": HULL,
-    "to steer": ORDER,
-    "rudder": RUDDER,
-    "wind": WIND,
-    "current": CURRENT,
-}
+@dataclass(frozen=True)
+class Colours:
+    """Colours of a picture: red, green and blue."""
+
+    water: Colour = (234, 241, 245)
+    grid: Colour = (213, 224, 231)
+    ink: Colour = (28, 40, 48)
+    faint: Colour = (104, 122, 134)
+    panel: Colour = (250, 252, 253)
+    hull: Colour = (42, 62, 80)
+    wake: Colour = (120, 160, 190)
+    rudder: Colour = (200, 60, 40)
+    path: Colour = (60, 110, 70)
+    corridor: Colour = (222, 236, 224)
+    order: Colour = (200, 120, 10)
+    wind: Colour = (120, 90, 160)
+    current: Colour = (0, 140, 150)
+
+
+COLOURS = Colours()
 
 #: Outline of a ship from above: forward and to starboard, in lengths and beams.
 OUTLINE = np.array([[0.5, 0.0], [0.38, 0.36], [0.2, 0.5], [-0.42, 0.5], [-0.5, 0.36]])
@@ -129,11 +128,11 @@ class Renderer:
         """Draw a scene, a uint8 array of shape (600, 600, 3)."""
         chart = _Chart(scene)
         brush = self._brush
-        brush.fill(WATER)
+        brush.fill(COLOURS.water)
         self._draw_grid(chart)
         self._draw_path(chart, scene)
         if len(scene.wake) > 1:
-            brush.lines(WAKE, chart.pixels(scene.wake), 2)
+            brush.lines(COLOURS.wake, chart.pixels(scene.wake), 2)
         self._draw_ship(chart, scene)
         self._draw_scale(chart)
         self._draw_compass(scene, centre=(SIZE - 70.0, 70.0), radius=52.0)
@@ -169,11 +168,11 @@ class Renderer:
         for down in chart.grid_lines(axis=0):
             left = (0.0, down)
             right = (SIZE, down)
-            self._brush.line(GRID, left, right)
+            self._brush.line(COLOURS.grid, left, right)
         for across in chart.grid_lines(axis=1):
             top = (across, 0.0)
             bottom = (across, SIZE)
-            self._brush.line(GRID, top, bottom)
+            self._brush.line(COLOURS.grid, top, bottom)
 
     def _draw_path(self, chart: _Chart, scene: Scene) -> None:
         if scene.waypoints is None:
@@ -186,14 +185,14 @@ class Renderer:
                 _, across = _axes(start, end)
                 side = half * across
                 corners = [start + side, end + side, end - side, start - side]
-                brush.polygon(CORRIDOR, corners)
+                brush.polygon(COLOURS.corridor, corners)
             for point in points:
-                brush.circle(CORRIDOR, point, half)
+                brush.circle(COLOURS.corridor, point, half)
 
-        brush.lines(PATH, points, 2)
+        brush.lines(COLOURS.path, points, 2)
         for point in chart.pixels(scene.waypoints):
-            brush.circle(WATER, point, 5)
-            brush.circle(PATH, point, 5, 2)
+            brush.circle(COLOURS.water, point, 5)
+            brush.circle(COLOURS.path, point, 5, 2)
 
     def _draw_ship(self, chart: _Chart, scene: Scene) -> None:
         brush = self._brush
@@ -202,45 +201,45 @@ class Renderer:
         middle = chart.pixels(centre)
         if scene.course_order is not None:
             order = centre + 1.6 * length * _direction(scene.course_order)
-            brush.arrow(ORDER, middle, chart.pixels(order))
+            brush.arrow(COLOURS.order, middle, chart.pixels(order))
 
         ahead = _direction(scene.heading)
         bow = centre + 1.1 * length * ahead
         stern = centre - 0.5 * length * ahead
-        brush.line(HULL, middle, chart.pixels(bow))
+        brush.line(COLOURS.hull, middle, chart.pixels(bow))
         # a rudder to starboard puts its trailing edge to starboard of the stern
         blade = stern - 0.22 * length * _direction(scene.heading - scene.rudder)
-        brush.line(RUDDER, chart.pixels(stern), chart.pixels(blade), 3)
+        brush.line(COLOURS.rudder, chart.pixels(stern), chart.pixels(blade), 3)
 
         starboard = [-ahead[1], ahead[0]]
         outline = HULL_OUTLINE * [length, scene.beam]
         turned = outline @ np.array([ahead, starboard])
-        brush.polygon(HULL, chart.pixels(centre + turned))
+        brush.polygon(COLOURS.hull, chart.pixels(centre + turned))
 
     def _draw_scale(self, chart: _Chart) -> None:
         left = 14.0
         right = left + chart.spacing / chart.metres
         bottom = SIZE - 18.0
-        self._brush.line(INK, (left, bottom), (right, bottom), 2)
+        self._brush.line(COLOURS.ink, (left, bottom), (right, bottom), 2)
         label = f"{chart.spacing:g} m"
-        self._brush.text(label, (left, bottom - 16.0), FAINT, small=True)
+        self._brush.text(label, (left, bottom - 16.0), COLOURS.faint, small=True)
 
     def _draw_compass(self, scene: Scene, centre: Point, radius: float) -> None:
         brush = self._brush
-        brush.circle(PANEL, centre, radius + 12.0)
-        brush.circle(FAINT, centre, radius, 1)
+        brush.circle(COLOURS.panel, centre, radius + 12.0)
+        brush.circle(COLOURS.faint, centre, radius, 1)
         for angle in range(0, 360, 30):
             outer = _on_circle(centre, radius, radians(angle))
             inner = _on_circle(centre, radius - 5.0, radians(angle))
-            brush.line(FAINT, outer, inner)
+            brush.line(COLOURS.faint, outer, inner)
         for name, angle in {"N": 0, "E": 90, "S": 180, "W": 270}.items():
             place = _on_circle(centre, radius - 15.0, radians(angle))
-            brush.text(name, place, INK, "centre", small=True)
+            brush.text(name, place, COLOURS.ink, "centre", small=True)
 
         needle = radius - 22.0  # keeps clear of the letters
         tail = _on_circle(centre, 0.6 * needle, scene.heading + pi)
         tip = _on_circle(centre, needle, scene.heading)
-        brush.arrow(HULL, tail, tip)
+        brush.arrow(COLOURS.hull, tail, tip)
         order = scene.course_order
         if order is not None:
             triangle = [
@@ -248,18 +247,20 @@ class Renderer:
                 _on_circle(centre, radius + 9.0, order - 0.09),
                 _on_circle(centre, radius + 9.0, order + 0.09),
             ]
-            brush.polygon(ORDER, triangle)
+            brush.polygon(COLOURS.order, triangle)
 
         outside = radius + 12.0
         inside = radius - 8.0
         if scene.wind is not None:
             _, wind_from = scene.wind
             start = _on_circle(centre, outside, wind_from)
-            brush.arrow(WIND, start, _on_circle(centre, inside, wind_from))
+            brush.arrow(COLOURS.wind, start, _on_circle(centre, inside, wind_from))
         if scene.current is not None:
             _, set_towards = scene.current
             start = _on_circle(centre, inside, set_towards)
-            brush.arrow(CURRENT, start, _on_circle(centre, outside, set_towards))
+            brush.arrow(
+                COLOURS.current, start, _on_circle(centre, outside, set_towards)
+            )
 
     def _draw_gauge(self, scene: Scene, centre: Point, width: float) -> None:
         brush = self._brush
@@ -267,20 +268,20 @@ class Renderer:
         half = width / 2.0
         left = x - half
         right = x + half
-        brush.panel(PANEL, (left - 28.0, y - 24.0, width + 56.0, 50.0))
-        brush.line(FAINT, (left, y), (right, y))
+        brush.panel(COLOURS.panel, (left - 28.0, y - 24.0, width + 56.0, 50.0))
+        brush.line(COLOURS.faint, (left, y), (right, y))
         for tick in np.linspace(left, right, 5):
-            brush.line(FAINT, (tick, y - 5.0), (tick, y + 5.0))
+            brush.line(COLOURS.faint, (tick, y - 5.0), (tick, y + 5.0))
         part = max(-1.0, min(1.0, scene.rudder / scene.rudder_limit))
-        brush.line(RUDDER, (x, y), (x + part * half, y), 5)
+        brush.line(COLOURS.rudder, (x, y), (x + part * half, y), 5)
 
         limit_deg = degrees(scene.rudder_limit)
         port = f"port {limit_deg:.0f}"
         starboard = f"stbd {limit_deg:.0f}"
         angle = f"rudder {degrees(scene.rudder):+.1f} deg"
-        brush.text(port, (left, y + 15.0), FAINT, "centre", small=True)
-        brush.text(starboard, (right, y + 15.0), FAINT, "centre", small=True)
-        brush.text(angle, (x, y - 14.0), INK, "centre", small=True)
+        brush.text(port, (left, y + 15.0), COLOURS.faint, "centre", small=True)
+        brush.text(starboard, (right, y + 15.0), COLOURS.faint, "centre", small=True)
+        brush.text(angle, (x, y - 14.0), COLOURS.ink, "centre", small=True)
 
     def _draw_readouts(self, scene: Scene) -> None:
         readouts = dict(scene.readouts)
@@ -295,11 +296,19 @@ class Renderer:
 
         spacing = 19.0
         height = 12.0 + spacing * len(readouts)
-        self._brush.panel(PANEL, (8.0, 8.0, 212.0, height))
+        self._brush.panel(COLOURS.panel, (8.0, 8.0, 212.0, height))
         down = 15.0
+        # Colours of read-outs whose quantity is drawn too.
+        legend = {
+            "heading": COLOURS.hull,
+            "to steer": COLOURS.order,
+            "rudder": COLOURS.rudder,
+            "wind": COLOURS.wind,
+            "current": COLOURS.current,
+        }
         for label, value in readouts.items():
-            self._brush.text(label, (18.0, down), LEGEND.get(label, FAINT))
-            self._brush.text(value, (210.0, down), INK, "right")
+            self._brush.text(label, (18.0, down), legend.get(label, COLOURS.faint))
+            self._brush.text(value, (210.0, down), COLOURS.ink, "right")
             down += spacing
 
 

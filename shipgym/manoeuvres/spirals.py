@@ -46,8 +46,6 @@ DIRECT_RUDDER_DEG = (
     -15.0,
     -20.0,
 )
-#: Yaw rates of the reverse spiral by U0 / L, from starboard to port.
-REVERSE_RATES = (0.2, 0.15, *(0.01 * k for k in range(12, -13, -1)), -0.15, -0.2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,8 +143,10 @@ def reverse_spiral(
     """
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
     length_time = voyage.length_time
+    # Yaw rates of the reverse spiral by U0 / L, from starboard to port.
+    reverse_rates = (0.2, 0.15, *(0.01 * k for k in range(12, -13, -1)), -0.15, -0.2)
     if yaw_rate_deg_s is None:
-        defaults = np.array(REVERSE_RATES) / length_time
+        defaults = np.array(reverse_rates) / length_time
         yaw_rate_deg_s = np.degrees(defaults).tolist()
     rates = one_way(
         yaw_rate_deg_s,

@@ -26,18 +26,6 @@ from shipgym.ships.kvlcc2 import Mass, planar_accelerations
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.structures import MMG
 
-#: What the general form has beyond the standard method, with the values that make it
-#: the standard one.
-BEYOND = {
-    "thrust": 1.0,  # factor on the open-water thrust coefficient
-    "delta_0": 0.0,  # rad, added to the rudder angle
-    "Y_0": 0.0,
-    "N_0": 0.0,
-    "c_R": 0.0,  # rudder force times 1 + c_R |sin alpha_R|
-    "speed_power": 0.0,  # of U / U0 in Y_r and N_r
-    "N_absr": 0.0,  # by |r'|: damping that differs to the two sides
-    "N_rr": 0.0,
-}
 #: Coefficients that are identified: hull by rho L d U^2 / 2 (moments L more), added
 #: mass by rho L^2 d / 2 (rho L^4 d / 2). C_2 is the mean of the sides and C_2_side half
 #: of starboard less port; gamma_R is the mean for beta_R > 0 and < 0, gamma_R_side half
@@ -97,7 +85,19 @@ def standard_form(
     `speed`, m/s, and `shaft`, 1/s, are those at service. Raises InputError for the
     variant of shipmmg, whose wake has another law.
     """
-    c = BEYOND | dict(model_coefficients)
+    # What the general form has beyond the standard method, with the values that make it
+    # the standard one.
+    beyond = {
+        "thrust": 1.0,  # factor on the open-water thrust coefficient
+        "delta_0": 0.0,  # rad, added to the rudder angle
+        "Y_0": 0.0,
+        "N_0": 0.0,
+        "c_R": 0.0,  # rudder force times 1 + c_R |sin alpha_R|
+        "speed_power": 0.0,  # of U / U0 in Y_r and N_r
+        "N_absr": 0.0,  # by |r'|: damping that differs to the two sides
+        "N_rr": 0.0,
+    }
+    c = beyond | dict(model_coefficients)
     if c["PACKAGE_FORM"]:
         raise InputError(
             "kvlcc2: expected the published form, got that of shipmmg, whose wake"

@@ -10,20 +10,7 @@ import pytest
 from shipgym import InputError
 from shipgym.envs.artist import scene
 from shipgym.envs.engine import Engine
-from shipgym.envs.rendering import (
-    CORRIDOR,
-    CURRENT,
-    GRID,
-    HULL,
-    ORDER,
-    PATH,
-    RUDDER,
-    SIZE,
-    WAKE,
-    WIND,
-    Renderer,
-    Scene,
-)
+from shipgym.envs.rendering import COLOURS, SIZE, Renderer, Scene
 from shipgym.sea import Current, Weather, Wind
 from shipgym.ships import load_model
 from shipgym.tasks.guidance import track
@@ -54,17 +41,17 @@ def test_the_ship_is_to_scale_and_north_is_up(renderer):
     picture = renderer.draw(SHIP)
     assert picture.shape == (SIZE, SIZE, 3)
     assert picture.dtype == np.uint8
-    north, east = where(picture, HULL)
+    north, east = where(picture, COLOURS.hull)
     hull = np.abs(east) > METRES  # without the line ahead
     assert np.ptp(north[hull]) == pytest.approx(0.95 * LENGTH, abs=6 * METRES)
     assert np.ptp(east) == pytest.approx(BEAM, abs=2.5 * METRES)
-    _, east = where(renderer.draw(replace(SHIP, heading=np.pi / 2)), HULL)
+    _, east = where(renderer.draw(replace(SHIP, heading=np.pi / 2)), COLOURS.hull)
     assert east.max() == pytest.approx(1.1 * LENGTH, abs=3 * METRES)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_rudder_to_starboard_shows_to_starboard(renderer, side):
-    _, east = where(renderer.draw(replace(SHIP, rudder=side * 0.5)), RUDDER)
+    _, east = where(renderer.draw(replace(SHIP, rudder=side * 0.5)), COLOURS.rudder)
     assert side * east.mean() > METRES
 
 
@@ -73,7 +60,7 @@ def test_a_path_lies_where_it_is(renderer):
         [[4000.0, -100.0], [6000.0, -100.0]]
     )  # 200 m to starboard of the ship
     north, east = where(
-        renderer.draw(replace(SHIP, waypoints=path, corridor=50.0)), PATH
+        renderer.draw(replace(SHIP, waypoints=path, corridor=50.0)), COLOURS.path
     )
     assert east.mean() == pytest.approx(200.0, abs=2 * METRES)
     assert np.ptp(north) > 1000.0
@@ -128,13 +115,33 @@ def test_a_ship_without_a_known_beam_is_drawn_like_most(beam, drawn):
         (
             COURSE_KEEPING,
             {},
-            (HULL, ORDER, WAKE, RUDDER),
-            (PATH, CORRIDOR, WIND, CURRENT),
+            (COLOURS.hull, COLOURS.order, COLOURS.wake, COLOURS.rudder),
+            (COLOURS.path, COLOURS.corridor, COLOURS.wind, COLOURS.current),
         ),
-        (COURSE_KEEPING, {"sea": "moderate"}, (HULL, ORDER, WIND), (PATH, CURRENT)),
-        (PATH_FOLLOWING, {}, (HULL, ORDER, PATH, CORRIDOR), (WIND, CURRENT)),
-        (PATH_FOLLOWING, {"sea": TROUBLED}, (HULL, PATH, WIND, CURRENT), ()),
-        (PATH_FOLLOWING, {"model": "kvlcc2"}, (HULL, PATH, CORRIDOR), (WIND,)),
+        (
+            COURSE_KEEPING,
+            {"sea": "moderate"},
+            (COLOURS.hull, COLOURS.order, COLOURS.wind),
+            (COLOURS.path, COLOURS.current),
+        ),
+        (
+            PATH_FOLLOWING,
+            {},
+            (COLOURS.hull, COLOURS.order, COLOURS.path, COLOURS.corridor),
+            (COLOURS.wind, COLOURS.current),
+        ),
+        (
+            PATH_FOLLOWING,
+            {"sea": TROUBLED},
+            (COLOURS.hull, COLOURS.path, COLOURS.wind, COLOURS.current),
+            (),
+        ),
+        (
+            PATH_FOLLOWING,
+            {"model": "kvlcc2"},
+            (COLOURS.hull, COLOURS.path, COLOURS.corridor),
+            (COLOURS.wind,),
+        ),
     ],
 )
 def test_environments_show_what_there_is(name, options, shown, absent):
@@ -150,7 +157,7 @@ def test_a_picture_follows_from_seed_and_actions_and_the_wake_begins_anew():
     first, again = sailed(env), sailed(env)
     np.testing.assert_array_equal(first, again)
     env.reset(seed=2)
-    assert not shows(env.render(), WAKE)
+    assert not shows(env.render(), COLOURS.wake)
 
 
 def test_rendering_changes_nothing_of_the_voyage():
@@ -227,7 +234,9 @@ def test_the_turns_of_a_planned_path_are_arcs_that_touch_both_legs(renderer):
         (None, (200.0, -300.0)),
         (400.0, (182.8, -182.8)),
     ):  # of the leg, of the arc
-        north, east = where(renderer.draw(replace(scene, turn_radius=radius)), PATH)
+        north, east = where(
+            renderer.draw(replace(scene, turn_radius=radius)), COLOURS.path
+        )
         near = {
             place: (np.hypot(north - place[0], east - place[1]) < 4 * METRES).any()
             for place in PLACES
@@ -343,7 +352,7 @@ def test_a_bearing_is_shown_as_on_a_compass(angle_deg, shown):
 def test_the_gauge_shows_the_rudder_as_part_of_its_limit(renderer, rudder_deg, part):
     picture = renderer.draw(replace(SHIP, rudder=np.radians(rudder_deg)))
     gauge = picture[CHART.stop :]
-    _, columns = np.nonzero(np.all(gauge == RUDDER, axis=-1))
+    _, columns = np.nonzero(np.all(gauge == COLOURS.rudder, axis=-1))
     offsets = columns - SIZE / 2
     assert offsets[np.abs(offsets).argmax()] == pytest.approx(90.0 * part, abs=2.0)
 
@@ -357,20 +366,20 @@ def test_the_compass_shows_wind_from_its_side_and_current_to_its_side(renderer):
     )
     compass = renderer.draw(scene)[: CHART.start, SIZE // 2 :]
     rows = {}
-    for colour in (WIND, CURRENT, ORDER):
+    for colour in (COLOURS.wind, COLOURS.current, COLOURS.order):
         # the read-outs stand on the other half
         rows[colour], columns = np.nonzero(np.all(compass == colour, axis=-1))
-    assert rows[WIND].min() > 70.0  # from the south, below the middle
-    assert rows[CURRENT].max() < 70.0  # to the north
+    assert rows[COLOURS.wind].min() > 70.0  # from the south, below the middle
+    assert rows[COLOURS.current].max() < 70.0  # to the north
     assert columns.min() > SIZE / 2 - 70.0 + 40.0  # the order's mark lies east
-    assert rows[ORDER].mean() == pytest.approx(70.0, abs=1.5)
+    assert rows[COLOURS.order].mean() == pytest.approx(70.0, abs=1.5)
 
 
 @pytest.mark.parametrize(("length", "spacing"), [(160.0, 200.0), (85.5, 100.0)])
 def test_lines_of_the_grid_are_a_round_distance_apart(renderer, length, spacing):
     """1, 2 or 5 times a power of ten, at most a sixth of the 14 ship lengths across."""
     picture = renderer.draw(replace(SHIP, length=length, beam=0.2 * length))
-    is_grid = np.all(picture[CHART] == GRID, axis=-1)
+    is_grid = np.all(picture[CHART] == COLOURS.grid, axis=-1)
     columns = np.flatnonzero(is_grid.sum(axis=0) > 300)
     metres = 14.0 * length / SIZE
     intervals = np.diff(columns) * metres / spacing  # some lines fall between pixels
@@ -383,13 +392,13 @@ def test_corridor_and_wake_lie_where_they_are(renderer):
     path = np.array([[3000.0, 0.0], [7000.0, 0.0]])
     wake = np.array([[4900.0, -700.0], [5100.0, -700.0]])
     picture = renderer.draw(replace(SHIP, waypoints=path, corridor=50.0, wake=wake))
-    _, east = where(picture, CORRIDOR)
+    _, east = where(picture, COLOURS.corridor)
     assert np.ptp(east) == pytest.approx(100.0, abs=3 * METRES)
     assert east.mean() == pytest.approx(300.0, abs=2 * METRES)
-    north, east = where(picture, WAKE)
+    north, east = where(picture, COLOURS.wake)
     assert np.ptp(north) == pytest.approx(200.0, abs=3 * METRES)
     assert east.mean() == pytest.approx(-400.0, abs=2 * METRES)
 
 
 def test_a_wake_of_one_place_is_not_drawn(renderer):
-    assert not shows(renderer.draw(replace(SHIP, wake=np.zeros((1, 2)))), WAKE)
+    assert not shows(renderer.draw(replace(SHIP, wake=np.zeros((1, 2)))), COLOURS.wake)
