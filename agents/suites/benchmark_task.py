@@ -1,22 +1,25 @@
 """Tasks of a suite: what a controller is made for and what it is evaluated in."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
 from agents.suites.environments import SHORT_NAMES
-from shipgym import InputError, ShipModel, SteeringGear, Weather
+from shipgym import InputError, ShipModel, SteeringGear, Weather, load_model
 from shipgym.arrays import Integers
 from shipgym.checks import check_choice
-from shipgym.envs.engine import Engine
-from shipgym.envs.environment import DEFAULT_TASK, read_options
-from shipgym.envs.randomisation import Randomisation
 from shipgym.envs.registration import env_id
-from shipgym.tasks.task import Observed, Task
+
+if TYPE_CHECKING:  # whoever shares work out does without
+    from shipgym.envs.engine import Engine
+    from shipgym.envs.randomisation import Randomisation
+    from shipgym.tasks.task import Observed, Task
 
 #: Seeds of the episodes that are scored; training and tuning use smaller ones.
 FIRST_SEED = 1_000_000
@@ -103,6 +106,8 @@ class BenchmarkTask:
     @property
     def env_id(self) -> str:
         """Id for `gymnasium.make`, with the keywords `model` and `arguments`."""
+        from shipgym.envs.environment import DEFAULT_TASK
+
         return env_id(SHORT_NAMES.get(self.environment, DEFAULT_TASK))
 
     @property
@@ -115,7 +120,7 @@ class BenchmarkTask:
     @cached_property
     def design(self) -> Scenario:
         """Scenario that controllers are made for."""
-        return self._scenario(self.model, self.options)
+        return self._scenario(self.ship, self.options)
 
     @cached_property
     def evaluation(self) -> Scenario:
@@ -124,14 +129,16 @@ class BenchmarkTask:
             return self.design
         options = {**self.options, **self.far}
         changes = options.pop("gear", {})
-        scenario = self._scenario(self.true_ship or self.model, options)
+        scenario = self._scenario(self.true_ship or self.ship, options)
 
         gear = {**asdict(scenario.ship.steering), **changes}
         steering = SteeringGear.from_mapping(gear, "far.gear")
         ship = replace(scenario.ship, steering=steering)
         return scenario._replace(ship=ship)
 
-    def _scenario(self, model: str, options: Mapping[str, Any]) -> Scenario:
+    def _scenario(self, model: str | ShipModel, options: Mapping[str, Any]) -> Scenario:
+        from shipgym.envs.environment import read_options
+
         task = SHORT_NAMES.get(self.environment, self.environment)
         return Scenario(*read_options(task, model, options))
 
@@ -147,10 +154,10 @@ class BenchmarkTask:
             design_name="",
         )
 
-    @property
+    @cached_property
     def ship(self) -> ShipModel:
         """Model that controllers are made for."""
-        return self.design.ship
+        return load_model(self.model)
 
     @property
     def task(self) -> Task:
@@ -166,6 +173,8 @@ class BenchmarkTask:
         self, num_envs: int, model: ShipModel | None = None, threads: int = 1
     ) -> Engine:
         """Return many ships at once in its episodes, by default its own ship."""
+        from shipgym.envs.engine import Engine
+
         ship, task, randomisation = self.evaluation
         return Engine(
             ship if model is None else model,

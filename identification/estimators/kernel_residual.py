@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from identification.validation.folds import FOLDS, TRIALS
 from shipgym.checks import check_choice, check_number, check_whole
-from shipgym.ships.kernel_boxes import RBF, SIZES
 
 
 @dataclass(frozen=True)
@@ -31,13 +30,15 @@ class KernelResidual:
         rudder together.
     """
 
-    kernel: str = RBF
+    kernel: str = "rbf"
     centres: int = 64
     length: float | None = None
     C: float | None = None
     folds: str = TRIALS
 
     def __post_init__(self) -> None:
+        from shipgym.ships.kernel_boxes import RBF, SIZES  # most runs have no kernel
+
         check_choice(self.kernel, (RBF,), "kernel")
         check_whole(self.centres, "centres", at_least=2, at_most=SIZES[-1])
         if self.length is not None:

@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 from shipgym.engine.records import Record
-from shipgym.instruments import bridge, perfect
+from shipgym.instruments import perfect
 from shipgym.tasks.source import Configurable, check_namespace, read_source
 
 #: Functions of a sensor set with their arguments, as `perfect` explains them.
@@ -63,6 +63,8 @@ def _sensors_of(namespace: Any, where: str) -> SensorSet:
 def shipped_sensors(windy: bool, noise: bool, filtered: bool) -> SensorSet:
     """Choose a shipped sensor set: without error in calm water, else a bridge's."""
     if windy or noise or filtered:
+        from shipgym.instruments import bridge
+
         sensors = _sensors_of(bridge, str(bridge.__file__))
         return replace(sensors, noise=noise, filter=filtered)
     return _sensors_of(perfect, str(perfect.__file__))
