@@ -49,6 +49,7 @@ def in_still_water(
     `Options`.
     """
     check_current(current)
+    check_wind(wind)
     is_usual_wind = isinstance(wind, str) and wind in ("auto", "none", "constant")
     feels_sea = any(_feels_sea(trial) for trial in trials)
     in_still = is_usual_wind and not feels_sea

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from identification.regression.samples import Samples
-from identification.regression.still_water import check_wind
 from identification.regression.velocities import CURRENT_COLUMNS
 from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Floats
@@ -39,7 +38,6 @@ def measured_wind(
         or a table themselves, and ``relative``: whether speed and direction are those
         felt on board, the latter from the bow.
     """
-    check_wind(option)
     table: dict[str, Any] = {"coefficients": option}
     if isinstance(option, Mapping):
         table = dict(option)
