@@ -49,7 +49,7 @@ def helm(folder):
     LQ.from_model(model).save(folder / "lq.json")
     address = f"tcp:127.0.0.1:{free_port()}"
     passage = simulate_ship(
-        SimulatedShip(model), address, duration=3600.0, speed_up=20.0
+        SimulatedShip(model), address, duration=3600.0, speed_up=5.0
     )
     loop = asyncio.new_event_loop()
     sailing = loop.create_task(passage)
@@ -60,7 +60,7 @@ def helm(folder):
 
     ship = Thread(target=sail)
     ship.start()
-    options = ["--heading", 5, "--duration", 40, "--speed-up", 20]
+    options = ["--heading", 5, "--duration", 20, "--speed-up", 5]
     options += ["--limit", "late_s=60"]  # whatever else the computer does
     try:
         run("steer", folder / "lq.json", "--nmea", address, *options)
