@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from agents.controllers.controller import Controller
-from agents.controllers.designs import INNER, design, no_path
+from agents.controllers.designs import CLASSICAL, INNER, design, no_path
 from agents.controllers.los_autopilot import CRITICAL
-from agents.controllers.registry import CLASSICAL
 from agents.controllers.wheel_over import own_lead
 from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask

@@ -16,7 +16,7 @@ from typing import Any
 
 from direct_search import FIRST_SEED, tunable, tune
 
-from agents.controllers.registry import CLASSICAL
+from agents.controllers.designs import CLASSICAL
 from agents.suites.reference import load_tuned
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, suite_file
 from shipgym.files import write_json

@@ -28,7 +28,7 @@ FIGURES = {
 TOTALS = {
     "exceptions from the formatter": (0, 0),
     "exceptions from sorted imports": (0, 0),
-    "module constants": (400, 502),
+    "module constants": (400, 504),
     "private names in tests": (0, 0),
     "lines of tests, % of the code's": (80, 80),
 }

@@ -9,6 +9,7 @@ from typing import Any
 from agents.agent_file import load_agent
 from agents.controllers.controller import Controller
 from agents.controllers.interface import model_hash
+from agents.controllers.registry import CLASSICAL as CLASSICAL
 from agents.controllers.registry import controller_class
 from agents.suites.reference import load_tuned
 from agents.suites.suite import BenchmarkTask

@@ -19,6 +19,16 @@ from shipgym.sea.current_wind_waves import Current
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 
+RECORDED = (
+    "x",
+    "y",
+    "cross_track",
+    "distance_made_good",
+    "success",
+    "in_corridor",
+    "grounded",
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Track:
@@ -62,16 +72,7 @@ def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:
     task = track_task(models[0])
     engine = Engine(models, len(models), task, allow_unstable=True)
     seeds = np.zeros(len(models), dtype=np.int64)
-    recorded = (
-        "x",
-        "y",
-        "cross_track",
-        "distance_made_good",
-        "success",
-        "in_corridor",
-        "grounded",
-    )
-    run = rollout(guide, engine, seeds, record=recorded)
+    run = rollout(guide, engine, seeds, record=RECORDED)
     figures = path_following(run)
 
     x = _of_first(run, run.states["x"])

@@ -56,6 +56,15 @@ if TYPE_CHECKING:  # few models have equations
 
 Model = TypeVar("Model", bound=ManoeuvringModel)
 
+OPTIONAL = (
+    "normalisation",
+    "covariance",
+    "service_shaft_speed",
+    "envelope",
+    "provenance",
+    "sha256",
+)
+
 
 def read_model(
     fields: Mapping[str, Any], where: str, make: Callable[..., Model]
@@ -73,15 +82,7 @@ def read_model(
         "particulars",
         "steering",
     )
-    optional = (
-        "normalisation",
-        "covariance",
-        "service_shaft_speed",
-        "envelope",
-        "provenance",
-        "sha256",
-    )
-    check_keys(fields, (*required, *optional), where, required)
+    check_keys(fields, (*required, *OPTIONAL), where, required)
     dynamics = _read_dynamics(fields["structure"], f"{where}: structure", make)
     own_unit = dynamics.normalisation
     unit = fields.get("normalisation", own_unit)

@@ -20,8 +20,7 @@ from direct_search import (
 )
 
 from agents import PID
-from agents.controllers.designs import design, design_base, tuned
-from agents.controllers.registry import CLASSICAL
+from agents.controllers.designs import CLASSICAL, design, design_base, tuned
 from agents.rollouts.rollout import episode_costs
 from agents.suites.reference import load_tuned
 from agents.suites.suite import BenchmarkTask, load_suite
