@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from typing import TypeVar
 
+from shipgym.engine.compiling import tell_who_waits
+
 T = TypeVar("T")
 #: Called with the stage of the work, the units of it done and their total.
 Progress = Callable[[str, int, int], None]
@@ -30,3 +32,9 @@ def counted(stage: str, items: Sequence[T]) -> Iterator[T]:
         finally:
             PROGRESS.reset(token)
     report(stage, len(items), len(items))
+
+
+def announce(words: str) -> None:
+    """Tell a person who waits what is begun, where no command shows its progress."""
+    if PROGRESS.get() is _ignored:
+        tell_who_waits(f"shipgym: {words}")

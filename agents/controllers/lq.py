@@ -5,6 +5,7 @@ cost); van Amerongen 1982, Adaptive steering of ships, chapter 3; Anderson & Moo
 Optimal Control, chapters 2 and 3 (cross terms).
 """
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, Self
@@ -25,6 +26,7 @@ from agents.controllers.linear_loop import (
 from shipgym import ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
+from shipgym.engine.compiling import tell_who_waits
 from shipgym.ships.by_name import takes_name
 from shipgym.tasks.scales import RUDDER_WEIGHT
 
@@ -138,6 +140,8 @@ def lq_gains(ship: SampledShip, cost: SteeringCost) -> dict[str, float]:
 
 def lq_gain(ship: SampledShip, cost: SteeringCost) -> Floats:
     """Gain G of order = -G x that minimises the steering cost on a ship, shape (5,)."""
+    if "control" not in sys.modules:
+        tell_who_waits("shipgym: importing python-control, about a second")
     import control  # here, because it takes a second to import
 
     measured = np.eye(len(SIGNALS))

@@ -7,6 +7,7 @@ from identification.estimators.kernel_residual import KernelResidual
 from identification.estimators.threads import single_threaded
 from identification.options import AUTO, Given, Options, stage
 from identification.pipeline.by_regression import by_regression
+from identification.progress import announce
 from identification.regression.preprocess import Preprocessing
 from identification.regression.samples import Sampling
 from identification.result import IdentificationResult
@@ -91,6 +92,7 @@ def identify(
     else:
         from identification.pipeline.routes import identified
 
+        announce(f"identifying {len(trials)} trials, some seconds")
         result = identified(trials, options)
     if options.accept is not None:
         result.metrics["unaccepted"] = unaccepted(result, options.accept)

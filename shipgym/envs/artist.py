@@ -94,12 +94,23 @@ def _readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, s
         lines["heading error"] = f"{degrees(error):+.1f} deg"
     rudder_deg = degrees(state["delta"])
     lines["rudder"] = f"{rudder_deg:+.1f} deg"
+    if "n" in state:
+        lines["shaft"] = _shaft(engine, lane, state["n"])
     if "cross_track" in engine.task.info_names:
         cross_track = engine.info("cross_track")[lane]
         lines["cross-track"] = f"{cross_track:+.0f} m"
     reward = engine.outputs.outcomes[0, lane]
     lines["reward"] = f"{reward:+.3f}"
     return lines
+
+
+def _shaft(engine: Engine, lane: int, shaft_speed: float) -> str:
+    """Shaft speed, and the order where the shaft is commanded."""
+    text = f"{60.0 * shaft_speed:.0f} rpm"
+    if len(engine.command) < 2:
+        return text
+    share = engine.command[1][lane]
+    return f"{text}, ordered {share:+.2f}"
 
 
 def _bearing(angle: float) -> str:

@@ -1,6 +1,7 @@
 """Many ships under a task as one of Gymnasium's vector environments."""
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from shipgym.envs.environment import (
     rudder_orders,
 )
 from shipgym.envs.outputs import named_rows
+from shipgym.envs.rows import FIXED, Row
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import VECTOR_OPTIONS
@@ -304,6 +306,47 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         None in course keeping.
         """
         return self._engine.waypoints(row)
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """Rows, as the single environments they stand for."""
+        return tuple(Row(self, number) for number in range(self.num_envs))
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Call a method of each row, or get an attribute (see `Row`).
+
+        As Gymnasium's SyncVectorEnv does.
+        """
+        results = []
+        for row in self.rows:
+            found = getattr(row, name)
+            results.append(found(*args, **kwargs) if callable(found) else found)
+        return tuple(results)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Attribute of each row, or one of `set_attr` (see `Row`)."""
+        return tuple(getattr(row, name) for row in self.rows)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Store a value for each row under a name of your own.
+
+        A list or tuple has one for each row. Raises InputError for another number of
+        them, and for an attribute that is fixed when the environment is made.
+        """
+        if name in FIXED:
+            raise InputError(
+                f"set_attr: expected a name of your own, got {name!r}, which is fixed"
+                " when the ships are made; make a new environment with another argument"
+            )
+        if not isinstance(values, list | tuple):
+            values = [values] * self.num_envs
+        if len(values) != self.num_envs:
+            raise InputError(
+                f"set_attr: expected a value for each of {self.num_envs} rows, got"
+                f" {len(values)}"
+            )
+        for row, value in zip(self.rows, values, strict=True):
+            setattr(row, name, value)
 
     def render(self) -> tuple[Any, ...] | None:
         """Picture of each row, uint8 arrays of shape (600, 600, 3).

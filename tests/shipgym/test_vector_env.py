@@ -333,3 +333,30 @@ def test_the_last_infos_of_rows_that_go_on_are_zeros():
             assert not np.array_equal(infos["final_obs"][row], seen[row])
         else:
             assert step not in (8, 11)
+
+
+def test_rows_answer_as_the_environments_of_gymnasium_s_sync_vector_env():
+    ours = gymnasium.make_vec("shipgym/PathFollowing-v0", num_envs=2)
+    theirs = gymnasium.make_vec(
+        "shipgym/PathFollowing-v0", num_envs=2, vectorization_mode="sync"
+    )
+    for envs in (ours, theirs):
+        envs.reset(seed=3)
+    native, sync = ours.unwrapped, theirs.unwrapped
+    assert native.get_attr("observation_names") == sync.get_attr("observation_names")
+    for mine, other in zip(
+        native.call("physical_state"), sync.call("physical_state"), strict=True
+    ):
+        assert mine == pytest.approx(other)
+    native.set_attr("skill", [1, 2])
+    assert native.get_attr("skill") == (1, 2)
+    native.set_attr("skill", 3)
+    assert native.call("skill") == (3, 3)
+    for name, values, said in (
+        ("model", 1, "set_attr: expected a name of your own, got 'model'"),
+        ("skill", [1], "set_attr: expected a value for each of 2 rows, got 1"),
+    ):
+        with pytest.raises(InputError, match=said):
+            native.set_attr(name, values)
+    with pytest.raises(AttributeError, match="a row has no attribute 'nothing'"):
+        native.call("nothing")
