@@ -12,6 +12,7 @@ from .controllers.lq import LQ as LQ
 from .controllers.lqg import LQG as LQG
 from .controllers.mpc import MPC as MPC
 from .controllers.pid import PID as PID
+from .controllers.preview_lq import PreviewLQ as PreviewLQ
 from .controllers.registry import controller_kinds as controller_kinds
 from .controllers.registry import register_controller as register_controller
 from .controllers.robustness import MarginUncertainty as MarginUncertainty

@@ -27,7 +27,6 @@ from pathlib import Path
 
 import numpy as np
 from build_models import COMPARED_DEG, errors
-from direct_search import tune
 
 import shipgym
 from agents.agent_file import load_agent
@@ -40,6 +39,7 @@ from agents.rollouts.metrics import evaluate
 from agents.suites.reference import load_tuned
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, suite_file
 from agents.training import run_folder
+from agents.training.controller_search import SearchBudget, tune_controller
 from agents.training.plan import TrainingPlan
 from agents.training.settings import load_settings
 from agents.training.training import train
@@ -163,12 +163,11 @@ def base_of(task: BenchmarkTask) -> str:
 
 
 def tune_on(task: BenchmarkTask, kind: str) -> Controller:
-    """Tune a controller with the suite's search budget; guidance leads a tuned LQ."""
+    """Tune a controller with the suite's search budget."""
     path = suite_file(DEFAULT_SUITE, "tuned")
-    search = read_json(path, "tuned settings", "take another copy")
-    budget = search["evaluations"], search["episodes"]
-    lq = tune("lq", task, None, *budget).settings
-    found = tune(kind, task, {"lq": lq}, *budget)
+    kept = read_json(path, "tuned settings", "take another copy")
+    budget = SearchBudget(seconds=kept["seconds"], episodes=kept["episodes"])
+    found = tune_controller(kind, task, budget)
     return design(kind, task, found.settings)
 
 

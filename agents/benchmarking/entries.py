@@ -16,16 +16,21 @@ A controller is named, on the command line and in Python, as
     name=...              any of these under another name
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from agents.benchmarking.isolated import (
+    ContestantError,
+    IsolatedPolicy,
+    LostContestant,
+)
 from agents.benchmarking.sources import (
     Source,
+    check_module,
     check_object,
     file_hash,
-    import_code,
     known_names,
     load_source,
     make_policies,
@@ -36,6 +41,7 @@ from agents.benchmarking.sources import (
 )
 from agents.controllers.interface import Policy, check_fits, model_hash
 from agents.suites.suite import BenchmarkTask
+from shipgym import load_model
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
 
@@ -68,13 +74,29 @@ class Entry:
         or was designed on the ship that it should not know.
         """
         where = f"'{self.name}' on task '{task.name}'"
+        if self.is_text and names_code(self.source):
+            return (self._isolated(task, where),)
         design = task.design_task
         policies = make_policies(self.source, design)
         for policy in policies:
             check_fits(policy, design.task, design.ship, where)
             if task.true_ship:
-                _check_design(policy, task, where)
+                _check_design(design_hashes(policy), task, where)
         return tuple(policies)
+
+    def _isolated(self, task: BenchmarkTask, where: str) -> Policy:
+        """Controller of a user's function, in a process of its own."""
+        forbidden: tuple[str, ...] = ()
+        if task.true_ship:
+            ships = (task.evaluation.ship, load_model(task.true_ship))
+            forbidden = tuple({model_hash(ship) for ship in ships})
+        try:
+            policy = IsolatedPolicy(self.source, task, forbidden)
+        except ContestantError as failure:
+            return LostContestant(failure)
+        if task.true_ship:
+            _check_design(policy.made.design_sha256, task, where)
+        return policy
 
     def fingerprint(self, task: BenchmarkTask) -> dict[str, str]:
         """Return the SHA-256 of each file that it is made from for a task, by path."""
@@ -83,17 +105,17 @@ class Entry:
         return {str(path): file_hash(path) for path in source_files(self.source, task)}
 
 
-def _check_design(policy: Policy, task: BenchmarkTask, where: str) -> None:
+def _check_design(hashes: Collection[str], task: BenchmarkTask, where: str) -> None:
     """Refuse a policy that was designed on the ship behind a task's model."""
     true_ship = task.evaluation.ship
-    if model_hash(true_ship) in _design_hashes(policy):
+    if model_hash(true_ship) in hashes:
         raise InputError(
             f"{where}: expected a design on the model '{task.model}', got one on the"
             f" ship '{task.true_ship}'"
         )
 
 
-def _design_hashes(policy: Policy) -> set[str]:
+def design_hashes(policy: Policy) -> set[str]:
     """Hashes of the models that a policy and the policies within it were made for."""
     hashes = set()
     visited: set[int] = set()
@@ -215,7 +237,7 @@ def _checked_text(text: str) -> str:
     if text in known or "{task}" in text:
         return text
     if names_code(text):
-        import_code(text)
+        check_module(text)
         return text
     if not all(matching_files(pattern) for pattern in text.split("+")):
         raise InputError(

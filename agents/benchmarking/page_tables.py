@@ -1,12 +1,13 @@
 """Tables of a benchmark's page, which sort by a click on a head."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from agents.benchmarking.page_replays import best_controllers
 from agents.benchmarking.results import BenchmarkResult
 from agents.benchmarking.sources import BEST_KNOWN
+from agents.suites.limits import LIMITED_FIGURES
 from shipgym.pages.numbers import fixed, number, percent
 
 BETTER, WORSE = "#1d70b8", "#d9822b"  # tints of probabilities of improvement
@@ -25,6 +26,8 @@ METRICS = (
     Metric("cross_track_rmse_m", "cross-track RMSE, m"),
     Metric("rudder_travel_deg_min", "rudder travel, deg/min"),
     Metric("rudder_reversals_min", "rudder reversals, 1/min"),
+    Metric("heel_deg", "largest heel, deg"),
+    Metric("speed_lost_percent", "speed lost, %"),
     Metric("overshoot_percent", "overshoot, %"),
     Metric("settling_s", "settling, s"),
     Metric("unsettled", "not settled", percent),
@@ -119,7 +122,8 @@ def ranking_table(result: BenchmarkResult) -> SortableTable:
     caption += (
         " Relative cost: geometric mean over tasks of the cost over the lowest one."
         " Best in tasks: has the lowest cost, or the same. Lost: episodes in which"
-        " control was lost. Failed: the controller gave no command."
+        " control was lost. Failed: the controller gave no command. Beyond limits:"
+        " tasks in which a limit of seamanship is exceeded; those entries come last."
     )
     heads = [
         TableHead("controller", kind=""),
@@ -130,6 +134,7 @@ def ranking_table(result: BenchmarkResult) -> SortableTable:
         TableHead("tasks", descending=True),
         TableHead("lost"),
         TableHead("failed"),
+        TableHead("beyond limits"),
     ]
     best: list[str] = []
     for task in result.tasks:
@@ -150,6 +155,7 @@ def ranking_table(result: BenchmarkResult) -> SortableTable:
             _count_cell(ranked["tasks"]),
             _failure_cell(ranked["lost"]),
             _failure_cell(ranked["failed"]),
+            _failure_cell(ranked["exceeding"]),
         ]
         rows.append(_controller_row(name, cells))
     return SortableTable("ranking-table", caption, heads, rows)
@@ -247,6 +253,8 @@ def metrics_table(result: BenchmarkResult, task: str, name: str) -> SortableTabl
         " in a batch."
     )
     cells = result.cells(task)
+    limits = result.summary["suite"]["tasks"][task]["limits"]
+    caption += _limits_text(limits)
     metrics = [metric for metric in METRICS if _is_shown(metric.name, cells)]
     titles = ["cost", *(metric.title for metric in metrics)]
     titles += ["lost", "failed", "µs per action"]
@@ -260,6 +268,18 @@ def metrics_table(result: BenchmarkResult, task: str, name: str) -> SortableTabl
             row = _metrics_row(cells[controller], metrics)
             rows.append(_controller_row(controller, row))
     return SortableTable(name, caption, heads, rows)
+
+
+def _limits_text(limits: Mapping[str, float]) -> str:
+    """Sentence on the limits of a task; empty if it has none."""
+    if not limits:
+        return ""
+    parts = []
+    for name, limit in limits.items():
+        figure = LIMITED_FIGURES[name]
+        statistic = "mean" if figure.statistic == "mean" else "95th percentile"
+        parts.append(f"{figure.title} {number(limit)} ({statistic})")
+    return f" Limits: {'; '.join(parts)}. What exceeds one is marked."
 
 
 def _is_shown(metric: str, cells: Mapping[str, Any]) -> bool:
@@ -279,7 +299,10 @@ def _metrics_row(cell: Mapping[str, Any], metrics: Sequence[Metric]) -> list[Tab
     row = [TableCell(number(cost), cost)]
     for metric in metrics:
         figures = cell["metrics"].get(metric.name)
-        row.append(_metric_cell(metric, figures))
+        shown = _metric_cell(metric, figures)
+        if metric.name in cell["exceeded"]:
+            shown = replace(shown, kind="bad")
+        row.append(shown)
 
     time = cell["microseconds_per_action"]
     row.append(_failure_cell(cell["lost"]))

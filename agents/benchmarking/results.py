@@ -265,6 +265,7 @@ def _about_task(task: BenchmarkTask) -> dict[str, Any]:
         "model": task.model,
         "model_sha256": model_hash(task.ship),
         "why": task.why,
+        "limits": dict(task.limits),
         "on": task.on,
         "ship": task.true_ship,
     }

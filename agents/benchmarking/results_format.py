@@ -22,6 +22,7 @@ TASK: Shape = {
     "why": TEXT,
     "on": TEXT,
     "ship": TEXT,
+    "limits": {ANY_KEY: NUMBER},  # largest values of figures
 }
 CONTROLLER: Shape = {
     "source": TEXT_OR_NULL,
@@ -38,6 +39,7 @@ CELL: Shape = {
     "lost": COUNT,
     "failed": COUNT,
     "failure": TEXT,
+    "exceeded": {ANY_KEY: NUMBER},  # figures beyond their limits
     "policy_sha256": [TEXT_OR_NULL],
     "microseconds_per_action": NUMBER_OR_NULL,
     "metrics": {
@@ -54,6 +56,7 @@ TOTAL: dict[str, Shape] = {
     "tasks": COUNT,
     "lost": COUNT,
     "failed": COUNT,
+    "exceeding": COUNT,  # tasks in which a limit is exceeded
 }
 #: The total is that of the episodes on the ship, `elsewhere` has those of other sets.
 RANKED: Shape = {"name": TEXT, **TOTAL, "elsewhere": {ANY_KEY: TOTAL}}

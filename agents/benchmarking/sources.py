@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,19 @@ def names_code(text: str) -> bool:
     module, colon, function = text.rpartition(":")
     parts = [*module.split("."), function]
     return bool(colon) and all(part.isidentifier() for part in parts)
+
+
+def check_module(text: str) -> None:
+    """Refuse a function whose module is not found; nothing of it is run."""
+    package, _, _ = text.partition(":")
+    top, _, _ = package.partition(".")
+    with working_folder():
+        known = top in sys.modules or find_spec(top) is not None
+    if not known:
+        raise InputError(
+            f"controllers: expected module:function, got '{text}', whose module"
+            f" '{top}' is not found in this folder or on Python's path"
+        )
 
 
 def import_code(text: str) -> Any:
@@ -91,11 +105,6 @@ def make_policies(source: Any, task: BenchmarkTask) -> list[Policy]:
 
         kind = source.removeprefix(TUNED)
         return [tuned(kind, task, task.suite)]
-    if names_code(source):
-        with working_folder():
-            function = import_code(source)
-            return [make_policy(function, task)]
-
     policies = []
     for path in source_files(source, task):
         agent = load_source(path)
@@ -150,10 +159,7 @@ def source_files(text: str, task: BenchmarkTask) -> list[Path]:
     if text in LEARNED:
         return pretrained(name, text)
     if names_code(text):
-        module_name, _, _ = text.rpartition(":")
-        module = sys.modules.get(module_name)
-        file = getattr(module, "__file__", None)
-        return [Path(file)] if file else []
+        return module_files(text)
     if text in known_names():
         return []
 
@@ -161,6 +167,18 @@ def source_files(text: str, task: BenchmarkTask) -> list[Path]:
     for pattern in text.split("+"):
         paths += matching_files(pattern.replace("{task}", name))
     return paths
+
+
+def module_files(text: str) -> list[Path]:
+    """File of the module that a function is named in; empty where it has none."""
+    module, _, _ = text.rpartition(":")
+    inside = Path(*module.split("."))
+    candidates = (inside.with_suffix(".py"), inside / "__init__.py")
+    for folder in (Path.cwd(), *map(Path, sys.path)):
+        for candidate in candidates:
+            if (folder / candidate).is_file():
+                return [folder / candidate]
+    return []
 
 
 def matching_files(pattern: str) -> list[Path]:

@@ -18,6 +18,7 @@ from agents.benchmarking.statistics import (
     Draws,
     score,
 )
+from agents.suites.limits import exceeded
 from agents.suites.reference import ScoreScale, reference_costs
 from agents.suites.suite import N_EPISODES, SETS, BenchmarkTask
 from shipgym.arrays import Floats, finite
@@ -120,7 +121,10 @@ class _Costs:
             if task in self.costs[controller]:
                 cell = self.cells[name, task_name]
                 costs = self._cost_figures(controller, task, lowest)
-                figures[name] = costs | _run_figures(cell)
+                run_figures = _run_figures(cell)
+                limits = self.tasks[task].limits
+                beyond = exceeded(limits, run_figures["metrics"])
+                figures[name] = costs | run_figures | {"exceeded": beyond}
         return figures
 
     def _lowest(self, task: int) -> float:
@@ -150,8 +154,9 @@ class _Costs:
     def ranking(self, by_task: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Return the controllers, the best first.
 
-        Those that could run all tasks come first; they are ordered by score if every
-        task has references, otherwise by relative cost.
+        Those that could run all tasks come first, and of them those within all limits;
+        they are ordered by score if every task has references, otherwise by relative
+        cost.
         """
         elsewhere = [on for on in SETS if on != "ship" and self.tasks_on(on)]
         ranked = []
@@ -181,6 +186,7 @@ class _Costs:
             "tasks": len(tasks),
             "lost": sum(cell["lost"] for cell in cells),
             "failed": sum(cell["failed"] for cell in cells),
+            "exceeding": sum(bool(cell["exceeded"]) for cell in cells),
         }
 
     def _score(self, controller: int, tasks: Sequence[int]) -> ConfidenceInterval:
@@ -296,11 +302,12 @@ def _metrics(cell: Cell) -> dict[str, dict[str, float | None]]:
 
 
 def _sort_key(total: Mapping[str, Any], by_score: bool) -> tuple[float, ...]:
-    """Return what controllers are sorted by: tasks, score, relative cost."""
+    """Return what controllers are sorted by: tasks, limits, score, relative cost."""
     score = total["score"]["value"]
     if score is None or not by_score:
         score = -np.inf
     cost = total["relative_cost"]
     if cost is None:
         cost = np.inf
-    return (-total["tasks"], -score, cost)
+    is_beyond = total["exceeding"] > 0
+    return (-total["tasks"], is_beyond, -score, cost)

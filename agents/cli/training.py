@@ -139,7 +139,7 @@ def train_command(
         int | None, Option(min=1, help="Threads for torch and the ships; default: 1.")
     ] = None,
     max_seconds: Annotated[
-        float | None, Option(min=0.0, help="Time limit; --resume continues.")
+        float | None, Option(min=0.0, help="Time of learning; --resume continues.")
     ] = None,
     resume: Annotated[
         bool, Option("--resume", help="Continue the run in the folder.")

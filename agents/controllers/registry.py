@@ -23,6 +23,7 @@ _HOMES = {
     "ilos": "agents.controllers.los_autopilot:IntegralLineOfSight",
     "alos": "agents.controllers.los_autopilot:AdaptiveLineOfSight",
     "wheel-over": "agents.controllers.wheel_over:WheelOver",
+    "preview-lq": "agents.controllers.preview_lq:PreviewLQ",
     "mpc": "agents.controllers.mpc:MPC",
 }
 BUILT_IN = tuple(_HOMES)

@@ -39,7 +39,7 @@ class CourseChange(NamedTuple):
 def recorded_for_metrics(task: Task) -> tuple[str, ...]:
     """Names of what a rollout has to record for `metrics`."""
     # Physical states that `metrics` needs, beside all of `info`.
-    states = ("psi", "u", "v", "n", "delta", "set_point")
+    states = ("psi", "u", "v", "n", "delta", "phi", "set_point")
     return (*states, *task.info_names)
 
 
@@ -91,6 +91,8 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         **undefined,
         **own,
         "fuel": fuel_per_distance(run),
+        "heel_deg": largest_heel(run),
+        "speed_lost_percent": speed_lost(run),
         "extrapolating": mean(run, "extrapolating"),
         "terminated": lost.astype(np.float64),
         "failed": run.failed.astype(np.float64),
@@ -284,6 +286,21 @@ def fuel_per_distance(run: Rollout) -> Floats:
     made_good = np.maximum(distance_made_good(run), 0.0)
     in_calm_water = made_good / model.particulars["speed"]
     return ratio(spent, in_calm_water)
+
+
+def largest_heel(run: Rollout) -> Floats:
+    """Largest angle of heel to either side, deg; NaN of a ship without roll."""
+    if "phi" not in run.states:
+        return np.full(len(run.seeds), np.nan)
+    heel = np.abs(during(run, "phi"))
+    return np.asarray(np.degrees(heel.max(axis=0, initial=0.0)))
+
+
+def speed_lost(run: Rollout) -> Floats:
+    """Service speed less the mean speed through the water, % of service speed."""
+    mean_speed = ratio(total(during(run, "u")), run.steps)
+    lost = 1.0 - mean_speed / run.model.particulars["speed"]
+    return np.asarray(100.0 * lost)
 
 
 def distance_made_good(run: Rollout) -> Floats:

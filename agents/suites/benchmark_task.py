@@ -67,6 +67,8 @@ class BenchmarkTask:
         Name of the task that controllers are made for, if another.
     suite : str
         `Suite.source` of its suite.
+    limits : mapping of str to float
+        Largest values of figures (`agents.suites.limits`).
     """
 
     name: str
@@ -79,6 +81,7 @@ class BenchmarkTask:
     on: str = "ship"
     design_name: str = ""
     suite: str = ""
+    limits: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.environment.endswith(".py"):

@@ -20,6 +20,7 @@ from agents.suites.benchmark_task import (
     BenchmarkTask,
 )
 from agents.suites.environments import read_environment
+from agents.suites.limits import read_limits
 from shipgym import InputError, Weather
 from shipgym.checks import (
     check_choice,
@@ -47,7 +48,16 @@ __all__ = [
 
 DEFAULT_SUITE = "shipgym-v1"
 FOLDER = Path(__file__).parent
-FIELDS = ("environment", "model", "why", "sea", "options", "ship", "far")
+FIELDS = (
+    "environment",
+    "model",
+    "why",
+    "sea",
+    "options",
+    "ship",
+    "far",
+    "limits",
+)
 
 
 @dataclass(frozen=True)
@@ -247,6 +257,7 @@ class _Reader:
                 true_ship=self.absolute(ship),
                 far=far,
                 design_name=name,
+                limits=read_limits(table.get("limits", {}), f"{where}.limits"),
             )
 
     def own_options(self, table: Mapping[str, Any], where: str) -> dict[str, Any]:

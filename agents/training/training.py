@@ -127,7 +127,8 @@ def train(
     resume : bool
         Continue the run in the folder.
     max_seconds : float, optional
-        Time after which the training stops at the next boundary; it can be resumed.
+        Time of learning, without that of setting up and of evaluations, after which
+        the training stops at the next boundary; it can be resumed.
     on_progress : callable, optional
         Called with the progress at each boundary. An exception of it ends the training.
     command : str, optional
@@ -181,6 +182,9 @@ class TrainingRun(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is n
         self.evaluation_episodes = evaluation_episodes
         self.checkpoint_seconds = checkpoint_seconds
         self.max_seconds: float | None = None
+        self.learning_since = self.started
+        #: Time spent on evaluations since then, s.
+        self.evaluating = 0.0
         self.on_progress: Callable[[TrainingProgress], None] | None = None
 
         base = design_base(plan.settings.base, plan.task)
@@ -202,6 +206,8 @@ class TrainingRun(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is n
         """Learn to the end, or until the time is up."""
         self.max_seconds = max_seconds
         self.on_progress = on_progress
+        self.learning_since = time.monotonic()
+        self.evaluating = 0.0
         self.agent.set_logger(_logger(self.folder))
         left = self.plan.settings.total_steps - self.agent.num_timesteps
         try:
@@ -268,8 +274,8 @@ class TrainingRun(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is n
             self.keep()
         set_deviation(self.agent, settings)
 
-        spent = time.monotonic() - self.started
-        if self.max_seconds is not None and spent >= self.max_seconds:
+        learning = time.monotonic() - self.learning_since - self.evaluating
+        if self.max_seconds is not None and learning >= self.max_seconds:
             self.keep()
             raise _TimeIsUpError
 
@@ -291,7 +297,9 @@ class TrainingRun(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is n
             if not bool(weight.isfinite().all()):
                 raise self._diverged()
         policy = LearnedPolicy.from_sb3(self.agent)
+        began = time.monotonic()
         cost = self.held_out.cost(policy)
+        self.evaluating += time.monotonic() - began
         returns = [episode["r"] for episode in self.agent.ep_info_buffer]
         mean_return = sum(returns) / len(returns) if returns else None
         is_best = self.evaluations.add(

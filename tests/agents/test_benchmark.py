@@ -357,9 +357,7 @@ def test_episodes_without_a_figure_are_not_counted():
         ("one-for-all", "expected one of 'pid'.*got 'one-for-all'"),
         ("pid,pid", "got 'pid' twice"),
         ("x=nobody.json", "got 'nobody.json'"),
-        ("no_such_module:make", "got 'no_such_module:make', which cannot be imported"),
-        ("json:no_such_thing", "got 'json:no_such_thing', which cannot be imported"),
-        ("math:pi", r"'math:pi': expected a controller.* got 3.14\d*"),
+        ("no_such_module:make", "whose module 'no_such_module' is not found"),
         ({"a": 3}, "'a': expected a controller.* got 3"),
         ({"a": [LQ.from_model(MARINER), 3]}, "'a': expected a controller.* got 3"),
         ([], "controllers: expected at least one, got none"),
@@ -372,6 +370,18 @@ def test_episodes_without_a_figure_are_not_counted():
 def test_wrong_controllers_are_refused(given, said):
     with pytest.raises(InputError, match=said):
         read_entries(given)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("json:no_such_thing", "got 'json:no_such_thing', which cannot be imported"),
+        ("math:pi", r"'math:pi': expected a controller.* got 3.14\d*"),
+    ],
+)
+def test_code_that_makes_no_controller_is_refused_when_it_is_run(given, said):
+    with pytest.raises(InputError, match=said):
+        benchmark(given, tasks="sharp-turns", episodes=1)
 
 
 def test_controllers_are_given_as_texts_functions_objects_and_by_name():
@@ -818,17 +828,6 @@ def test_a_folder_takes_the_results_of_one_suite_only(copy, tmp_path):
 
 # --- the command
 
-INTERRUPTED_PILOT = """
-from agents import PID
-
-INTERRUPTED = True
-
-def pilot(task):
-    if INTERRUPTED:
-        raise KeyboardInterrupt
-    return PID.from_model(task.ship)
-"""
-
 
 def test_the_command_ranks_and_writes(suite, tmp_path):
     out = tmp_path / "r"
@@ -846,22 +845,24 @@ def test_the_command_ranks_and_writes(suite, tmp_path):
 
 
 def test_the_command_goes_on_where_it_was_interrupted(suite, tmp_path, monkeypatch):
-    module = tmp_path / "interrupted_pilot.py"
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
     monkeypatch.chdir(tmp_path)
-    words = ["--controllers", "lq,mine=interrupted_pilot:pilot", "--suite", suite]
+    words = ["--controllers", "lq,pid", "--suite", suite]
     words += ["--tasks", "calm", "--episodes", 2, "--workers", 1, "--out", "r"]
-    module.write_text(INTERRUPTED_PILOT)
-    answer = shipgym(*words)
+    with monkeypatch.context() as patched:
+        patched.setattr(PID, "from_model", interrupted)
+        answer = shipgym(*words)
     assert answer.exit_code == 130
     assert "what was done is kept in r: continue with --resume" in answer.stderr
 
     monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
-    sys.modules["interrupted_pilot"].INTERRUPTED = False
     answer = shipgym(*words, "--resume", "--page")
     assert answer.exit_code == 0
     assert "warning: there is no index.html: plotly" in answer.stderr
     assert "warning: 2 of 100 episodes: for a quick look" in answer.stderr
-    assert set(load_results("r").ranking) == {"lq", "mine"}
+    assert set(load_results("r").ranking) == {"lq", "pid"}
 
 
 def test_bad_input_is_one_message_and_nothing_is_written(suite, tmp_path):

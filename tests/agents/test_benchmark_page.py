@@ -186,9 +186,12 @@ def test_rare_metrics_are_shown_only_where_they_are_not_zero_throughout():
     def heads(**means):
         metrics = {name: {"mean": mean, "p95": mean} for name, mean in means.items()}
         cell = {"cost": {"value": 1.0}, "metrics": metrics, "lost": 0, "failed": 0}
+        cell["exceeded"] = {}
         cells = {"pid": cell | {"microseconds_per_action": None}}
         ranking = [{"name": "pid"}]
-        result = BenchmarkResult({"tasks": {"calm": cells}, "ranking": ranking}, {})
+        suite = {"tasks": {"calm": {"limits": {}}}}
+        summary = {"tasks": {"calm": cells}, "ranking": ranking, "suite": suite}
+        result = BenchmarkResult(summary, {})
         return {head.text for head in metrics_table(result, "calm", "x").heads}
 
     assert "outside model" in heads(extrapolating=0.1)

@@ -10,6 +10,7 @@ import pytest
 
 import shipgym
 from agents.suites.environments import read_environment
+from agents.suites.limits import exceeded
 from agents.suites.reference import best_costs, best_known, load_tuned, reference_costs
 from agents.suites.suite import (
     BenchmarkTask,
@@ -346,3 +347,43 @@ def test_tuned_settings_are_tables_by_task(tmp_path):
             load_tuned(str(write_suite(tmp_path, tuned=content)))
     tasks = {"calm": {"lq": {"cost": 1.0}}}
     assert load_tuned(str(write_suite(tmp_path, tuned={"tasks": tasks}))) == tasks
+
+
+def test_limits_are_read_and_what_exceeds_them_is_named():
+    text = """
+name = "own-v1"
+[tasks.calm]
+environment = "path-following"
+model = "mariner"
+[tasks.calm.limits]
+heel_deg = 10.0
+rudder_reversals_min = 2.0
+"""
+    task = parse_suite(text, "own").task("calm")
+    assert task.limits == {"heel_deg": 10.0, "rudder_reversals_min": 2.0}
+    assert BenchmarkTask.from_dict(task.to_dict()).limits == task.limits
+    statistics = {"mean": 3.0, "median": 0.0, "p95": 9.0}
+    metrics = {"heel_deg": statistics, "rudder_reversals_min": statistics}
+    assert exceeded(task.limits, metrics) == {"rudder_reversals_min": 3.0}
+    assert exceeded(task.limits, {}) == {}
+
+
+@pytest.mark.parametrize(
+    ("limits", "said"),
+    [
+        ("heel = 3.0", "heel_deg"),
+        ("heel_deg = -1.0", "heel_deg: expected a number"),
+        ("heel_deg = true", "heel_deg: expected a number"),
+    ],
+)
+def test_limits_of_unknown_figures_or_values_are_refused(limits, said):
+    text = f"""
+name = "own-v1"
+[tasks.calm]
+environment = "path-following"
+model = "mariner"
+[tasks.calm.limits]
+{limits}
+"""
+    with pytest.raises(InputError, match=rf"own: tasks\.calm\.limits.*{said}"):
+        parse_suite(text, "own")

@@ -1,0 +1,286 @@
+"""Search of a controller's settings on a task, by CMA-ES on the design model.
+
+Every controller has the same budget of processor time and episodes, whose seeds are
+never scored. The search begins with the design's own settings; a generation of
+candidates steers side by side in one batch of ships. What is returned is the best, on
+episodes that the search has not seen, of the design, the best candidate and the mean
+of the search: so it is no worse there than the design. Settings whose loop is unstable
+or has too little margin are refused untried.
+
+Source: Hansen 2016, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772 (the
+package cma).
+"""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from agents.controllers.controller import Controller
+from agents.controllers.designs import design
+from agents.controllers.side_by_side import side_by_side
+from agents.rollouts.rollout import episode_costs
+from agents.suites.suite import BenchmarkTask
+from agents.training.controller_space import Setting, search_space
+from shipgym.arrays import Floats, Integers
+from shipgym.checks import check_number, check_whole
+from shipgym.envs.engine import Engine
+from shipgym.errors import InputError
+from shipgym.extras import library
+
+FIRST_SEED = 500_000  # of the episodes of a search; scored ones begin at 1,000,000
+REFUSED = 1e12  # cost of settings with which no controller can be designed
+
+
+@dataclass(frozen=True)
+class SearchBudget:
+    """What a search may use; it ends when either is spent.
+
+    Attributes
+    ----------
+    seconds : float
+        Processor time.
+    evaluations : int
+        Candidates. With enough time they alone decide, and the result is the same on
+        every machine.
+    episodes : int
+        Episodes that each candidate is tried on.
+    """
+
+    seconds: float = 35.0
+    evaluations: int = 100_000
+    episodes: int = 24
+
+    def __post_init__(self) -> None:
+        check_number(self.seconds, "seconds", above=0.0)
+        check_whole(self.evaluations, "evaluations", at_least=1)
+        check_whole(self.episodes, "episodes", at_least=1)
+
+
+@dataclass(frozen=True)
+class FoundSettings:
+    """Settings that a search found.
+
+    Attributes
+    ----------
+    settings : dict of str to float
+        Keywords of `from_model`, and of the LQ that is led after `lq_`.
+    cost, start_cost : float
+        Mean over episodes that the search has not seen, of these settings and of the
+        design's own.
+    evaluations, episodes : int
+        Candidates that were tried, and on how many episodes each.
+    seconds : float
+        Processor time of the search.
+    """
+
+    settings: dict[str, float]
+    cost: float
+    start_cost: float
+    evaluations: int
+    episodes: int
+    seconds: float
+
+
+#: Called with processor seconds spent, the whole budget of them, and the least cost.
+OnProgress = Callable[[float, float, float], None]
+#: Mean cost of each of some settings, shape (n,); `REFUSED` of those without a design.
+Costs = Callable[[Sequence[Mapping[str, float]]], Floats]
+
+
+class SearchResult(NamedTuple):
+    """Where a search ended, as settings."""
+
+    best: dict[str, float]  # the candidate of least cost
+    mean: dict[str, float]  # of the distribution of the last generation
+    evaluations: int
+
+
+def tune_controller(
+    kind: str,
+    task: BenchmarkTask,
+    budget: SearchBudget | None = None,
+    *,
+    seed: int = 0,
+    on_progress: OnProgress | None = None,
+) -> FoundSettings:
+    """Search the settings of a controller on the model of a task.
+
+    Raises InputError for an unknown kind, guidance without a path, and if no design
+    with enough margin is found.
+
+    Parameters
+    ----------
+    kind : str
+        As registered, with settings to search (`search_space`).
+    task : BenchmarkTask
+        Its design task is what is sailed.
+    budget : SearchBudget, optional
+    seed : int
+        Of the candidates drawn.
+    on_progress : callable, optional
+        Called after each generation.
+    """
+    spent = time.process_time()
+    budget = budget or SearchBudget()
+    space = search_space(kind, task)
+    seen = FIRST_SEED + np.arange(budget.episodes)
+    episodes = CandidateEpisodes(kind, task.design_task, seen)
+    found = search(episodes.costs, space, budget, seed=seed, on_progress=on_progress)
+
+    start = {setting.name: setting.start for setting in space}
+    finalists = [start, found.best, found.mean]
+    costs = unseen_costs(kind, task, finalists, budget.episodes)
+    winner = int(np.argmin(costs))
+    if costs[winner] >= REFUSED:
+        raise InputError(
+            f"controller: expected a design of '{kind}' with enough margin for the"
+            f" model of task '{task.name}', found none"
+        )
+    return FoundSettings(
+        settings=finalists[winner],
+        cost=float(costs[winner]),
+        start_cost=float(costs[0]),
+        evaluations=found.evaluations,
+        episodes=budget.episodes,
+        seconds=time.process_time() - spent,
+    )
+
+
+def unseen_costs(
+    kind: str,
+    task: BenchmarkTask,
+    candidates: Sequence[Mapping[str, float]],
+    searched_episodes: int,
+) -> Floats:
+    """Mean cost of settings on twice the episodes of a search, which it has not seen.
+
+    The shape is (n_candidates,).
+    """
+    first = FIRST_SEED + searched_episodes
+    seeds = first + np.arange(2 * searched_episodes)
+    return CandidateEpisodes(kind, task.design_task, seeds).costs(candidates)
+
+
+def search(
+    costs: Costs,
+    space: Sequence[Setting],
+    budget: SearchBudget,
+    *,
+    seed: int = 0,
+    on_progress: OnProgress | None = None,
+) -> SearchResult:
+    """Search for the least cost by CMA-ES, within a budget.
+
+    The same arguments give the same result where the number of evaluations ends it.
+
+    Parameters
+    ----------
+    costs : callable
+        Mean cost of each of some settings, shape (n,).
+    space : sequence of Setting
+    budget : SearchBudget
+    seed : int
+    on_progress : callable, optional
+    """
+    cma: Any = library("cma", "tune", "searching settings needs it")
+    began = time.process_time()
+    first_step = 0.5  # of the steps of the settings
+    options = {"seed": 1 + seed, "verbose": -9, "popsize": _generation(space)}
+    strategy = cma.CMAEvolutionStrategy(np.zeros(len(space)), first_step, options)
+    best = {setting.name: setting.start for setting in space}
+    least = np.inf
+    evaluations = 0
+
+    while not strategy.stop():
+        spent = time.process_time() - began
+        left = budget.evaluations - evaluations
+        if spent >= budget.seconds or left < strategy.popsize:
+            break
+        points = strategy.ask()
+        candidates = [settings_at(point, space) for point in points]
+        found = costs(candidates)
+        strategy.tell(points, found.tolist())
+
+        evaluations += len(points)
+        first = int(np.argmin(found))
+        if found[first] < least:
+            least = float(found[first])
+            best = candidates[first]
+        if on_progress is not None:
+            on_progress(spent, budget.seconds, least)
+    mean = settings_at(strategy.result.xfavorite, space)
+    return SearchResult(best, mean, evaluations)
+
+
+def _generation(space: Sequence[Setting]) -> int:
+    """Candidates in a generation: half more than the rule of Hansen 2016, eq. 48."""
+    by_rule = 4 + 3.0 * np.log(len(space))
+    return int(1.5 * by_rule)
+
+
+def settings_at(point: Floats, space: Sequence[Setting]) -> dict[str, float]:
+    """Settings at a point of the search, whose origin is the design."""
+    settings = {}
+    for setting, z in zip(space, point, strict=True):
+        settings[setting.name] = setting.at(float(z))
+    return settings
+
+
+class CandidateEpisodes:
+    """Episodes of a task that candidates are tried on, with a design for its model."""
+
+    def __init__(self, kind: str, task: BenchmarkTask, seeds: Integers) -> None:
+        self.kind = kind
+        self.task = task
+        self.seeds = seeds
+        self._engines: dict[int, Engine] = {}
+
+    def costs(self, candidates: Sequence[Mapping[str, float]]) -> Floats:
+        """Mean cost of each candidate, shape (n,)."""
+        designs = [self.designed(settings) for settings in candidates]
+        known = [number for number, made in enumerate(designs) if made is not None]
+        found = np.full(len(candidates), REFUSED)
+        found[known] = self._steered([designs[number] for number in known])
+        return np.where(np.isfinite(found), found, REFUSED)
+
+    def designed(self, settings: Mapping[str, float]) -> Controller | None:
+        """Controller with these settings; None without enough margin."""
+        try:
+            made = design(self.kind, self.task, settings)
+        except InputError:
+            return None
+        return made if has_margin(made) else None
+
+    def _steered(self, controllers: Sequence[Any]) -> Floats:
+        """Mean costs of controllers, side by side where their kind can be."""
+        if not controllers:
+            return np.zeros(0)
+        n_episodes = len(self.seeds)
+        if type(controllers[0]).is_closed_form():
+            n = len(controllers)
+            seeds = np.tile(self.seeds, n)
+            batch = side_by_side(controllers, n_episodes)
+            costs = episode_costs(batch, self._engine(n * n_episodes), seeds)
+            return np.asarray(costs.reshape(n, n_episodes).mean(axis=1))
+
+        engine = self._engine(n_episodes)
+        means = []
+        for controller in controllers:
+            means.append(episode_costs(controller, engine, self.seeds).mean())
+        return np.array(means)
+
+    def _engine(self, n_ships: int) -> Engine:
+        if n_ships not in self._engines:
+            self._engines[n_ships] = self.task.engine(n_ships)
+        return self._engines[n_ships]
+
+
+def has_margin(controller: Controller) -> bool:
+    """True if a loop has a gain margin of 1.5 and a phase margin of 20 degrees."""
+    least_gain_margin, least_phase_margin_deg = 1.5, 20.0
+    margins = controller.margins
+    has_gain_margin = margins.gain_margin >= least_gain_margin
+    return has_gain_margin and margins.phase_margin_deg >= least_phase_margin_deg

@@ -1,0 +1,159 @@
+"""Settings of controllers that are searched: where each begins, and how far it goes."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from agents.controllers.designs import INNER, design, no_path
+from agents.controllers.los_autopilot import CRITICAL
+from agents.controllers.wheel_over import own_lead
+from agents.suites.suite import BenchmarkTask
+from shipgym.checks import check_choice
+from shipgym.tasks.scales import RUDDER_WEIGHT
+
+
+class Setting(NamedTuple):
+    """A setting that is searched.
+
+    Attributes
+    ----------
+    name : str
+        Keyword of `from_model`.
+    start : float
+        The design's own value, or a small one in place of 0 where it is a factor.
+    step : float
+        Change for a step of 1: in the setting, or in its logarithm.
+    low, high : float
+        Bounds.
+    is_factor : bool
+        True to search the logarithm.
+    """
+
+    name: str
+    start: float
+    step: float
+    low: float
+    high: float
+    is_factor: bool = False
+
+    def at(self, z: float) -> float:
+        """Value z steps from the start, within the bounds."""
+        if self.is_factor:
+            value = self.start * np.exp(self.step * z)
+        else:
+            value = self.start + self.step * z
+        return float(np.clip(value, self.low, self.high))
+
+
+def factor(name: str, start: float, step: float, reach: float = 100.0) -> Setting:
+    """Setting whose logarithm is searched, up to a factor of `reach` either way."""
+    return Setting(
+        name,
+        start,
+        step,
+        low=start / reach,
+        high=start * reach,
+        is_factor=True,
+    )
+
+
+def search_space(kind: str, task: BenchmarkTask) -> list[Setting]:
+    """Settings of a controller that are searched, beginning with its design.
+
+    Raises InputError for a kind that has none, and for guidance without a path.
+    """
+    spaces = {
+        "pid": pid_space,
+        "lq": lq_space,
+        "lqg": lqg_space,
+        "los": los_space,
+        "ilos": ilos_space,
+        "alos": ilos_space,
+        "wheel-over": wheel_over_space,
+        "preview-lq": preview_space,
+        "mpc": mpc_space,
+    }
+    check_choice(kind, spaces, "controller")
+    guides = ("los", "ilos", "alos", "wheel-over", "preview-lq", "mpc")
+    if kind not in guides:
+        return spaces[kind](task)
+    if not task.task.follows_path:
+        raise no_path(kind, task)
+    of_autopilot = []
+    for setting in lq_space(task):
+        of_autopilot.append(setting._replace(name=INNER + setting.name))
+    return [*spaces[kind](task), *of_autopilot]
+
+
+def pid_space(task: BenchmarkTask) -> list[Setting]:
+    """Bandwidth, damping and time of the integral."""
+    designed = design("pid", task).design
+    return [
+        factor("frequency", designed["frequency"], 0.5),
+        factor("damping", designed["damping"], 0.5),
+        factor("integral_lengths", 20.0, 1.0),
+    ]
+
+
+def lq_space(task: BenchmarkTask) -> list[Setting]:
+    """Weights of the rudder and of its rate, and time of the integral."""
+    designed = design("lq", task).design
+    return [
+        factor("rudder_weight", RUDDER_WEIGHT, 0.7),
+        factor("rate_weight_s2", designed["rate_weight_s2"], 1.0),
+        factor("integral_lengths", 20.0, 1.0),
+    ]
+
+
+def lqg_space(task: BenchmarkTask) -> list[Setting]:
+    """Those of LQ, noise and disturbance, and the period of the waves there are."""
+    space = [
+        *lq_space(task),
+        factor("noise", 1.0, 1.0),
+        factor("disturbance_deg", 2.0, 1.0),
+    ]
+    waves = task.task.weather.waves
+    if waves is not None:
+        space.append(factor("wave_period", waves.peak_period, 0.3, reach=3.0))
+    return space
+
+
+def los_space(task: BenchmarkTask) -> list[Setting]:
+    """Lookahead."""
+    return [factor("lookahead_lengths", task.task.lookahead, 0.5)]
+
+
+def ilos_space(task: BenchmarkTask) -> list[Setting]:
+    """Lookahead and time of the integral."""
+    integral_lengths = CRITICAL * task.task.lookahead
+    return [*los_space(task), factor("integral_lengths", integral_lengths, 0.5)]
+
+
+def wheel_over_space(task: BenchmarkTask) -> list[Setting]:
+    """Lookahead, reach along the turns, and share of the drift that is countered."""
+    return [
+        *los_space(task),
+        factor("reach_lengths", own_lead(task.ship, None), 0.4),
+        Setting("crab_share", 1.0, 0.2, low=0.0, high=2.0),
+    ]
+
+
+def mpc_space(task: BenchmarkTask) -> list[Setting]:
+    """Those of wheel-over and the scatter of the plans."""
+    return [*wheel_over_space(task), factor("deviation_deg", 3.0, 0.5)]
+
+
+def preview_space(task: BenchmarkTask) -> list[Setting]:
+    """All settings of `PreviewLQ.from_model`."""
+    return [
+        *los_space(task),
+        factor("lead_lengths", own_lead(task.ship, None), 0.4),
+        factor("window_lengths", 0.5, 0.7),
+        Setting("inside_lengths", 0.0, 0.2, low=-5.0, high=5.0),
+        Setting("feed_forward_lengths", 0.0, 0.3, low=-10.0, high=10.0),
+        Setting("crab_share", 1.0, 0.2, low=0.0, high=2.0),
+        factor("crab_time", 0.05, 1.0),
+        factor("yaw_time", 0.01, 1.2),
+        factor("dead_band_deg", 0.05, 1.2),
+        Setting("speed_power", 0.0, 0.5, low=-2.0, high=4.0),
+    ]

@@ -1,0 +1,158 @@
+"""Search of settings by CMA-ES: it finds a known optimum within its budget, is no worse
+than the design, and refuses loops with little margin."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents import PID
+from agents.controllers.designs import CLASSICAL, design, design_base, tuned
+from agents.suites.reference import load_tuned
+from agents.suites.suite import BenchmarkTask, load_suite
+from agents.training.controller_search import (
+    SearchBudget,
+    has_margin,
+    search,
+    settings_at,
+    tune_controller,
+)
+from agents.training.controller_space import Setting, factor, search_space
+from shipgym.errors import InputError
+from shipgym.files import write_json
+
+CALM = BenchmarkTask("calm", "course-keeping", "mariner", "", {"episode_steps": 60})
+NOISY = BenchmarkTask(
+    "noisy", "course-keeping", "mariner", "", {"episode_steps": 60, "noise": 5.0}
+)
+PATH = BenchmarkTask("path", "path-following", "mariner", "", {"episode_steps": 60})
+BOWL = [factor("a", 1.0, 0.5), Setting("b", 0.0, 0.3, low=-1.0, high=1.0)]
+
+
+def bowl(candidates: Sequence[Mapping[str, float]]) -> np.ndarray:
+    a = np.array([candidate["a"] for candidate in candidates])
+    b = np.array([candidate["b"] for candidate in candidates])
+    return 1.0 + np.log(a / 3.0) ** 2 + (b - 0.4) ** 2
+
+
+def test_it_finds_the_bottom_of_a_bowl_within_its_budget() -> None:
+    asked: list[int] = []
+
+    def counted(candidates: Sequence[Mapping[str, float]]) -> np.ndarray:
+        asked.append(len(candidates))
+        return bowl(candidates)
+
+    found = search(counted, BOWL, SearchBudget(evaluations=300))
+    assert found.best["a"] == pytest.approx(3.0, rel=0.05)
+    assert found.mean["b"] == pytest.approx(0.4, abs=0.05)
+    assert sum(asked) == found.evaluations <= 300
+    assert search(bowl, BOWL, SearchBudget(evaluations=300)) == found
+
+
+def test_settings_stay_within_their_bounds() -> None:
+    far = settings_at(np.array([100.0, -100.0]), BOWL)
+    assert far == {"a": pytest.approx(100.0), "b": -1.0}
+    assert settings_at(np.zeros(2), BOWL) == {"a": 1.0, "b": 0.0}
+
+
+def test_a_search_is_reproducible_and_not_worse_than_the_design() -> None:
+    budget = SearchBudget(evaluations=30, episodes=4)
+    first, second = (tune_controller("pid", NOISY, budget) for _ in range(2))
+    assert replace(first, seconds=0.0) == replace(second, seconds=0.0)
+    assert first.cost <= first.start_cost
+    assert has_margin(design("pid", NOISY, first.settings))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("seconds", 0.0), ("evaluations", 0), ("episodes", 0)]
+)
+def test_a_budget_of_nothing_is_refused(name: str, value: float) -> None:
+    with pytest.raises(InputError, match=rf"^{name}: expected"):
+        SearchBudget(**{name: value})  # type: ignore[arg-type]
+
+
+def test_a_loop_with_little_margin_is_refused() -> None:
+    plain = PID.from_model(CALM.ship)
+    assert has_margin(plain)
+    for few in ({"phase_margin_deg": 10.0}, {"gain_margin": 1.2}):
+        assert not has_margin(replace(plain, margins=replace(plain.margins, **few)))
+
+
+@pytest.mark.parametrize("kind", CLASSICAL)
+def test_every_search_starts_at_the_design(kind: str) -> None:
+    """Where a factor cannot be 0, from a small one."""
+    start = {setting.name: setting.start for setting in search_space(kind, PATH)}
+    designed, plain = design(kind, PATH, start), design(kind, PATH, {})
+    loose = {"rel": 0.6, "abs": 1e-3} if kind == "preview-lq" else {"rel": 1e-6}
+    for name, gain in plain.gains.items():
+        assert designed.gains[name] == pytest.approx(gain, **loose), name
+
+
+def test_guidance_leads_the_lq_that_was_tuned_and_needs_a_path() -> None:
+    led = design("los", PATH, {"lookahead_lengths": 3.0, "lq_integral_lengths": 50.0})
+    inner = design("lq", PATH, {"integral_lengths": 50.0})
+    assert getattr(led, "autopilot").gains == inner.gains  # noqa: B009
+    for ask in (search_space, design):
+        with pytest.raises(InputError, match="expected a path for 'los'"):
+            ask("los", CALM)
+
+
+def test_settings_found_are_read_from_the_file_of_the_suite(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "tuned.json"
+    monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: path)
+    found = {
+        "pid": {"settings": {"damping": 1.0}, "cost": 2.0},
+        "lq": {"settings": {}, "cost": 3.0},
+    }
+    write_json({"tasks": {"calm": found}}, path)
+    assert tuned("best", CALM, "any").kind == "pid"
+    assert tuned("pid", CALM, "any").design["damping"] == 1.0
+    with pytest.raises(
+        InputError, match="for task 'calm' of suite 'any', 'pid', 'lq', got 'lqg'"
+    ):
+        tuned("lqg", CALM, "any")
+    with pytest.raises(
+        InputError, match=r"task of suite 'any' with tuned controllers, got 'noisy'"
+    ):
+        tuned("best", NOISY, "any")
+
+
+def test_policies_are_not_added_to_slow_controllers_unless_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "tuned.json"
+    monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: path)
+    costs = {"mpc": 1.0, "lq": 3.0, "pid": 4.0}
+    found = {kind: {"settings": {}, "cost": cost} for kind, cost in costs.items()}
+    write_json({"tasks": {"calm": found}}, path)
+    base = design_base("tuned", replace(CALM, suite="shipgym-v1"))
+    assert getattr(base, "kind", None) == "lq"
+    del found["lq"], found["pid"]
+    write_json({"tasks": {"calm": found}}, path)
+    with pytest.raises(
+        InputError, match="for task 'calm' of suite 'any', 'mpc', got 'base'"
+    ):
+        tuned("base", CALM, "any")
+
+
+def test_the_suite_s_settings_make_sane_controllers_for_every_task() -> None:
+    suite, found = load_suite(), load_tuned("shipgym-v1")
+    tasks = [task.design_task for task in suite.tasks if task.on == "ship"]
+    assert set(found) == {task.name for task in tasks}
+    for task in tasks:
+        for kind in ("base", "best"):
+            assert has_margin(tuned(kind, task, suite.name))
+        assert set(found[task.name]) == {
+            "lq",
+            "ilos",
+            "wheel-over",
+            "preview-lq",
+            "mpc",
+        }
+        assert all(
+            one["cost"] <= one["start_cost"] for one in found[task.name].values()
+        )

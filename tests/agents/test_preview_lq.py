@@ -1,0 +1,98 @@
+"""LQ path tracking with preview: the path is read ahead, averaged, and turned with."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agents import LQ, PID, PreviewLQ, WheelOver, check_controller, load_agent
+from agents.controllers.guided import bend
+from agents.controllers.law import Turns
+from agents.controllers.preview_lq import summed_bend
+from agents.controllers.side_by_side import side_by_side
+from agents.rollouts.rollout import episode_costs
+from shipgym.envs.engine import Engine
+from shipgym.errors import InputError
+from shipgym.tasks.task import path_following_task
+from tests.agents.mariners import MARINER
+
+PATH = path_following_task(max_turn_deg=90.0, leg_lengths=[12.0, 16.0])
+
+metres = st.floats(0.0, 3000.0)
+angles = st.floats(-1.5, 1.5)
+
+
+@given(metres, metres, angles, metres, angles, st.floats(200.0, 900.0))
+def test_the_mean_course_is_the_integral_of_the_course(
+    distance, first, first_angle, second, second_angle, radius
+):
+    turns = Turns(first, first_angle, first + second, second_angle)
+    points = np.linspace(0.0, distance, 4001)
+    courses = [bend(point, turns, radius) for point in points]
+    summed = summed_bend(distance, turns, radius)
+    assert summed == pytest.approx(np.trapezoid(courses, points), abs=1e-3 * 3000.0)
+
+
+def test_with_nothing_added_it_is_wheel_over():
+    narrow = PreviewLQ.from_model(MARINER, task=PATH, window_lengths=1e-4)
+    seeds = np.arange(4)
+    engine = Engine(MARINER, 4, PATH)
+    ours, wheel_over = (
+        episode_costs(guide, engine, seeds)
+        for guide in (narrow, WheelOver.from_model(MARINER, task=PATH))
+    )
+    np.testing.assert_allclose(ours, wheel_over, rtol=1e-3)
+
+
+def test_designs_side_by_side_steer_as_each_alone():
+    designs = [
+        PreviewLQ.from_model(MARINER, task=PATH, window_lengths=1.0, yaw_time=0.1),
+        PreviewLQ.from_model(
+            MARINER,
+            task=PATH,
+            autopilot=LQ.from_model(MARINER, rudder_weight=0.5),
+            inside_lengths=0.3,
+            feed_forward_lengths=0.2,
+            crab_time=0.2,
+            dead_band_deg=0.5,
+            speed_power=1.0,
+        ),
+    ]
+    together = episode_costs(
+        side_by_side(designs, 3), Engine(MARINER, 6, PATH), np.tile(np.arange(3), 2)
+    )
+    alone = [
+        episode_costs(one, Engine(MARINER, 3, PATH), np.arange(3)) for one in designs
+    ]
+    np.testing.assert_array_equal(together, np.concatenate(alone))
+
+
+def test_it_is_a_controller_and_a_file(tmp_path):
+    guide = PreviewLQ.from_model(MARINER, task=PATH, dead_band_deg=0.2)
+    check_controller(guide, MARINER, PATH, n_steps=20)
+    guide.save(tmp_path / "guide.json")
+    again = load_agent(tmp_path / "guide.json", MARINER)
+    assert (again.kind, again.gains) == ("preview-lq", guide.gains)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("lookahead_lengths", 0.0),
+        ("lead_lengths", 0.0),
+        ("window_lengths", 0.0),
+        ("inside_lengths", np.nan),
+        ("crab_share", 3.0),
+        ("crab_time", -1.0),
+        ("dead_band_deg", 200.0),
+        ("speed_power", 9.0),
+    ],
+)
+def test_numbers_beyond_their_bounds_are_refused(name, value):
+    with pytest.raises(InputError, match=f"^{name}: .*expected a number"):
+        PreviewLQ.from_model(MARINER, **{name: value})
+
+
+def test_it_leads_lq_alone():
+    with pytest.raises(InputError, match=r"^autopilot: expected LQ, got PID"):
+        PreviewLQ.from_model(MARINER, autopilot=PID.from_model(MARINER))
