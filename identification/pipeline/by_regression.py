@@ -16,15 +16,19 @@ from identification.pipeline.evaluation import (
     provenance_of,
     with_uncertainty,
 )
-from identification.regression.problem import Problem, pose
+from identification.regression.problem import Problem, held_out, pose
 from identification.result import IdentificationResult
+from identification.simulation_error.refinement import Refinement
 from identification.uncertainty.model_error import without_trials
 from identification.validation.guard import (
     GuardedFit,
     guarded_fit,
     with_coefficients,
 )
-from shipgym import ShipModel, Trial
+from identification.validation.predicted import is_yaw_alone
+from identification.validation.rudder_bias import with_bias
+from shipgym import ShipModel, Trial, list_structures
+from shipgym.ships import Structure, get_structure
 
 if TYPE_CHECKING:
     from identification.simulation_error.refine import Refined
@@ -44,6 +48,11 @@ class RegressionFit:
     def model(self) -> ShipModel:
         """The model of all trials."""
         return self.fit.model
+
+    @property
+    def free_coefficients(self) -> int:
+        """Number of coefficients."""
+        return len(self.model.coefficients)
 
     @property
     def stable(self) -> bool:
@@ -96,12 +105,60 @@ class RegressionFit:
             problem,
             provenance,
             options,
+            self.without if is_yaw_alone(self.model) else None,
         )
 
 
 def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationResult:
-    """Fit the regression of each equation, guard the model, and refine it if asked."""
-    return fit_regression(trials, options).result(options)
+    """Fit the regression of each equation, guard the model, and refine it if asked.
+
+    A structure without a constant is fitted again with one where the bias of the rudder
+    differs from zero.
+    """
+    if options.method_is_default and differentiates_heading(trials, options):
+        options = replace(options, method=Refinement.name)
+    found = fit_regression(trials, options)
+    biased = with_rudder_bias(found, options)
+    if biased is None:
+        return found.result(options)
+    own, fit = biased
+    return fit.result(own, found.problem.sea)
+
+
+def differentiates_heading(trials: Sequence[Trial], options: Options) -> bool:
+    """Return True for a structure of yaw alone on yaw rates derived from the heading.
+
+    Differentiation biases a regression on them, but not what is fitted to the heading.
+    """
+    table = options.structure
+    if isinstance(table, str) and table in list_structures():
+        table = get_structure(table)
+    is_response = isinstance(table, Structure) and set(table.equations) == {"r"}
+    if not is_response or options.prior is not None:
+        return False
+    derived = []
+    for trial in held_out(trials, options.hold_out):
+        if trial.use == "fit":
+            derived.append("r" in trial.derived and "psi" in trial)
+    return all(derived)
+
+
+def with_rudder_bias(
+    found: RegressionFit, options: Options
+) -> tuple[Options, RegressionFit] | None:
+    """Options and fit of the same structure with the constant of a biased rudder.
+
+    None where there is none to add, or where the fit with it runs away.
+    """
+    if options.rudder_bias == "none":
+        return None
+    table = with_bias(found.model, found.problem)
+    if table is None:
+        return None
+    own = replace(options, structure=table)
+    calm = replace(own, current="none", wind="none", hold_out=())
+    fit = fit_regression(found.problem.trials, calm)
+    return (own, fit) if fit.stable else None
 
 
 def fit_regression(trials: Sequence[Trial], options: Options) -> RegressionFit:

@@ -246,10 +246,11 @@ def motion_errors(
     if predicted is None or len(runs) < DRAWS / 2:
         return []
 
-    names = [name for name in predicted_channels(own) if name in trial]
+    names = counted_channels(own, trial)
     levels = {name: noise_level(trial.t, trial[name]) for name in names}
     from_shifted = _from_shifted_starts(own, clean, levels)
-    timing = _timing(trial)
+    # where the heading is differentiated, jitter of the clock is in its noise already
+    timing = 0.0 if "r" in trial.derived else _timing(trial)
     found = []
     for name, level in levels.items():
         mine = predicted[name]
@@ -266,6 +267,19 @@ def motion_errors(
         )
         found.append(error)
     return found
+
+
+def counted_channels(model: ShipModel, trial: Trial) -> list[str]:
+    """Channels whose errors count: those predicted that are no other one's double.
+
+    Heading and yaw rate, of which one was derived from the other, have the same
+    information; smoothing hides the noise of a derivative from `noise_level`.
+    """
+    names = [name for name in predicted_channels(model) if name in trial]
+    for name, source in (("r", "psi"), ("psi", "r")):
+        if name in trial.derived and name in names and source in names:
+            names.remove(name)
+    return names
 
 
 def _mean_variance(runs: Sequence[Trial], name: str, mine: Floats) -> float:
