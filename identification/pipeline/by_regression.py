@@ -18,7 +18,7 @@ from identification.pipeline.evaluation import (
 )
 from identification.regression.problem import Problem, held_out, pose
 from identification.result import IdentificationResult
-from identification.simulation_error.refinement import Refinement
+from identification.simulation_error.refinement import Refinement, whole_trials
 from identification.uncertainty.model_error import without_trials
 from identification.validation.guard import (
     GuardedFit,
@@ -116,7 +116,7 @@ def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationRe
     differs from zero.
     """
     if options.method_is_default and differentiates_heading(trials, options):
-        options = replace(options, method=Refinement.name)
+        options = replace(options, method=_by_heading(trials))
     found = fit_regression(trials, options)
     biased = with_rudder_bias(found, options)
     if biased is None:
@@ -141,6 +141,13 @@ def differentiates_heading(trials: Sequence[Trial], options: Options) -> bool:
         if trial.use == "fit":
             derived.append("r" in trial.derived and "psi" in trial)
     return all(derived)
+
+
+def _by_heading(trials: Sequence[Trial]) -> Refinement:
+    """Output error of whole trials, in wind, by which the heading drifts, of parts."""
+    if any("wind_speed" in trial for trial in trials):
+        return Refinement()
+    return whole_trials()
 
 
 def with_rudder_bias(

@@ -10,14 +10,15 @@ from identification.arrays import root_mean_square
 from identification.options import MAP, Options, name_of
 from identification.progress import counted
 from identification.result import IdentificationResult
-from identification.simulation_error.refinement import Refinement
+from identification.simulation_error.refinement import whole_trials
 from identification.simulation_error.similarity import AUTO
 from identification.validation.folds import pieces
 from identification.validation.predicted import predicts_track
 from identification.validation.prediction import predict
 from identification.validation.ranking import RankedFit, fit_name
 from identification.validation.rudder_bias import with_bias
-from shipgym import InputError, ShipModel, Trial
+from identification.validation.usual_hull import with_usual_hull
+from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.arrays import Integers
 from shipgym.ships.structures import GREY_BOX, MMG
 from shipgym.trials.resampling import usual_step
@@ -198,6 +199,8 @@ class _Attempts:
             method=method,
             reference_model=reference,
         )
+        if structure in (GREY_BOX, MMG) and own.particulars is not None:
+            own = replace(own, particulars=_of_usual_hull(own.particulars))
         name = fit_name(structure, MAP if structure == MMG else name_of(method))
         try:
             found = self.fit(self.trials, own)
@@ -210,6 +213,13 @@ class _Attempts:
     def by_rank(self) -> list[RankedFit]:
         """The fits, the best first."""
         return sorted(self.ranked, key=lambda fit: fit.rank)
+
+
+def _of_usual_hull(given: Particulars | Mapping[str, Any]) -> Particulars:
+    """Particulars by which a reference ship or formulas are found."""
+    if not isinstance(given, Particulars):
+        given = Particulars.from_mapping(given)
+    return with_usual_hull(given)
 
 
 class HeldOut(NamedTuple):
@@ -330,11 +340,6 @@ def _mean_error(found: Sequence[HeldOut | None]) -> float | None:
     if len(known) < len(found):
         return None
     return float(np.mean(known))
-
-
-def whole_trials() -> Refinement:
-    """Output error of whole trials, each a single segment."""
-    return Refinement(segment_lengths=1e6, staggered=False)
 
 
 def methods_of(structure: str, usual: str) -> tuple[str, ...]:
