@@ -28,7 +28,9 @@ from identification.validation.guard import (
 from identification.validation.predicted import is_yaw_alone
 from identification.validation.rudder_bias import with_bias
 from shipgym import ShipModel, Trial, list_structures
+from shipgym.arrays import Floats
 from shipgym.ships import Structure, get_structure
+from shipgym.trials.resampling import usual_step
 
 if TYPE_CHECKING:
     from identification.simulation_error.refine import Refined
@@ -106,7 +108,33 @@ class RegressionFit:
             provenance,
             options,
             self.without if is_yaw_alone(self.model) else None,
+            self._by_clock(),
         )
+
+    def _by_clock(self) -> Floats | float:
+        """Change of the coefficients where the rudder is late by what a step hides.
+
+        Of responses that are fitted to headings, whose own errors are smaller. A rudder
+        that is logged at the end of its step differs by half a step from one logged at
+        its beginning.
+        """
+        trials = self.task.trials
+        derived = all("r" in trial.derived for trial in trials)
+        if self.refined is None or not (derived and is_yaw_alone(self.model)):
+            return 0.0
+        late = replace(self.task, trials=[_with_late_rudder(trial) for trial in trials])
+        again = _refined(self.fit, late, self.method, rounds=1)
+        assert again is not None
+        moved = list(again.fit.model.coefficients.values())
+        found = list(self.model.coefficients.values())
+        return np.subtract(moved, found)
+
+
+def _with_late_rudder(trial: Trial) -> Trial:
+    """The trial with a rudder that is late by the standard deviation of a step."""
+    late = usual_step(trial.t) / np.sqrt(12.0)
+    delta = np.interp(trial.t - late, trial.t, trial["delta"])
+    return trial.with_channels({"delta": delta})
 
 
 def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationResult:

@@ -119,10 +119,12 @@ def with_uncertainty(
     provenance: dict[str, Any],
     options: Options,
     without: Callable[[Sequence[int]], ShipModel] | None = None,
+    by_clock: Floats | float = 0.0,
 ) -> IdentificationResult:
     """The result of a fit, its covariance scaled by the model error.
 
-    `without`: fits again without some trials, where that is quick.
+    `without`: fits again without some trials, where that is quick; `by_clock`: change
+    of the coefficients by a standard deviation of the time of the rudder.
     """
     covariance, error = scaled_covariance(
         options.uncertainty,
@@ -133,6 +135,7 @@ def with_uncertainty(
     )
     if error:
         provenance = provenance | {"model_error": error}
+        covariance = covariance + np.outer(by_clock, by_clock)
     model = replace(fit.model, covariance=covariance)
     return evaluated(model, fit, problem, provenance, options)
 
