@@ -18,7 +18,7 @@ from identification.simulation_error.refinement import Refinement
 from identification.uncertainty.uncertainty import Uncertainty
 from identification.validation.acceptance import check_accept
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
-from shipgym.checks import check_flag, check_number, check_text
+from shipgym.checks import check_choice, check_flag, check_number, check_text
 from shipgym.ships import Structure
 from shipgym.ships.structures import MMG
 
@@ -79,6 +79,10 @@ class Options:
         in `shipgym.sea`, or a table such as
         `{ coefficients = "isherwood", relative = true }`; relative means the wind felt
         on board, measured from the bow.
+    rudder_bias : {"auto", "none"}
+        Constant moment of a rudder that is off, or of a propeller that turns one way.
+        "auto": a structure without a constant is given one where the bias differs from
+        zero; "none": it stays as it is.
     hold_out : sequence of str
         Trials, by name, that are only predicted, as if they were marked validate.
     guarded : bool
@@ -107,6 +111,7 @@ class Options:
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
     current: str | Mapping[str, float] = "auto"
     wind: str | Mapping[str, Any] = "auto"
+    rudder_bias: str = "auto"
     hold_out: str | Sequence[str] = ()
     guarded: bool = True
     accept: Mapping[str, float] | None = None
@@ -125,6 +130,7 @@ class Options:
             check_text(self.reference_model, "reference_model")
         check_current(self.current)
         check_wind(self.wind)
+        check_choice(self.rudder_bias, ("auto", "none"), "rudder_bias")
         if self.prior is not None and self.prior.source is None:
             self._check_prior_is_implied()
         check_flag(self.guarded, "guarded")

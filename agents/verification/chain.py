@@ -25,7 +25,8 @@ from agents.verification.tracks import Track
 from agents.verification.verify import DESIGNS, verify
 from identification import IdentificationResult, identify
 from identification.progress import PROGRESS, Progress
-from identification.validation.selection import RESPONSES, whole_trials
+from identification.simulation_error.refinement import whole_trials
+from identification.validation.selection import RESPONSES
 from identification.validation.warnings import why_unstable
 from shipgym.checks import check_number, placed, quoted
 from shipgym.errors import InputError, UnstableModelError

@@ -16,15 +16,21 @@ from identification.pipeline.evaluation import (
     provenance_of,
     with_uncertainty,
 )
-from identification.regression.problem import Problem, pose
+from identification.regression.problem import Problem, held_out, pose
 from identification.result import IdentificationResult
+from identification.simulation_error.refinement import Refinement, whole_trials
 from identification.uncertainty.model_error import without_trials
 from identification.validation.guard import (
     GuardedFit,
     guarded_fit,
     with_coefficients,
 )
-from shipgym import ShipModel, Trial
+from identification.validation.predicted import is_yaw_alone
+from identification.validation.rudder_bias import with_bias
+from shipgym import ShipModel, Trial, list_structures
+from shipgym.arrays import Floats
+from shipgym.ships import Structure, get_structure
+from shipgym.trials.resampling import usual_step
 
 if TYPE_CHECKING:
     from identification.simulation_error.refine import Refined
@@ -44,6 +50,11 @@ class RegressionFit:
     def model(self) -> ShipModel:
         """The model of all trials."""
         return self.fit.model
+
+    @property
+    def free_coefficients(self) -> int:
+        """Number of coefficients."""
+        return len(self.model.coefficients)
 
     @property
     def stable(self) -> bool:
@@ -96,12 +107,93 @@ class RegressionFit:
             problem,
             provenance,
             options,
+            self.without if is_yaw_alone(self.model) else None,
+            self._by_clock(),
         )
+
+    def _by_clock(self) -> Floats | float:
+        """Change of the coefficients where the rudder is late by what a step hides.
+
+        Of responses that are fitted to headings, whose own errors are smaller. A rudder
+        that is logged at the end of its step differs by half a step from one logged at
+        its beginning.
+        """
+        trials = self.task.trials
+        derived = all("r" in trial.derived for trial in trials)
+        if self.refined is None or not (derived and is_yaw_alone(self.model)):
+            return 0.0
+        late = replace(self.task, trials=[_with_late_rudder(trial) for trial in trials])
+        again = _refined(self.fit, late, self.method, rounds=1)
+        assert again is not None
+        moved = list(again.fit.model.coefficients.values())
+        found = list(self.model.coefficients.values())
+        return np.subtract(moved, found)
+
+
+def _with_late_rudder(trial: Trial) -> Trial:
+    """The trial with a rudder that is late by the standard deviation of a step."""
+    late = usual_step(trial.t) / np.sqrt(12.0)
+    delta = np.interp(trial.t - late, trial.t, trial["delta"])
+    return trial.with_channels({"delta": delta})
 
 
 def by_regression(trials: Sequence[Trial], options: Options) -> IdentificationResult:
-    """Fit the regression of each equation, guard the model, and refine it if asked."""
-    return fit_regression(trials, options).result(options)
+    """Fit the regression of each equation, guard the model, and refine it if asked.
+
+    A structure without a constant is fitted again with one where the bias of the rudder
+    differs from zero.
+    """
+    if options.method_is_default and differentiates_heading(trials, options):
+        options = replace(options, method=_by_heading(trials))
+    found = fit_regression(trials, options)
+    biased = with_rudder_bias(found, options)
+    if biased is None:
+        return found.result(options)
+    own, fit = biased
+    return fit.result(own, found.problem.sea)
+
+
+def differentiates_heading(trials: Sequence[Trial], options: Options) -> bool:
+    """Return True for a structure of yaw alone on yaw rates derived from the heading.
+
+    Differentiation biases a regression on them, but not what is fitted to the heading.
+    """
+    table = options.structure
+    if isinstance(table, str) and table in list_structures():
+        table = get_structure(table)
+    is_response = isinstance(table, Structure) and set(table.equations) == {"r"}
+    if not is_response or options.prior is not None:
+        return False
+    derived = []
+    for trial in held_out(trials, options.hold_out):
+        if trial.use == "fit":
+            derived.append("r" in trial.derived and "psi" in trial)
+    return all(derived)
+
+
+def _by_heading(trials: Sequence[Trial]) -> Refinement:
+    """Output error of whole trials, in wind, by which the heading drifts, of parts."""
+    if any("wind_speed" in trial for trial in trials):
+        return Refinement()
+    return whole_trials()
+
+
+def with_rudder_bias(
+    found: RegressionFit, options: Options
+) -> tuple[Options, RegressionFit] | None:
+    """Options and fit of the same structure with the constant of a biased rudder.
+
+    None where there is none to add, or where the fit with it runs away.
+    """
+    if options.rudder_bias == "none":
+        return None
+    table = with_bias(found.model, found.problem)
+    if table is None:
+        return None
+    own = replace(options, structure=table)
+    calm = replace(own, current="none", wind="none", hold_out=())
+    fit = fit_regression(found.problem.trials, calm)
+    return (own, fit) if fit.stable else None
 
 
 def fit_regression(trials: Sequence[Trial], options: Options) -> RegressionFit:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -117,17 +117,34 @@ def with_uncertainty(
     problem: Problem,
     provenance: dict[str, Any],
     options: Options,
+    without: Callable[[Sequence[int]], ShipModel] | None = None,
+    by_clock: Floats | float = 0.0,
 ) -> IdentificationResult:
-    """The result of a fit, its covariance scaled by the model error."""
-    covariance, error = scaled_covariance(options.uncertainty, fit, refined, problem)
+    """The result of a fit, its covariance scaled by the model error.
+
+    `without`: fits again without some trials, where that is quick; `by_clock`: change
+    of the coefficients by a standard deviation of the time of the rudder.
+    """
+    covariance, error = scaled_covariance(
+        options.uncertainty,
+        fit,
+        refined,
+        problem,
+        without,
+    )
     if error:
         provenance = provenance | {"model_error": error}
+        covariance = covariance + np.outer(by_clock, by_clock)
     model = replace(fit.model, covariance=covariance)
     return evaluated(model, fit, problem, provenance, options)
 
 
 def scaled_covariance(
-    asked: Uncertainty, fit: GuardedFit, refined: Refined | None, problem: Problem
+    asked: Uncertainty,
+    fit: GuardedFit,
+    refined: Refined | None,
+    problem: Problem,
+    without: Callable[[Sequence[int]], ShipModel] | None = None,
 ) -> tuple[Floats, dict[str, Any]]:
     """Covariance of the coefficients, scaled by the model error, and a report on it."""
     covariance = unscaled_covariance(
@@ -140,7 +157,7 @@ def scaled_covariance(
     if not asked.model_error:
         return covariance, {}
     own = replace(fit.model, covariance=covariance)
-    left_out = left_out_models(fit, problem, refined, covariance)
+    left_out = left_out_models(fit, problem, refined, covariance, without)
     error = model_error(own, left_out, problem.used)
     factor: float = error["factor"]
     return factor**2 * covariance, error
@@ -172,7 +189,11 @@ def unscaled_covariance(
 
 
 def left_out_models(
-    fit: GuardedFit, problem: Problem, refined: Refined | None, covariance: Floats
+    fit: GuardedFit,
+    problem: Problem,
+    refined: Refined | None,
+    covariance: Floats,
+    without: Callable[[Sequence[int]], ShipModel] | None = None,
 ) -> list[ShipModel]:
     """The models, with covariance, of fits without each of the trials."""
     n_trials = len(problem.used)
@@ -181,6 +202,12 @@ def left_out_models(
     if refined is None or refined.covariance is None:
         return [_without(trial, fit, problem) for trial in range(n_trials)]
 
+    if without is not None:
+        inflation = n_trials / (n_trials - 1)
+        return [
+            replace(without([trial]), covariance=inflation * covariance)
+            for trial in range(n_trials)
+        ]
     full = replace(fit.model, covariance=covariance)
     return _less_influences(full, refined.influences)
 

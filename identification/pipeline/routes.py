@@ -198,6 +198,11 @@ class SimulationFit:
         """The model of all trials."""
         return self.fit.model
 
+    @property
+    def free_coefficients(self) -> int:
+        """Number of coefficients that the trials, and not the prior, determine."""
+        return self.fit.free_coefficients
+
     @cached_property
     def reasons(self) -> list[str]:
         """Simulations in which the model of all trials runs away."""

@@ -68,6 +68,19 @@ class MMGFit:
     posterior: Posterior
     estimate: Estimate
 
+    @property
+    def free_coefficients(self) -> int:
+        """Number of coefficients that the trials, and not the prior, determine.
+
+        The trace of the resolution: 1 for what the prior says nothing of, 0 for what
+        the trials say nothing of.
+        """
+        variances = np.linalg.eigvalsh(self.estimate.covariance)
+        of_trials = 1.0 / variances - 1.0
+        of_prior = self.estimate.strength**2
+        resolved = of_trials / (of_trials + of_prior)
+        return max(round(float(resolved.sum())), 1)
+
     def without(self, trials: Sequence[int]) -> ShipModel:
         """The model of the other trials, by their places."""
         z = self.posterior.without_trials(trials, self.estimate)

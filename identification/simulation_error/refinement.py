@@ -92,3 +92,8 @@ class Refinement:
             {"name": trial.name, "sha256": trial.sha256} for trial in self.extra_trials
         ]
         return settings
+
+
+def whole_trials() -> Refinement:
+    """Output error of whole trials, each a single segment."""
+    return Refinement(segment_lengths=1e6, staggered=False)

@@ -38,6 +38,7 @@ FEWEST_TRIALS = 3  # to leave one out and learn something from it
 # structure's
 DEFAULT = 2.5
 DRAWS = 20  # of each model that a trial was left out of
+RUDDERS = 5  # with the noise of the logged one
 
 
 class PredictionError(NamedTuple):
@@ -246,10 +247,12 @@ def motion_errors(
     if predicted is None or len(runs) < DRAWS / 2:
         return []
 
-    names = [name for name in predicted_channels(own) if name in trial]
+    names = counted_channels(own, trial)
     levels = {name: noise_level(trial.t, trial[name]) for name in names}
     from_shifted = _from_shifted_starts(own, clean, levels)
-    timing = _timing(trial)
+    by_rudder = _with_noisy_rudder(own, clean)
+    # where the heading is differentiated, jitter of the clock is in its noise already
+    timing = 0.0 if "r" in trial.derived else _timing(trial)
     found = []
     for name, level in levels.items():
         mine = predicted[name]
@@ -257,15 +260,29 @@ def motion_errors(
         if variance <= 0.0:
             continue
         by_start = [mean_square(run[name] - mine) for run in from_shifted]
+        by_noise = [mean_square(run[name] - mine) for run in by_rudder]
         slope = np.gradient(clean[name], clean.t)
         by_timing = mean_square(timing * slope)
         error = PredictionError(
             square=mean_square(mine - trial[name]),
             variance=variance,
-            noise=level**2 + by_timing + sum(by_start),
+            noise=level**2 + by_timing + sum(by_start) + sum(by_noise) / RUDDERS,
         )
         found.append(error)
     return found
+
+
+def counted_channels(model: ShipModel, trial: Trial) -> list[str]:
+    """Channels whose errors count: those predicted that are no other one's double.
+
+    Heading and yaw rate, of which one was derived from the other, have the same
+    information; smoothing hides the noise of a derivative from `noise_level`.
+    """
+    names = [name for name in predicted_channels(model) if name in trial]
+    for name, source in (("r", "psi"), ("psi", "r")):
+        if name in trial.derived and name in names and source in names:
+            names.remove(name)
+    return names
 
 
 def _mean_variance(runs: Sequence[Trial], name: str, mine: Floats) -> float:
@@ -299,6 +316,24 @@ def _from_shifted_starts(
         if level:
             shifted = clean.with_channels({name: clean[name] + 0.5 * level})
             cases.append((own, shifted))
+    return _runs(cases)
+
+
+def _with_noisy_rudder(own: ShipModel, clean: Trial) -> list[Trial]:
+    """Predictions with the noise of the logged rudder once more.
+
+    It makes the heading walk off, which is no error of the model.
+    """
+    delta = clean["delta"]
+    level = noise_level(clean.t, delta)
+    smallest = math.radians(0.01)
+    if level < smallest or "r" not in clean.derived:
+        return []
+    rng = np.random.default_rng(0)
+    cases = []
+    for _ in range(RUDDERS):
+        noise = level * rng.standard_normal(len(delta))
+        cases.append((own, clean.with_channels({"delta": delta + noise})))
     return _runs(cases)
 
 

@@ -122,6 +122,7 @@ def compare_methods(
     **arguments
         Of `identify` but for `method`.
     """
+    arguments = {"rudder_bias": "none", **arguments}  # structures as they are named
     pairs, several = _asked(structures, methods, arguments)
     fitted, held = _by_use(held_out(trials, arguments.get("hold_out", ())))
     settings = settings or {}
@@ -207,8 +208,8 @@ def _with_settings(
 ) -> Any:
     """A method given by name with those of the settings that it has."""
     known = {name: settings[name] for name in settings if name not in left_out}
-    if isinstance(method, str) and known:
-        return make_method(method, known)
+    if isinstance(method, str) and method in METHODS:
+        return make_method(method, known)  # an object: no default that may change
     return method
 
 

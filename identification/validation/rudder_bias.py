@@ -1,7 +1,8 @@
 """Bias of the rudder: the angle, as it was logged, at which the ship runs straight.
 
 A rudder indicator that is off, a propeller that turns one way and a hull that is not
-quite symmetric look the same: a constant moment.
+quite symmetric look the same: a constant moment, which a structure without one is given
+where the bias differs from zero.
 """
 
 from collections.abc import Sequence
@@ -21,8 +22,9 @@ from identification.uncertainty.model_error import (
 from identification.validation.guard import with_coefficients
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
-from shipgym.ships import Structure, get_structure
+from shipgym.ships import Structure, Term, get_structure, list_structures
 from shipgym.ships.linear import straight_running
+from shipgym.ships.structures import MMG
 
 
 class RudderBias(NamedTuple):
@@ -54,19 +56,57 @@ def rudder_bias(model: ShipModel, problem: Problem) -> RudderBias | None:
     if "r" not in equations or "delta" not in model.command_names:
         return None
     try:
-        if has_constant(model.dynamics):
+        if model.structure == MMG or has_constant(model.dynamics):
             return _of_model(model, in_model=True)
         return _of_companion(problem)
     except InputError:
         return None
 
 
+def with_bias(model: ShipModel, problem: Problem) -> Structure | None:
+    """The model's structure with a constant, where the bias differs from zero.
+
+    None where it has one already, where it is no plain table, or where the bias may be
+    chance.
+    """
+    table = model.dynamics
+    if type(table) is not Structure or has_constant(table):
+        return None
+    bias = rudder_bias(model, problem)
+    if bias is None or not bias.significant:
+        return None
+    return with_constant(table)
+
+
+def with_constant(table: Structure) -> Structure:
+    """A table with a constant in sway and yaw, or in the memory of yaw."""
+    name = f"{table.name}-bias"
+    if name in list_structures():
+        return get_structure(name)
+
+    # a constant of yaw itself is lost in the unknown memory at the start
+    sideways = ("v", "q") if table.remembers else ("v", "r")
+    constant = Term("0", ())
+    equations = dict(table.equations)
+    for equation in sideways:
+        if equation in equations:
+            equations[equation] = (constant, *equations[equation])
+    return replace(
+        table,
+        name=name,
+        source=f"{table.source}; with the constant of a rudder that is off",
+        equations=equations,
+    )
+
+
 def has_constant(dynamics: Any) -> bool:
-    """Return True where a term of sway or yaw does not change with the side."""
+    """Return True where a term of sway, yaw or its memory has no side."""
     if not isinstance(dynamics, Structure):
         return False
     sides = {"v", "r", "p", "phi", "delta"}
-    terms = [*dynamics.equations.get("v", ()), *dynamics.equations.get("r", ())]
+    terms = list[Term]()
+    for equation in ("v", "r", "q"):
+        terms += dynamics.equations.get(equation, ())
     for term in terms:
         symbols = {symbol.strip("|") for symbol in term.symbols}
         if not symbols & sides:

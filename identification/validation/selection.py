@@ -10,15 +10,18 @@ from identification.arrays import root_mean_square
 from identification.options import MAP, Options, name_of
 from identification.progress import counted
 from identification.result import IdentificationResult
-from identification.simulation_error.refinement import Refinement
+from identification.simulation_error.refinement import whole_trials
 from identification.simulation_error.similarity import AUTO
 from identification.validation.folds import pieces
 from identification.validation.predicted import predicts_track
 from identification.validation.prediction import predict
 from identification.validation.ranking import RankedFit, fit_name
-from shipgym import InputError, ShipModel, Trial
+from identification.validation.rudder_bias import with_bias
+from identification.validation.usual_hull import with_usual_hull
+from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.arrays import Integers
 from shipgym.ships.structures import GREY_BOX, MMG
+from shipgym.trials.resampling import usual_step
 
 #: Of few coefficients, those with the bias of the rudder last; by the simulated motion
 #: of whole trials, in which a small bias shows, too.
@@ -49,6 +52,10 @@ class Fitted(Protocol):
     @property
     def model(self) -> ShipModel:
         """The model of all trials."""
+
+    @property
+    def free_coefficients(self) -> int:
+        """Number of coefficients that the trials determine."""
 
     @property
     def stable(self) -> bool:
@@ -103,7 +110,7 @@ def select(
     attempts.add_all(structures)
 
     ranked = attempts.by_rank()
-    best = simplest(ranked)
+    best = simplest(ranked, in_wind(parts))
     others = [other for other in ranked if other is not best]
     report = {
         "held_out": held_out,
@@ -114,13 +121,25 @@ def select(
     if single:
         whole = fit(trials, own)
     found = Choice(own, whole, report)
-    with_bias = f"{best.structure}-bias"
-    if with_bias in structures and options.method_is_default:
-        return _with_bias(found, with_bias, fit, trials)
-    return found
+    if options.rudder_bias == "none":
+        return found
+    biased = f"{best.structure}-bias"
+    if biased in structures and options.method_is_default:
+        return _response_with_bias(found, biased, fit, trials)
+    return _with_bias(found, fit, trials)
 
 
-def _with_bias(
+def _with_bias(choice: Choice, fit: Fit, trials: Sequence[Trial]) -> Choice:
+    """The same table with a constant, where it has none and the bias differs from 0."""
+    table = with_bias(choice.fit.model, choice.fit.problem)
+    if table is None:
+        return choice
+    options = replace(choice.options, structure=table)
+    other = fit(trials, options)
+    return Choice(options, other, choice.report) if other.stable else choice
+
+
+def _response_with_bias(
     choice: Choice, structure: str, fit: Fit, trials: Sequence[Trial]
 ) -> Choice:
     """The same structure with the bias of the rudder, where that differs from 0.
@@ -180,6 +199,8 @@ class _Attempts:
             method=method,
             reference_model=reference,
         )
+        if structure in (GREY_BOX, MMG) and own.particulars is not None:
+            own = replace(own, particulars=_of_usual_hull(own.particulars))
         name = fit_name(structure, MAP if structure == MMG else name_of(method))
         try:
             found = self.fit(self.trials, own)
@@ -194,10 +215,19 @@ class _Attempts:
         return sorted(self.ranked, key=lambda fit: fit.rank)
 
 
+def _of_usual_hull(given: Particulars | Mapping[str, Any]) -> Particulars:
+    """Particulars by which a reference ship or formulas are found."""
+    if not isinstance(given, Particulars):
+        given = Particulars.from_mapping(given)
+    return with_usual_hull(given)
+
+
 class HeldOut(NamedTuple):
     """Errors of the prediction of a trial held out."""
 
-    relative: float  # of the heading, by its standard deviation; without one, of r
+    #: of the heading, by its standard deviation; without one, of the yaw rate; in wind
+    #: that of `_turning_error`
+    relative: float
     heading: float  # root mean square, rad
     yaw_rate: float  # rad/s
     speed: float  # of the surge speed, by its standard deviation
@@ -229,7 +259,7 @@ def _ranked(options: Options, fit: Fitted) -> RankedFit:
     return RankedFit(
         structure=name_of(options.structure),
         method=method,
-        coefficients=len(fit.model.coefficients),
+        coefficients=fit.free_coefficients,
         stable=fit.stable,
         ran_away=len(ran_away),
         error=mean_error,
@@ -273,12 +303,35 @@ def _held_out(model: ShipModel, trial: Trial) -> HeldOut | None:
         if name in trial:
             errors[name] = root_mean_square(run[name] - trial[name])
             relative[name] = errors[name] / max(float(np.std(trial[name])), 1e-12)
+    error = next(iter(relative.values()))
+    if "psi" in trial and in_wind([trial]):
+        error = _turning_error(model, run, trial)
     return HeldOut(
-        relative=next(iter(relative.values())),
+        relative=error,
         heading=errors.get("psi", np.nan),
         yaw_rate=errors["r"],
         speed=relative.get("u", np.inf),
     )
+
+
+def in_wind(trials: Sequence[Trial]) -> bool:
+    """Return True where wind was logged and its force is known."""
+    return any("wind_rdot" in trial for trial in trials)
+
+
+def _turning_error(model: ShipModel, run: Trial, trial: Trial) -> float:
+    """Error of a prediction in how far the ship turns in one ship length, relative.
+
+    Root mean squares. What is left of the moment of the wind makes the heading of a
+    gentle zigzag drift, and hardly matters in a turn.
+    """
+    steps = model.travel_time / usual_step(trial.t)
+    lag = min(max(round(steps), 1), len(trial) - 1)
+    heading = trial["psi"]
+    turned = heading[lag:] - heading[:-lag]
+    error = run["psi"] - heading
+    change = error[lag:] - error[:-lag]
+    return root_mean_square(change) / max(root_mean_square(turned), 1e-12)
 
 
 def _mean_error(found: Sequence[HeldOut | None]) -> float | None:
@@ -287,11 +340,6 @@ def _mean_error(found: Sequence[HeldOut | None]) -> float | None:
     if len(known) < len(found):
         return None
     return float(np.mean(known))
-
-
-def whole_trials() -> Refinement:
-    """Output error of whole trials, each a single segment."""
-    return Refinement(segment_lengths=1e6, staggered=False)
 
 
 def methods_of(structure: str, usual: str) -> tuple[str, ...]:
@@ -312,11 +360,16 @@ def reference_of(structure: str, named: Any) -> Any:
     return None
 
 
-def simplest(ranked: Sequence[RankedFit]) -> RankedFit:
+def simplest(ranked: Sequence[RankedFit], in_wind: bool = False) -> RankedFit:
     """The fit of fewest coefficients whose errors differ from the first's by chance.
 
-    Of those with no larger error than it has, one that predicts the speed, too.
+    Of those with no larger error than it has, one that predicts the speed, too. In wind
+    no other is taken while there is one: the speed changes with the course, and with it
+    how the ship turns.
     """
+    if in_wind:
+        with_speed = [fit for fit in ranked if fit.predicts_speed]
+        ranked = with_speed or ranked
     first = ranked[0]
     if first.error is None:
         return first

@@ -122,7 +122,11 @@ def at_best(structure: str, noisy: bool = False) -> dict[str, float]:
     if noisy:
         return dict(
             identify(
-                [run], structure, "output-error", particulars=PARTICULARS
+                [run],
+                structure,
+                "output-error",
+                particulars=PARTICULARS,
+                rudder_bias="none",
             ).coefficients
         )
     return coefficient_history(

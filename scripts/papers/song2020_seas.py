@@ -79,6 +79,7 @@ def identified(structure: str, knows_seas: bool) -> Mapping[str, float]:
         particulars=PARTICULARS,
         current=removed,
         wind=removed,
+        rudder_bias="none",
     )
     return found.coefficients
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,6 +16,7 @@ from identification.validation.ranking import RankedFit
 from identification.validation.selection import select, simplest
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
+from shipgym.ships.linear import straight_running
 from shipgym.trials.derivatives import time_derivative
 
 Auto = Callable[..., IdentificationResult]
@@ -134,7 +136,11 @@ def test_each_trial_is_held_out_and_those_of_the_largest_rudder_together(
 
         problem = SimpleNamespace(used=parts)
         return SimpleNamespace(
-            problem=problem, model=ship, stable=True, without=without
+            problem=problem,
+            model=ship,
+            free_coefficients=3,
+            stable=True,
+            without=without,
         )
 
     options = Options(structure="auto", method="ls")  # no other method is tried
@@ -192,14 +198,41 @@ def test_few_parameters_and_the_bias_of_the_rudder_are_found(
     assert (f"{abs(bias_deg):.2g} ±" in result.summary()) == bool(bias_deg)
 
 
-def test_a_structure_without_a_constant_tells_the_bias_all_the_same() -> None:
+@pytest.mark.parametrize("structure", ["nomoto", "norrbin", "nomoto2"])
+def test_a_structure_without_a_constant_gets_one_for_the_bias(
+    structure: str, tmp_path: Path
+) -> None:
+    """In the model file, too, so that an environment runs straight with that rudder."""
     trials = logged(nomoto_ship(2.0), 10.0, -10.0, 20.0)
     particulars = {"length": 150.0, "speed": 7.0}
-    result = identify(trials, "nomoto", particulars=particulars)
+    result = identify(trials, structure, particulars=particulars)
+    assert result.model.structure == f"{structure}-bias"
     found = result.metrics["rudder_bias"]
+    assert found["in_model"]
+    assert found["angle_deg"] == pytest.approx(2.0, abs=0.3)
+
+    result.model.save(tmp_path / "model.json")
+    read = ShipModel.load(tmp_path / "model.json")
+    neutral = straight_running(read).rudder
+    assert np.degrees(neutral) == pytest.approx(found["angle_deg"])
+
+
+def test_a_bias_that_is_to_stay_out_of_the_structure_is_reported() -> None:
+    trials = logged(nomoto_ship(2.0), 10.0, -10.0, 20.0)
+    particulars = {"length": 150.0, "speed": 7.0}
+    result = identify(trials, "nomoto", particulars=particulars, rudder_bias="none")
+    found = result.metrics["rudder_bias"]
+    assert result.model.structure == "nomoto"
     assert found["angle_deg"] == pytest.approx(2.0, abs=0.2)
-    assert not found["in_model"]
     assert "take structure 'norrbin-bias'" in result.summary()
+
+
+def test_in_wind_a_structure_that_knows_no_speed_comes_after_those_that_do() -> None:
+    small, large = fit("norrbin", 3, 0.06, 0.07), fit("cubic", 27, 0.08, 0.12)
+    knows_speed = replace(large, predicts_speed=True)
+    assert simplest([small, knows_speed]) is small
+    assert simplest([small, knows_speed], in_wind=True) is knows_speed
+    assert simplest([small, large], in_wind=True) is small
 
 
 def test_nothing_to_fit_is_refused(auto: Auto, trials: list[Trial]) -> None:

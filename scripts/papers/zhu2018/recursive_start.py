@@ -180,6 +180,7 @@ def at_best() -> Floats:
         particulars=ship().particulars,
         steering=ship().steering,
         guarded=False,
+        rudder_bias="none",
     ).model
     return np.asarray(np.array(list(model.coefficients.values())) * TO_STARBOARD)
 

@@ -157,6 +157,7 @@ def at_best(trial: Trial, form: str) -> Form:
         steering=ship(LEARNED[2]).steering,
         preprocessing=Preprocessing("none", repair=True),
         guarded=False,
+        rudder_bias="none",
     ).model
     c = model.coefficients
     return Form(-c["c_d"] / c["c_r"], -1.0 / c["c_r"], c.get("c_r3", 0.0) / c["c_r"])

@@ -130,6 +130,7 @@ def at_best(trial: Trial) -> ShipModel:
         particulars=ship().particulars,
         steering=ship().steering,
         guarded=False,
+        rudder_bias="none",
     ).model
 
 
