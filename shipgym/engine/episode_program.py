@@ -1,5 +1,6 @@
 """Episodes compiled for a ship, a sea, a sensor set and a task."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
@@ -21,7 +22,7 @@ from shipgym.engine.record_code import clipped_storer, loader, storer, summed, z
 from shipgym.engine.records import LANES, Layout
 from shipgym.instruments.sensor_set import SensorSet
 from shipgym.sea import open_sea
-from shipgym.tasks.contract import Random
+from shipgym.tasks.contract import ObservationSpec, Random
 from shipgym.tasks.definition import TaskDefinition
 
 
@@ -66,6 +67,7 @@ class EpisodeProgram:
             reward=self.task.Reward,
             reported=(self.task.State, self.task.reported),
             observation=self.task.Observation,
+            goals=self._goals,
             **(stages.BETWEEN_STAGES if self.ship.staged else {}),
         )
 
@@ -78,7 +80,14 @@ class EpisodeProgram:
             envelope=Envelope,
             sea_parameters=open_sea.sea_records(self.windy)[1],
             scale=self.task.Observation,
+            goal_scale=self._goals,
         )
+
+    @property
+    def _goals(self) -> Any:
+        """Record of goals for a `Layout`; no rows where the task has none."""
+        record = self.task.goals_record
+        return record if self.task.has_goals else (record, ())
 
     @cached_property
     def random_rows(self) -> Layout:
@@ -108,7 +117,7 @@ class EpisodeProgram:
         part = name.removeprefix("reward_")
         if name in self.task.reported:
             return rows["reported"].row(name)
-        if name in Outcome._fields or part == "end":
+        if name in Outcome._fields or part in self.task.parts_of_engine:
             return rows["outcome"].row(part)
         parts = self.task.reward_names
         return rows["reward"].first + parts.index(part)
@@ -144,20 +153,23 @@ class EpisodeProgram:
     def _task_hooks(self) -> dict[str, Any]:
         """Functions of the task, and what its records are used for."""
         task = self.task
-        bounds = {
-            path: (spec.low, spec.high) for path, spec in task.observations.items()
-        }
         return {
             "task_begin": task.begin,
             "task_step": task.step,
             "observe": task.observe,
+            "goals_of": task.goals_of,
             "due": task.due,
             "on_event": task.on_event,
             "worst_cost": task.worst_cost,
             "no_reward": zeros(task.Reward),
             "total_reward": summed(task.Reward),
             "store_observation": clipped_storer(
-                self.result_rows["observation"], bounds
+                self.result_rows["observation"],
+                bounds_of(task.observations),
+            ),
+            "store_goals": clipped_storer(
+                self.result_rows["goals"],
+                bounds_of(task.goals),
             ),
         }
 
@@ -169,6 +181,13 @@ class EpisodeProgram:
 
 
 episode_program = cache(EpisodeProgram)  # compiled once in a process
+
+
+def bounds_of(
+    specs: Mapping[str, ObservationSpec],
+) -> dict[str, tuple[float, float]]:
+    """Bounds of observations by their paths."""
+    return {path: (spec.low, spec.high) for path, spec in specs.items()}
 
 
 def _loaders(layout: Layout, lanes: int) -> dict[str, Any]:

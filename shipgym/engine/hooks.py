@@ -140,6 +140,16 @@ def store_observation(result: Floats, lane: int, observation: Any, scale: Any) -
     raise NotImplementedError(RECORDS)
 
 
+def store_goals(result: Floats, lane: int, goals: Any, scale: Any) -> None:
+    """Write the task's goals times `scale`, clipped to their bounds, if it has any."""
+    raise NotImplementedError(RECORDS)
+
+
+def load_goal(tile: Floats, lane: int) -> Any:
+    """Read a `Goal` of the task."""
+    raise NotImplementedError(RECORDS)
+
+
 def no_reward() -> Any:
     """Make a `Reward` of zeros."""
     raise NotImplementedError(RECORDS)
@@ -175,6 +185,11 @@ def load_envelope(ships: Floats, lane: int) -> Envelope:
 
 def load_scale(ships: Floats, lane: int) -> Any:
     """Read the factors by which observations are multiplied, an `Observation`."""
+    raise NotImplementedError(RECORDS)
+
+
+def load_goal_scale(ships: Floats, lane: int) -> Any:
+    """Read the factors by which goals are multiplied, a pair of goals."""
     raise NotImplementedError(RECORDS)
 
 
@@ -382,6 +397,22 @@ def observe(
     settings: Any,
 ) -> Any:
     """Return the observations of the autopilot, an `Observation` in SI units."""
+    raise NotImplementedError(TASK)
+
+
+def goals_of(
+    motion: Motion,
+    task_state: Any,
+    interval: Interval,
+    ship: Ship,
+    settings: Any,
+) -> Any:
+    """Return the goals achieved and desired (`shipgym.tasks.goals`)."""
+    raise NotImplementedError(TASK)
+
+
+def goal_reward(achieved: Any, desired: Any, settings: Any) -> float:
+    """Return the reward of a goal achieved for one desired."""
     raise NotImplementedError(TASK)
 
 

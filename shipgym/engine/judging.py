@@ -11,9 +11,11 @@ from shipgym.engine.envelope import Envelope, envelope_distance, outside_range
 from shipgym.engine.hooks import (
     due,
     encounter_frequency,
+    goals_of,
     load_commands,
     load_counters,
     load_envelope,
+    load_goal_scale,
     load_memory,
     load_motion,
     load_outcome,
@@ -32,6 +34,7 @@ from shipgym.engine.hooks import (
     on_event,
     readings,
     store_counters,
+    store_goals,
     store_memory,
     store_observation,
     store_outcome,
@@ -109,6 +112,8 @@ def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
         seen = readings(motion, load_sea(state, lane), memory)
         observation = observe(seen, task_state, interval, ship, settings.task)
         store_observation(tile.result, lane, observation, scale)
+        goals = goals_of(motion, task_state, interval, ship, settings.task)
+        store_goals(tile.result, lane, goals, load_goal_scale(tile.ships, lane))
 
         is_due = due(motion, task_state, interval, ship, settings.task)
         goes_on = not (over | just_ended)
@@ -204,6 +209,7 @@ def outcome_of(
         envelope_distance=interval.envelope_distance,
         extrapolating=interval.extrapolating,
         end=end,
+        goal=0.0,
     )
 
 
@@ -278,3 +284,5 @@ def observe_lane(tile: Tile, lane: int) -> None:
     seen = readings(motion, sea, memory)
     observation = observe(seen, task_state, interval, ship, settings)
     store_observation(tile.result, lane, observation, scale)
+    goals = goals_of(motion, task_state, interval, ship, settings)
+    store_goals(tile.result, lane, goals, load_goal_scale(tile.ships, lane))

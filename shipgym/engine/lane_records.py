@@ -38,6 +38,7 @@ class Outcome(NamedTuple):
     envelope_distance: float
     extrapolating: float  # 1 or 0
     end: float  # part of the reward: the rest of an episode that failed
+    goal: float  # part of the reward of a task with goals, which is added afterwards
 
 
 class SeaRandom(NamedTuple):

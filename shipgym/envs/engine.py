@@ -16,6 +16,7 @@ from shipgym.engine.compiling import entry_of
 from shipgym.engine.episode_program import EpisodeProgram, episode_program
 from shipgym.engine.episodes import BEGIN, BEGIN_NEXT, STEP, STEP_AND_BEGIN
 from shipgym.engine.records import LANES
+from shipgym.envs.goals import Goals
 from shipgym.envs.lanes import Lanes
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES
 from shipgym.envs.plain_python import plain_loop
@@ -104,6 +105,7 @@ class Engine(Lanes):
             len(own) == 1,
         )
         super().__init__(program, model, task, num_envs, own, drawn, threads)
+        self.goals = Goals(task, model) if task.definition.has_goals else None
         self._begin_all(loop or self._compiled)
 
     def _begin_all(self, loop: Callable[[EpisodeProgram], Any]) -> None:
@@ -160,10 +162,10 @@ class Engine(Lanes):
         if anew:
             self.renew_outputs()
         asked = STEP_AND_BEGIN if begin_ended else STEP
+        step: Callable[[], int] = partial(self._run_shares, asked)
         if self.n_shares == 1:
-            n_ended: int = self._run(self._memory, self.outputs.memory, 0, asked)
-        else:
-            n_ended = self._run_shares(asked)
+            step = partial(self._run, self._memory, self.outputs.memory, 0, asked)
+        n_ended = step() if self.goals is None else self._step_to_goals(step)
         if n_ended < 0:  # `REFUSED`, in every share
             self.outputs = before
             self._refuse_orders()
@@ -196,7 +198,21 @@ class Engine(Lanes):
         The step returns the number of episodes that ended, or
         `shipgym.engine.episodes.REFUSED`.
         """
-        return partial(self._run, self._memory, self.outputs.memory, 0, STEP)
+        step = partial(self._run, self._memory, self.outputs.memory, 0, STEP)
+        return step if self.goals is None else partial(self._step_to_goals, step)
+
+    def _step_to_goals(self, step: Callable[[], int]) -> int:
+        """Take a step, and add the rewards of goals in lanes that had not ended."""
+        over = self.read("ended") > 0.0
+        n_ended = step()
+        if n_ended < 0 or self.goals is None:
+            return n_ended
+        earned = self.goals.of_rows(self.outputs.observations)
+        self.info("reward_goal")[:] = np.where(over, 0.0, earned)
+        parts = {name: self.info(name) for name in self.task.reward_parts}
+        others = self.goals.sum_of_others(parts)
+        self.outputs.outcomes[0] = others + parts["reward_goal"]
+        return n_ended
 
     def reset(self, seeds: ArrayLike) -> Observation:
         """Begin in each lane the episode of the single environment's `reset(seed=...)`.

@@ -23,6 +23,7 @@ from shipgym.checks import (
     unexpected,
 )
 from shipgym.envs.engine import Engine, as_array, episode_key
+from shipgym.envs.goals import Goals, box_of
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import read_sensors
@@ -86,14 +87,9 @@ def read_options(
     return ship, Task.of(definition, **rest), randomisation
 
 
-def spaces(task: Task, model: ShipModel) -> tuple[gymnasium.spaces.Box, Space]:
+def spaces(task: Task, model: ShipModel, goals: Goals | None) -> tuple[Any, Space]:
     """Observation and action space of a task for a ship."""
-    observed = task.observed(model)
-    observations = gymnasium.spaces.Box(
-        low=np.array([quantity.low for quantity in observed], dtype=np.float32),
-        high=np.array([quantity.high for quantity in observed], dtype=np.float32),
-        dtype=np.float32,
-    )
+    observations = goals.space() if goals else box_of(task.observed(model))
     if task.action == "rudder-discrete":
         return observations, gymnasium.spaces.Discrete(len(RUDDER_ORDERS))
     shape = (task.n_commands,)
@@ -134,6 +130,8 @@ class ShipsEnv:
     observation_names : tuple of str
     observation_scales : array of shape (n_observations,)
         Physical value of an observation of 1, SI units.
+    compute_reward : callable
+        Of a task with goals alone (`shipgym.envs.goals.Goals.compute_reward`).
     render_mode : str or None
     """
 
@@ -146,7 +144,7 @@ class ShipsEnv:
         arguments: dict[str, Any],
         taken: Sequence[str],
         render_modes: Sequence[str],
-    ) -> tuple[gymnasium.spaces.Box, Space]:
+    ) -> tuple[Any, Space]:
         """Read the arguments of the environment; return the spaces of one ship."""
         options = arguments.pop("options")
         given = dict(arguments)
@@ -185,7 +183,14 @@ class ShipsEnv:
         self._begun = False  # and not closed since
         self._keys: NDArray[np.uint64] | None = None  # of each row's episodes
         self._use(self._own_engine)
-        return spaces(self.task, self.model)
+        self._goals = self._own_engine.goals
+        if self._goals:  # by having it an environment says that it has goals
+            self.compute_reward = self._goals.compute_reward
+        return spaces(self.task, self.model, self._goals)
+
+    def _shown(self, rows: NDArray[np.float32]) -> Any:
+        """Observations as they are returned: an array, or a dictionary with goals."""
+        return rows if self._goals is None else self._goals.split(rows)
 
     def _made(self) -> None:
         """End the construction: attributes that are added later are the user's."""

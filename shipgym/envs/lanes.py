@@ -19,6 +19,7 @@ from shipgym.envs.randomisation import Pool
 from shipgym.errors import InputError
 from shipgym.sea.weather_column import weather_column
 from shipgym.ships import ShipModel
+from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.task import Task
 
 
@@ -62,7 +63,7 @@ class Lanes:
         self.flag_names = [name for name in task.info_names if name in task.flags]
         self._output_pool = OutputPool(
             num_envs,
-            n_observed=len(task.observed(model)),
+            n_observed=len(task.observed(model)) + len(task.goals(model)),
             n_outcomes=ANSWER_OUTCOMES + len(task.info_names),
             n_flags=ANSWER_FLAGS + len(self.flag_names),
         )
@@ -144,6 +145,8 @@ class Lanes:
         observed = []
         for quantity in self.task.observed(self.model):
             observed.append(rows["observation"].row(quantity.path))
+        for goal in self.task.goals(self.model):
+            observed.append(rows["goals"].row(goal.path))
         outcomes = ("reward", "terminated", "truncated")
         answer = [rows["outcome"].row(name) for name in outcomes]
         info = [self.program.info_row(name) for name in self.task.info_names]
@@ -399,17 +402,22 @@ def ship_columns(
         sea_parameters = known.get(kind, np.zeros(0))
 
         ship = Ship(*numbers[: len(Ship._fields)].tolist())
-        factors = _scale_factors(task, ship)
+        factors = _scale_factors(task, ship, task.definition.observations)
+        factors += _scale_factors(task, ship, task.definition.goals)
         envelope = envelope_numbers(model)
         columns.append([*numbers, *envelope, *sea_parameters, *factors])
     return np.stack(columns)
 
 
-def _scale_factors(task: Task, ship: Ship) -> list[float]:
+def _scale_factors(
+    task: Task,
+    ship: Ship,
+    specs: Mapping[str, ObservationSpec],
+) -> list[float]:
     """Observations of quantities of 1; 0 for those that such a ship does not have."""
     factors = []
-    for path in task.definition.observations:
-        scale = task.scale(path, ship)
+    for spec in specs.values():
+        scale = task.scale_of(spec, ship)
         if scale == 0.0:
             factors.append(0.0)
         else:

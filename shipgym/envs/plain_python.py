@@ -32,6 +32,7 @@ def plain_loop(
         "task_begin": (Motion, task.State),
         "task_step": (task.State, task.Reward, bool, bool),
         "observe": task.Observation,
+        "goals_of": task.goals_record,
         "due": bool,
         "on_event": task.State,
         "worst_cost": float,
@@ -51,6 +52,7 @@ def _checked(program: EpisodeProgram, name: str, form: Any) -> Callable[..., Any
     # of a task with another's reward, the function that differs from its own step
     namespace = function.__globals__
     own = namespace.get("reward_of_another", function)
+    own = namespace.get("achieved_of_task", own)
     return partial(_result_of, function, own, form)
 
 

@@ -31,6 +31,7 @@ Vectors = VectorEnv[Any, Any, Any]
 
 #: Attributes that all rows share, by the names of the single environment.
 SHARED = (
+    "compute_reward",
     "dt",
     "metadata",
     "model",

@@ -139,7 +139,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             self._engine.begin(self._keys, episodes)
             self._draw_and_show()
         numbers = self._outcomes[ANSWER_OUTCOMES:].tolist()
-        return self._observation.copy(), self._info(numbers)
+        return self._shown(self._observation.copy()), self._info(numbers)
 
     def step(
         self, action: Any
@@ -179,7 +179,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         info = self._info(numbers)
         if self._artists:
             self._draw_and_show()
-        return self._observation.copy(), reward, terminated > 0.0, truncated > 0.0, info
+        observation = self._shown(self._observation.copy())
+        return observation, reward, terminated > 0.0, truncated > 0.0, info
 
     def _draw_and_show(self) -> None:
         self._draw()

@@ -137,7 +137,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         state = self._take(options, "reset_mask") if mask.all() else None
         if state is not None:
             self.set_state(state)
-            return self._engine.outputs.observations, self._infos()
+            return self._shown(self._engine.outputs.observations), self._infos()
 
         engine = self._engine
         self._keys, episodes = self._next_episodes(seed, mask, episodes)
@@ -150,7 +150,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         infos = self._infos()
         for name in self._masks:
             infos[name] = mask.copy()
-        return engine.outputs.observations, infos
+        return self._shown(engine.outputs.observations), infos
 
     def _next_episodes(
         self,
@@ -247,7 +247,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             engine.begin_next(outputs.terminated | outputs.truncated)
         self._draw()
         return (
-            outputs.observations,
+            self._shown(outputs.observations),
             rewards,
             outputs.terminated,
             outputs.truncated,
@@ -260,7 +260,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         ended = outputs.terminated | outputs.truncated
         final_obs = np.full(self.num_envs, None, dtype=object)
         for row in np.flatnonzero(ended).tolist():
-            final_obs[row] = outputs.observations[row].copy()
+            final_obs[row] = self._shown(outputs.observations[row].copy())
 
         # zero in the rows that go on, as in Gymnasium's vector environments
         outcomes = np.where(ended, outputs.outcomes, 0.0)

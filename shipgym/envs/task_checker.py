@@ -166,10 +166,16 @@ def _numbers(
         numbers[f"State.{path}"] = engine.read(path)
     for name in engine.task.reward_parts:
         numbers[name] = engine.info(name)
-    observed = engine.task.observed(engine.model)
-    for quantity, values in zip(observed, observations.T, strict=True):
-        numbers[f"Observation.{quantity.path}"] = values
+    for name, values in zip(_seen_names(engine), observations.T, strict=True):
+        numbers[name] = values
     return numbers
+
+
+def _seen_names(engine: Engine) -> list[str]:
+    """Names of the columns of the observations, goals among them."""
+    task = engine.task
+    observed = [f"Observation.{one.path}" for one in task.observed(engine.model)]
+    return observed + [f"Goal: {one.path}" for one in task.goals(engine.model)]
 
 
 def _source_of(name: str, task: Task) -> str:
@@ -191,10 +197,7 @@ def _differ(
     ways: tuple[str, str],
 ) -> Iterator[str]:
     """First difference of an engine's lanes from another's under the same orders."""
-    names = ["reward"]
-    for quantity in one.task.observed(one.model):
-        names.append(f"Observation.{quantity.path}")
-
+    names = ["reward", *_seen_names(one)]
     seeds = np.arange(one.num_envs)
     rewards: Floats = np.zeros(one.num_envs)
     other_rewards: Floats = np.zeros(other.num_envs)

@@ -27,6 +27,8 @@ from shipgym.engine.specialise import is_shipped
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function
 from shipgym.tasks.contract import ObservationSpec
+from shipgym.tasks.goals import check_goal_names, goals_function, goals_record
+from shipgym.tasks.places import place_of_field
 from shipgym.tasks.source import (
     Configurable,
     annotated,
@@ -44,6 +46,9 @@ FUNCTIONS = {
     "on_event": (*MOMENT, "random", "plan"),
     "worst_cost": ("settings",),
     "plan_length": ("settings",),
+    "achieved": MOMENT,
+    "desired": MOMENT,
+    "goal_reward": ("achieved", "desired", "settings"),
     "check": ("settings", "model"),
     "listed": ("value",),
 }
@@ -111,6 +116,8 @@ class TaskDefinition(Configurable):
     Settings, State, Reward, Observation : type
     begin, step, observe : callable
     due, on_event, worst_cost, plan_length, check, listed : callable
+    Goal, achieved, desired, goal_reward : type and callables, or None
+        Of a task with goals (`shipgym.tasks.goals`).
     reported : tuple of str
         Fields of the state that `info` has.
     episode_steps : int
@@ -131,6 +138,35 @@ class TaskDefinition(Configurable):
     listed: Callable[[Any], Any] = np.asarray
     reported: tuple[str, ...] = ()
     episode_steps: int = 600
+    Goal: Record | None = None
+    achieved: Callable[..., Any] | None = None
+    desired: Callable[..., Any] | None = None
+    goal_reward: Callable[..., Any] | None = None
+
+    @property
+    def has_goals(self) -> bool:
+        """True where what is achieved and desired are observed."""
+        return self.Goal is not None
+
+    @property
+    def parts_of_engine(self) -> tuple[str, ...]:
+        """Names of the parts of the reward that the engine adds."""
+        return ("end", "goal") if self.has_goals else ("end",)
+
+    @property
+    def goals_record(self) -> Record:
+        """Record of the goals that are achieved and desired."""
+        return goals_record(self.Goal)
+
+    @property
+    def goals_of(self) -> Any:
+        """Function that makes the goals of the task."""
+        return goals_function(self.Goal, self.achieved, self.desired)
+
+    @cached_property
+    def goals(self) -> dict[str, ObservationSpec]:
+        """Bounds, unit and scale of each number of the goals, by its path."""
+        return _observations(self.goals_record) if self.has_goals else {}
 
     @cached_property
     def observations(self) -> dict[str, ObservationSpec]:
@@ -230,6 +266,9 @@ def _definition(source: Any) -> TaskDefinition:
     definition = _definition_of(namespace, where)
     for path, spec in definition.observations.items():
         _check_observation(spec, f"{where}: Observation.{path}")
+    for path, spec in definition.goals.items():
+        field = path.removeprefix("achieved.").removeprefix("desired.")
+        _check_observation(spec, place_of_field(where, "Goal", field))
     _check_names(definition)
     return definition
 
@@ -237,7 +276,7 @@ def _definition(source: Any) -> TaskDefinition:
 def _definition_of(namespace: Any, where: str) -> TaskDefinition:
     """Return the definition in a namespace, with defaults for absent names."""
     found = {}
-    for name in (*RECORDS, *FUNCTIONS):
+    for name in (*RECORDS, "Goal", *FUNCTIONS):
         if hasattr(namespace, name):
             found[name] = getattr(namespace, name)
     return TaskDefinition(
@@ -255,7 +294,7 @@ def _check_task(namespace: Any, where: str) -> None:
     check_namespace(
         namespace,
         where,
-        records=RECORDS,
+        records=(*RECORDS, "Goal") if check_goal_names(namespace, where) else RECORDS,
         functions=FUNCTIONS,
         optional=[name for name in FUNCTIONS if name not in needed],
     )
@@ -300,7 +339,7 @@ def _check_observation(spec: ObservationSpec | None, where: str) -> None:
 def _check_names(definition: TaskDefinition) -> None:
     """Refuse two fields of one name; those of records within count as the record's."""
     source = definition.source
-    rewards = ("end", *definition.reward_names)
+    rewards = (*definition.parts_of_engine, *definition.reward_names)
     observations = last_names(definition.observations)
     _check_differ(rewards, f"{definition.reward_source}: Reward")
     _check_differ(definition.settings, f"{source}: Settings")
@@ -311,7 +350,8 @@ def _check_differ(names: Iterable[str], where: str) -> None:
     for name, count in Counter(list(names)).items():
         if count < 2:
             continue
-        also = "; the engine has one of that name" if name == "end" else ""
+        taken = name in ("end", "goal")
+        also = "; the engine has one of that name" if taken else ""
         raise InputError(
             f"{where}: expected names that differ, got two fields {name!r}{also}"
         )

@@ -15,6 +15,7 @@ from shipgym.python_files import asked
 from shipgym.sea.conditions import Weather, as_weather
 from shipgym.ships import ShipModel
 from shipgym.ships.manoeuvring_model import ship_of
+from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.definition import TaskDefinition, read_definition
 from shipgym.tasks.scales import control_interval
 
@@ -244,8 +245,11 @@ class Task:
 
         source = self.definition.source
         asked(self.definition.check, self.settings, model)
-        for quantity in self.observed(model):
-            where = f"{source}: Observation.{quantity.path}: scale for {model.name!r}"
+        for quantity in (*self.observed(model), *self.goals(model)):
+            record = (
+                "Goals" if quantity.path in self.definition.goals else "Observation"
+            )
+            where = f"{source}: {record}.{quantity.path}: scale for {model.name!r}"
             check_number(quantity.scale, where, above=0.0)
         length = asked(self.definition.plan_length, self.settings)
         check_whole(length, f"{source}: plan_length", at_least=0)
@@ -275,6 +279,22 @@ class Task:
             observed.append(quantity)
         return tuple(observed)
 
+    def goals(self, model: ShipModel) -> tuple[Observed, ...]:
+        """Numbers of the goals achieved and desired, in order; none without goals."""
+        ship = ship_of(model, self.water_depth)
+        quantities = []
+        for path, spec in self.definition.goals.items():
+            kind, _, name = path.partition(".")
+            quantity = Observed(
+                name=f"{kind}_goal.{name}",
+                low=spec.low,
+                high=spec.high,
+                scale=self.scale_of(spec, ship),
+                path=path,
+            )
+            quantities.append(quantity)
+        return tuple(quantities)
+
     def instruments(self, windy: bool) -> SensorSet:
         """Sensor set of the ship, in weather or in calm water."""
         if self.sensors is not None:
@@ -283,7 +303,11 @@ class Task:
 
     def scale(self, path: str, ship: Ship) -> float:
         """Physical value of an observation of 1."""
-        scale = self.definition.observations[path].scale
+        return self.scale_of(self.definition.observations[path], ship)
+
+    def scale_of(self, spec: ObservationSpec, ship: Ship) -> float:
+        """Physical value of an observation of 1, by its specification."""
+        scale = spec.scale
         return asked(scale, ship, self.settings) if callable(scale) else scale
 
     @property
@@ -309,7 +333,8 @@ class Task:
     @property
     def reward_parts(self) -> tuple[str, ...]:
         """Names of the parts of the reward among them."""
-        parts = (*self.definition.reward_names, "end")
+        definition = self.definition
+        parts = (*definition.reward_names, *definition.parts_of_engine)
         return tuple(f"reward_{name}" for name in parts)
 
     def __getattr__(self, name: str) -> Any:
