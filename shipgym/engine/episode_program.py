@@ -9,6 +9,7 @@ from shipgym.engine import episodes, sailing, stages, tiles
 from shipgym.engine.compiled_ship import CompiledShip
 from shipgym.engine.compiling import compiled, plain_python
 from shipgym.engine.envelope import Envelope
+from shipgym.engine.extra_arguments import completed
 from shipgym.engine.lane_records import (
     Commands,
     EpisodeCounters,
@@ -155,10 +156,10 @@ class EpisodeProgram:
         task = self.task
         return {
             "task_begin": task.begin,
-            "task_step": task.step,
-            "observe": task.observe,
+            "task_step": completed(task.step),
+            "observe": completed(task.observe),
             "goals_of": task.goals_of,
-            "due": task.due,
+            "due": completed(task.due),
             "on_event": task.on_event,
             "worst_cost": task.worst_cost,
             "no_reward": zeros(task.Reward),

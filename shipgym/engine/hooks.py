@@ -384,6 +384,8 @@ def task_step(
     interval: Interval,
     ship: Ship,
     settings: Any,
+    random: Random,
+    plan: Floats,
 ) -> tuple[Any, Any, bool, bool]:
     """Return state and reward of an interval, whether it failed, and has arrived."""
     raise NotImplementedError(TASK)
@@ -395,6 +397,8 @@ def observe(
     interval: Interval,
     ship: Ship,
     settings: Any,
+    random: Random,
+    plan: Floats,
 ) -> Any:
     """Return the observations of the autopilot, an `Observation` in SI units."""
     raise NotImplementedError(TASK)
@@ -406,6 +410,8 @@ def goals_of(
     interval: Interval,
     ship: Ship,
     settings: Any,
+    random: Random,
+    plan: Floats,
 ) -> Any:
     """Return the goals achieved and desired (`shipgym.tasks.goals`)."""
     raise NotImplementedError(TASK)
@@ -422,6 +428,8 @@ def due(
     interval: Interval,
     ship: Ship,
     settings: Any,
+    random: Random,
+    plan: Floats,
 ) -> bool:
     """Return whether an event is due, such as a new set-point."""
     raise NotImplementedError(TASK)
@@ -455,6 +463,8 @@ def step_of_task(
     interval: Interval,
     ship: Ship,
     settings: Any,
+    random: Random,
+    plan: Floats,
 ) -> tuple[Any, Any, bool, bool]:
     """Return the same as `task_step`, with a reward that is not used."""
     raise NotImplementedError(TASK)
@@ -466,6 +476,8 @@ def reward_of_another(
     interval: Interval,
     ship: Ship,
     settings: Any,
+    random: Random,
+    plan: Floats,
 ) -> Any:
     """Return the `Reward` of the other file."""
     raise NotImplementedError(TASK)

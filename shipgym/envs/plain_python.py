@@ -10,6 +10,7 @@ import numpy as np
 from shipgym.engine import episodes
 from shipgym.engine.compiling import plain
 from shipgym.engine.episode_program import EpisodeProgram
+from shipgym.engine.extra_arguments import innermost
 from shipgym.engine.motion import Motion
 from shipgym.engine.records import Record, field_types, is_record
 from shipgym.engine.specialise import Specialisation
@@ -50,20 +51,19 @@ def _checked(program: EpisodeProgram, name: str, form: Any) -> Callable[..., Any
     specialisation = Specialisation(program.hooks)
     function = specialisation.copy(program.hooks[name])
     # of a task with another's reward, the function that differs from its own step
-    namespace = function.__globals__
-    own = namespace.get("reward_of_another", function)
-    own = namespace.get("achieved_of_task", own)
-    return partial(_result_of, function, own, form)
+    names = function.__globals__
+    reward = names.get("reward_of_another") or names.get("achieved_of_task")
+    return partial(_result_of, function, reward, form)
 
 
-def _result_of(function: Any, own: Any, form: Any, *arguments: Any) -> Any:
+def _result_of(function: Any, reward: Any, form: Any, *arguments: Any) -> Any:
     """Call a function, and refuse a result in another form."""
     given = asked(function, *arguments)
     fault = _fault(given, form, "returned value")
-    if fault and own is not function:
+    if fault and reward is not None:
         fault = fault.replace("result 2", "returned value")  # the reward
     if fault:
-        raise InputError(f"{place_of(own)}: {fault}")
+        raise InputError(f"{place_of(innermost(reward or function))}: {fault}")
     return given
 
 

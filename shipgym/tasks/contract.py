@@ -52,7 +52,7 @@ from numpy.typing import NDArray
 
 from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
 from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.random import uniform
+from shipgym.engine.random import GOLDEN, NORMAL, episode_word, normal, uniform
 
 #: A last field of `Settings` that holds any number of numbers, and its default, none.
 Numbers = NDArray[np.float64]
@@ -76,6 +76,12 @@ class Random(NamedTuple):
 def drawn(random: Random, number: int, low: float, high: float) -> float:
     """Draw the random number of an episode that has a number, in [low, high)."""
     return uniform(random.key, random.episode, np.uint64(number), low, high)
+
+
+def drawn_normal(random: Random, number: int) -> float:
+    """Draw the normally distributed random number that has a number, of variance 1."""
+    word = episode_word(random.key, random.episode) ^ NORMAL
+    return normal(word, np.uint64(number) * GOLDEN)
 
 
 class Interval(NamedTuple):
@@ -175,6 +181,7 @@ __all__ = [
     "at_service_speed",
     "clip",
     "drawn",
+    "drawn_normal",
     "pick",
     "sin_cos",
     "wrap",

@@ -21,6 +21,7 @@ from shipgym.checks import (
     quoted,
     unexpected,
 )
+from shipgym.engine.extra_arguments import completed
 from shipgym.engine.hooks import reward_of_another, step_of_task
 from shipgym.engine.records import Record, field_types, is_record, leaves
 from shipgym.engine.specialise import is_shipped
@@ -363,10 +364,14 @@ def rewarded_step(
     interval: Any,
     ship: Any,
     settings: Any,
+    random: Any,
+    plan: Any,
 ) -> Any:
     """Step of a task with the reward of another file."""
-    after, _, failed, arrived = step_of_task(motion, state, interval, ship, settings)
-    reward = reward_of_another(motion, after, interval, ship, settings)
+    after, _, failed, arrived = step_of_task(
+        motion, state, interval, ship, settings, random, plan
+    )
+    reward = reward_of_another(motion, after, interval, ship, settings, random, plan)
     return after, reward, failed, arrived
 
 
@@ -397,8 +402,8 @@ def _filled(step: Any, reward: Any) -> FunctionType:
     """Fill the hooks of `rewarded_step`."""
     hooks = {
         "__name__": __name__,
-        "step_of_task": step,
-        "reward_of_another": reward,
+        "step_of_task": completed(step),
+        "reward_of_another": completed(reward),
     }
     function = FunctionType(rewarded_step.__code__, hooks, "rewarded_step")
     return _FILLED.setdefault((step, reward), function)

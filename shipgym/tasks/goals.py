@@ -16,6 +16,7 @@ from functools import cache
 from types import FunctionType
 from typing import Any, NamedTuple
 
+from shipgym.engine.extra_arguments import completed
 from shipgym.engine.records import Record
 from shipgym.errors import InputError
 
@@ -36,6 +37,8 @@ def no_goals(
     interval: Any,
     ship: Any,
     settings: Any,
+    random: Any,
+    plan: Any,
 ) -> Any:
     """Default `goals_of`: the task has none."""
     return Goals(0.0, 0.0)
@@ -47,11 +50,15 @@ def goals_of_functions(
     interval: Any,
     ship: Any,
     settings: Any,
+    random: Any,
+    plan: Any,
 ) -> Any:
     """Goals by the functions of a task."""
     return Goals(
-        achieved=achieved_of_task(motion, state, interval, ship, settings),
-        desired=desired_of_task(motion, state, interval, ship, settings),
+        achieved=achieved_of_task(
+            motion, state, interval, ship, settings, random, plan
+        ),
+        desired=desired_of_task(motion, state, interval, ship, settings, random, plan),
     )
 
 
@@ -61,6 +68,8 @@ def achieved_of_task(
     interval: Any,
     ship: Any,
     settings: Any,
+    random: Any,
+    plan: Any,
 ) -> Any:
     """Return `achieved` of the task."""
     raise NotImplementedError
@@ -72,6 +81,8 @@ def desired_of_task(
     interval: Any,
     ship: Any,
     settings: Any,
+    random: Any,
+    plan: Any,
 ) -> Any:
     """Return `desired` of the task."""
     raise NotImplementedError
@@ -95,8 +106,8 @@ def goals_function(goal: Record | None, achieved: Any, desired: Any) -> Any:
     hooks = {
         "__name__": __name__,
         "Goals": goals_record(goal),
-        "achieved_of_task": achieved,
-        "desired_of_task": desired,
+        "achieved_of_task": completed(achieved),
+        "desired_of_task": completed(desired),
     }
     return FunctionType(goals_of_functions.__code__, hooks, "goals_of_functions")
 

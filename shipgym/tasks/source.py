@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from shipgym.checks import check_keys, check_number, check_whole, unexpected
+from shipgym.engine.extra_arguments import EXTRAS, takes_extras
 from shipgym.engine.records import Record, field_types, is_list, is_record, leaves
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function, load_file, refuse_closure
@@ -62,10 +63,13 @@ def check_namespace(
     for name, arguments in functions.items():
         if name in optional and not hasattr(namespace, name):
             continue
+        extras = EXTRAS if takes_extras(arguments) else ()
         what = f"a function {name}({', '.join(arguments)})"
+        if extras:
+            what += f", with or without {' and '.join(extras)} behind them"
         function = _named(namespace, name, where, what)
         refuse_closure(function)
-        check_function(function, len(arguments), f"{where}: {name}", what)
+        check_function(function, len(arguments), f"{where}: {name}", what, extras)
         found[name] = function
     return found
 
