@@ -14,6 +14,7 @@ from .errors import UnstableModelError as UnstableModelError
 from .examples import example_ship as example_ship
 from .manoeuvres import towing_tank as towing_tank
 from .sea.conditions import Weather as Weather
+from .sea.current_field import CurrentField as CurrentField
 from .sea.current_wind_waves import Current as Current
 from .sea.current_wind_waves import Waves as Waves
 from .sea.current_wind_waves import Wind as Wind

@@ -40,6 +40,8 @@ class EpisodeProgram:
         Whether there is current, wind or waves.
     shared : bool
         Whether all lanes have the same ship and sea.
+    current : callable or None
+        `current(x, y, settings)`, of a current that differs from place to place.
     """
 
     ship: CompiledShip
@@ -47,6 +49,7 @@ class EpisodeProgram:
     sensors: SensorSet
     windy: bool
     shared: bool
+    current: Any = None
 
     @cached_property
     def state_rows(self) -> Layout:
@@ -149,6 +152,8 @@ class EpisodeProgram:
             **self.ship.hooks(shared=self.shared),
             **self.ship.staged,
             **open_sea.sea_functions(self.windy),
+            "CURRENT_BY_PLACE": self.current is not None,
+            **({} if self.current is None else {"current_at": self.current}),
         }
 
     def _task_hooks(self) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from shipgym.engine.hooks import (
     begin_sea,
+    current_at,
     load_arguments,
     load_counters,
     load_outcome,
@@ -19,6 +20,7 @@ from shipgym.engine.hooks import (
     load_rules,
     load_sea_parameters,
     load_ship,
+    load_task_settings,
     sail_lanes,
     store_commands,
     store_memory,
@@ -39,7 +41,7 @@ from shipgym.engine.judging import (
 )
 from shipgym.engine.lane_records import Commands, SeaRandom
 from shipgym.engine.memory import bool_in, float32_in, int64_row_in
-from shipgym.engine.motion import HAS_SEA, Motion
+from shipgym.engine.motion import CURRENT_BY_PLACE, HAS_SEA, Motion
 from shipgym.engine.random import BEGIN_WORDS, rng_state, uniform
 from shipgym.engine.records import LANES
 from shipgym.engine.sailing import are_finite, take_commands
@@ -54,6 +56,7 @@ from shipgym.engine.tiles import (
     tile_of,
     write_outputs,
 )
+from shipgym.sea.open_sea import add_current
 from shipgym.tasks.contract import Random
 
 SIGNATURE = "int64(float64[::1], float64[::1], int64, int64)"
@@ -178,6 +181,10 @@ def begin_sea_of(tile: Tile, lane: int, motion: Motion, random: Random) -> None:
     word = rng_state(random.key, random.episode)
     parameters = load_sea_parameters(tile.ships, lane)
     sea = begin_sea(motion, word, parameters)
+    if CURRENT_BY_PLACE:
+        settings = load_task_settings(tile.settings)
+        here = current_at(motion.x, motion.y, settings)
+        sea = add_current(sea, here[0], here[1])
     store_sea(tile.state, lane, sea)
     store_sea_random(tile.random, lane, SeaRandom(word + BEGIN_WORDS))
 

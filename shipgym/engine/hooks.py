@@ -332,6 +332,14 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
     raise NotImplementedError(SEA)
 
 
+def current_at(x: float, y: float, settings: Any) -> tuple[float, float]:
+    """Current that differs from place to place, north and east, m/s.
+
+    Given by the task, whose settings it takes, or by a file of the sea.
+    """
+    raise NotImplementedError(SEA)
+
+
 @called
 def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
     """Return the sea at the beginning of an episode."""

@@ -86,7 +86,7 @@ class Engine(Lanes):
         randomisation = randomisation or Randomisation()
         self.pool = randomisation.ships(model, task.seas)
         drawn = len(self.pool) > 1
-        windy = any(not sea.calm for _, sea in self.pool)
+        windy = any(not sea.calm for _, sea in self.pool) or task.current is not None
         if model_index is not None:
             self.pool = _only(model_index, self.pool)
         own = [(ship, task.seas[0]) for ship in ships]
@@ -103,6 +103,7 @@ class Engine(Lanes):
             task.instruments(windy),
             windy,
             len(own) == 1,
+            task.current,
         )
         super().__init__(program, model, task, num_envs, own, drawn, threads)
         self.goals = Goals(task, model) if task.definition.has_goals else None

@@ -40,6 +40,8 @@ def plain_loop(
         "measure": program.sensors.Memory,
         "readings": Readings,
     }
+    if program.current is not None:
+        forms["current_at"] = (float, float)
     checked = {name: _checked(program, name, form) for name, form in forms.items()}
     run = plain(episodes.run, {**program.hooks, **checked, **(hooks or {})})
     # words of random numbers overflow, as they do when compiled
@@ -53,6 +55,7 @@ def _checked(program: EpisodeProgram, name: str, form: Any) -> Callable[..., Any
     # of a task with another's reward, the function that differs from its own step
     names = function.__globals__
     reward = names.get("reward_of_another") or names.get("achieved_of_task")
+    reward = reward or names.get("current_of_file")
     return partial(_result_of, function, reward, form)
 
 

@@ -16,7 +16,8 @@ from shipgym.envs.plain_python import plain_loop
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
 from shipgym.findings import Findings
-from shipgym.python_files import asked
+from shipgym.python_files import asked, place_of
+from shipgym.sea.current_field import function_of_file
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 from shipgym.wrong_types import typed
@@ -164,6 +165,9 @@ def _numbers(
     numbers: dict[str, NDArray[Any]] = {}
     for path in engine.program.state_rows["task_state"].present:
         numbers[f"State.{path}"] = engine.read(path)
+    if engine.task.current is not None:
+        numbers["current: north"] = engine.read("current_north")
+        numbers["current: east"] = engine.read("current_east")
     for name in engine.task.reward_parts:
         numbers[name] = engine.info(name)
     for name, values in zip(_seen_names(engine), observations.T, strict=True):
@@ -181,6 +185,8 @@ def _seen_names(engine: Engine) -> list[str]:
 def _source_of(name: str, task: Task) -> str:
     """File that a number comes from, for messages."""
     definition = task.definition
+    if name.startswith("current"):
+        return place_of(function_of_file(task.current))
     if name.startswith("reward_"):
         return definition.reward_source
     if task.sensors is None or not name.startswith("Observation."):

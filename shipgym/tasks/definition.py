@@ -50,6 +50,7 @@ FUNCTIONS = {
     "achieved": MOMENT,
     "desired": MOMENT,
     "goal_reward": ("achieved", "desired", "settings"),
+    "current": ("x", "y", "settings"),
     "check": ("settings", "model"),
     "listed": ("value",),
 }
@@ -119,6 +120,8 @@ class TaskDefinition(Configurable):
     due, on_event, worst_cost, plan_length, check, listed : callable
     Goal, achieved, desired, goal_reward : type and callables, or None
         Of a task with goals (`shipgym.tasks.goals`).
+    current : callable or None
+        Current by place, `current(x, y, settings) -> (north, east)`, m/s.
     reported : tuple of str
         Fields of the state that `info` has.
     episode_steps : int
@@ -143,6 +146,7 @@ class TaskDefinition(Configurable):
     achieved: Callable[..., Any] | None = None
     desired: Callable[..., Any] | None = None
     goal_reward: Callable[..., Any] | None = None
+    current: Callable[..., Any] | None = None
 
     @property
     def has_goals(self) -> bool:
