@@ -107,6 +107,7 @@ class Engine(Lanes):
         )
         super().__init__(program, model, task, num_envs, own, drawn, threads)
         self.goals = Goals(task, model) if task.definition.has_goals else None
+        self._is_watched = bool(self.goals or task.definition.targets)
         self._begin_all(loop or self._compiled)
 
     def _begin_all(self, loop: Callable[[EpisodeProgram], Any]) -> None:
@@ -166,7 +167,7 @@ class Engine(Lanes):
         step: Callable[[], int] = partial(self._run_shares, asked)
         if self.n_shares == 1:
             step = partial(self._run, self._memory, self.outputs.memory, 0, asked)
-        n_ended = step() if self.goals is None else self._step_to_goals(step)
+        n_ended = self._watched(step) if self._is_watched else step()
         if n_ended < 0:  # `REFUSED`, in every share
             self.outputs = before
             self._refuse_orders()
@@ -200,20 +201,27 @@ class Engine(Lanes):
         `shipgym.engine.episodes.REFUSED`.
         """
         step = partial(self._run, self._memory, self.outputs.memory, 0, STEP)
-        return step if self.goals is None else partial(self._step_to_goals, step)
+        return partial(self._watched, step) if self._is_watched else step
 
-    def _step_to_goals(self, step: Callable[[], int]) -> int:
-        """Take a step, and add the rewards of goals in lanes that had not ended."""
+    def _watched(self, step: Callable[[], int]) -> int:
+        """Take a step of a task with goals, or other ships, and look after both."""
         over = self.read("ended") > 0.0
         n_ended = step()
-        if n_ended < 0 or self.goals is None:
+        if n_ended < 0:
             return n_ended
-        earned = self.goals.of_rows(self.outputs.observations)
+        if self.task.definition.targets:
+            self.refuse_lost_targets()
+        if self.goals is not None:
+            self._reward_goals(self.goals, over)
+        return n_ended
+
+    def _reward_goals(self, goals: Goals, over: Flags) -> None:
+        """Add the rewards of goals in lanes that had not ended."""
+        earned = goals.of_rows(self.outputs.observations)
         self.info("reward_goal")[:] = np.where(over, 0.0, earned)
         parts = {name: self.info(name) for name in self.task.reward_parts}
-        others = self.goals.sum_of_others(parts)
+        others = goals.sum_of_others(parts)
         self.outputs.outcomes[0] = others + parts["reward_goal"]
-        return n_ended
 
     def reset(self, seeds: ArrayLike) -> Observation:
         """Begin in each lane the episode of the single environment's `reset(seed=...)`.

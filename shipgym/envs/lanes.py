@@ -17,9 +17,11 @@ from shipgym.engine.records import LANES, flat, leaves
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES, OutputPool, Outputs
 from shipgym.envs.randomisation import Pool
 from shipgym.errors import InputError
+from shipgym.python_files import place_of
 from shipgym.sea.weather_column import weather_column
 from shipgym.ships import ShipModel
 from shipgym.tasks.contract import ObservationSpec
+from shipgym.tasks.shapes import Shape, shapes_of
 from shipgym.tasks.task import Task
 
 
@@ -259,6 +261,43 @@ class Lanes:
         if lengths is None:
             return None
         return float(lengths * self.model.particulars["length"])
+
+    def shapes(self, lane: int) -> tuple[Shape, ...]:
+        """Shapes that the task has drawn for a lane (`shipgym.tasks.shapes`)."""
+        draw = self.task.definition.draw
+        if draw is None:
+            return ()
+        tile, lane_in_tile = divmod(lane, LANES)
+        hooks = self.program.hooks
+        ships = self._ships[tile % len(self._ships)]
+        return shapes_of(
+            draw,
+            hooks["load_motion"](self._states[tile], lane_in_tile),
+            hooks["load_task_state"](self._states[tile], lane_in_tile),
+            hooks["load_ship"](ships, lane_in_tile),
+            self.task.settings,
+        )
+
+    def refuse_lost_targets(self) -> None:
+        """Refuse numbers of other ships that are not finite.
+
+        InputError names the task's file and line, the target and her equations.
+        """
+        rows = self.program.state_rows["task_state"]
+        end = rows.first + len(rows.present)
+        by_lane = lanes_of(self._states)[:, rows.first : end].swapaxes(0, 1)
+        numbers = by_lane.reshape(len(rows.present), -1)[:, : self.num_envs]
+        if np.isfinite(numbers).all():
+            return
+        row, lane = np.argwhere(~np.isfinite(numbers))[0]
+        target = rows.present[row].rpartition(".")[0] or rows.present[row]
+        definition = self.task.definition
+        raise InputError(
+            f"{place_of(definition.step)}: State.{target}: expected a target ship"
+            " within the physical range, got one that has left it in lane"
+            f" {lane} at step {self.steps[lane]:g}; look at how she begins, and at her"
+            f" equations ({', '.join(definition.targets)})"
+        )
 
     def get_state(self) -> dict[str, Any]:
         """Return all that `set_state` needs to continue from here, copies by name."""

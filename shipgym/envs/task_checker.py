@@ -52,6 +52,7 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
         model, given, randomisation = read_options(task, ship, options)
         plain, seen = _plain_engine(model, given, randomisation)
         _sail_in_python(plain)
+        plain.shapes(0)
         few = Engine(model, PLAIN_LANES, given, randomisation)
         many = Engine(model, LANES, given, randomisation)
         one = Engine(model, 1, given, randomisation)

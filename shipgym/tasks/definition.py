@@ -36,6 +36,7 @@ from shipgym.tasks.source import (
     check_namespace,
     read_source,
 )
+from shipgym.tasks.traffic import targets_of
 
 RECORDS = ("Settings", "State", "Reward", "Observation")
 MOMENT = ("motion", "state", "interval", "ship", "settings")
@@ -51,6 +52,7 @@ FUNCTIONS = {
     "desired": MOMENT,
     "goal_reward": ("achieved", "desired", "settings"),
     "current": ("x", "y", "settings"),
+    "draw": ("motion", "state", "ship", "settings"),
     "check": ("settings", "model"),
     "listed": ("value",),
 }
@@ -122,6 +124,8 @@ class TaskDefinition(Configurable):
         Of a task with goals (`shipgym.tasks.goals`).
     current : callable or None
         Current by place, `current(x, y, settings) -> (north, east)`, m/s.
+    draw : callable or None
+        Shapes for pictures (`shipgym.tasks.shapes`).
     reported : tuple of str
         Fields of the state that `info` has.
     episode_steps : int
@@ -147,6 +151,12 @@ class TaskDefinition(Configurable):
     desired: Callable[..., Any] | None = None
     goal_reward: Callable[..., Any] | None = None
     current: Callable[..., Any] | None = None
+    draw: Callable[..., Any] | None = None
+
+    @cached_property
+    def targets(self) -> tuple[str, ...]:
+        """Equations of the other ships that a step sails (`shipgym.tasks.traffic`)."""
+        return tuple(targets_of(self.step))
 
     @property
     def has_goals(self) -> bool:

@@ -1,0 +1,229 @@
+"""Other ships in a task: how they sail, and how they are met.
+
+Targets are records in the `State` of a task. `step` advances them: one at constant
+course and speed by `advance`, one that sails by equations of her own by a function that
+`vessel` makes of them. All of it becomes part of the compiled loop over ships.
+"""
+
+from collections.abc import Callable, Iterator
+from math import fabs, sqrt
+from typing import Any, NamedTuple
+
+from shipgym.checks import check_whole
+from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
+from shipgym.engine.motion import CALM, Motion, Ship, lost, sail
+from shipgym.engine.records import is_record
+from shipgym.engine.specialise import Specialisation, captured_globals, is_plain
+from shipgym.errors import InputError
+from shipgym.python_files import place_of
+
+#: Kinds of an encounter by the rules of the road (COLREG), seen from the own ship.
+CLEAR, OVERTAKING, OVERTAKEN, HEAD_ON, GIVE_WAY, STAND_ON = (
+    float(kind) for kind in range(6)
+)
+
+
+class Target(NamedTuple):
+    """A ship that keeps course and speed."""
+
+    x: float  # m, north
+    y: float  # m, east
+    course: float  # rad
+    speed: float  # m/s, over ground
+
+
+class Approach(NamedTuple):
+    """Where another ship is, and how close she comes if both keep course and speed."""
+
+    distance: float  # m
+    bearing: float  # rad from the bow, to starboard positive
+    aspect: float  # rad, bearing of the own ship from the bow of the other
+    dcpa: float  # m, distance at the closest point of approach
+    tcpa: float  # s, time to it, negative where it is past
+
+
+def advance(target: Target, dt: float) -> Target:
+    """Target dt seconds later."""
+    sine, cosine = sin_cos(target.course)
+    return Target(
+        x=target.x + dt * target.speed * cosine,
+        y=target.y + dt * target.speed * sine,
+        course=target.course,
+        speed=target.speed,
+    )
+
+
+def target_of(motion: Motion) -> Target:
+    """Target as which a ship under way in still water is seen."""
+    sine, cosine = sin_cos(motion.psi)
+    north = motion.u * cosine - motion.v * sine
+    east = motion.u * sine + motion.v * cosine
+    speed = sqrt(north * north + east * east)
+    return Target(motion.x, motion.y, arctan2(east, north), speed)
+
+
+def meeting(target: Target, place: Target, meeting_time: float) -> Target:
+    """Target that sails to a place, and is there after a time, s.
+
+    Course and speed are those of `target`; the encounters of Imazu begin so.
+    """
+    sine, cosine = sin_cos(target.course)
+    run = target.speed * meeting_time
+    return Target(
+        x=place.x - run * cosine,
+        y=place.y - run * sine,
+        course=target.course,
+        speed=target.speed,
+    )
+
+
+def approach(motion: Motion, target: Target) -> Approach:
+    """How a ship in still water, and another, approach each other."""
+    own = target_of(motion)
+    own_east, own_north = sin_cos(own.course)
+    east, north = sin_cos(target.course)
+    away_x = target.x - motion.x
+    away_y = target.y - motion.y
+    relative_x = target.speed * north - own.speed * own_north
+    relative_y = target.speed * east - own.speed * own_east
+
+    squared_speed = relative_x * relative_x + relative_y * relative_y
+    slowest = 1e-6  # m/s, below which the distance stays as it is
+    closing = -(away_x * relative_x + away_y * relative_y)
+    tcpa = closing / max(squared_speed, slowest * slowest)
+    closest_x = away_x + tcpa * relative_x
+    closest_y = away_y + tcpa * relative_y
+    return Approach(
+        distance=sqrt(away_x * away_x + away_y * away_y),
+        bearing=wrap(arctan2(away_y, away_x) - motion.psi),
+        aspect=wrap(arctan2(-away_y, -away_x) - target.course),
+        dcpa=sqrt(closest_x * closest_x + closest_y * closest_y),
+        tcpa=tcpa,
+    )
+
+
+def encounter(near: Approach, risk_distance: float, risk_time: float) -> float:
+    """Kind of an encounter by COLREG rules 13 to 15: `CLEAR`, `GIVE_WAY`, ...
+
+    It is `CLEAR` unless the other comes closer than `risk_distance`, m, within
+    `risk_time`, s. A ship overtakes from more than 22.5 degrees abaft the other's beam;
+    ships meet head on where each has the other within 6 degrees of the bow.
+    """
+    abaft = 1.9634954084936207  # rad, 112.5 degrees from the bow
+    ahead = 0.10471975511965977  # rad, 6 degrees
+    on_bow = fabs(near.bearing) < ahead
+    on_her_bow = fabs(near.aspect) < ahead
+    kind = pick(near.bearing > 0.0, GIVE_WAY, STAND_ON)
+    kind = pick(on_bow & on_her_bow, HEAD_ON, kind)
+    kind = pick(fabs(near.bearing) > abaft, OVERTAKEN, kind)
+    kind = pick(fabs(near.aspect) > abaft, OVERTAKING, kind)
+    risk = (near.dcpa < risk_distance) & (near.tcpa > 0.0) & (near.tcpa < risk_time)
+    return pick(risk, kind, CLEAR)
+
+
+def rudder_to(motion: Motion, heading: float, ship: Ship) -> float:
+    """Rudder of a helmsman who keeps a heading, rad."""
+    error = wrap(heading - motion.psi)
+    lead = 2.0 * ship.length / ship.speed  # s
+    return clip(error - lead * motion.r, -ship.rudder_limit, ship.rudder_limit)
+
+
+def sail_steps(motion: Motion, rudder: float, shaft: float, dt: float) -> Motion:
+    """State of a target dt seconds later, not numbers if she leaves any ship's range.
+
+    A loop in which hooks are filled by `vessel`.
+    """
+    h = dt / TARGET_STEPS
+    after = motion
+    for _ in range(TARGET_STEPS):
+        after = sail(after, rudder, shaft, h, CALM, TARGET_COEFFICIENTS, TARGET_SHIP)
+    gone = float("nan")
+    adrift = Motion(gone, gone, gone, gone, gone, gone, gone, gone, gone, gone, gone)
+    return pick(lost(after, TARGET_SHIP), adrift, after)
+
+
+TARGET_STEPS = 1
+TARGET_COEFFICIENTS: Any = None
+TARGET_SHIP: Any = None
+
+
+class _OfTarget(Specialisation):
+    """Copies that keep the equations of a target where those of a ship are filled."""
+
+    def copy(self, function: Any, checked: bool = False) -> Any:
+        made = super().copy(function, checked)
+        made.__module__ = "target_ship"  # hooks of the package fill its functions only
+        return made
+
+
+def vessel(source: Any, steps: int = 2) -> Callable[..., Motion]:
+    """Return a function that sails a target by equations of her own.
+
+    It is `sail(motion, rudder, shaft, dt) -> Motion`, rudder in rad, shaft in 1/s, for
+    use in `step`; `sail.ship` has her particulars and `sail.start` her motion straight
+    ahead at service speed. Name it at the top of a task's file.
+
+    Parameters
+    ----------
+    source : str, Path or ShipModel
+        As `shipgym.load_model` takes it, a Python file with equations among them, or a
+        model.
+    steps : int
+        Steps of the integration in a control interval.
+
+    Raises
+    ------
+    InputError
+        For a model whose forces are a sum over a table, which no task can name.
+    """
+    from shipgym.ships import ShipModel, load_model
+    from shipgym.ships.manoeuvring_model import ship_of
+
+    model = source if isinstance(source, ShipModel) else load_model(source)
+    if model.compiled.staged:
+        raise InputError(
+            f"vessel: expected a ship with equations or a table of terms, got"
+            f" {model.name!r}, whose forces are a sum over her data"
+        )
+    check_whole(steps, "vessel: steps", at_least=1)
+    hooks = model.compiled.hooks(lanes=1)
+    numbers = model.ship_numbers(float("inf"), 1.0)
+    ship = as_numbers(ship_of(model, float("inf")))
+    hooks |= {
+        "TARGET_STEPS": steps,
+        "TARGET_SHIP": ship,
+        "TARGET_COEFFICIENTS": as_numbers(hooks["load_coefficients"](numbers)),
+    }
+    made: Any = _OfTarget(hooks).copy(sail_steps)
+    made.equations = place_of(hooks["accelerations"])
+    made.ship = ship
+    at_speed = [0.0, 0.0, 0.0, ship.speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ship.shaft]
+    made.start = Motion(*at_speed)
+    return made  # type: ignore[no-any-return]
+
+
+def as_numbers(record: Any) -> Any:
+    """Record of Python's own numbers, which compiled code holds as constants."""
+    numbers = []
+    for value in record:
+        within = is_record(type(value))
+        numbers.append(as_numbers(value) if within else float(value))
+    return type(record)(*numbers)
+
+
+def targets_of(function: Any) -> Iterator[str]:
+    """Places of the equations of targets that a function sails, or those it names."""
+    seen: set[Any] = set()
+    pending = [function]
+    while pending:
+        one = pending.pop()
+        if one in seen:
+            continue
+        seen.add(one)
+        if one is advance:
+            yield "constant course and speed"
+        elif hasattr(one, "equations"):
+            yield one.equations
+        else:
+            named = captured_globals(one, {})
+            pending += [value for _, value in named if is_plain(value)]
