@@ -1,8 +1,9 @@
-"""Functions of a task that leave out arguments, completed to the full list.
+"""Functions of a task that name what else they need: random numbers, the plan.
 
-`step`, `observe`, `due` and `reward` are called with all arguments of a moment, and
-with the `EXTRAS`. A function that names only some of those is wrapped by one of the
-functions here, whose hook `partial_function` is filled by it.
+`step`, `observe`, `due` and `reward` have five arguments, and may name `EXTRAS` behind
+them. Loops call them with tile and lane behind the five. Each is therefore wrapped by
+one of the functions here, which take from tile and lane what it names, and nothing
+else: a loop is not slower for what a task does not use.
 """
 
 from collections.abc import Sequence
@@ -10,12 +11,16 @@ from functools import cache
 from types import FunctionType
 from typing import Any
 
+from shipgym.engine.hooks import load_random
+from shipgym.engine.random import interval_key
+from shipgym.engine.tiles import Tile, plan_of
+from shipgym.tasks.contract import Random
+
 #: Arguments that a function may name behind the required ones, in any order.
 EXTRAS = ("random", "plan")
-
-
 #: Last of the required arguments of such a function.
 LAST_REQUIRED = ("interval", "ship", "settings")
+N_REQUIRED = 5
 
 
 def takes_extras(arguments: Sequence[str]) -> bool:
@@ -23,22 +28,33 @@ def takes_extras(arguments: Sequence[str]) -> bool:
     return tuple(arguments[-len(LAST_REQUIRED) :]) == LAST_REQUIRED
 
 
-def partial_function(*arguments: Any) -> Any:
+def random_of(tile: Tile, lane: int, steps: float) -> Random:
+    """Return what the random numbers of one interval of a lane follow from."""
+    random = load_random(tile.random, lane)
+    return Random(interval_key(random.key, steps), random.episode)
+
+
+def plan_to_read(tile: Tile, lane: int) -> Any:
+    """Return the plan of a lane's episode."""
+    return plan_of(tile.state, lane)
+
+
+def wrapped_function(*arguments: Any) -> Any:
     """Hook: the function that is wrapped."""
     raise NotImplementedError("filled by `completed`")
 
 
-def without_extras(
+def with_nothing(
     moment: Any,
     state: Any,
     interval: Any,
     ship: Any,
     settings: Any,
-    random: Any,
-    plan: Any,
+    tile: Tile,
+    lane: int,
 ) -> Any:
-    """Call a function that takes neither random numbers nor the plan."""
-    return partial_function(moment, state, interval, ship, settings)
+    """Call a function that names no extras."""
+    return wrapped_function(moment, state, interval, ship, settings)
 
 
 def with_random(
@@ -47,11 +63,12 @@ def with_random(
     interval: Any,
     ship: Any,
     settings: Any,
-    random: Any,
-    plan: Any,
+    tile: Tile,
+    lane: int,
 ) -> Any:
-    """Call a function that takes random numbers."""
-    return partial_function(moment, state, interval, ship, settings, random)
+    """Call a function that names random numbers."""
+    random = random_of(tile, lane, interval.steps)
+    return wrapped_function(moment, state, interval, ship, settings, random)
 
 
 def with_plan(
@@ -60,52 +77,65 @@ def with_plan(
     interval: Any,
     ship: Any,
     settings: Any,
-    random: Any,
-    plan: Any,
+    tile: Tile,
+    lane: int,
 ) -> Any:
-    """Call a function that takes the plan."""
-    return partial_function(moment, state, interval, ship, settings, plan)
+    """Call a function that names the plan."""
+    plan = plan_to_read(tile, lane)
+    return wrapped_function(moment, state, interval, ship, settings, plan)
 
 
-def with_plan_first(
+def with_random_and_plan(
     moment: Any,
     state: Any,
     interval: Any,
     ship: Any,
     settings: Any,
-    random: Any,
-    plan: Any,
+    tile: Tile,
+    lane: int,
 ) -> Any:
-    """Call a function that takes the plan and random numbers, in this order."""
-    return partial_function(moment, state, interval, ship, settings, plan, random)
+    """Call a function that names both, random numbers first."""
+    random = random_of(tile, lane, interval.steps)
+    plan = plan_to_read(tile, lane)
+    return wrapped_function(moment, state, interval, ship, settings, random, plan)
+
+
+def with_plan_and_random(
+    moment: Any,
+    state: Any,
+    interval: Any,
+    ship: Any,
+    settings: Any,
+    tile: Tile,
+    lane: int,
+) -> Any:
+    """Call a function that names both, the plan first."""
+    random = random_of(tile, lane, interval.steps)
+    plan = plan_to_read(tile, lane)
+    return wrapped_function(moment, state, interval, ship, settings, plan, random)
 
 
 WRAPPERS = {
-    (): without_extras,
+    (): with_nothing,
     ("random",): with_random,
     ("plan",): with_plan,
-    ("plan", "random"): with_plan_first,
+    ("random", "plan"): with_random_and_plan,
+    ("plan", "random"): with_plan_and_random,
 }
-
-
-def extras_of(function: Any) -> tuple[str, ...]:
-    """Names of the extra arguments that a function of a moment takes."""
-    code = function.__code__
-    required = 5  # those of a moment
-    names: tuple[str, ...] = code.co_varnames[required : code.co_argcount]
-    return names
 
 
 @cache
 def completed(function: Any) -> Any:
-    """Return a function of a moment that takes all extra arguments."""
-    wrapper = WRAPPERS.get(extras_of(function))
-    if wrapper is None:
+    """Wrap a function of a task, so that it is called with tile and lane."""
+    code = function.__code__
+    extras = code.co_varnames[N_REQUIRED : code.co_argcount]
+    if extras == ("tile", "lane"):  # one of the package's
         return function
-    hooks = {"__name__": __name__, "partial_function": function}
+    wrapper = WRAPPERS[extras]
+    hooks = {**wrapper.__globals__, "wrapped_function": function}
     return FunctionType(wrapper.__code__, hooks, wrapper.__name__)
 
 
 def innermost(function: Any) -> Any:
     """Return the function that a completed one wraps, or itself."""
-    return function.__globals__.get("partial_function", function)
+    return function.__globals__.get("wrapped_function", function)

@@ -372,7 +372,8 @@ def readings(motion: Motion, sea: Sea, memory: Any) -> Readings:
     raise NotImplementedError(SENSORS)
 
 
-# The task (interface: `shipgym.tasks.contract`)
+# The task (interface: `shipgym.tasks.contract`). Functions that are given tile and lane
+# take from them what else they name (`shipgym.engine.extra_arguments`).
 
 
 @called
@@ -392,8 +393,8 @@ def task_step(
     interval: Interval,
     ship: Ship,
     settings: Any,
-    random: Random,
-    plan: Floats,
+    tile: Tile,
+    lane: int,
 ) -> tuple[Any, Any, bool, bool]:
     """Return state and reward of an interval, whether it failed, and has arrived."""
     raise NotImplementedError(TASK)
@@ -405,8 +406,8 @@ def observe(
     interval: Interval,
     ship: Ship,
     settings: Any,
-    random: Random,
-    plan: Floats,
+    tile: Tile,
+    lane: int,
 ) -> Any:
     """Return the observations of the autopilot, an `Observation` in SI units."""
     raise NotImplementedError(TASK)
@@ -418,8 +419,8 @@ def goals_of(
     interval: Interval,
     ship: Ship,
     settings: Any,
-    random: Random,
-    plan: Floats,
+    tile: Tile,
+    lane: int,
 ) -> Any:
     """Return the goals achieved and desired (`shipgym.tasks.goals`)."""
     raise NotImplementedError(TASK)
@@ -436,8 +437,8 @@ def due(
     interval: Interval,
     ship: Ship,
     settings: Any,
-    random: Random,
-    plan: Floats,
+    tile: Tile,
+    lane: int,
 ) -> bool:
     """Return whether an event is due, such as a new set-point."""
     raise NotImplementedError(TASK)
@@ -471,8 +472,8 @@ def step_of_task(
     interval: Interval,
     ship: Ship,
     settings: Any,
-    random: Random,
-    plan: Floats,
+    tile: Tile,
+    lane: int,
 ) -> tuple[Any, Any, bool, bool]:
     """Return the same as `task_step`, with a reward that is not used."""
     raise NotImplementedError(TASK)
@@ -484,8 +485,8 @@ def reward_of_another(
     interval: Interval,
     ship: Ship,
     settings: Any,
-    random: Random,
-    plan: Floats,
+    tile: Tile,
+    lane: int,
 ) -> Any:
     """Return the `Reward` of the other file."""
     raise NotImplementedError(TASK)

@@ -48,10 +48,9 @@ from shipgym.engine.hooks import (
 from shipgym.engine.lane_records import EpisodeCounters, Outcome, Rules
 from shipgym.engine.mathematics import pick
 from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.random import interval_key
 from shipgym.engine.specialise import called
 from shipgym.engine.tiles import FIRST_LANE, GROUP, SHARED_SHIP, Tile, plan_of
-from shipgym.tasks.contract import Interval, Random
+from shipgym.tasks.contract import Interval
 
 
 class LaneView(NamedTuple):
@@ -106,26 +105,19 @@ def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
         over = load_counters(state, lane).ended != 0.0
         interval = past_interval(tile, lane, motion, data, settings.rules)
 
-        random = random_of(tile, lane, interval.steps)
-        plan = plan_of(state, lane)
-
-        task_state, just_ended = judge(
-            tile, lane, motion, interval, ship, settings, random, plan
-        )
+        task_state, just_ended = judge(tile, lane, motion, interval, ship, settings)
         memory = sample(tile, lane, motion, interval, settings)
         memory = pick(over, load_memory(state, lane), memory)
         store_memory(state, lane, memory)
         seen = readings(motion, load_sea(state, lane), memory)
         observation = observe(
-            seen, task_state, interval, ship, settings.task, random, plan
+            seen, task_state, interval, ship, settings.task, tile, lane
         )
         store_observation(tile.result, lane, observation, scale)
-        goals = goals_of(
-            motion, task_state, interval, ship, settings.task, random, plan
-        )
+        goals = goals_of(motion, task_state, interval, ship, settings.task, tile, lane)
         store_goals(tile.result, lane, goals, load_goal_scale(tile.ships, lane))
 
-        is_due = due(motion, task_state, interval, ship, settings.task, random, plan)
+        is_due = due(motion, task_state, interval, ship, settings.task, tile, lane)
         goes_on = not (over | just_ended)
         real = lane < tile.lanes
         n_due += 1 if is_due & goes_on & real else 0
@@ -162,8 +154,6 @@ def judge(
     interval: Interval,
     ship: Ship,
     settings: AllSettings,
-    random: Random,
-    plan: Any,
 ) -> tuple[Any, bool]:
     """Let the task reward an interval, and end the episode if it is over.
 
@@ -174,7 +164,7 @@ def judge(
     over = counters.ended != 0.0
     before = load_task_state(tile.state, lane)
     after, reward, failed, arrived = task_step(
-        motion, before, interval, ship, settings.task, random, plan
+        motion, before, interval, ship, settings.task, tile, lane
     )
     task_state = pick(over, before, after)
     reward = pick(over, no_reward(), reward)
@@ -247,12 +237,6 @@ def sample(
     return measure(motion, sea, memory, frequency, interval, settings.sensors, random)
 
 
-def random_of(tile: Tile, lane: int, steps: float) -> Random:
-    """Return what the random numbers of one interval of a lane follow from."""
-    random = load_random(tile.random, lane)
-    return Random(interval_key(random.key, steps), random.episode)
-
-
 @called
 def take_events(tile: Tile) -> None:
     """Take events, such as a new set-point, in the lanes in which one is due."""
@@ -264,10 +248,9 @@ def take_events(tile: Tile) -> None:
         before = load_task_state(state, lane)
         interval = last_interval(tile, lane)
         going = load_counters(state, lane).ended == 0.0
-        now = random_of(tile, lane, interval.steps)
-        plan = plan_of(state, lane)
-        if going and due(motion, before, interval, ship, settings, now, plan):
+        if going and due(motion, before, interval, ship, settings, tile, lane):
             random = load_random(tile.random, lane)
+            plan = plan_of(state, lane)
             after = on_event(motion, before, interval, ship, settings, random, plan)
             store_task(tile, lane, after)
             observe_lane(tile, lane)
@@ -300,10 +283,8 @@ def observe_lane(tile: Tile, lane: int) -> None:
     ship, _, scale = view_of(tile, lane)
     settings = load_task_settings(tile.settings)
     interval = last_interval(tile, lane)
-    random = random_of(tile, lane, interval.steps)
-    plan = plan_of(state, lane)
     seen = readings(motion, sea, memory)
-    observation = observe(seen, task_state, interval, ship, settings, random, plan)
+    observation = observe(seen, task_state, interval, ship, settings, tile, lane)
     store_observation(tile.result, lane, observation, scale)
-    goals = goals_of(motion, task_state, interval, ship, settings, random, plan)
+    goals = goals_of(motion, task_state, interval, ship, settings, tile, lane)
     store_goals(tile.result, lane, goals, load_goal_scale(tile.ships, lane))

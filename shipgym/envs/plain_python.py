@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from shipgym.engine.compiling import plain
 from shipgym.engine.episode_program import EpisodeProgram
 from shipgym.engine.extra_arguments import innermost
 from shipgym.engine.motion import Motion
-from shipgym.engine.records import Record, field_types, is_record
+from shipgym.engine.records import Record, is_array, is_record, members
 from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
 from shipgym.python_files import asked, place_of
@@ -75,18 +75,23 @@ def _fault(given: Any, form: Any, name: str) -> str:
 
     A form is a record, float, bool, or a tuple of forms.
     """
+    names: list[str] = []
+    if isinstance(form, tuple):
+        names = [f"result {k + 1}" for k in range(len(form))]
+    if is_array(form):
+        form = get_args(form)
+        names = [f"{name}[{k}]" for k in range(len(form))]
     if isinstance(form, tuple):
         if not isinstance(given, tuple) or len(given) != len(form):
             return _other(given, form, name)
-        return _fault_within(given, form, [f"result {k + 1}" for k in range(len(form))])
+        return _fault_within(given, form, names)
     if is_record(form):
         if type(given) is not form:
             return _other(given, form, name)
         record: Record = form
         kinds = []
-        names = []
-        for field, kind in field_types(record).items():
-            kinds.append(kind if is_record(kind) else float)
+        for field, kind in members(record):
+            kinds.append(kind if members(kind) else float)
             names.append(f"{record.__name__}.{field}")
         return _fault_within(given, kinds, names)
     numbers = Integral if form is bool else Real

@@ -53,6 +53,7 @@ from numpy.typing import NDArray
 from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.random import GOLDEN, NORMAL, episode_word, normal, uniform
+from shipgym.engine.records import Size
 
 #: A last field of `Settings` that holds any number of numbers, and its default, none.
 Numbers = NDArray[np.float64]
@@ -177,6 +178,7 @@ __all__ = [
     "Scale",
     "Setting",
     "Ship",
+    "Size",
     "arctan2",
     "at_service_speed",
     "clip",

@@ -2,8 +2,7 @@
 
 import importlib
 import sys
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -23,17 +22,25 @@ from shipgym.checks import (
 )
 from shipgym.engine.extra_arguments import completed
 from shipgym.engine.hooks import reward_of_another, step_of_task
-from shipgym.engine.records import Record, field_types, is_record, leaves
+from shipgym.engine.records import (
+    Record,
+    field_types,
+    is_array,
+    is_record,
+    members,
+    short_names,
+)
 from shipgym.engine.specialise import is_shipped
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function
 from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.goals import check_goal_names, goals_function, goals_record
-from shipgym.tasks.places import place_of_field
 from shipgym.tasks.source import (
     Configurable,
     annotated,
     check_namespace,
+    field_place,
+    keywords,
     read_source,
 )
 from shipgym.tasks.traffic import targets_of
@@ -202,7 +209,12 @@ class TaskDefinition(Configurable):
     @cached_property
     def reward_names(self) -> tuple[str, ...]:
         """Names of the parts of its reward."""
-        return last_names(leaves(self.Reward))
+        return tuple(short_names(self.Reward).values())
+
+    @cached_property
+    def observation_names(self) -> dict[str, str]:
+        """Name of each observation by its path in `Observation`."""
+        return short_names(self.Observation)
 
     @property
     def shipped(self) -> bool:
@@ -229,16 +241,20 @@ def _observations(record: Record, prefix: str = "") -> dict[str, Any]:
     """Annotations of the fields of a record, and of those within it, by their paths."""
     specs: dict[str, Any] = {}
     for name, kind, spec in annotated(record, ObservationSpec):
-        if is_record(kind):
-            specs |= _observations(kind, f"{prefix}{name}.")
-        else:
-            specs[prefix + name] = spec
+        specs |= _observations_at(f"{prefix}{name}", kind, spec)
     return specs
 
 
-def last_names(paths: Iterable[str]) -> tuple[str, ...]:
-    """Last names of paths such as `helm.rudder`."""
-    return tuple(path.rpartition(".")[2] for path in paths)
+def _observations_at(path: str, kind: Any, spec: Any) -> dict[str, Any]:
+    """Annotations of a field by their paths; entries of an array have the same."""
+    if is_record(kind):
+        return _observations(kind, f"{path}.")
+    if not is_array(kind):
+        return {path: spec}
+    specs: dict[str, Any] = {}
+    for name, entry in members(kind):
+        specs |= _observations_at(f"{path}.{name}", entry, spec)
+    return specs
 
 
 #: Definitions, each its own key: one that is read again is the same object, so that it
@@ -283,7 +299,8 @@ def _definition(source: Any) -> TaskDefinition:
         _check_observation(spec, f"{where}: Observation.{path}")
     for path, spec in definition.goals.items():
         field = path.removeprefix("achieved.").removeprefix("desired.")
-        _check_observation(spec, place_of_field(where, "Goal", field))
+        place = field_place(definition.Goal, field.partition(".")[0], where)
+        _check_observation(spec, f"{place}: Goal.{field}")
     _check_names(definition)
     return definition
 
@@ -325,12 +342,12 @@ def _check_reported(namespace: Any, where: str) -> None:
     """Check which fields of a state are to be reported."""
     reported = getattr(namespace, "REPORTED", ())
     where = f"{where}: REPORTED"
-    expected = f"a tuple of fields of State, none of {TAKEN}"
+    expected = f"a tuple of fields of State that are numbers, none of {TAKEN}"
     if not isinstance(reported, tuple | list):
         raise unexpected(where, expected, reported)
-    fields = namespace.State._fields
+    kinds = field_types(namespace.State)
     for name in reported:
-        if name not in fields or name in TAKEN:
+        if name not in kinds or name in TAKEN or members(kinds[name]):
             raise unexpected(where, expected, name)
 
 
@@ -354,22 +371,35 @@ def _check_observation(spec: ObservationSpec | None, where: str) -> None:
 def _check_names(definition: TaskDefinition) -> None:
     """Refuse two fields of one name; those of records within count as the record's."""
     source = definition.source
-    rewards = (*definition.parts_of_engine, *definition.reward_names)
-    observations = last_names(definition.observations)
-    _check_differ(rewards, f"{definition.reward_source}: Reward")
-    _check_differ(definition.settings, f"{source}: Settings")
-    _check_differ(observations, f"{source}: Observation")
+    rewards = short_names(definition.Reward)
+    _check_differ(
+        definition.Reward,
+        rewards,
+        definition.reward_source,
+        taken=definition.parts_of_engine,
+    )
+    settings = [name for name, *_ in keywords(definition.Settings)]
+    _check_differ(definition.Settings, dict(enumerate(settings)), source)
+    _check_differ(definition.Observation, definition.observation_names, source)
 
 
-def _check_differ(names: Iterable[str], where: str) -> None:
-    for name, count in Counter(list(names)).items():
-        if count < 2:
-            continue
-        taken = name in ("end", "goal")
-        also = "; the engine has one of that name" if taken else ""
-        raise InputError(
-            f"{where}: expected names that differ, got two fields {name!r}{also}"
-        )
+def _check_differ(
+    record: Record,
+    names: Mapping[Any, str],
+    where: str,
+    taken: Collection[str] = (),
+) -> None:
+    """Refuse a name that two numbers of a record have, given by their paths."""
+    known: dict[str, Any] = dict.fromkeys(taken)
+    for path, name in names.items():
+        if name in known:
+            field = str(path).partition(".")[0]
+            also = "; the engine has one of that name" if name in taken else ""
+            raise InputError(
+                f"{field_place(record, field, where)}: {record.__name__}: expected"
+                f" names that differ, got two fields {name!r}{also}"
+            )
+        known[name] = path
 
 
 def rewarded_step(
@@ -378,14 +408,14 @@ def rewarded_step(
     interval: Any,
     ship: Any,
     settings: Any,
-    random: Any,
-    plan: Any,
+    tile: Any,
+    lane: Any,
 ) -> Any:
     """Step of a task with the reward of another file."""
     after, _, failed, arrived = step_of_task(
-        motion, state, interval, ship, settings, random, plan
+        motion, state, interval, ship, settings, tile, lane
     )
-    reward = reward_of_another(motion, after, interval, ship, settings, random, plan)
+    reward = reward_of_another(motion, after, interval, ship, settings, tile, lane)
     return after, reward, failed, arrived
 
 

@@ -37,8 +37,8 @@ def no_goals(
     interval: Any,
     ship: Any,
     settings: Any,
-    random: Any,
-    plan: Any,
+    tile: Any,
+    lane: Any,
 ) -> Any:
     """Default `goals_of`: the task has none."""
     return Goals(0.0, 0.0)
@@ -50,15 +50,13 @@ def goals_of_functions(
     interval: Any,
     ship: Any,
     settings: Any,
-    random: Any,
-    plan: Any,
+    tile: Any,
+    lane: Any,
 ) -> Any:
     """Goals by the functions of a task."""
     return Goals(
-        achieved=achieved_of_task(
-            motion, state, interval, ship, settings, random, plan
-        ),
-        desired=desired_of_task(motion, state, interval, ship, settings, random, plan),
+        achieved=achieved_of_task(motion, state, interval, ship, settings, tile, lane),
+        desired=desired_of_task(motion, state, interval, ship, settings, tile, lane),
     )
 
 
@@ -68,8 +66,8 @@ def achieved_of_task(
     interval: Any,
     ship: Any,
     settings: Any,
-    random: Any,
-    plan: Any,
+    tile: Any,
+    lane: Any,
 ) -> Any:
     """Return `achieved` of the task."""
     raise NotImplementedError
@@ -81,8 +79,8 @@ def desired_of_task(
     interval: Any,
     ship: Any,
     settings: Any,
-    random: Any,
-    plan: Any,
+    tile: Any,
+    lane: Any,
 ) -> Any:
     """Return `desired` of the task."""
     raise NotImplementedError

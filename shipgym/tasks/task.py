@@ -289,7 +289,7 @@ class Task:
             if spec.option not in options:
                 continue
             quantity = Observed(
-                name=path.rpartition(".")[2],
+                name=self.definition.observation_names[path],
                 low=spec.low,
                 high=spec.high,
                 scale=self.scale(path, ship),
