@@ -91,7 +91,8 @@ def goals_record(goal: Record | None) -> Record:
     """Record of the goal that is achieved and the one that is desired."""
     if goal is None:
         return Goals
-    pair: Any = NamedTuple("Goals", [("achieved", goal), ("desired", goal)])
+    made: Any = NamedTuple
+    pair = made("Goals", [("achieved", goal), ("desired", goal)])
     pair.__module__ = __name__
     return pair  # type: ignore[no-any-return]
 

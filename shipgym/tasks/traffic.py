@@ -62,19 +62,18 @@ def target_of(motion: Motion) -> Target:
     return Target(motion.x, motion.y, arctan2(east, north), speed)
 
 
-def meeting(target: Target, place: Target, meeting_time: float) -> Target:
-    """Target that sails to a place, and is there after a time, s.
-
-    Course and speed are those of `target`; the encounters of Imazu begin so.
-    """
+def meeting(target: Target, x: float, y: float, meeting_time: float) -> Target:
+    """Target of a course and speed that is at a place after a time, s."""
     sine, cosine = sin_cos(target.course)
     run = target.speed * meeting_time
-    return Target(
-        x=place.x - run * cosine,
-        y=place.y - run * sine,
-        course=target.course,
-        speed=target.speed,
-    )
+    return Target(x - run * cosine, y - run * sine, target.course, target.speed)
+
+
+def distance_to(motion: Motion, target: Target) -> float:
+    """Distance of another ship, m."""
+    away_x = target.x - motion.x
+    away_y = target.y - motion.y
+    return sqrt(away_x * away_x + away_y * away_y)
 
 
 def approach(motion: Motion, target: Target) -> Approach:
@@ -94,7 +93,7 @@ def approach(motion: Motion, target: Target) -> Approach:
     closest_x = away_x + tcpa * relative_x
     closest_y = away_y + tcpa * relative_y
     return Approach(
-        distance=sqrt(away_x * away_x + away_y * away_y),
+        distance=distance_to(motion, target),
         bearing=wrap(arctan2(away_y, away_x) - motion.psi),
         aspect=wrap(arctan2(-away_y, -away_x) - target.course),
         dcpa=sqrt(closest_x * closest_x + closest_y * closest_y),
@@ -126,6 +125,25 @@ def rudder_to(motion: Motion, heading: float, ship: Ship) -> float:
     error = wrap(heading - motion.psi)
     lead = 2.0 * ship.length / ship.speed  # s
     return clip(error - lead * motion.r, -ship.rudder_limit, ship.rudder_limit)
+
+
+def rudder_by_rules(
+    motion: Motion,
+    other: Target,
+    course: float,
+    safe: float,
+    ship: Ship,
+) -> float:
+    """Rudder of a helmsman who keeps a course, and gives way by COLREG, rad.
+
+    He alters course to starboard while another ship that he has to keep clear of would
+    come closer than `safe`, m, within twelve times that he travels his length.
+    """
+    risk_time = 12.0 * ship.length / ship.speed
+    kind = encounter(approach(motion, other), safe, risk_time)
+    gives_way = (kind == GIVE_WAY) | (kind == HEAD_ON) | (kind == OVERTAKING)
+    alteration = 0.7  # rad
+    return rudder_to(motion, course + pick(gives_way, alteration, 0.0), ship)
 
 
 def sail_steps(motion: Motion, rudder: float, shaft: float, dt: float) -> Motion:
