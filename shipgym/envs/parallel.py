@@ -1,0 +1,274 @@
+"""Several ships in the same water: a parallel environment of PettingZoo."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.arrays import Floats
+from shipgym.checks import check_keys, check_whole, did_you_mean, unexpected
+from shipgym.envs.artist import Artist
+from shipgym.envs.engine import Engine, episode_key
+from shipgym.envs.environment import DEFAULT_MODEL, read_options, rudder_orders, spaces
+from shipgym.errors import InputError
+from shipgym.extras import library
+from shipgym.tasks import shared_water
+from shipgym.tasks.encounters import ABSENT, IMAZU
+
+ParallelEnv: Any = library(
+    "pettingzoo", "marl", "several ships in one environment need it"
+).ParallelEnv
+
+MOST_SHIPS = 4  # whom each other sees
+
+
+class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked here
+    """Ships whose tracks cross, each steered by an agent who sees the others.
+
+    They begin straight ahead at service speed, at about the same distance from the
+    crossing. An agent's episode ends when she has passed it by that distance, when she
+    comes closer to another than a ship length, or with the time; she is then out of the
+    others' way. Observations, rewards and settings are those of
+    `shipgym.tasks.shared_water`.
+
+    Raises InputError for a number of ships, a model or an option that does not fit.
+
+    Parameters
+    ----------
+    n_ships : int
+        Number of ships, 2 to 4.
+    model : str, Path or ShipModel
+        The ship of all agents, as environments take it.
+    render_mode : {None, "rgb_array"}
+        Whether `render` gives a picture around the first ship.
+    **options
+        Keywords of environments and settings of the task; the sea is calm.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "name": "shipgym_ships_v0",
+        "render_modes": ["rgb_array"],
+        "render_fps": 30,
+        "is_parallelizable": True,
+    }
+
+    def __init__(
+        self,
+        n_ships: int = 3,
+        model: Any = DEFAULT_MODEL,
+        render_mode: str | None = None,
+        **options: Any,
+    ) -> None:
+        check_whole(n_ships, "n_ships", at_least=2, at_most=MOST_SHIPS)
+        if render_mode not in (None, "rgb_array"):
+            raise unexpected("render_mode", "'rgb_array' or None", render_mode)
+        ship, task, randomisation = read_options(shared_water, model, options)
+        if not task.weather.calm or len(task.seas) > 1:
+            raise unexpected("sea", "'calm', the only one that ships share", task.sea)
+        self.render_mode = render_mode
+        self.task = task
+        self.model = ship
+        self.possible_agents = [f"ship_{number}" for number in range(n_ships)]
+        self.agents: list[str] = []
+        self._engine = Engine(ship, n_ships, task, randomisation)
+        observations, actions = spaces(task, ship, None)
+        self.observation_spaces = dict.fromkeys(self.possible_agents, observations)
+        self.action_spaces = dict.fromkeys(self.possible_agents, actions)
+        self._artist = Artist(render_mode) if render_mode else None
+        self._random: np.random.Generator | None = None
+
+    def observation_space(self, agent: str) -> gymnasium.spaces.Space[Any]:
+        """Observation space of an agent."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> gymnasium.spaces.Space[Any]:
+        """Action space of an agent."""
+        return self.action_spaces[agent]
+
+    def reset(
+        self,
+        seed: int | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> tuple[dict[str, NDArray[np.float32]], dict[str, dict[str, Any]]]:
+        """Begin an encounter.
+
+        Raises InputError for a case of another number of ships.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Fixes this encounter and all that follow it.
+        options : dict, optional
+            `case`, 1 to 22: that of Imazu (`shipgym.tasks.encounters.IMAZU`). Without
+            it courses and distances are drawn. Others are ignored, as PettingZoo's
+            test of the interface demands, unless they look like it.
+        """
+        if seed is not None or self._random is None:
+            self._random, _ = gymnasium.utils.seeding.np_random(seed)
+        given = dict(options or {})
+        for name in given:
+            if name != "case" and did_you_mean(name, ["case"]):
+                check_keys(given, ["case"], "options")
+        n_ships = len(self.possible_agents)
+        keys = [episode_key(self._random) for _ in range(n_ships)]
+        courses, parts = self._drawn(self._random)
+        if "case" in given:
+            courses, parts = imazu_courses(given["case"], n_ships)
+
+        self.agents = list(self.possible_agents)
+        self._engine.renew_outputs()
+        self._engine.begin(np.array(keys, dtype=np.uint64))
+        self._place(courses, parts)
+        self._show_others()
+        if self._artist:
+            self._artist.begin(self._engine)
+        return self._observations(self.agents), self._infos(self.agents)
+
+    def _drawn(self, random: np.random.Generator) -> tuple[Floats, Floats]:
+        """Courses of ships, and their distances by that of the settings."""
+        n_ships = len(self.possible_agents)
+        even = 2.0 * np.pi * np.arange(n_ships) / n_ships
+        spread = 0.8 * np.pi / n_ships
+        courses = random.uniform(-np.pi, np.pi) + even
+        courses = courses + random.uniform(-spread, spread, n_ships)
+        return courses, random.uniform(0.9, 1.1, n_ships)
+
+    def _place(self, courses: Floats, parts: Floats) -> None:
+        """Write where ships begin, each on her track."""
+        engine = self._engine
+        length = self.model.particulars["length"]
+        run = parts * self.task.settings.distance * length
+        engine.write("x", -run * np.cos(courses))
+        engine.write("y", -run * np.sin(courses))
+        engine.write("psi", courses)
+        engine.write("course", courses)
+
+    def step(
+        self, actions: Mapping[str, Any]
+    ) -> tuple[
+        dict[str, NDArray[np.float32]],
+        dict[str, float],
+        dict[str, bool],
+        dict[str, bool],
+        dict[str, dict[str, Any]],
+    ]:
+        """Take one control interval with the actions of all agents that are left.
+
+        Returns observations, rewards, terminations, truncations and infos by agent.
+        Raises InputError for an agent without an action, or a wrong one.
+        """
+        agents = self.agents
+        engine = self._engine
+        engine.order(self._commands(actions))
+        engine.advance(anew=True)
+        outputs = engine.outputs
+        lanes = [self.possible_agents.index(agent) for agent in agents]
+        rewards = outputs.outcomes[0, lanes].tolist()
+        terminated = outputs.terminated[lanes].tolist()
+        truncated = outputs.truncated[lanes].tolist()
+        over = outputs.terminated | outputs.truncated
+        self.agents = [
+            agent for agent, lane in zip(agents, lanes, strict=True) if not over[lane]
+        ]
+        self._show_others()
+        if self._artist:
+            self._artist.note(engine)
+        return (
+            self._observations(agents),
+            dict(zip(agents, rewards, strict=True)),
+            dict(zip(agents, terminated, strict=True)),
+            dict(zip(agents, truncated, strict=True)),
+            self._infos(agents),
+        )
+
+    def _commands(self, actions: Mapping[str, Any]) -> Floats:
+        """Commands of all ships, 0 of those whose episode is over."""
+        commands = np.zeros((len(self.possible_agents), self.task.n_commands))
+        discrete = self.task.action == "rudder-discrete"
+        for agent in self.agents:
+            if agent not in actions:
+                raise InputError(f"actions: expected one of {agent!r}, got none")
+            action = actions[agent]
+            if discrete:
+                action = rudder_orders(action, (), f"actions: {agent}")[0]
+            shape = commands[0].shape
+            if np.shape(action) != shape:
+                expected = f"shape {shape}"
+                raise unexpected(f"actions: {agent}", expected, np.shape(action))
+            commands[self.possible_agents.index(agent)] = action
+        return commands
+
+    def _show_others(self) -> None:
+        """Let each ship see where the others are now; those that are over are not."""
+        engine = self._engine
+        state = self.state()
+        x, y, psi, u, v, _ = state.T
+        north = u * np.cos(psi) - v * np.sin(psi)
+        east = u * np.sin(psi) + v * np.cos(psi)
+        here = np.isin(self.possible_agents, self.agents)
+        seen = {
+            "x": np.where(here, x, shared_water.ABSENT_X),
+            "y": np.where(here, y, 0.0),
+            "course": np.arctan2(east, north),
+            "speed": np.where(here, np.hypot(north, east), 0.0),
+        }
+        n_ships = len(here)
+        for place in range(n_ships - 1):
+            # ship i sees i + 1, i + 2, ...
+            of_others = (np.arange(n_ships) + place + 1) % n_ships
+            for name, values in seen.items():
+                engine.write(f"others.{place}.{name}", values[of_others])
+        engine.observe_again()
+
+    def state(self) -> Floats:
+        """North, east, heading, surge, sway and yaw rate of each ship, SI units."""
+        names = ("x", "y", "psi", "u", "v", "r")
+        return np.stack([self._engine.read(name) for name in names], axis=1)
+
+    def _observations(self, agents: list[str]) -> dict[str, NDArray[np.float32]]:
+        observations = self._engine.observations
+        return {
+            agent: observations[self.possible_agents.index(agent)] for agent in agents
+        }
+
+    def _infos(self, agents: list[str]) -> dict[str, dict[str, Any]]:
+        infos: dict[str, dict[str, Any]] = {}
+        for agent in agents:
+            lane = self.possible_agents.index(agent)
+            infos[agent] = {}
+            for name in self.task.info_names:
+                value = float(self._engine.info(name)[lane])
+                is_flag = name in self.task.flags
+                infos[agent][name] = value > 0.0 if is_flag else value
+        return infos
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Picture around the first ship, uint8 array of shape (600, 600, 3)."""
+        return self._artist.picture(self._engine) if self._artist else None
+
+    def close(self) -> None:
+        """End the encounter."""
+        self.agents = []
+
+
+def imazu_courses(case: Any, n_ships: int) -> tuple[Floats, Floats]:
+    """Courses of the ships in a case, rad, and the parts of the distance of each."""
+    check_whole(case, "options: case", at_least=1, at_most=len(IMAZU))
+    degrees = IMAZU[case - 1]
+    others = degrees[degrees != ABSENT]
+    if len(others) != n_ships - 1:
+        raise InputError(
+            f"options: case: expected one of {n_ships} ships, got {case}, of"
+            f" {len(others) + 1}"
+        )
+    courses = np.radians([0.0, *others])
+    slower = 0.7  # ships on the course of the own ship are overtaken
+    parts = np.where(degrees[: len(others)] == 0.0, slower, 1.0)
+    return courses, np.array([1.0, *parts])
+
+
+def parallel_env(**options: Any) -> ShipsParallelEnv:
+    """Make the environment, as PettingZoo's modules name it (`ShipsParallelEnv`)."""
+    return ShipsParallelEnv(**options)
