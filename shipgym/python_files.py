@@ -106,10 +106,12 @@ def check_function(
         )
     names = code.co_varnames[: code.co_argcount]
     unknown = set(names[count:]) - set(extras)
-    if len(names) < count or unknown:
+    if len(names) < count or (unknown and not extras):
         raise InputError(
             f"{where}: expected {what}, got one of {code.co_argcount} arguments"
         )
+    if unknown:
+        raise InputError(f"{where}: expected {what}, got one with {unknown.pop()!r}")
 
 
 def refuse_closure(function: Any) -> None:

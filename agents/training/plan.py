@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 from agents.controllers.interface import model_hash
+from agents.policies.policy import OUTPUTS
 from agents.policies.weights_file import as_json
 from agents.suites.suite import BenchmarkTask
 from agents.training.settings import LearningSettings, make_settings, settings_of
 from shipgym import ShipModel
-from shipgym.checks import check_keys, check_whole
+from shipgym.checks import check_choice, check_keys, check_whole
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather, as_weather
 from shipgym.sea.weather_column import weather_column
@@ -75,6 +76,7 @@ class TrainingPlan:
     def _check_action(self) -> None:
         action = self.task.task.action
         base = self.settings.base
+        check_choice(action, OUTPUTS, "action")
         if action == "rudder-discrete" and self.algorithm != "ppo":
             raise InputError(
                 f"action: expected one that {self.algorithm} learns, got '{action}';"

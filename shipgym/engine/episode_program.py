@@ -40,6 +40,8 @@ class EpisodeProgram:
         Whether there is current, wind or waves.
     shared : bool
         Whether all lanes have the same ship and sea.
+    shared_settings : bool
+        Whether all lanes have the same settings of the task.
     current : callable or None
         `current(x, y, settings)`, of a current that differs from place to place.
     """
@@ -49,6 +51,7 @@ class EpisodeProgram:
     sensors: SensorSet
     windy: bool
     shared: bool
+    shared_settings: bool = True
     current: Any = None
 
     @cached_property
@@ -100,12 +103,13 @@ class EpisodeProgram:
 
     @cached_property
     def settings_rows(self) -> Layout:
-        """Rows of the settings of engine, sensor set and task."""
-        return Layout(
-            rules=Rules,
-            sensor_settings=self.sensors.Settings,
-            task_settings=self.task.Settings,
-        )
+        """Rows of the settings of engine and sensor set."""
+        return Layout(rules=Rules, sensor_settings=self.sensors.Settings)
+
+    @cached_property
+    def task_settings_rows(self) -> Layout:
+        """Rows of the settings of the task."""
+        return Layout(task_settings=self.task.Settings)
 
     def row(self, name: str) -> int:
         """Row of a number of the state by its name: `u`, `course`, `steps`."""
@@ -130,9 +134,11 @@ class EpisodeProgram:
     def hooks(self) -> dict[str, Any]:
         """Functions and values for the hooks and constants of loops, by name."""
         of_ships = 1 if self.shared else LANES
+        of_settings = 1 if self.shared_settings else LANES
         return {
             "GROUP": 1 if plain_python() else tiles.GROUP,
             "SHARED_SHIP": self.shared,
+            "SHARED_SETTINGS": self.shared_settings,
             "PLAN_ROW": self.state_rows.n_rows,
             **_loaders(self.state_rows, LANES),
             **_storers(self.state_rows, LANES),
@@ -142,6 +148,7 @@ class EpisodeProgram:
             **_storers(self.random_rows, LANES),
             **_loaders(self.ship_rows, of_ships),
             **_loaders(self.settings_rows, 1),
+            **_loaders(self.task_settings_rows, of_settings),
             **_loaders(Layout(arguments=Arguments), 1),
             **self._task_hooks(),
             "measure": self.sensors.measure,

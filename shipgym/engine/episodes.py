@@ -40,6 +40,7 @@ from shipgym.engine.judging import (
     take_events,
 )
 from shipgym.engine.lane_records import Commands, SeaRandom
+from shipgym.engine.mathematics import pick
 from shipgym.engine.memory import bool_in, float32_in, int64_row_in
 from shipgym.engine.motion import CURRENT_BY_PLACE, HAS_SEA, Motion
 from shipgym.engine.random import BEGIN_WORDS, rng_state, uniform
@@ -169,13 +170,13 @@ def begin_lane(tile: Tile, lane: int) -> None:
     clear_lane(state, lane)
     clear_lane(tile.result, lane)
 
-    settings = settings_of(tile)
+    settings = settings_of(tile, lane)
     ship = load_ship(tile.ships, lane)
     plan = plan_of(state, lane)
     motion, task_state = task_begin(ship, settings.task, random, plan)
     commands = Commands(
         rudder_command=0.0,
-        shaft_command=1.0,
+        shaft_command=pick(ship.shaft > 0.0, motion.n / ship.shaft, 1.0),
         rudder_before=0.0,
     )
     store_motion(state, lane, motion)
@@ -196,7 +197,7 @@ def begin_sea_of(tile: Tile, lane: int, motion: Motion, random: Random) -> None:
     parameters = load_sea_parameters(tile.ships, lane)
     sea = begin_sea(motion, word, parameters)
     if CURRENT_BY_PLACE:
-        settings = load_task_settings(tile.settings)
+        settings = load_task_settings(tile.task_settings, lane)
         here = current_at(motion.x, motion.y, settings)
         sea = add_current(sea, here[0], here[1])
     store_sea(tile.state, lane, sea)

@@ -223,8 +223,8 @@ def load_sensor_settings(settings: Floats) -> Any:
     raise NotImplementedError(RECORDS)
 
 
-def load_task_settings(settings: Floats) -> Any:
-    """Read the `Settings` of the task."""
+def load_task_settings(task_settings: Floats, lane: int) -> Any:
+    """Read the `Settings` of the task in a lane."""
     raise NotImplementedError(RECORDS)
 
 

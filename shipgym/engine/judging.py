@@ -49,7 +49,14 @@ from shipgym.engine.lane_records import EpisodeCounters, Outcome, Rules
 from shipgym.engine.mathematics import pick
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.specialise import called
-from shipgym.engine.tiles import FIRST_LANE, GROUP, SHARED_SHIP, Tile, plan_of
+from shipgym.engine.tiles import (
+    FIRST_LANE,
+    GROUP,
+    SHARED_SETTINGS,
+    SHARED_SHIP,
+    Tile,
+    plan_of,
+)
 from shipgym.tasks.contract import Interval
 
 
@@ -78,12 +85,12 @@ def view_of(tile: Tile, lane: int) -> LaneView:
     )
 
 
-def settings_of(tile: Tile) -> AllSettings:
-    """Return the settings of all ships."""
+def settings_of(tile: Tile, lane: int) -> AllSettings:
+    """Return the settings of a lane."""
     return AllSettings(
         rules=load_rules(tile.settings),
         sensors=load_sensor_settings(tile.settings),
-        task=load_task_settings(tile.settings),
+        task=load_task_settings(tile.task_settings, lane),
     )
 
 
@@ -95,12 +102,13 @@ def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
     just ended; lanes beyond them, up to so many groups, fill vectors.
     """
     state = tile.state
-    settings = settings_of(tile)
+    first_settings = settings_of(tile, FIRST_LANE)
     shared = view_of(tile, FIRST_LANE)
     n_due = 0
     n_ended = 0
     for lane in range(groups * GROUP):
         ship, data, scale = shared if SHARED_SHIP else view_of(tile, lane)
+        settings = first_settings if SHARED_SETTINGS else settings_of(tile, lane)
         motion = load_motion(state, lane)
         over = load_counters(state, lane).ended != 0.0
         interval = past_interval(tile, lane, motion, data, settings.rules)
@@ -241,8 +249,8 @@ def sample(
 def take_events(tile: Tile) -> None:
     """Take events, such as a new set-point, in the lanes in which one is due."""
     state = tile.state
-    settings = load_task_settings(tile.settings)
     for lane in range(tile.lanes):
+        settings = load_task_settings(tile.task_settings, lane)
         ship = load_ship(tile.ships, lane)
         motion = load_motion(state, lane)
         before = load_task_state(state, lane)
@@ -281,7 +289,7 @@ def observe_lane(tile: Tile, lane: int) -> None:
     task_state = load_task_state(state, lane)
 
     ship, _, scale = view_of(tile, lane)
-    settings = load_task_settings(tile.settings)
+    settings = load_task_settings(tile.task_settings, lane)
     interval = last_interval(tile, lane)
     seen = readings(motion, sea, memory)
     observation = observe(seen, task_state, interval, ship, settings, tile, lane)

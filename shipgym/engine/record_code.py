@@ -59,6 +59,8 @@ def loader(rows: Rows, lanes: int = LANES) -> Function:
             return f"Table(array, {in_lane}, {lanes})"
         if path not in rows.present:
             return "0.0"
+        if is_list(kind) and lanes > 1:
+            return f"array[{rows.row(path) * lanes} + lane :: {lanes}]"
         if is_list(kind):
             return f"array[{rows.row(path)}:]"
         return _entry(rows.row(path), lanes, names)

@@ -156,7 +156,7 @@ def in_local_water(
     She is carried along like the water she displaces; where she moves through it into
     water of another speed, hers over ground stays.
     """
-    settings = load_task_settings(tile.settings)
+    settings = load_task_settings(tile.task_settings, lane)
     sea = load_sea(tile.state, lane)
     drifted_x = before.x + h * sea.current_north
     drifted_y = before.y + h * sea.current_east
@@ -177,7 +177,7 @@ def evolved_sea(
     sea = load_sea(tile.state, lane)
     if not CURRENT_BY_PLACE:
         return evolve(motion, h, sea, word, parameters)
-    settings = load_task_settings(tile.settings)
+    settings = load_task_settings(tile.task_settings, lane)
     before = load_motion(tile.state, lane)
     left = current_at(before.x, before.y, settings)
     met = current_at(motion.x, motion.y, settings)

@@ -54,6 +54,10 @@ class Engine(Lanes):
         Number of the ship, of those that are drawn from, that all episodes have.
     loop : callable, optional
         Makes the loop that steps the ships; by default it is compiled.
+    lane_settings : sequence of NamedTuple, optional
+        Settings of the task in each lane, in place of the task's.
+    scale_task : Task, optional
+        Task that gives the scales of observations; by default `task`.
     """
 
     def __init__(
@@ -66,9 +70,19 @@ class Engine(Lanes):
         threads: int = 1,
         model_index: int | None = None,
         loop: Callable[[EpisodeProgram], Any] | None = None,
+        lane_settings: Sequence[Any] | None = None,
+        scale_task: Task | None = None,
     ) -> None:
         check_whole(num_envs, "num_envs", at_least=1)
         check_whole(threads, "threads", at_least=1)
+        ships = [models] if isinstance(models, ShipModel) else list(models)
+        _check_ships(ships, num_envs, allow_unstable)
+        model = ships[0]
+        task = task or course_keeping_task()
+        task.check_fits(model)
+        settings = lane_settings or [task.settings]
+        scale_task = scale_task or task
+
         self.rebuild: Callable[..., Engine] = partial(
             Engine,
             models,
@@ -76,13 +90,8 @@ class Engine(Lanes):
             randomisation=randomisation,
             allow_unstable=allow_unstable,
             threads=threads,
+            scale_task=scale_task,
         )
-        ships = [models] if isinstance(models, ShipModel) else list(models)
-        _check_ships(ships, num_envs, allow_unstable)
-        model = ships[0]
-        task = task or course_keeping_task()
-        task.check_fits(model)
-
         randomisation = randomisation or Randomisation()
         self.pool = randomisation.ships(model, task.seas)
         drawn = len(self.pool) > 1
@@ -103,10 +112,23 @@ class Engine(Lanes):
             task.instruments(windy),
             windy,
             len(own) == 1,
+            len(settings) == 1,
             task.current,
         )
-        super().__init__(program, model, task, num_envs, own, drawn, threads)
-        self.goals = Goals(task, model) if task.definition.has_goals else None
+        super().__init__(
+            program,
+            model,
+            task,
+            num_envs,
+            own,
+            drawn,
+            threads,
+            settings,
+            scale_task,
+        )
+        self.goals: Goals | None = None
+        if task.definition.has_goals:
+            self.goals = Goals(task, model, scale_task, self.task_settings)
         self._is_watched = bool(self.goals or task.definition.targets)
         self._begin_all(loop or self._compiled)
 

@@ -25,19 +25,21 @@ from shipgym.checks import (
 from shipgym.envs.engine import Engine, as_array, episode_key
 from shipgym.envs.goals import Goals, box_of
 from shipgym.envs.randomisation import Randomisation
+from shipgym.envs.row_settings import parted, row_settings
 from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import read_sensors
 from shipgym.ships import ShipModel, load_model
 from shipgym.tasks.definition import read_definition
-from shipgym.tasks.task import RUDDER_ORDERS, Task
+from shipgym.tasks.task import Task
 
 if TYPE_CHECKING:
     from shipgym.envs.artist import Artist
 
-Space = gymnasium.spaces.Box | gymnasium.spaces.Discrete
+Space = (
+    gymnasium.spaces.Box | gymnasium.spaces.Discrete | gymnasium.spaces.MultiDiscrete
+)
 DEFAULT_MODEL = "mariner-tls-svm"
 DEFAULT_TASK = "CourseKeeping"
-ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
 
 
 class UnknownKeywordError(InputError, TypeError):
@@ -90,31 +92,47 @@ def read_options(
 def spaces(task: Task, model: ShipModel, goals: Goals | None) -> tuple[Any, Space]:
     """Observation and action space of a task for a ship."""
     observations = goals.space() if goals else box_of(task.observed(model))
-    if task.action == "rudder-discrete":
-        return observations, gymnasium.spaces.Discrete(len(RUDDER_ORDERS))
+    counts = [len(orders) for orders in task.orders(model)]
+    if len(counts) == 1:
+        return observations, gymnasium.spaces.Discrete(counts[0])
+    if counts:
+        return observations, gymnasium.spaces.MultiDiscrete(counts)
     shape = (task.n_commands,)
     return observations, gymnasium.spaces.Box(-1.0, 1.0, shape, dtype=np.float32)
 
 
-def rudder_orders(
+def given_orders(
+    orders: Sequence[NDArray[np.float32]],
     numbers: Any,
     shape: tuple[int, ...],
     where: str,
 ) -> NDArray[np.float32]:
-    """Discrete rudder orders by their numbers, as a column for each row.
+    """Discrete orders by their numbers, a column for each command.
 
-    InputError for other numbers, or another shape.
+    `shape` is that of the rows. InputError for other numbers, or another shape.
     """
     array = as_array(numbers)
-    last = len(ORDERS) - 1
+    if len(orders) > 1:
+        shape = (*shape, len(orders))
     is_whole = array.shape == shape and array.dtype.kind in "iu"
-    if not is_whole or array.min() < 0 or array.max() > last:
-        expected = f"an integer from 0 to {last}: a rudder order"
-        if shape:
-            expected = f"integers of shape {shape} from 0 to {last}: rudder orders"
-        raise unexpected(where, expected, numbers)
-    ordered: NDArray[np.float32] = ORDERS[array.reshape(-1, 1)]
-    return ordered
+    of_rows = array.reshape(-1, len(orders)) if is_whole else np.array([[-1]])
+    ordered = []
+    for known, chosen in zip(orders, of_rows.T, strict=False):
+        if chosen.min() < 0 or chosen.max() >= len(known):
+            raise unexpected(where, _orders_in_words(orders, shape), numbers)
+        ordered.append(known[chosen])
+    return np.stack(ordered, axis=-1)
+
+
+def _orders_in_words(
+    orders: Sequence[NDArray[np.float32]],
+    shape: tuple[int, ...],
+) -> str:
+    last = " and ".join(f"0 to {len(known) - 1}" for known in orders)
+    if not shape:
+        return f"an integer from {last}: a rudder order"
+    kind = "rudder orders" if len(orders) == 1 else "orders of rudder and shaft"
+    return f"integers of shape {shape} from {last}: {kind}"
 
 
 class ShipsEnv:
@@ -179,7 +197,10 @@ class ShipsEnv:
         observed = self.task.observed(self.model)
         self.observation_names = tuple(quantity.name for quantity in observed)
         self.observation_scales = np.array([quantity.scale for quantity in observed])
-        self._discrete = self.task.action == "rudder-discrete"
+        # of each command of a discrete action
+        self._orders: list[NDArray[np.float32]] = []
+        for orders in self.task.orders(self.model):
+            self._orders.append(np.array(orders, dtype=np.float32))
         self._begun = False  # and not closed since
         self._keys: NDArray[np.uint64] | None = None  # of each row's episodes
         self._use(self._own_engine)
@@ -276,16 +297,18 @@ class ShipsEnv:
         self._keys = counters["row_keys"].copy()
 
     def _engine_for(self, asked: Mapping[str, Any]) -> Engine:
-        """Return the engine, or one with other waypoints or a certain ship."""
+        """Return the engine, or one with other settings or a certain ship."""
         own = self._own_engine
         if not asked:
             return own
-        task = self.task
-        if "waypoints" in asked:
-            task = task.changed(waypoints=asked["waypoints"])
+        given = dict(asked)
+        model_index = given.pop("model_index", None)
+        shared, by_row = parted(self.task.definition, given, own.num_envs)
+        task = self.task.changed(**shared) if shared else self.task
         return own.rebuild(
             task=task,
-            model_index=asked.get("model_index"),
+            model_index=model_index,
+            lane_settings=row_settings(task, self.model, by_row, own.num_envs),
         )
 
     def _take(self, options: Mapping[str, Any] | None, *more: str) -> Any:
@@ -297,9 +320,7 @@ class ShipsEnv:
         for name, value in (options or {}).items():
             if value is not None:
                 asked[name] = value
-        known = ["model_index", "state", *more]
-        if self.task.follows_path:
-            known.insert(0, "waypoints")
+        known = [*self.task.definition.settings, "model_index", "state", *more]
         check_keys(asked, known, "options")
 
         state = asked.pop("state", None)

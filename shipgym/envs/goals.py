@@ -14,6 +14,7 @@ from shipgym.engine.goal_rewards import SIGNATURE, reward_goals
 from shipgym.engine.record_code import loader
 from shipgym.engine.records import LANES, Layout, flat
 from shipgym.ships import ShipModel
+from shipgym.tasks.definition import TaskDefinition
 from shipgym.tasks.task import Observed, Task
 
 
@@ -27,18 +28,38 @@ def box_of(quantities: Sequence[Observed]) -> gymnasium.spaces.Box:
 
 
 class Goals:
-    """Goals of a task for a ship: columns of the observations after the task's own."""
+    """Goals of a task for a ship: columns of the observations after the task's own.
 
-    def __init__(self, task: Task, model: ShipModel) -> None:
-        self._observed = task.observed(model)
-        goals = task.goals(model)
+    Parameters
+    ----------
+    task : Task
+    model : ShipModel
+    scale_task : Task
+        Task that gives the scales of observations.
+    lane_settings : array
+        Settings of the lanes, in tiles as loops take them, or one vector for all.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        model: ShipModel,
+        scale_task: Task,
+        lane_settings: Floats,
+    ) -> None:
+        self._observed = scale_task.observed(model)
+        goals = scale_task.goals(model)
         self._size = len(goals) // 2
         self._goal = goals[: self._size]
         scales = [quantity.scale for quantity in self._goal]
         self._scales = np.array(scales).reshape(-1, 1)
-        self._settings = np.array(flat(task.settings))
+        self._settings = np.array([flat(task.settings)])
+        self._lane_settings = lane_settings
         self._other_parts = task.reward_parts[:-1]  # the last is that of the goal
-        self._run = _compiled(task)
+        self._run = _compiled(task.definition, 1)
+        self._run_lanes = self._run
+        if lane_settings.shape != self._settings.shape:  # a tile for each of lanes
+            self._run_lanes = _compiled(task.definition, LANES)
 
     def space(self) -> gymnasium.spaces.Dict:
         """Space of the observations of one ship."""
@@ -63,7 +84,8 @@ class Goals:
     def of_rows(self, rows: NDArray[np.float32]) -> Floats:
         """Rewards of the goals of many ships, shape (num_envs,)."""
         shown = self.split(rows)
-        return self._rewards(shown["achieved_goal"], shown["desired_goal"])
+        goals = shown["achieved_goal"], shown["desired_goal"]
+        return self._rewards(*goals, self._run_lanes, self._lane_settings)
 
     def compute_reward(
         self,
@@ -89,7 +111,8 @@ class Goals:
         wanted = self._checked(desired_goal, "desired_goal")
         single = reached.ndim == 1
         both = np.broadcast_arrays(np.atleast_2d(reached), np.atleast_2d(wanted))
-        rewards = self._others(info) + self._rewards(*both)
+        earned = self._rewards(*both, self._run, self._settings)
+        rewards = self._others(info) + earned
         return float(rewards[0]) if single else rewards
 
     def _others(self, info: Any) -> Any:
@@ -114,14 +137,20 @@ class Goals:
             raise unexpected(name, expected, np.shape(goals))
         return array
 
-    def _rewards(self, achieved: Any, desired: Any) -> Floats:
+    def _rewards(
+        self,
+        achieved: Any,
+        desired: Any,
+        run: Any,
+        settings: Floats,
+    ) -> Floats:
         n_goals = len(achieved)
         n_tiles = -(-n_goals // LANES)
         rewards = np.zeros((n_tiles, LANES))
-        self._run(
+        run(
             self._tiles(achieved, n_tiles),
             self._tiles(desired, n_tiles),
-            self._settings,
+            settings,
             rewards,
         )
         earned: Floats = rewards.reshape(-1)[:n_goals]
@@ -136,14 +165,16 @@ class Goals:
         return np.ascontiguousarray(by_tile).reshape(n_tiles, -1)
 
 
-def _compiled(task: Task) -> Any:
-    """Return the compiled loop of a task's goal rewards."""
-    definition = task.definition
+def _compiled(definition: TaskDefinition, lanes: int) -> Any:
+    """Return the compiled loop of a task's goal rewards.
+
+    `lanes` are those of a tile of settings, 64, or 1 where all share them.
+    """
     settings = Layout(settings=definition.Settings)["settings"]
     hooks = {
         "goal_reward": definition.goal_reward,
         "load_goal": loader(Layout(goal=definition.Goal)["goal"], LANES),
-        "load_task_settings": loader(settings, 1),
+        "load_task_settings": loader(settings, lanes),
     }
     what = f"the goals of {definition.name}"
     return compiled(reward_goals, SIGNATURE, hooks, what)

@@ -42,6 +42,10 @@ class Lanes:
     drawn : bool
     threads : int
         That share the lanes.
+    settings : sequence of NamedTuple
+        Settings of the task, one for all lanes or one each.
+    scale_task : Task
+        Task that gives the scales of observations.
     """
 
     outputs: Outputs  # of the last step
@@ -55,6 +59,8 @@ class Lanes:
         own: Pool,
         drawn: bool,
         threads: int,
+        settings: Sequence[Any],
+        scale_task: Task,
     ) -> None:
         self.program = program
         self.model = model
@@ -73,13 +79,15 @@ class Lanes:
         n_tiles = -(-num_envs // LANES)
         shares = lane_shares(n_tiles, threads)
         self.n_shares = len(shares)
-        columns = ship_columns(own, self.windy, task, model, drawn)
+        columns = ship_columns(own, self.windy, task, model, drawn, scale_task)
+        of_task = np.array([flat(one) for one in settings])
         n_ship_rows = columns.shape[1]
         pool = columns if drawn else np.zeros((0, n_ship_rows))
         tables = self._allocate(
             ships=ship_tiles(columns, n_tiles, len(own) > 1),
             pool=pool.reshape(1, -1),
             settings=np.array([self._settings()]),
+            task_settings=ship_tiles(of_task, n_tiles, len(settings) > 1),
             shares=shares,
             **self._empty_tables(n_tiles),
             **self._output_rows(),
@@ -87,6 +95,7 @@ class Lanes:
         self._states = tables["states"]
         self._random = lanes_of(tables["random"])
         self._ships = tables["ships"]
+        self.task_settings = tables["task_settings"]
         self._actions = tables["actions"]
         self._chosen = tables["chosen"][0]
 
@@ -125,7 +134,7 @@ class Lanes:
         return tables
 
     def _settings(self) -> list[float]:
-        """Settings of engine, sensor set and task, one after another."""
+        """Settings of engine and sensor set, one after another."""
         task = self.task
         rules = Rules(
             dt=self.dt,
@@ -139,7 +148,7 @@ class Lanes:
         if sensor_settings is None:
             noise = bridge_noise(task.noise) if sensors.noise else {}
             sensor_settings = sensors.make_settings(noise)
-        return [*flat(rules), *flat(sensor_settings), *flat(task.settings)]
+        return [*flat(rules), *flat(sensor_settings)]
 
     def _output_rows(self) -> dict[str, NDArray[np.int64]]:
         """Entries of a tile's results at which rows of outputs begin, shape (1, n)."""
@@ -275,8 +284,14 @@ class Lanes:
             hooks["load_motion"](self._states[tile], lane_in_tile),
             hooks["load_task_state"](self._states[tile], lane_in_tile),
             hooks["load_ship"](ships, lane_in_tile),
-            self.task.settings,
+            self.settings_of(lane),
         )
+
+    def settings_of(self, lane: int) -> Any:
+        """Settings of the task in a lane."""
+        tile, lane_in_tile = divmod(lane, LANES)
+        settings = self.task_settings[tile % len(self.task_settings)]
+        return self.program.hooks["load_task_settings"](settings, lane_in_tile)
 
     def refuse_lost_targets(self) -> None:
         """Refuse numbers of other ships that are not finite.
@@ -420,11 +435,12 @@ def ship_columns(
     task: Task,
     base: ShipModel,
     drawn: bool,
+    scale_task: Task,
 ) -> Floats:
     """Numbers of ships and of the seas around them, a row each.
 
     The sea is computed once for each kind of ship. Ships that are drawn for an
-    episode are seen in the scales of the environment's model.
+    episode are seen in the scales of the environment's model, and of `scale_task`.
     """
     step = task.substep(base)
     known: dict[tuple[int, int], Floats] = {}
@@ -441,8 +457,8 @@ def ship_columns(
         sea_parameters = known.get(kind, np.zeros(0))
 
         ship = Ship(*numbers[: len(Ship._fields)].tolist())
-        factors = _scale_factors(task, ship, task.definition.observations)
-        factors += _scale_factors(task, ship, task.definition.goals)
+        factors = _scale_factors(scale_task, ship, task.definition.observations)
+        factors += _scale_factors(scale_task, ship, task.definition.goals)
         envelope = envelope_numbers(model)
         columns.append([*numbers, *envelope, *sea_parameters, *factors])
     return np.stack(columns)

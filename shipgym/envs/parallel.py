@@ -11,7 +11,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_keys, check_whole, did_you_mean, unexpected
 from shipgym.envs.artist import Artist
 from shipgym.envs.engine import Engine, episode_key
-from shipgym.envs.environment import DEFAULT_MODEL, read_options, rudder_orders, spaces
+from shipgym.envs.environment import DEFAULT_MODEL, given_orders, read_options, spaces
 from shipgym.errors import InputError
 from shipgym.extras import library
 from shipgym.tasks import shared_water
@@ -73,6 +73,9 @@ class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked h
         self.possible_agents = [f"ship_{number}" for number in range(n_ships)]
         self.agents: list[str] = []
         self._engine = Engine(ship, n_ships, task, randomisation)
+        self._orders = []
+        for orders in task.orders(ship):
+            self._orders.append(np.array(orders, dtype=np.float32))
         observations, actions = spaces(task, ship, None)
         self.observation_spaces = dict.fromkeys(self.possible_agents, observations)
         self.action_spaces = dict.fromkeys(self.possible_agents, actions)
@@ -186,13 +189,13 @@ class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked h
     def _commands(self, actions: Mapping[str, Any]) -> Floats:
         """Commands of all ships, 0 of those whose episode is over."""
         commands = np.zeros((len(self.possible_agents), self.task.n_commands))
-        discrete = self.task.action == "rudder-discrete"
         for agent in self.agents:
             if agent not in actions:
                 raise InputError(f"actions: expected one of {agent!r}, got none")
             action = actions[agent]
-            if discrete:
-                action = rudder_orders(action, (), f"actions: {agent}")[0]
+            if self._orders:
+                where = f"actions: {agent}"
+                action = given_orders(self._orders, action, (), where)[0]
             shape = commands[0].shape
             if np.shape(action) != shape:
                 expected = f"shape {shape}"

@@ -16,7 +16,7 @@ from shipgym.envs.environment import (
     DEFAULT_MODEL,
     DEFAULT_TASK,
     ShipsEnv,
-    rudder_orders,
+    given_orders,
 )
 from shipgym.envs.outputs import ANSWER_OUTCOMES
 from shipgym.errors import InputError
@@ -116,9 +116,10 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         seed : int, optional
             Fixes this episode and all that follow it.
         options : dict, optional
-            Until the next reset: `waypoints` of the path, or of several; `model_index`,
-            the one of the ships that episodes are drawn from. Or, alone, `state`: go on
-            from what `get_state` gave.
+            Until the next reset: settings of the task by their names, such as
+            `waypoints` of the path, or of several; `model_index`, the one of the ships
+            that episodes are drawn from. Or, alone, `state`: go on from what
+            `get_state` gave. Observations keep the scales of the environment.
 
         Returns
         -------
@@ -153,7 +154,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         ----------
         action : array of shape (n_commands,), or int
             Commanded rudder, and shaft speed, parts of their limits, clipped to [-1,
-            1]; or the number of a rudder order.
+            1]; or the number of a rudder order, or of a rudder and a shaft order.
 
         Returns
         -------
@@ -197,8 +198,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         """Set the command; InputError for an invalid action."""
         # as in the action space: its numbers need no check
         is_array = isinstance(action, np.ndarray) and action.dtype is FLOAT32
-        if self._discrete:
-            action = rudder_orders(action, (), "action")[0]
+        if self._orders:
+            action = given_orders(self._orders, action, (), "action")[0]
         elif not is_array:
             action = as_numbers(action, "action")
         if action.shape != self._command.shape:

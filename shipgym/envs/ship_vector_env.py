@@ -17,7 +17,7 @@ from shipgym.envs.environment import (
     DEFAULT_MODEL,
     DEFAULT_TASK,
     ShipsEnv,
-    rudder_orders,
+    given_orders,
 )
 from shipgym.envs.outputs import named_rows
 from shipgym.errors import InputError
@@ -122,8 +122,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             next episodes begin.
         options : dict, optional
             `reset_mask`, bool array of shape (num_envs,): rows in which an episode is
-            to begin, the others go on. Or, for all rows, those of the single
-            environment.
+            to begin, the others go on. Or those of the single environment, a setting
+            being the same for all rows or an array with an entry for each.
 
         Returns
         -------
@@ -216,7 +216,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         ----------
         actions : array of shape (num_envs, n_commands)
             See the single environment; rudder orders are an int array of shape
-            (num_envs,).
+            (num_envs,), those of rudder and shaft one of shape (num_envs, 2).
 
         Returns
         -------
@@ -229,8 +229,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         """
         if not self._begun:
             self._refuse_step()
-        if self._discrete:
-            actions = rudder_orders(actions, (self.num_envs,), "actions")
+        if self._orders:
+            actions = given_orders(self._orders, actions, (self.num_envs,), "actions")
         engine = self._engine
         engine.order(actions)
         n_ended = engine.advance(self._some_over, anew=True)

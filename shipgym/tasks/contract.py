@@ -161,9 +161,17 @@ class Setting:
     whole: bool = False
 
 
+def under_way(x: float, y: float, psi: float, speed: float, shaft: float) -> Motion:
+    """Straight ahead at a speed, m/s, the rudder amidships, with a shaft speed, 1/s.
+
+    The shaft keeps that speed until it is commanded another.
+    """
+    return Motion(x, y, psi, speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, shaft)
+
+
 def at_service_speed(x: float, y: float, psi: float, ship: Ship) -> Motion:
     """Straight ahead at service speed, the rudder amidships."""
-    return Motion(x, y, psi, ship.speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ship.shaft)
+    return under_way(x, y, psi, ship.speed, ship.shaft)
 
 
 __all__ = [
@@ -186,5 +194,6 @@ __all__ = [
     "drawn_normal",
     "pick",
     "sin_cos",
+    "under_way",
     "wrap",
 ]

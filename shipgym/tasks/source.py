@@ -24,13 +24,9 @@ from shipgym.engine.records import (
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function, load_file, refuse_closure
 from shipgym.tasks.contract import Setting
+from shipgym.tasks.refused_code import refuse_foreign_random, refuse_writes_to_plan
 
 UNBOUNDED = Setting("")
-#: Expected of a field that is not a single number.
-ARRAY = (
-    "a float, or an array of a fixed size: tuple[float, float], or"
-    " Annotated[tuple[float, ...], Size(8)]"
-)
 
 
 def read_source(source: Any) -> tuple[Any, str]:
@@ -84,6 +80,9 @@ def check_namespace(
         function = _named(namespace, name, where, what)
         refuse_closure(function)
         check_function(function, len(arguments), f"{where}: {name}", what, extras)
+        refuse_foreign_random(function)
+        if extras:
+            refuse_writes_to_plan(function)
         found[name] = function
     return found
 
@@ -142,15 +141,27 @@ def _check_kind(kind: Any, name: str, place: str) -> None:
         for entry in dict.fromkeys(get_args(kind)):
             _check_kind(entry, name, place)
     elif is_list(kind):
-        raise unexpected(place, ARRAY, kind)
+        raise not_of_numbers(place, kind)
 
 
 def _check_list(kind: Any, default: Any, place: str, is_last_setting: bool) -> None:
     """Refuse a list that is not the last of settings, and an array without a size."""
     if get_origin(kind) is tuple or not (is_last_setting or "Settings" in place):
-        raise unexpected(place, ARRAY, kind)
+        raise not_of_numbers(place, kind)
     if isinstance(default, str) or not is_last_setting:
         raise unexpected(place, "a number, or a list as the last field", default)
+
+
+def not_of_numbers(place: str, kind: Any) -> InputError:
+    """Make the error for a field that is neither a number nor made of numbers."""
+    is_array_of_any_size = get_origin(kind) in (tuple, list, np.ndarray)
+    if kind in (tuple, list, np.ndarray) or is_array_of_any_size:
+        expected = (
+            "an array of a fixed size, as tuple[float, float] or"
+            " Annotated[tuple[float, ...], Size(8)]"
+        )
+        return unexpected(place, expected, kind)
+    return unexpected(place, "a float", kind)
 
 
 def field_place(record: Any, field: str, where: str) -> str:

@@ -31,9 +31,14 @@ VECTOR_OPTIONS = (
     "max_episode_steps",
 )
 
-ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft")
+ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft", "rudder-shaft-discrete")
 #: Rudder orders of a discrete action, parts of the rudder limit.
 RUDDER_ORDERS = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0)
+#: Shaft orders of a discrete action, parts of the speed at service speed, as of an
+#: engine telegraph; those astern only where the propeller is known astern.
+_SHAFT_ORDERS = (-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
+#: Options of a reset that are not settings of the task.
+_RESET_OPTIONS = ("model_index", "state", "reset_mask")
 
 
 class Observed(NamedTuple):
@@ -67,10 +72,10 @@ class Task:
     max_envelope_distance : float
         Distance from the training data at which an episode ends, in multiples of their
         extent (see `Envelope.distance`).
-    action : {"rudder", "rudder-discrete", "rudder-shaft"}
-        Commands: the rudder, one of the orders in `RUDDER_ORDERS`, or rudder and shaft
-        speed. A shaft whose propeller is known ahead only is stopped by an
-        order astern.
+    action : {"rudder", "rudder-discrete", "rudder-shaft", "rudder-shaft-discrete"}
+        Commands: the rudder, one of the orders in `RUDDER_ORDERS`, rudder and shaft
+        speed, or an order of each (`orders`). A shaft whose propeller is known ahead
+        only is stopped by an order astern.
     roll : bool
         Whether roll angle and rate are observed.
     noise : float
@@ -169,7 +174,8 @@ class Task:
         if sensors is not None:
             names += sensors.settings
         for name in names:
-            if names.count(name) > 1 or name in VECTOR_OPTIONS:
+            taken = name in VECTOR_OPTIONS or name in _RESET_OPTIONS
+            if names.count(name) > 1 or taken:
                 source = definition.source
                 if sensors is not None and name in sensors.settings:
                     source = sensors.source
@@ -256,10 +262,10 @@ class Task:
                 "roll: expected a ship with 4 degrees of freedom, got"
                 f" {model.name!r}, which does not roll; leave it out"
             )
-        if self.action == "rudder-shaft" and not model.service_shaft_speed > 0.0:
+        if self.n_commands > 1 and not model.service_shaft_speed > 0.0:
             raise InputError(
                 "action: expected one without a shaft for a ship without shaft speed,"
-                f" {model.name!r}, got 'rudder-shaft'"
+                f" {model.name!r}, got {self.action!r}"
             )
 
         source = self.definition.source
@@ -278,7 +284,7 @@ class Task:
         options = [""]
         if self.roll:
             options.append("roll")
-        if self.action == "rudder-shaft":
+        if self.n_commands > 1:
             options.append("shaft")
             if "n" in model.state_names:
                 options.append("shaft speed")
@@ -332,7 +338,15 @@ class Task:
     @property
     def n_commands(self) -> int:
         """Number of commands: rudder, and shaft."""
-        return 2 if self.action == "rudder-shaft" else 1
+        return 2 if "shaft" in self.action else 1
+
+    def orders(self, model: ShipModel) -> tuple[tuple[float, ...], ...]:
+        """Orders of each command of a discrete action; empty if it is continuous."""
+        if not self.action.endswith("discrete"):
+            return ()
+        least = self.least_shaft(model)
+        shaft = tuple(order for order in _SHAFT_ORDERS if order >= least)
+        return (RUDDER_ORDERS, shaft)[: self.n_commands]
 
     def least_shaft(self, model: ShipModel) -> float:
         """Least command of the shaft, part of service speed; 0 if it stays ahead."""

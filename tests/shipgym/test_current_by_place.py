@@ -25,7 +25,7 @@ OWN = """
 from shipgym.tasks.course_keeping import *
 
 def current(x, y, settings):
-    return 0.0, settings.rudder_weight * x / 1000.0
+    return 0.0, settings.course_change_deg * x / 1000.0
 """
 
 
@@ -75,10 +75,10 @@ def test_velocity_over_ground_goes_on_where_the_current_changes(tmp_path):
 
 def test_a_task_has_one_by_its_settings(tmp_path):
     path = written(tmp_path, OWN)
-    found = voyage("calm", task=path, rudder_weight=0.5)
+    found = voyage("calm", task=path, course_change_deg=0.5)
     assert found["current_east"] == pytest.approx(0.5 * found["x"] / 1000.0)
     assert np.ptp(found["x"]) > 1.0
-    many = gymnasium.make_vec(COURSE, num_envs=3, task=path, rudder_weight=0.5)
+    many = gymnasium.make_vec(COURSE, num_envs=3, task=path, course_change_deg=0.5)
     many.reset(seed=0)
     for k in range(39):
         many.step(np.full((3, 1), 0.3 * np.sin(k / 4.0), dtype=np.float32))

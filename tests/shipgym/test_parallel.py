@@ -24,6 +24,10 @@ def test_it_has_the_interface(ships):
     parallel_seed_test(lambda: parallel_env(**FEW), num_cycles=20)
 
 
+def wrap_all(angles):
+    return (angles + np.pi) % (2.0 * np.pi) - np.pi
+
+
 def rollout(env, seed, steps=30):
     seen, _ = env.reset(seed=seed)
     found = [np.concatenate(list(seen.values()))]
@@ -70,9 +74,11 @@ def test_case_one_of_imazu_is_a_collision_of_both():
     ships = parallel_env(n_ships=2, dt=5.0, render_mode="rgb_array")
     ships.reset(seed=0, options={"case": 1})
     assert ships.render().shape == (600, 600, 3)
-    nothing = np.zeros(1, dtype=np.float32)
     while ships.agents:
-        last = ships.step(dict.fromkeys(ships.agents, nothing))
+        errors = wrap_all(ships.state()[:, 2] - [0.0, np.pi])
+        rudders = np.clip(-3.0 * errors - 60.0 * ships.state()[:, 5], -1.0, 1.0)
+        actions = dict(zip(ships.agents, rudders[:, None], strict=False))
+        last = ships.step(actions)
     _, rewards, terminated, truncated, infos = last
     assert terminated == {"ship_0": True, "ship_1": True}
     assert truncated == {"ship_0": False, "ship_1": False}
@@ -106,6 +112,6 @@ def test_wrong_actions_and_cases_are_refused(ships):
         ships.step(wrong)
     with pytest.raises(InputError, match="case: expected one of 3 ships, got 1"):
         ships.reset(options={"case": 1})
-    with pytest.raises(InputError, match="did you mean 'case'|Did you mean 'case'"):
+    with pytest.raises(InputError, match="id you mean 'case'"):
         ships.reset(options={"cases": 1})
     assert isinstance(ships.action_space("ship_0"), gymnasium.spaces.Box)
