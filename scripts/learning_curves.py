@@ -3,11 +3,12 @@
     python scripts/learning_curves.py              six runs of a minute, and the picture
     python scripts/learning_curves.py --draw       the picture alone
     python scripts/learning_curves.py --defaults   learners of stable-baselines3 with
-                                                   their defaults, some minutes a run
+                                                   their defaults, minutes each; only
+                                                   some with their names, such as PPO
     python scripts/learning_curves.py --defaults --draw
 
 The picture is docs/images/learning_curves.png, its data
-build/learning_curves.json; of the defaults they are default_learners.png and .json.
+build/learning_curves.json; of the defaults default_learners.png, and a folder.
 Costs are means of a hundred episodes held out, of the defaults of fifty.
 """
 
@@ -126,7 +127,7 @@ DEFAULTS = (
     DefaultRun("DQN", "shipgym/CourseKeepingDiscrete-v0", 100_000, LQ),
     DefaultRun("PPO", "shipgym/PathFollowing-v0", 150_000, LineOfSight),
 )
-DEFAULTS_FOUND = ROOT / "build" / "default_learners.json"
+DEFAULTS_FOLDER = ROOT / "build" / "default_learners"
 DEFAULTS_PICTURE = ROOT / "docs" / "images" / "default_learners.png"
 EVALUATIONS = 10  # of each run
 
@@ -168,12 +169,13 @@ def default_run(asked: DefaultRun, seed: int, env: Any) -> dict[str, Any]:
         print(asked.algorithm, asked.env_id, seed, evaluation, flush=True)
         curve.append(evaluation)
 
-    def after_step(*_: Any) -> None:
-        """Evaluate where it is time to; the last time when the agent has learned."""
+    def after_step(*_: Any) -> bool:
+        """Evaluate where it is time to, and go on; the last time is after learning."""
         number = 1 + len(curve)
         due = number * asked.steps // EVALUATIONS
         if number < EVALUATIONS and agent.num_timesteps >= due:
             evaluate()
+        return True
 
     before = time.process_time()
     agent.learn(asked.steps, callback=after_step)
@@ -182,45 +184,50 @@ def default_run(asked: DefaultRun, seed: int, env: Any) -> dict[str, Any]:
     return {"seed": seed, "processor_s": round(seconds, 1), "curve": curve}
 
 
-def default_curves() -> dict[str, Any]:
-    """Of each learner, the cost of the classical autopilot and its evaluations."""
-    found: dict[str, Any] = {}
-    if DEFAULTS_FOUND.exists():
-        found = dict(read_json(DEFAULTS_FOUND, "results", "remove it"))
+def default_file(asked: DefaultRun, seed: int) -> Path:
+    """File of the evaluations of one learner."""
+    task = asked.env_id.removeprefix("shipgym/")
+    return DEFAULTS_FOLDER / f"{asked.algorithm}-{task}-{seed}.json"
+
+
+def default_curves(names: list[str]) -> None:
+    """Evaluate learners of some algorithms that were not evaluated before."""
+    make_folder(DEFAULTS_FOLDER)
     for seed in SEEDS:
         for asked in DEFAULTS:
+            file = default_file(asked, seed)
+            if file.exists() or asked.algorithm not in names:
+                continue
             env: Any = gymnasium.make(asked.env_id).unwrapped
             classical = asked.classical.from_model(env.model)
             cost = held_out(classical, env)["cost"]
-            name = f"{asked.algorithm}, {asked.env_id}"
-            about = {"classical": {asked.classical.__name__: cost}, "runs": []}
-            runs = found.setdefault(name, about)["runs"]
-            if seed in [run["seed"] for run in runs]:
-                continue
-            runs.append(default_run(asked, seed, env))
-            make_folder(DEFAULTS_FOUND.parent)
-            write_json(found, DEFAULTS_FOUND)
-    return found
+            run = default_run(asked, seed, env)
+            write_json(run | {"classical": cost}, file)
 
 
-def draw_defaults(found: dict[str, Any]) -> None:
-    """Cost against steps, a line a seed, for each learner."""
+def draw_defaults() -> None:
+    """Cost against steps, a line a seed, for each learner that was evaluated."""
     import matplotlib
 
     matplotlib.use("agg")
     from matplotlib import pyplot as plt
 
-    figure, axes = plt.subplots(
-        1, len(found), figsize=(13.0, 3.4), layout="constrained"
-    )
-    for axis, (name, about) in zip(axes, found.items(), strict=True):
-        for run in about["runs"]:
+    size = (3.2 * len(DEFAULTS), 3.4)
+    figure, axes = plt.subplots(1, len(DEFAULTS), figsize=size, layout="constrained")
+    for axis, asked in zip(axes, DEFAULTS, strict=True):
+        for seed in SEEDS:
+            file = default_file(asked, seed)
+            if not file.exists():
+                continue
+            run = dict(read_json(file, "results", "remove it"))
             steps = [row["steps"] / 1e3 for row in run["curve"]]
             costs = [row["cost"] for row in run["curve"]]
-            axis.plot(steps, costs, lw=1.1, label=f"seed {run['seed']}")
-        for classical, cost in about["classical"].items():
-            axis.axhline(cost, color="black", lw=1.0, label=classical)
-        axis.set_title(name, fontsize=8)
+            axis.plot(steps, costs, lw=1.1, label=f"seed {seed}")
+            print(file.stem, run["classical"], run["processor_s"], run["curve"][-1])
+        axis.axhline(
+            run["classical"], color="k", lw=1.0, label=asked.classical.__name__
+        )
+        axis.set_title(f"{asked.algorithm}, {asked.env_id}", fontsize=8)
         axis.set(xlabel="steps, thousands", yscale="log")
         axis.grid(alpha=0.3, which="both")
         axis.legend(fontsize=8)
@@ -228,14 +235,17 @@ def draw_defaults(found: dict[str, Any]) -> None:
     figure.savefig(DEFAULTS_PICTURE, dpi=100, metadata={"Software": None})
 
 
-def shown(found: Path) -> dict[str, Any]:
-    """Results of an earlier run."""
-    return dict(read_json(found, "results", "run it without --draw"))
-
-
 if __name__ == "__main__":
     only_draw = "--draw" in sys.argv
     if "--defaults" in sys.argv:
-        draw_defaults(shown(DEFAULTS_FOUND) if only_draw else default_curves())
+        algorithms = [asked.algorithm for asked in DEFAULTS]
+        named = [name for name in algorithms if name in sys.argv]
+        if not only_draw:
+            default_curves(named or algorithms)
+        draw_defaults()
     else:
-        draw(shown(FOUND) if only_draw else curves())
+        draw(
+            dict(read_json(FOUND, "results", "run it without --draw"))
+            if only_draw
+            else curves()
+        )

@@ -26,7 +26,7 @@ from shipgym.tasks.task import ENV_OPTIONS
 
 Observation = NDArray[np.float32]
 FLOAT32 = np.dtype(np.float32)
-NOT_OVER = (False, False)  # neither terminated nor truncated
+NOT_OVER = (0.0, 0.0)  # neither terminated nor truncated
 
 
 class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
@@ -80,22 +80,15 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         self._names = self.task.info_names
         flags = self.task.flags
         self._flags = [name for name in self._names if name in flags]
-        self._end = NOT_OVER
-        self._warned = False  # that the episode is over
+        self._note_end()
         self._made()
 
     def _counters(self) -> dict[str, Any]:
-        return {**super()._counters(), "end": np.array(self._end)}
+        return {**super()._counters(), "end": np.array(self._end, dtype=np.bool_)}
 
     def _recall(self, counters: Mapping[str, Any]) -> None:
         super()._recall(counters)
-        self._goes_on(counters["end"])
-
-    def _goes_on(self, end: Any = NOT_OVER) -> None:
-        """Note that an episode goes on, or how it ended."""
-        terminated, truncated = end
-        self._end = (bool(terminated), bool(truncated))
-        self._warned = False
+        self._note_end(counters["end"].tolist())
 
     def _use(self, engine: Engine) -> None:
         super()._use(engine)
@@ -154,7 +147,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
                 self._keys = self._drawn_keys()
                 episodes[:] = 0
             self._begun = True
-            self._goes_on()
+            self._note_end()
             self._engine.begin(self._keys, episodes)
             self._draw_and_show()
         numbers = self._outcomes[ANSWER_OUTCOMES:].tolist()
@@ -199,11 +192,18 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         info = self._info(numbers)
         if self._artists:
             self._draw_and_show()
-        if self._end != NOT_OVER:
+        if self._over:
             self._warn_of_the_end()
-        else:
-            self._end = (terminated > 0.0, truncated > 0.0)
-        return self._observation.copy(), reward, *self._end, info
+            terminated, truncated = self._end
+        elif terminated or truncated:
+            self._note_end((terminated, truncated))
+        return self._observation.copy(), reward, terminated > 0.0, truncated > 0.0, info
+
+    def _note_end(self, end: Any = NOT_OVER) -> None:
+        """Note how an episode ended, or that it goes on."""
+        self._end = tuple(end)
+        self._over = any(end)
+        self._warned = False
 
     def _warn_of_the_end(self) -> None:
         """Warn once that an episode is over."""

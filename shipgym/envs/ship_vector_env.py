@@ -100,16 +100,16 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self._made()
 
     def _counters(self) -> dict[str, Any]:
-        return {
-            **super()._counters(),
-            "some_over": np.array(self._some_over),
-            "over": self._over.copy(),
-        }
+        counters = {**super()._counters(), "some_over": np.array(self._some_over)}
+        if self.autoreset_mode is AutoresetMode.DISABLED:
+            counters["over"] = self._over.copy()
+        return counters
 
     def _recall(self, counters: Mapping[str, Any]) -> None:
         super()._recall(counters)
         self._some_over = bool(counters["some_over"])
-        self._over = np.array(counters["over"], dtype=np.bool_)
+        if self.autoreset_mode is AutoresetMode.DISABLED:
+            self._over = np.array(counters["over"], dtype=np.bool_)
 
     def reset(
         self,
