@@ -77,7 +77,7 @@ def step(motion, state, interval, ship, settings):
     _, north = sin_cos(own.course)
     made_good = own.speed * north / ship.speed
     reward = Reward(
-        progress=-0.5 * clip(1.0 - made_good, 0.0, 1.0),
+        progress=-clip(1.0 - made_good, 0.0, 1.0),
         off_track=-0.2 * clip(fabs(motion.y) / (5.0 * ship.length), 0.0, 1.0),
         closeness=-exp(-near * near),
     )
@@ -88,7 +88,7 @@ def step(motion, state, interval, ship, settings):
 
 
 def worst_cost(settings):
-    return 1.7
+    return 2.2
 
 
 def observe(readings, state, interval, ship, settings):

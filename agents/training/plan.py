@@ -143,6 +143,7 @@ def _read_option(value: Any, name: str) -> Any:
 def training_options(plan: TrainingPlan) -> dict[str, Any]:
     """Keywords of the environment that the ships learn in.
 
+    They earn what the setting `reward` says, unless the task's options do.
     With `randomise`, or the setting `model_uncertainty`, each episode has a ship drawn
     from the model's covariance, where it has one; with `randomise` also an approach
     speed of 0.8 to 1.1 times the service speed, and any of the sea states that the
@@ -150,6 +151,7 @@ def training_options(plan: TrainingPlan) -> dict[str, Any]:
     """
     task = plan.task
     options = task.arguments
+    options.setdefault("bounded", plan.settings.reward == "bounded")
     uncertain = plan.settings.model_uncertainty == "covariance"
     has_covariance = task.ship.covariance is not None
     if has_covariance and (plan.randomise or uncertain):

@@ -5,6 +5,7 @@ What every interval needs is one loop over lanes, which is vectorised (see
 lane by lane.
 """
 
+from math import fabs
 from typing import Any, NamedTuple
 
 from shipgym.engine.envelope import Envelope, envelope_distance, outside_range
@@ -211,16 +212,39 @@ def outcome_of(
     terminated = max(wrecked, going * pick(arrived, 1.0, 0.0))
     late = pick(counters.steps >= rules.time_limit, going, 0.0)
     steps_left = rules.time_limit - counters.steps
-    end = -(wrecked * worst_cost(settings.task) * steps_left)
+    worst = worst_cost(settings.task)
+    end = -(wrecked * worst * steps_left)
+    seen_end = -(wrecked * worst * min(steps_left, rules.loss_horizon))
+    bounded = bounded_reward(-earned, going, wrecked, terminated, rules)
     return Outcome(
-        reward=earned + end,
+        reward=pick(rules.half_reward_cost > 0.0, bounded, earned + seen_end),
         terminated=terminated,
         truncated=late * (1.0 - terminated),
         envelope_distance=interval.envelope_distance,
         extrapolating=interval.extrapolating,
         end=end,
+        cost=-(earned + end),
         goal=0.0,
     )
+
+
+def bounded_reward(
+    cost: float,
+    going: float,
+    wrecked: float,
+    terminated: float,
+    rules: Rules,
+) -> float:
+    """Reward from 0 to 1 of an interval with a cost, to 2 where the cost is negative.
+
+    A lost ship earns nothing any more, which no ship that goes on falls below at any
+    discount. One that has arrived is paid the reward of no cost for the intervals
+    that the end stands for, so that she does not linger.
+    """
+    scale = max(rules.half_reward_cost, 1e-300)  # 0 where this is not used
+    rate = 1.0 - cost / (scale + fabs(cost))
+    arrived = terminated - wrecked
+    return going * pick(wrecked > 0.0, 0.0, rate) + arrived * rules.loss_horizon
 
 
 def store_task(tile: Tile, lane: int, task_state: Any) -> None:

@@ -238,12 +238,18 @@ class Engine(Lanes):
         return n_ended
 
     def _reward_goals(self, goals: Goals, over: Flags) -> None:
-        """Add the rewards of goals in lanes that had not ended."""
+        """Add the rewards of goals in lanes that had not ended.
+
+        A lost ship is charged for the intervals of `Task.end_intervals`.
+        """
+        left = np.maximum(self.task.episode_steps - self.steps, 1.0)
+        self.info("reward_end")[:] *= np.minimum(self.task.end_intervals / left, 1.0)
         earned = goals.of_rows(self.outputs.observations)
         self.info("reward_goal")[:] = np.where(over, 0.0, earned)
         parts = {name: self.info(name) for name in self.task.reward_parts}
         others = goals.sum_of_others(parts)
         self.outputs.outcomes[0] = others + parts["reward_goal"]
+        self.info("cost")[:] = -self.outputs.outcomes[0]
 
     def reset(self, seeds: ArrayLike) -> Observation:
         """Begin in each lane the episode of the single environment's `reset(seed=...)`.

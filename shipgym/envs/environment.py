@@ -345,6 +345,14 @@ class ShipsEnv:
             " first"
         )
 
+    def _warn_of_no_mode(self) -> None:
+        """Warn, as Gymnasium's environments do, that nothing can be rendered."""
+        if self.render_mode is None:
+            gymnasium.logger.warn(
+                "render: expected a render_mode, got none; give it where the"
+                " environment is made, such as render_mode='rgb_array'"
+            )
+
     def _drawn_keys(self) -> NDArray[np.uint64]:
         """Keys of episodes from the environment's own random numbers."""
         rows = range(self._engine.num_envs)

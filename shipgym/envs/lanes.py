@@ -142,6 +142,8 @@ class Lanes:
             time_limit=task.episode_steps,
             largest_distance=task.max_envelope_distance,
             least_shaft=task.least_shaft(self.model),
+            half_reward_cost=task.half_reward_cost,
+            loss_horizon=task.end_intervals,
         )
         sensors = self.program.sensors
         sensor_settings = task.sensor_settings

@@ -1,5 +1,6 @@
 """One ship under a task as one of Gymnasium's environments."""
 
+from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Any, SupportsFloat
@@ -25,6 +26,7 @@ from shipgym.tasks.task import ENV_OPTIONS
 
 Observation = NDArray[np.float32]
 FLOAT32 = np.dtype(np.float32)
+NOT_OVER = (0.0, 0.0)  # neither terminated nor truncated
 
 
 class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
@@ -32,10 +34,11 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
 
     The action is the commanded rudder, -1 to 1 of its limit, positive to starboard. The
     observation holds the quantities of `observation_names`, each divided by its entry
-    of `observation_scales`. The reward is the sum of its parts, which `info` has by
-    name. Settings, observations and reward are defined in the task's file
-    (`shipgym/tasks/course_keeping.py`, `shipgym/tasks/path_following.py`, or one of
-    your own).
+    of `observation_scales`. The reward of a step is `1 - cost / (cost + 0.1)` by its
+    steering cost, which `info` has, and minus its parts by name; with `bounded=False`
+    it is minus the cost. Settings, observations and cost are defined in the task's
+    file (`shipgym/tasks/course_keeping.py`, `shipgym/tasks/path_following.py`, or one
+    of your own).
 
     Raises InputError for an unknown model or keyword, or an argument out of its range.
 
@@ -77,7 +80,15 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         self._names = self.task.info_names
         flags = self.task.flags
         self._flags = [name for name in self._names if name in flags]
+        self._note_end()
         self._made()
+
+    def _counters(self) -> dict[str, Any]:
+        return {**super()._counters(), "end": np.array(self._end, dtype=np.bool_)}
+
+    def _recall(self, counters: Mapping[str, Any]) -> None:
+        super()._recall(counters)
+        self._note_end(counters["end"].tolist())
 
     def _use(self, engine: Engine) -> None:
         super()._use(engine)
@@ -125,7 +136,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         -------
         observation : float32 array
         info : dict
-            As `step` has it, the parts of the reward 0.
+            As `step` has it, the cost and its parts 0.
         """
         super().reset(seed=seed)
         episodes = self._engine.episodes + np.uint64(1)
@@ -137,6 +148,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
                 self._keys = self._drawn_keys()
                 episodes[:] = 0
             self._begun = True
+            self._note_end()
             self._engine.begin(self._keys, episodes)
             self._draw_and_show()
         numbers = self._outcomes[ANSWER_OUTCOMES:].tolist()
@@ -148,7 +160,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         """Hold a command over one control interval.
 
         Raises InputError if the action is not a finite number for each command, or no
-        episode has begun.
+        episode has begun. An episode that is over stays as it is and earns 0, with a
+        warning.
 
         Parameters
         ----------
@@ -162,7 +175,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         reward : float
         terminated, truncated : bool
         info : dict
-            The parts of the reward, `heading_error` in rad, `envelope_distance`,
+            The cost and its parts, `heading_error` in rad, `envelope_distance`,
             `extrapolating`, and what the environment's page names.
         """
         if not self._begun:
@@ -180,8 +193,29 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         info = self._info(numbers)
         if self._artists:
             self._draw_and_show()
+        if self._over:
+            self._warn_of_the_end()
+            terminated, truncated = self._end
+        elif terminated or truncated:
+            self._note_end((terminated, truncated))
         observation = self._shown(self._observation.copy())
         return observation, reward, terminated > 0.0, truncated > 0.0, info
+
+    def _note_end(self, end: Any = NOT_OVER) -> None:
+        """Note how an episode ended, or that it goes on."""
+        self._end = tuple(end)
+        self._over = any(end)
+        self._warned = False
+
+    def _warn_of_the_end(self) -> None:
+        """Warn once that an episode is over."""
+        if self._warned:
+            return
+        self._warned = True
+        gymnasium.logger.warn(
+            "step: the episode is over, the ship stays where she is and earns 0; call"
+            " reset when terminated or truncated is true"
+        )
 
     def _draw_and_show(self) -> None:
         self._draw()
@@ -220,8 +254,9 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     def render(self) -> Any:
         """Picture of the ship on her chart, uint8 array of shape (600, 600, 3).
 
-        None in a window, and without a render mode.
+        None in a window, and without a render mode, with a warning.
         """
+        self._warn_of_no_mode()
         pictures = [artist.picture(self._engine) for artist in self._artists]
         return pictures[0] if self.render_mode == "rgb_array" else None
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -96,14 +96,20 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self._masks = {f"_{name}": self._engine.all_lanes for name in self._names}
         self._own_reward = not self.task.definition.shipped
         self._some_over = False  # NEXT_STEP: whether episodes ended in the last step
+        self._over = np.zeros(self.num_envs, dtype=np.bool_)  # DISABLED: rows to reset
         self._made()
 
     def _counters(self) -> dict[str, Any]:
-        return {**super()._counters(), "some_over": np.array(self._some_over)}
+        counters = {**super()._counters(), "some_over": np.array(self._some_over)}
+        if self.autoreset_mode is AutoresetMode.DISABLED:
+            counters["over"] = self._over.copy()
+        return counters
 
     def _recall(self, counters: Mapping[str, Any]) -> None:
         super()._recall(counters)
         self._some_over = bool(counters["some_over"])
+        if self.autoreset_mode is AutoresetMode.DISABLED:
+            self._over = np.array(counters["over"], dtype=np.bool_)
 
     def reset(
         self,
@@ -145,6 +151,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         engine.renew_outputs()
         engine.outputs.take(shown_before)  # of rows that go on
         self._begun = True
+        self._over = self._over & ~mask
         engine.begin(self._keys, episodes, mask)
         self._draw(mask)
         infos = self._infos()
@@ -210,7 +217,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         """Take one control interval in all rows.
 
         Raises InputError if an action is not a number or their shape is another, a
-        reward of your own is not finite, or no episode has begun.
+        reward of your own is not finite, no episode has begun, or, without autoreset,
+        some are over.
 
         Parameters
         ----------
@@ -229,6 +237,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         """
         if not self._begun:
             self._refuse_step()
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._over.any():
+            self._refuse_over()
         if self._orders:
             actions = given_orders(self._orders, actions, (self.num_envs,), "actions")
         engine = self._engine
@@ -245,6 +255,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         elif n_ended and self.autoreset_mode is AutoresetMode.SAME_STEP:
             infos |= self._final()
             engine.begin_next(outputs.terminated | outputs.truncated)
+        elif n_ended and self.autoreset_mode is AutoresetMode.DISABLED:
+            self._over = outputs.terminated | outputs.truncated
         self._draw()
         return (
             self._shown(outputs.observations),
@@ -252,6 +264,14 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             outputs.terminated,
             outputs.truncated,
             infos,
+        )
+
+    def _refuse_over(self) -> NoReturn:
+        """Raise the InputError of rows that nobody has reset."""
+        rows = np.flatnonzero(self._over).tolist()
+        raise InputError(
+            f"step: expected episodes that go on, got ends in rows {rows}:"
+            " reset them (options: reset_mask), or choose another autoreset_mode"
         )
 
     def _final(self) -> Infos:
@@ -308,8 +328,9 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
     def render(self) -> tuple[Any, ...] | None:
         """Picture of each row, uint8 arrays of shape (600, 600, 3).
 
-        None without a render mode.
+        None without a render mode, with a warning.
         """
+        self._warn_of_no_mode()
         if self.render_mode is None:
             return None
         return tuple(artist.picture(self._engine) for artist in self._artists)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ PLAIN_STEPS = 40  # in plain Python
 PLAIN_LANES = 3
 AGREEMENT = 1e-5  # of compiled and plain results, whose last digits differ
 BEYOND = 1e-6  # beyond a bound, by rounding
+RARE = 20.0  # times the median of its magnitude that a rare reward is at least
 
 
 class TaskCheck(Findings):
@@ -41,7 +42,8 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
     Its records and functions; compilation; some steps in plain Python, whose errors
     name the line; some hundred steps of many ships under crude orders: rewards, state
     and observations finite and within their bounds; the same results compiled and in
-    plain Python, for one ship and for many.
+    plain Python, for one ship and for many. It remarks on observations that are often
+    clipped, and on rewards, under random orders, that a learner cannot learn from.
 
     The task is a file or module (`shipgym.tasks.contract`), or the name of one of the
     package's; options are keywords of the environment, `model`, `reward` and `sensors`
@@ -76,7 +78,7 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
         ways=("among many ships", "alone"),
     )
     problems = [*_not_finite(many), *compiled_and_plain, *many_and_one]
-    remarks = _often_clipped(given, seen)
+    remarks = [*_often_clipped(given, seen), *_hard_to_learn(many)]
     return TaskCheck(given.name, tuple(problems), tuple(remarks))
 
 
@@ -252,3 +254,66 @@ def _often_clipped(task: Task, seen: dict[str, list[float]]) -> Iterator[str]:
                 f" {100.0 * part:.0f} % of the steps; give it wider bounds or a larger"
                 " scale if the agent is to see more"
             )
+
+
+class RewardDistribution(NamedTuple):
+    """Distribution of rewards under random orders, each held for some intervals."""
+
+    median: float  # of the magnitude of a step's reward
+    rare_share: float  # of all reward in steps of more than `RARE` times the median
+    largest: float  # reward of the largest magnitude
+
+
+def reward_distribution(engine: Engine) -> RewardDistribution:
+    """Distribution of the rewards of an engine's ships under random orders.
+
+    Each order is held for twenty control intervals.
+    """
+    held = 20
+    random = np.random.default_rng(0)
+    shape = (engine.num_envs, engine.task.n_commands)
+    engine.reset(np.arange(engine.num_envs))
+    sailing = np.ones(engine.num_envs, dtype=np.bool_)
+    earned = []
+    for step in range(engine.task.episode_steps):
+        if step % held == 0:
+            orders = random.uniform(-1.0, 1.0, shape)
+        _, rewards, terminated, truncated = engine.step(orders)
+        earned.append(rewards[sailing])
+        sailing &= ~(terminated | truncated)
+        if not sailing.any():
+            break
+
+    rewards = np.concatenate(earned)
+    size = np.abs(rewards)
+    median = float(np.median(size))
+    total = size.sum()
+    rare = size[size > RARE * median].sum()
+    return RewardDistribution(
+        median=median,
+        rare_share=float(rare / total) if total > 0.0 else 0.0,
+        largest=float(rewards[size.argmax()]),
+    )
+
+
+def _hard_to_learn(engine: Engine) -> Iterator[str]:
+    """Remark on rewards of which most lies in rare events, or that hardly differ."""
+    most = 0.2  # share of all reward in rare events that learners cope with
+    faint = 0.02  # bounded reward that most steps should earn
+    median, rare_share, largest = reward_distribution(engine)
+    if rare_share > most:
+        yield (
+            f"reward: expected at most {100.0 * most:.0f} % of all reward in steps of"
+            f" more than {RARE:g} times the median, {median:.3g}, got"
+            f" {100.0 * rare_share:.0f} % under random orders, in one step"
+            f" {largest:.4g}: one event drowns the rest; leave bounded=True, or lower"
+            " loss_horizon"
+        )
+    scale = engine.task.half_reward_cost
+    if scale > 0.0 and median < faint:
+        cost = scale / max(median, 1e-9) - scale
+        yield (
+            f"reward: expected a median above {faint:g} under random orders, got"
+            f" {median:.2g}: a step costs {cost:.3g}, which earns next to nothing with"
+            f" bounded={scale:g}; give a tenth of that cost as bounded"
+        )

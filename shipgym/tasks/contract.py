@@ -4,9 +4,10 @@ A task file defines (`shipgym/tasks/course_keeping.py` is one)
 
 * `Settings`, `State`, `Reward` and `Observation`, named tuples of floats. `Settings`
   has defaults, which are keywords of its environment; a last field annotated `Numbers`
-  is a list. The reward is the sum of the fields of `Reward`, which `info` has as
-  `reward_NAME`. Each field of `Observation` is annotated with an
-  `ObservationSpec`.
+  is a list. The fields of `Reward` are minus the parts of the cost of a step, such as
+  minus the square of an error; `info` has them as `reward_NAME`, and the cost. What a
+  learner earns follows from the cost (see below). Each field of `Observation` is
+  annotated with an `ObservationSpec`.
 * `begin(ship, settings, random, plan) -> (Motion, State)`: the beginning of an episode.
 * `step(motion, state, interval, ship, settings) -> (State, Reward, failed, arrived)`:
   after an interval.
@@ -19,7 +20,7 @@ and may define
   interval, ship, settings, random, plan) -> State`: rare events, such as the next
   set-point.
 * `worst_cost(settings) -> float`: the largest cost of a step. A lost ship costs
-  as much for the rest of the episode, so that ending early is never an advantage.
+  as much for the rest of the episode, so that ending early never lowers the cost.
 * `NAME`, by default that of the file, and `EPISODE_STEPS`, by default 600.
 * `REPORTED`: names of fields of `State` that `info` has; those annotated `Flag` as
   booleans.
@@ -28,6 +29,12 @@ and may define
 * `check(settings, model)`: raises `InputError` for settings that do not fit, first
   without a ship, `model` None, then with one; `listed(value)`: what a keyword of
   another kind, such as a list of waypoints, means as numbers.
+
+The engine makes the reward of the cost c of a step, for any task: 1 - c / (c + b),
+where the keyword `bounded` is b, 0.1 by default. A lost ship earns nothing from then
+on, and one that has arrived 1 for each interval of the keyword `loss_horizon`. Let
+c = 1 be the cost of a ship that makes no headway: then lingering does not pay. With
+`bounded=False` the reward is minus the cost.
 
 A field `heading_setpoint` of `State`, rad, is `set_point` in `physical_state()` and in
 pictures.

@@ -73,6 +73,7 @@ TAKEN = (
     "envelope_distance",
     "extrapolating",
     "end",
+    "cost",
 )
 #: Registered tasks: name to module name.
 TASKS = {

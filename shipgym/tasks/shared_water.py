@@ -112,7 +112,7 @@ def step(
     sine, cosine = sin_cos(motion.psi - state.course)
     made_good = (motion.u * cosine - motion.v * sine) / ship.speed
     reward = Reward(
-        progress=-0.5 * clip(1.0 - made_good, 0.0, 1.0),
+        progress=-clip(1.0 - made_good, 0.0, 1.0),
         off_track=-0.2 * clip(fabs(across) / (5.0 * ship.length), 0.0, 1.0),
         closeness=-exp(-near * near),
     )
@@ -123,7 +123,7 @@ def step(
 
 def worst_cost(settings: Settings) -> float:
     """Sum of the largest costs of a step."""
-    return 1.7
+    return 2.2
 
 
 def observe(

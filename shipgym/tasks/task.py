@@ -32,6 +32,10 @@ VECTOR_OPTIONS = (
 )
 
 ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft", "rudder-shaft-discrete")
+#: Cost of a step that earns half of a bounded reward, and control intervals that the
+#: end of an episode stands for, by default.
+HALF_REWARD_COST = 0.1
+LOSS_HORIZON = 100.0
 #: Rudder orders of a discrete action, parts of the rudder limit.
 RUDDER_ORDERS = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0)
 #: Shaft orders of a discrete action, parts of the speed at service speed, as of an
@@ -86,6 +90,16 @@ class Task:
         through a notch filter at the frequency of encounter.
     water_depth : float
         m; for ships that know shallow water.
+    bounded : bool or float
+        Whether the reward of a step is bounded, 1 - cost / (cost + scale); a number
+        is the scale, the cost of a step that earns a half, `HALF_REWARD_COST` by
+        default. False for minus the cost.
+    loss_horizon : float or None
+        Control intervals that the end of an episode stands for: a bounded reward pays
+        a ship that has arrived 1 for each, and one that is lost nothing; minus the
+        cost charges a lost one the worst. By default `LOSS_HORIZON`, the horizon
+        1 / (1 - 0.99) of a learner's discount, or, of minus the cost, the rest of the
+        episode.
     sensors : SensorSet, optional
         Instruments of a user's own in place of `noise` and `measurement`; as a keyword,
         their file.
@@ -106,6 +120,8 @@ class Task:
     noise: float = 0.0
     measurement: str = "raw"
     water_depth: float = float("inf")
+    bounded: bool | float = True
+    loss_horizon: float | None = None
     sensors: SensorSet | None = None
     sensor_settings: Any = None
     options: Mapping[str, Any] = field(default_factory=dict, compare=False)
@@ -121,6 +137,16 @@ class Task:
         measurements = ("raw", "filtered")
         check_choice(self.measurement, measurements, "measurement")
         check_number(self.noise, "noise", at_least=0.0)
+        if not isinstance(self.bounded, bool):
+            check_number(self.bounded, "bounded", above=0.0, hint="or True or False")
+        if self.definition.has_goals and self.options.get("bounded"):
+            source = self.definition.source
+            raise InputError(
+                f"bounded: expected none with the goals of {source}, whose reward"
+                f" compute_reward gives, got {self.bounded!r}; leave it out"
+            )
+        if self.loss_horizon is not None:
+            check_number(self.loss_horizon, "loss_horizon", at_least=0.0)
         if self.sensors is not None and (self.noise > 0.0 or self.measurement != "raw"):
             raise InputError(
                 "sensors: expected either these or noise and measurement, got"
@@ -348,6 +374,25 @@ class Task:
         shaft = tuple(order for order in _SHAFT_ORDERS if order >= least)
         return (RUDDER_ORDERS, shaft)[: self.n_commands]
 
+    @property
+    def half_reward_cost(self) -> float:
+        """Cost of a step that earns half of a bounded reward; 0 for minus the cost.
+
+        The reward of a task with goals is minus the cost.
+        """
+        if self.definition.has_goals:
+            return 0.0
+        if isinstance(self.bounded, bool):
+            return HALF_REWARD_COST if self.bounded else 0.0
+        return float(self.bounded)
+
+    @property
+    def end_intervals(self) -> float:
+        """Control intervals that the end of an episode stands for."""
+        if self.loss_horizon is not None:
+            return float(self.loss_horizon)
+        return LOSS_HORIZON if self.bounded else float("inf")
+
     def least_shaft(self, model: ShipModel) -> float:
         """Least command of the shaft, part of service speed; 0 if it stays ahead."""
         return -1.0 if model.turns_astern else 0.0
@@ -355,7 +400,7 @@ class Task:
     @cached_property
     def info_names(self) -> tuple[str, ...]:
         """Names of the numbers in `info`."""
-        engine = ("envelope_distance", "extrapolating")
+        engine = ("envelope_distance", "extrapolating", "cost")
         return (*self.definition.reported, *engine, *self.reward_parts)
 
     @cached_property

@@ -87,6 +87,8 @@ def test_reward_of_a_step_is_that_of_its_goals(task):
         assert info["reward_goal"] == (0.0 if near else -1.0)
         rewards.append(info["reward_goal"])
     assert set(rewards) == {0.0, -1.0}
+    with pytest.raises(InputError, match="bounded: expected none with the goals"):
+        gymnasium.make(COURSE, task=task, bounded=True)
     # any number of goals at once, and one that is desired by all
     many = np.tile(seen["achieved_goal"], (70, 1))
     assert env.compute_reward(many, many[0], [{}] * 70).tolist() == [0.0] * 70

@@ -103,7 +103,7 @@ def test_a_target_that_leaves_the_physical_range_is_named(tmp_path):
     path.write_text(ENCOUNTER.replace('"mariner"', repr(str(tmp_path / "tug.py"))))
     message = (
         r"encounter.py, line \d+, in step: State\.[a-z.1]+: expected a target ship"
-        r" within the physical range, got .* at step \d+.*tug.py, line \d+, in accelerations"
+        r" within the physical range.* at step \d+.*tug.py, line \d+, in accelerations"
     )
     with pytest.raises(InputError, match=message):
         gymnasium.make(COURSE, task=path, dt=5.0).reset(seed=0)
