@@ -31,8 +31,8 @@ from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS
 from agents.training.request import TrainingRequest, make_plan
 from agents.training.training import train
 from shipgym.envs.engine import Engine
-from shipgym.envs.environment import ORDERS
 from shipgym.files import make_folder, read_json, write_json
+from shipgym.tasks.task import RUDDER_ORDERS
 
 ROOT = Path(__file__).parents[1]
 FOUND, PICTURE = (
@@ -141,7 +141,7 @@ class Orders:
     def predict(self, *seen: Any) -> tuple[Any, Any]:
         """Return commands, and no memory."""
         numbers, memory = self.agent.predict(*seen)
-        return ORDERS[numbers][:, None], memory
+        return np.array(RUDDER_ORDERS)[numbers][:, None], memory
 
 
 def held_out(policy: Any, env: Any) -> dict[str, float]:

@@ -242,14 +242,19 @@ class Engine(Lanes):
 
         A lost ship is charged for the intervals of `Task.end_intervals`.
         """
-        left = np.maximum(self.task.episode_steps - self.steps, 1.0)
-        self.info("reward_end")[:] *= np.minimum(self.task.end_intervals / left, 1.0)
-        earned = goals.of_rows(self.outputs.observations)
-        self.info("reward_goal")[:] = np.where(over, 0.0, earned)
-        parts = {name: self.info(name) for name in self.task.reward_parts}
-        others = goals.sum_of_others(parts)
-        self.outputs.outcomes[0] = others + parts["reward_goal"]
-        self.info("cost")[:] = -self.outputs.outcomes[0]
+        task = self.task
+        end = self.info("reward_end")
+        left = np.maximum(task.episode_steps - self.steps, 1.0)
+        end *= np.minimum(task.end_intervals / left, 1.0)
+
+        outputs = self.outputs
+        earned = goals.of_rows(outputs.observations)
+        earned[over] = 0.0
+        parts = {name: self.info(name) for name in task.reward_parts}
+        parts["reward_goal"][:] = earned
+        rewards = goals.sum_of_others(parts) + earned
+        outputs.outcomes[0] = rewards
+        self.info("cost")[:] = -rewards
 
     def reset(self, seeds: ArrayLike) -> Observation:
         """Begin in each lane the episode of the single environment's `reset(seed=...)`.

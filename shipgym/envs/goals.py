@@ -52,7 +52,7 @@ class Goals:
         self._size = len(goals) // 2
         self._goal = goals[: self._size]
         scales = [quantity.scale for quantity in self._goal]
-        self._scales = np.array(scales).reshape(-1, 1)
+        self._scales = np.array(scales)
         self._settings = np.array([flat(task.settings)])
         self._lane_settings = lane_settings
         self._other_parts = task.reward_parts[:-1]  # the last is that of the goal
@@ -110,8 +110,11 @@ class Goals:
         reached = self._checked(achieved_goal, "achieved_goal")
         wanted = self._checked(desired_goal, "desired_goal")
         single = reached.ndim == 1
-        both = np.broadcast_arrays(np.atleast_2d(reached), np.atleast_2d(wanted))
-        earned = self._rewards(*both, self._run, self._settings)
+        reached, wanted = np.broadcast_arrays(
+            np.atleast_2d(reached),
+            np.atleast_2d(wanted),
+        )
+        earned = self._rewards(reached, wanted, self._run, self._settings)
         rewards = self._others(info) + earned
         return float(rewards[0]) if single else rewards
 
@@ -158,11 +161,13 @@ class Goals:
 
     def _tiles(self, goals: Any, n_tiles: int) -> Floats:
         """Goals in SI units, in tiles of 64, shape (n_tiles, n_numbers * 64)."""
-        columns = np.zeros((self._size, n_tiles * LANES))
-        columns[:, : len(goals)] = np.asarray(goals, dtype=np.float64).T
-        columns *= self._scales
-        by_tile = columns.reshape(self._size, n_tiles, LANES).swapaxes(0, 1)
-        return np.ascontiguousarray(by_tile).reshape(n_tiles, -1)
+        numbers = np.asarray(goals, dtype=np.float64)
+        padded = np.zeros((n_tiles * LANES, self._size))
+        padded[: len(numbers)] = numbers * self._scales
+        by_tile = padded.reshape(n_tiles, LANES, self._size)
+        by_number = by_tile.swapaxes(1, 2)
+        rows = np.ascontiguousarray(by_number)
+        return rows.reshape(n_tiles, -1)
 
 
 def _compiled(definition: TaskDefinition, lanes: int) -> Any:

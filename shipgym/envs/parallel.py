@@ -16,6 +16,7 @@ from shipgym.errors import InputError
 from shipgym.extras import library
 from shipgym.tasks import shared_water
 from shipgym.tasks.encounters import ABSENT, IMAZU
+from shipgym.tasks.task import Task
 
 ParallelEnv: Any = library(
     "pettingzoo", "marl", "several ships in one environment need it"
@@ -64,31 +65,37 @@ class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked h
         check_whole(n_ships, "n_ships", at_least=2, at_most=MOST_SHIPS)
         if render_mode not in (None, "rgb_array"):
             raise unexpected("render_mode", "'rgb_array' or None", render_mode)
-        ship, task, randomisation = read_options(shared_water, model, options)
-        if not task.weather.calm or len(task.seas) > 1:
-            raise unexpected("sea", "'calm', the only one that ships share", task.sea)
+        self.model, self.task, randomisation = read_options(
+            shared_water, model, options
+        )
+        _refuse_weather(self.task)
         self.render_mode = render_mode
-        self.task = task
-        self.model = ship
         self.possible_agents = [f"ship_{number}" for number in range(n_ships)]
         self.agents: list[str] = []
-        self._engine = Engine(ship, n_ships, task, randomisation)
-        self._orders = []
-        for orders in task.orders(ship):
-            self._orders.append(np.array(orders, dtype=np.float32))
-        observations, actions = spaces(task, ship, None)
-        self.observation_spaces = dict.fromkeys(self.possible_agents, observations)
-        self.action_spaces = dict.fromkeys(self.possible_agents, actions)
+        self._engine = Engine(self.model, n_ships, self.task, randomisation)
         self._artist = Artist(render_mode) if render_mode else None
         self._random: np.random.Generator | None = None
+        self._orders = []
+        for orders in self.task.orders(self.model):
+            self._orders.append(np.array(orders, dtype=np.float32))
+        self._make_spaces()
+
+    def _make_spaces(self) -> None:
+        """Make the spaces of each agent, which stay the same objects."""
+        observations, actions = spaces(self.task, self.model, None)
+        agents = self.possible_agents
+        self.observation_spaces: dict[str, Any] = dict.fromkeys(agents, observations)
+        self.action_spaces: dict[str, Any] = dict.fromkeys(agents, actions)
 
     def observation_space(self, agent: str) -> gymnasium.spaces.Space[Any]:
         """Observation space of an agent."""
-        return self.observation_spaces[agent]
+        space: gymnasium.spaces.Space[Any] = self.observation_spaces[agent]
+        return space
 
     def action_space(self, agent: str) -> gymnasium.spaces.Space[Any]:
         """Action space of an agent."""
-        return self.action_spaces[agent]
+        space: gymnasium.spaces.Space[Any] = self.action_spaces[agent]
+        return space
 
     def reset(
         self,
@@ -110,33 +117,33 @@ class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked h
         """
         if seed is not None or self._random is None:
             self._random, _ = gymnasium.utils.seeding.np_random(seed)
-        given = dict(options or {})
-        for name in given:
-            if name != "case" and did_you_mean(name, ["case"]):
-                check_keys(given, ["case"], "options")
-        n_ships = len(self.possible_agents)
-        keys = [episode_key(self._random) for _ in range(n_ships)]
         courses, parts = self._drawn(self._random)
+        given = dict(options or {})
+        _refuse_misspelt(given)
         if "case" in given:
-            courses, parts = imazu_courses(given["case"], n_ships)
+            courses, parts = imazu_courses(given["case"], len(courses))
 
+        engine = self._engine
+        keys = [episode_key(self._random) for _ in courses]
+        engine.renew_outputs()
+        engine.begin(np.array(keys, dtype=np.uint64))
         self.agents = list(self.possible_agents)
-        self._engine.renew_outputs()
-        self._engine.begin(np.array(keys, dtype=np.uint64))
         self._place(courses, parts)
         self._show_others()
         if self._artist:
-            self._artist.begin(self._engine)
+            self._artist.begin(engine)
         return self._observations(self.agents), self._infos(self.agents)
 
     def _drawn(self, random: np.random.Generator) -> tuple[Floats, Floats]:
         """Courses of ships, and their distances by that of the settings."""
         n_ships = len(self.possible_agents)
-        even = 2.0 * np.pi * np.arange(n_ships) / n_ships
-        spread = 0.8 * np.pi / n_ships
-        courses = random.uniform(-np.pi, np.pi) + even
+        between = 2.0 * np.pi / n_ships
+        spread = 0.4 * between
+        first = random.uniform(-np.pi, np.pi)
+        courses = first + between * np.arange(n_ships)
         courses = courses + random.uniform(-spread, spread, n_ships)
-        return courses, random.uniform(0.9, 1.1, n_ships)
+        parts = random.uniform(0.9, 1.1, n_ships)
+        return courses, parts
 
     def _place(self, courses: Floats, parts: Floats) -> None:
         """Write where ships begin, each on her track."""
@@ -167,24 +174,28 @@ class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked h
         engine.order(self._commands(actions))
         engine.advance(anew=True)
         outputs = engine.outputs
-        lanes = [self.possible_agents.index(agent) for agent in agents]
-        rewards = outputs.outcomes[0, lanes].tolist()
-        terminated = outputs.terminated[lanes].tolist()
-        truncated = outputs.truncated[lanes].tolist()
-        over = outputs.terminated | outputs.truncated
-        self.agents = [
-            agent for agent, lane in zip(agents, lanes, strict=True) if not over[lane]
-        ]
+        terminated = self._by_agent(agents, outputs.terminated)
+        truncated = self._by_agent(agents, outputs.truncated)
+        self.agents = []
+        for agent in agents:
+            if not (terminated[agent] or truncated[agent]):
+                self.agents.append(agent)
+
         self._show_others()
         if self._artist:
             self._artist.note(engine)
         return (
             self._observations(agents),
-            dict(zip(agents, rewards, strict=True)),
-            dict(zip(agents, terminated, strict=True)),
-            dict(zip(agents, truncated, strict=True)),
+            self._by_agent(agents, outputs.outcomes[0]),
+            terminated,
+            truncated,
             self._infos(agents),
         )
+
+    def _by_agent(self, agents: list[str], values: Any) -> dict[str, Any]:
+        """Values of some agents, of an array with an entry for each ship."""
+        of_all = dict(zip(self.possible_agents, values.tolist(), strict=True))
+        return {agent: of_all[agent] for agent in agents}
 
     def _commands(self, actions: Mapping[str, Any]) -> Floats:
         """Commands of all ships, 0 of those whose episode is over."""
@@ -205,24 +216,23 @@ class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked h
 
     def _show_others(self) -> None:
         """Let each ship see where the others are now; those that are over are not."""
-        engine = self._engine
-        state = self.state()
-        x, y, psi, u, v, _ = state.T
-        north = u * np.cos(psi) - v * np.sin(psi)
-        east = u * np.sin(psi) + v * np.cos(psi)
+        x, y, psi, u, v, _ = self.state().T
         here = np.isin(self.possible_agents, self.agents)
+        drift = np.arctan2(v, u)
+        speed = np.hypot(u, v)
         seen = {
             "x": np.where(here, x, shared_water.ABSENT_X),
             "y": np.where(here, y, 0.0),
-            "course": np.arctan2(east, north),
-            "speed": np.where(here, np.hypot(north, east), 0.0),
+            "course": psi + drift,
+            "speed": np.where(here, speed, 0.0),
         }
-        n_ships = len(here)
-        for place in range(n_ships - 1):
-            # ship i sees i + 1, i + 2, ...
-            of_others = (np.arange(n_ships) + place + 1) % n_ships
+        engine = self._engine
+        n_others = len(here) - 1
+        for place in range(n_others):
             for name, values in seen.items():
-                engine.write(f"others.{place}.{name}", values[of_others])
+                # ship i sees i + 1, i + 2, ...
+                of_others = np.roll(values, -1 - place)
+                engine.write(f"others.{place}.{name}", of_others)
         engine.observe_again()
 
     def state(self) -> Floats:
@@ -231,29 +241,42 @@ class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked h
         return np.stack([self._engine.read(name) for name in names], axis=1)
 
     def _observations(self, agents: list[str]) -> dict[str, NDArray[np.float32]]:
-        observations = self._engine.observations
-        return {
-            agent: observations[self.possible_agents.index(agent)] for agent in agents
-        }
+        rows = self._engine.observations
+        of_all = dict(zip(self.possible_agents, rows, strict=True))
+        return {agent: of_all[agent] for agent in agents}
 
     def _infos(self, agents: list[str]) -> dict[str, dict[str, Any]]:
-        infos: dict[str, dict[str, Any]] = {}
-        for agent in agents:
-            lane = self.possible_agents.index(agent)
-            infos[agent] = {}
-            for name in self.task.info_names:
-                value = float(self._engine.info(name)[lane])
-                is_flag = name in self.task.flags
-                infos[agent][name] = value > 0.0 if is_flag else value
+        infos: dict[str, dict[str, Any]] = {agent: {} for agent in agents}
+        for name in self.task.info_names:
+            values = self._engine.info(name)
+            if name in self.task.flags:
+                values = values > 0.0
+            for agent, value in self._by_agent(agents, values).items():
+                infos[agent][name] = value
         return infos
 
     def render(self) -> NDArray[np.uint8] | None:
         """Picture around the first ship, uint8 array of shape (600, 600, 3)."""
-        return self._artist.picture(self._engine) if self._artist else None
+        if self._artist is None:
+            return None
+        return self._artist.picture(self._engine)
 
     def close(self) -> None:
         """End the encounter."""
         self.agents = []
+
+
+def _refuse_weather(task: Task) -> None:
+    """Refuse any sea but a calm one, the only one that ships share."""
+    if not task.weather.calm or len(task.seas) > 1:
+        raise unexpected("sea", "'calm', the only one that ships share", task.sea)
+
+
+def _refuse_misspelt(options: Mapping[str, Any]) -> None:
+    """Refuse options of a reset that look like a known one; others are ignored."""
+    for name in options:
+        if name != "case" and did_you_mean(name, ["case"]):
+            check_keys(options, ["case"], "options")
 
 
 def imazu_courses(case: Any, n_ships: int) -> tuple[Floats, Floats]:

@@ -75,7 +75,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         observation_space, action_space = self._make(
             arguments, ENV_OPTIONS, self.metadata["render_modes"]
         )
-        self.observation_space = observation_space  # type: ignore[assignment]
+        self.observation_space = observation_space
         self.action_space = action_space
         self._names = self.task.info_names
         flags = self.task.flags

@@ -7,7 +7,7 @@ import numpy as np
 from shipgym.engine.mathematics import clip, sin_cos
 from shipgym.engine.motion import Ship
 from shipgym.tasks.contract import ObservationSpec, Random, drawn
-from shipgym.tasks.traffic import Target, approach, meeting
+from shipgym.tasks.traffic import Target, advance, approach
 
 #: Course of a ship that a case does not have.
 ABSENT = 999.0
@@ -77,12 +77,18 @@ def imazu_target(case: int, number: int, distance: float, ship: Ship) -> Target:
     too far away to be met.
     """
     degrees = IMAZU[case - 1, number]
-    course = degrees * np.pi / 180.0
-    meeting_time = distance / ship.speed
     if degrees == ABSENT:
-        return Target(1000.0 * distance, 0.0, 0.0, 0.0)
-    speed = 0.7 * ship.speed if degrees == 0.0 else ship.speed
-    return meeting(Target(0.0, 0.0, course, speed), 0.0, 0.0, meeting_time)
+        too_far = 1000.0 * distance
+        return Target(too_far, 0.0, 0.0, 0.0)
+    slower = 0.7 if degrees == 0.0 else 1.0
+    at_origin = Target(
+        x=0.0,
+        y=0.0,
+        course=degrees * np.pi / 180.0,
+        speed=slower * ship.speed,
+    )
+    meeting_time = distance / ship.speed
+    return advance(at_origin, -meeting_time)
 
 
 def seen(readings: Any, other: Target, ship: Ship) -> Seen:

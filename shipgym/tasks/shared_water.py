@@ -8,6 +8,8 @@ each is taken to keep course and speed.
 from math import exp, fabs
 from typing import Annotated, Any, NamedTuple
 
+import numpy as np
+
 from shipgym.engine.mathematics import clip, sin_cos
 from shipgym.engine.motion import Motion, Ship
 from shipgym.tasks.contract import (
@@ -20,7 +22,7 @@ from shipgym.tasks.contract import (
 )
 from shipgym.tasks.encounters import Seen, Unit, seen_three
 from shipgym.tasks.shapes import ChartWidth, Circle, Line, Shape, ShipOutline
-from shipgym.tasks.traffic import Target, advance, distance_to
+from shipgym.tasks.traffic import Target, advance, distance_to, own_velocity
 
 EPISODE_STEPS = 150
 ABSENT_X = 1e6  # m, north, of a ship that is not there
@@ -77,7 +79,9 @@ class Observation(NamedTuple):
 def along_and_across(x: float, y: float, course: float) -> tuple[float, float]:
     """Distance along a track beyond the crossing, and to starboard of it, m."""
     sine, cosine = sin_cos(course)
-    return x * cosine + y * sine, y * cosine - x * sine
+    along = x * cosine + y * sine
+    across = y * cosine - x * sine
+    return along, across
 
 
 def begin(
@@ -87,9 +91,19 @@ def begin(
     plan: Any,
 ) -> tuple[Motion, State]:
     """Begin south of the crossing, alone; the environment places the ships."""
-    absent = Target(ABSENT_X, 0.0, 0.0, 0.0)
-    motion = at_service_speed(-settings.distance * ship.length, 0.0, 0.0, ship)
-    return motion, State(0.0, (absent, absent, absent))
+    absent = Target(
+        x=ABSENT_X,
+        y=0.0,
+        course=0.0,
+        speed=0.0,
+    )
+    run = settings.distance * ship.length
+    motion = at_service_speed(-run, 0.0, 0.0, ship)
+    state = State(
+        course=0.0,
+        others=(absent, absent, absent),
+    )
+    return motion, state
 
 
 def step(
@@ -101,24 +115,44 @@ def step(
 ) -> tuple[State, Reward, bool, bool]:
     """Reward progress along the track, and distance from others."""
     first, second, third = state.others
-    first = advance(first, interval.dt)
-    second = advance(second, interval.dt)
-    third = advance(third, interval.dt)
-    nearest = min(distance_to(motion, first), distance_to(motion, second))
-    nearest = min(nearest, distance_to(motion, third))
-    near = nearest / (settings.safe * ship.length)
-
+    after = State(
+        course=state.course,
+        others=(
+            advance(first, interval.dt),
+            advance(second, interval.dt),
+            advance(third, interval.dt),
+        ),
+    )
+    nearest = distance_to_nearest(motion, after)
     along, across = along_and_across(motion.x, motion.y, state.course)
-    sine, cosine = sin_cos(motion.psi - state.course)
-    made_good = (motion.u * cosine - motion.v * sine) / ship.speed
     reward = Reward(
-        progress=-clip(1.0 - made_good, 0.0, 1.0),
+        progress=-clip(1.0 - made_good(motion, state, ship), 0.0, 1.0),
         off_track=-0.2 * clip(fabs(across) / (5.0 * ship.length), 0.0, 1.0),
-        closeness=-exp(-near * near),
+        closeness=-closeness(nearest, ship, settings),
     )
     arrived = along > settings.distance * ship.length
-    after = State(state.course, (first, second, third))
     return after, reward, nearest < ship.length, arrived
+
+
+def distance_to_nearest(motion: Motion, state: State) -> float:
+    """Distance to the nearest of the others, m."""
+    first, second, third = state.others
+    nearest = distance_to(motion, first)
+    nearest = min(nearest, distance_to(motion, second))
+    return min(nearest, distance_to(motion, third))
+
+
+def made_good(motion: Motion, state: State, ship: Ship) -> float:
+    """Speed made good along the track, part of service speed."""
+    velocity = own_velocity(motion)
+    along, _ = along_and_across(velocity.north, velocity.east, state.course)
+    return along / ship.speed
+
+
+def closeness(distance: float, ship: Ship, settings: Settings) -> float:
+    """How close another ship is, 1 at no distance."""
+    part = distance / (settings.safe * ship.length)
+    return exp(-part * part)
 
 
 def worst_cost(settings: Settings) -> float:
@@ -150,11 +184,22 @@ def draw(motion: Motion, state: State, ship: Ship, settings: Settings) -> list[S
     """Draw the track, and the others with their distance to keep."""
     run = settings.distance * ship.length
     sine, cosine = sin_cos(state.course)
-    end = [run * cosine, run * sine]
-    start = [-run * cosine, -run * sine]
-    shapes: list[Shape] = [ChartWidth(2.5 * run), Line([start, end], "faint")]
+    end = np.array([run * cosine, run * sine])
+    track = Line([-end, end], "faint")
+    shapes: list[Shape] = [ChartWidth(2.5 * run), track]
+    safe = settings.safe * ship.length
     for other in state.others:
-        shapes.append(ShipOutline(other.x, other.y, other.course, ship.length))
-        radius = settings.safe * ship.length
-        shapes.append(Circle(other.x, other.y, radius, "warning"))
+        outline = ShipOutline(
+            x=other.x,
+            y=other.y,
+            psi=other.course,
+            length=ship.length,
+        )
+        circle = Circle(
+            x=other.x,
+            y=other.y,
+            radius=safe,
+            colour="warning",
+        )
+        shapes += [outline, circle]
     return shapes

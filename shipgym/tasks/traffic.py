@@ -32,6 +32,13 @@ class Target(NamedTuple):
     speed: float  # m/s, over ground
 
 
+class Velocity(NamedTuple):
+    """Velocity over ground in still water."""
+
+    north: float  # m/s
+    east: float
+
+
 class Approach(NamedTuple):
     """Where another ship is, and how close she comes if both keep course and speed."""
 
@@ -44,29 +51,43 @@ class Approach(NamedTuple):
 
 def advance(target: Target, dt: float) -> Target:
     """Target dt seconds later."""
-    sine, cosine = sin_cos(target.course)
+    velocity = velocity_of(target)
     return Target(
-        x=target.x + dt * target.speed * cosine,
-        y=target.y + dt * target.speed * sine,
+        x=target.x + dt * velocity.north,
+        y=target.y + dt * velocity.east,
         course=target.course,
         speed=target.speed,
     )
 
 
+def velocity_of(target: Target) -> Velocity:
+    """Velocity of a target."""
+    sine, cosine = sin_cos(target.course)
+    return Velocity(
+        north=target.speed * cosine,
+        east=target.speed * sine,
+    )
+
+
+def own_velocity(motion: Motion) -> Velocity:
+    """Velocity of a ship under way in still water."""
+    sine, cosine = sin_cos(motion.psi)
+    return Velocity(
+        north=motion.u * cosine - motion.v * sine,
+        east=motion.u * sine + motion.v * cosine,
+    )
+
+
 def target_of(motion: Motion) -> Target:
     """Target as which a ship under way in still water is seen."""
-    sine, cosine = sin_cos(motion.psi)
-    north = motion.u * cosine - motion.v * sine
-    east = motion.u * sine + motion.v * cosine
-    speed = sqrt(north * north + east * east)
-    return Target(motion.x, motion.y, arctan2(east, north), speed)
-
-
-def meeting(target: Target, x: float, y: float, meeting_time: float) -> Target:
-    """Target of a course and speed that is at a place after a time, s."""
-    sine, cosine = sin_cos(target.course)
-    run = target.speed * meeting_time
-    return Target(x - run * cosine, y - run * sine, target.course, target.speed)
+    north, east = own_velocity(motion)
+    squared_speed = north * north + east * east
+    return Target(
+        x=motion.x,
+        y=motion.y,
+        course=arctan2(east, north),
+        speed=sqrt(squared_speed),
+    )
 
 
 def distance_to(motion: Motion, target: Target) -> float:
@@ -78,25 +99,27 @@ def distance_to(motion: Motion, target: Target) -> float:
 
 def approach(motion: Motion, target: Target) -> Approach:
     """How a ship in still water, and another, approach each other."""
-    own = target_of(motion)
-    own_east, own_north = sin_cos(own.course)
-    east, north = sin_cos(target.course)
     away_x = target.x - motion.x
     away_y = target.y - motion.y
-    relative_x = target.speed * north - own.speed * own_north
-    relative_y = target.speed * east - own.speed * own_east
+    own = own_velocity(motion)
+    other = velocity_of(target)
+    north = other.north - own.north
+    east = other.east - own.east
 
-    squared_speed = relative_x * relative_x + relative_y * relative_y
-    slowest = 1e-6  # m/s, below which the distance stays as it is
-    closing = -(away_x * relative_x + away_y * relative_y)
-    tcpa = closing / max(squared_speed, slowest * slowest)
-    closest_x = away_x + tcpa * relative_x
-    closest_y = away_y + tcpa * relative_y
+    squared_speed = north * north + east * east
+    slowest = 1e-12  # m2/s2, below which the distance stays as it is
+    closing = -(away_x * north + away_y * east)
+    tcpa = closing / max(squared_speed, slowest)
+    closest_x = away_x + tcpa * north
+    closest_y = away_y + tcpa * east
+    squared_dcpa = closest_x * closest_x + closest_y * closest_y
+    to_other = arctan2(away_y, away_x)
+    to_own = arctan2(-away_y, -away_x)
     return Approach(
         distance=distance_to(motion, target),
-        bearing=wrap(arctan2(away_y, away_x) - motion.psi),
-        aspect=wrap(arctan2(-away_y, -away_x) - target.course),
-        dcpa=sqrt(closest_x * closest_x + closest_y * closest_y),
+        bearing=wrap(to_other - motion.psi),
+        aspect=wrap(to_own - target.course),
+        dcpa=sqrt(squared_dcpa),
         tcpa=tcpa,
     )
 
@@ -116,15 +139,17 @@ def encounter(near: Approach, risk_distance: float, risk_time: float) -> float:
     kind = pick(on_bow & on_her_bow, HEAD_ON, kind)
     kind = pick(fabs(near.bearing) > abaft, OVERTAKEN, kind)
     kind = pick(fabs(near.aspect) > abaft, OVERTAKING, kind)
-    risk = (near.dcpa < risk_distance) & (near.tcpa > 0.0) & (near.tcpa < risk_time)
-    return pick(risk, kind, CLEAR)
+    soon = (near.tcpa > 0.0) & (near.tcpa < risk_time)
+    close = near.dcpa < risk_distance
+    return pick(soon & close, kind, CLEAR)
 
 
 def rudder_to(motion: Motion, heading: float, ship: Ship) -> float:
     """Rudder of a helmsman who keeps a heading, rad."""
     error = wrap(heading - motion.psi)
     lead = 2.0 * ship.length / ship.speed  # s
-    return clip(error - lead * motion.r, -ship.rudder_limit, ship.rudder_limit)
+    limit = ship.rudder_limit
+    return clip(error - lead * motion.r, -limit, limit)
 
 
 def rudder_by_rules(
