@@ -2,11 +2,14 @@
 
 A task file defines (`shipgym/tasks/course_keeping.py` is one)
 
-* `Settings`, `State`, `Reward` and `Observation`, named tuples of floats. `Settings`
+* `Settings`, `State`, `Reward` and `Observation`, named tuples of floats, of such
+  records, and of arrays of a fixed size of either, which are tuples:
+  `tuple[Target, Target]`, or `Annotated[tuple[float, ...], Size(8)]`. `Settings`
   has defaults, which are keywords of its environment; a last field annotated `Numbers`
   is a list. The reward is the sum of the fields of `Reward`, which `info` has as
   `reward_NAME`. Each field of `Observation` is annotated with an
-  `ObservationSpec`.
+  `ObservationSpec`; fields of a record that occurs twice, and entries of arrays, are
+  prefixed: `starboard_range`, `targets_0_range`.
 * `begin(ship, settings, random, plan) -> (Motion, State)`: the beginning of an episode.
 * `step(motion, state, interval, ship, settings) -> (State, Reward, failed, arrived)`:
   after an interval.
@@ -28,6 +31,11 @@ and may define
 * `check(settings, model)`: raises `InputError` for settings that do not fit, first
   without a ship, `model` None, then with one; `listed(value)`: what a keyword of
   another kind, such as a list of waypoints, means as numbers.
+
+`step`, `observe`, `due` and `reward` may take `random`, `plan` or both, by these names,
+behind `settings`. There `plan` is only read, and `random` holds the numbers of the
+interval, not of the episode: `drawn(random, 0, low, high)` is another in each.
+`numpy.random` and `random` are refused.
 
 A field `heading_setpoint` of `State`, rad, is `set_point` in `physical_state()` and in
 pictures.
