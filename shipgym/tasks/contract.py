@@ -2,12 +2,15 @@
 
 A task file defines (`shipgym/tasks/course_keeping.py` is one)
 
-* `Settings`, `State`, `Reward` and `Observation`, named tuples of floats. `Settings`
+* `Settings`, `State`, `Reward` and `Observation`, named tuples of floats, of such
+  records, and of arrays of a fixed size of either, which are tuples:
+  `tuple[Target, Target]`, or `Annotated[tuple[float, ...], Size(8)]`. `Settings`
   has defaults, which are keywords of its environment; a last field annotated `Numbers`
   is a list. The fields of `Reward` are minus the parts of the cost of a step, such as
   minus the square of an error; `info` has them as `reward_NAME`, and the cost. What a
   learner earns follows from the cost (see below). Each field of `Observation` is
-  annotated with an `ObservationSpec`.
+  annotated with an `ObservationSpec`; fields of a record that occurs twice, and entries
+  of arrays, are prefixed: `starboard_range`, `targets_0_range`.
 * `begin(ship, settings, random, plan) -> (Motion, State)`: the beginning of an episode.
 * `step(motion, state, interval, ship, settings) -> (State, Reward, failed, arrived)`:
   after an interval.
@@ -29,6 +32,16 @@ and may define
 * `check(settings, model)`: raises `InputError` for settings that do not fit, first
   without a ship, `model` None, then with one; `listed(value)`: what a keyword of
   another kind, such as a list of waypoints, means as numbers.
+* `Goal`, `achieved`, `desired` and `goal_reward`: goals (`shipgym.tasks.goals`).
+* `current(x, y, settings) -> (north, east)`: a current by place, m/s.
+* `draw(motion, state, ship, settings)`: shapes for pictures (`shipgym.tasks.shapes`).
+
+Other ships are records in `State` that `step` sails (`shipgym.tasks.traffic`).
+
+`step`, `observe`, `due` and `reward` may take `random`, `plan` or both, by these names,
+behind `settings`. There `plan` is only read, and `random` holds the numbers of the
+interval, not of the episode: `drawn(random, 0, low, high)` is another in each.
+`numpy.random` and `random` are refused.
 
 The engine makes the reward of the cost c of a step, for any task: 1 - c / (c + b),
 where the keyword `bounded` is b, 0.1 by default. A lost ship earns nothing from then
