@@ -9,6 +9,7 @@ from typing import Any
 from shipgym.checks import check_text
 from shipgym.errors import InputError
 from shipgym.python_files import check_function, load_file, refuse_closure
+from shipgym.tasks.refused_code import refuse_foreign_random
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class CurrentField:
             raise InputError(f"{path}: expected {what}, got no 'current'")
         check_function(found, 2, f"{path}: current", what)
         refuse_closure(found)
+        refuse_foreign_random(found)
 
     @cached_property
     def function(self) -> Any:
