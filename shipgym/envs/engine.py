@@ -95,7 +95,7 @@ class Engine(Lanes):
         randomisation = randomisation or Randomisation()
         self.pool = randomisation.ships(model, task.seas)
         drawn = len(self.pool) > 1
-        windy = any(not sea.calm for _, sea in self.pool) or task.current is not None
+        windy = _any_weather(self.pool, task)
         if model_index is not None:
             self.pool = _only(model_index, self.pool)
         own = [(ship, task.seas[0]) for ship in ships]
@@ -126,11 +126,16 @@ class Engine(Lanes):
             settings,
             scale_task,
         )
+        self._watch(scale_task)
+        self._begin_all(loop or self._compiled)
+
+    def _watch(self, scale_task: Task) -> None:
+        """Prepare what is done after steps of a task with goals or other ships."""
+        task = self.task
         self.goals: Goals | None = None
         if task.definition.has_goals:
-            self.goals = Goals(task, model, scale_task, self.task_settings)
+            self.goals = Goals(task, self.model, scale_task, self.task_settings)
         self._is_watched = bool(self.goals or task.definition.targets)
-        self._begin_all(loop or self._compiled)
 
     def _begin_all(self, loop: Callable[[EpisodeProgram], Any]) -> None:
         """Begin an episode in each lane, with the loop of the program."""
@@ -382,6 +387,13 @@ class Engine(Lanes):
     def reward_parts(self) -> Floats:
         """Parts of the last rewards, shape (num_envs, n_parts)."""
         return np.stack([self.info(name) for name in self.task.reward_parts], axis=-1)
+
+
+def _any_weather(pool: Pool, task: Task) -> bool:
+    """Return whether there is current, wind or waves in any episode."""
+    if task.current is not None:
+        return True
+    return any(not sea.calm for _, sea in pool)
 
 
 def _only(model_index: int, pool: Pool) -> Pool:

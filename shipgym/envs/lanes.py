@@ -69,12 +69,7 @@ class Lanes:
         self.windy = program.windy
         self.dt = task.interval(model)
         self.flag_names = [name for name in task.info_names if name in task.flags]
-        self._output_pool = OutputPool(
-            num_envs,
-            n_observed=len(task.observed(model)) + len(task.goals(model)),
-            n_outcomes=ANSWER_OUTCOMES + len(task.info_names),
-            n_flags=ANSWER_FLAGS + len(self.flag_names),
-        )
+        self._output_pool = self._pool_of_outputs()
 
         n_tiles = -(-num_envs // LANES)
         shares = lane_shares(n_tiles, threads)
@@ -98,6 +93,17 @@ class Lanes:
         self.task_settings = tables["task_settings"]
         self._actions = tables["actions"]
         self._chosen = tables["chosen"][0]
+
+    def _pool_of_outputs(self) -> OutputPool:
+        """Make the pool of the arrays that steps return."""
+        task = self.task
+        n_goals = len(task.goals(self.model))
+        return OutputPool(
+            self.num_envs,
+            n_observed=len(task.observed(self.model)) + n_goals,
+            n_outcomes=ANSWER_OUTCOMES + len(task.info_names),
+            n_flags=ANSWER_FLAGS + len(self.flag_names),
+        )
 
     def _empty_tables(self, n_tiles: int) -> dict[str, NDArray[Any]]:
         """Zeros of states, random numbers, results, actions and chosen lanes."""
