@@ -287,10 +287,11 @@ class Lanes:
         tile, lane_in_tile = divmod(lane, LANES)
         hooks = self.program.hooks
         ships = self._ships[tile % len(self._ships)]
+        states = self._states[tile]
         return shapes_of(
             draw,
-            hooks["load_motion"](self._states[tile], lane_in_tile),
-            hooks["load_task_state"](self._states[tile], lane_in_tile),
+            hooks["load_motion"](states, lane_in_tile),
+            hooks["load_task_state"](states, lane_in_tile),
             hooks["load_ship"](ships, lane_in_tile),
             self.settings_of(lane),
         )

@@ -66,7 +66,9 @@ class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked h
         if render_mode not in (None, "rgb_array"):
             raise unexpected("render_mode", "'rgb_array' or None", render_mode)
         self.model, self.task, randomisation = read_options(
-            shared_water, model, options
+            task=shared_water,
+            model=model,
+            options=options,
         )
         _refuse_weather(self.task)
         self.render_mode = render_mode
@@ -216,24 +218,28 @@ class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked h
 
     def _show_others(self) -> None:
         """Let each ship see where the others are now; those that are over are not."""
-        x, y, psi, u, v, _ = self.state().T
-        here = np.isin(self.possible_agents, self.agents)
-        drift = np.arctan2(v, u)
-        speed = np.hypot(u, v)
-        seen = {
-            "x": np.where(here, x, shared_water.ABSENT_X),
-            "y": np.where(here, y, 0.0),
-            "course": psi + drift,
-            "speed": np.where(here, speed, 0.0),
-        }
+        seen = self._targets()
         engine = self._engine
-        n_others = len(here) - 1
+        n_others = len(self.possible_agents) - 1
         for place in range(n_others):
             for name, values in seen.items():
                 # ship i sees i + 1, i + 2, ...
                 of_others = np.roll(values, -1 - place)
                 engine.write(f"others.{place}.{name}", of_others)
         engine.observe_again()
+
+    def _targets(self) -> dict[str, Floats]:
+        """Numbers of `Target` of all ships; those that are over are far away."""
+        x, y, psi, u, v, _ = self.state().T
+        here = np.isin(self.possible_agents, self.agents)
+        drift = np.arctan2(v, u)
+        speed = np.hypot(u, v)
+        return {
+            "x": np.where(here, x, shared_water.ABSENT_X),
+            "y": np.where(here, y, 0.0),
+            "course": psi + drift,
+            "speed": np.where(here, speed, 0.0),
+        }
 
     def state(self) -> Floats:
         """North, east, heading, surge, sway and yaw rate of each ship, SI units."""

@@ -16,6 +16,7 @@ from shipgym.engine.records import is_record
 from shipgym.engine.specialise import Specialisation, captured_globals, is_plain
 from shipgym.errors import InputError
 from shipgym.python_files import place_of
+from shipgym.tasks.contract import at_service_speed
 
 #: Kinds of an encounter by the rules of the road (COLREG), seen from the own ship.
 CLEAR, OVERTAKING, OVERTAKEN, HEAD_ON, GIVE_WAY, STAND_ON = (
@@ -72,9 +73,11 @@ def velocity_of(target: Target) -> Velocity:
 def own_velocity(motion: Motion) -> Velocity:
     """Velocity of a ship under way in still water."""
     sine, cosine = sin_cos(motion.psi)
+    north = motion.u * cosine - motion.v * sine
+    east = motion.u * sine + motion.v * cosine
     return Velocity(
-        north=motion.u * cosine - motion.v * sine,
-        east=motion.u * sine + motion.v * cosine,
+        north=north,
+        east=east,
     )
 
 
@@ -240,8 +243,7 @@ def vessel(source: Any, steps: int = 2) -> Callable[..., Motion]:
     made: Any = _OfTarget(hooks).copy(sail_steps)
     made.equations = place_of(hooks["accelerations"])
     made.ship = ship
-    at_speed = [0.0, 0.0, 0.0, ship.speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ship.shaft]
-    made.start = Motion(*at_speed)
+    made.start = at_service_speed(0.0, 0.0, 0.0, ship)
     return made  # type: ignore[no-any-return]
 
 
@@ -249,8 +251,10 @@ def as_numbers(record: Any) -> Any:
     """Record of Python's own numbers, which compiled code holds as constants."""
     numbers = []
     for value in record:
-        within = is_record(type(value))
-        numbers.append(as_numbers(value) if within else float(value))
+        if is_record(type(value)):
+            numbers.append(as_numbers(value))
+        else:
+            numbers.append(float(value))
     return type(record)(*numbers)
 
 
