@@ -43,10 +43,12 @@ def evaluate(agent: Any) -> tuple[float, float]:
 def main() -> None:
     """Train, and print a row for each part of the training."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--steps", type=int, default=400_000)
-    parser.add_argument("--parts", type=int, default=8)
+    parser.add_argument("--steps", type=int, default=350_000)
+    parser.add_argument("--parts", type=int, default=6)
+    parser.add_argument("--bounded", type=float, default=1.0)
     given = parser.parse_args()
-    shipgym.register_task("harbour/Encounter-v0", TASK, dt=5.0)
+    bounded = given.bounded or False
+    shipgym.register_task("harbour/Encounter-v0", TASK, dt=5.0, bounded=bounded)
     ships = shipgym.ShipVecEnv("harbour/Encounter-v0", num_envs=32, seed=0)
     agent = PPO("MlpPolicy", ships, n_steps=256, batch_size=256, seed=0)
     began = time.time()

@@ -198,7 +198,9 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             terminated, truncated = self._end
         elif terminated or truncated:
             self._note_end((terminated, truncated))
-        observation = self._shown(self._observation.copy())
+        observation: Any = self._observation.copy()
+        if self._goals is not None:
+            observation = self._goals.split(observation)
         return observation, reward, terminated > 0.0, truncated > 0.0, info
 
     def _note_end(self, end: Any = NOT_OVER) -> None:
