@@ -16,7 +16,7 @@ from shipgym.engine.compiling import entry_of
 from shipgym.engine.episode_program import EpisodeProgram, episode_program
 from shipgym.engine.episodes import BEGIN, BEGIN_NEXT, STEP, STEP_AND_BEGIN
 from shipgym.engine.records import LANES
-from shipgym.envs.lanes import Lanes
+from shipgym.envs.lanes import Contents, Lanes
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES
 from shipgym.envs.plain_python import plain_loop
 from shipgym.envs.randomisation import Pool, Randomisation
@@ -113,17 +113,8 @@ class Engine(Lanes):
             len(own) == 1,
             len(settings) == 1,
         )
-        super().__init__(
-            program,
-            model,
-            task,
-            num_envs,
-            own,
-            drawn,
-            threads,
-            settings,
-            scale_task,
-        )
+        contents = Contents(own, drawn, settings, scale_task)
+        super().__init__(program, model, task, num_envs, contents, threads)
         self._begin_all(loop or self._compiled)
 
     def _begin_all(self, loop: Callable[[EpisodeProgram], Any]) -> None:

@@ -301,9 +301,11 @@ class Task:
         """Orders of each command of a discrete action; empty if it is continuous."""
         if not self.action.endswith("discrete"):
             return ()
+        if self.n_commands == 1:
+            return (RUDDER_ORDERS,)
         least = self.least_shaft(model)
-        shaft = tuple(order for order in _SHAFT_ORDERS if order >= least)
-        return (RUDDER_ORDERS, shaft)[: self.n_commands]
+        shaft_orders = tuple(order for order in _SHAFT_ORDERS if order >= least)
+        return RUDDER_ORDERS, shaft_orders
 
     def least_shaft(self, model: ShipModel) -> float:
         """Least command of the shaft, part of service speed; 0 if it stays ahead."""
