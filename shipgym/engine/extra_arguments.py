@@ -18,14 +18,12 @@ from shipgym.tasks.contract import Random
 
 #: Arguments that a function may name behind the required ones, in any order.
 EXTRAS = ("random", "plan")
-#: Last of the required arguments of such a function.
-LAST_REQUIRED = ("interval", "ship", "settings")
-N_REQUIRED = 5
 
 
 def takes_extras(arguments: Sequence[str]) -> bool:
     """Return whether a function of these arguments may name extras behind them."""
-    return tuple(arguments[-len(LAST_REQUIRED) :]) == LAST_REQUIRED
+    last = tuple(arguments[-3:])
+    return last == ("interval", "ship", "settings")
 
 
 def random_of(tile: Tile, lane: int, steps: float) -> Random:
@@ -115,7 +113,7 @@ def with_plan_and_random(
     return wrapped_function(moment, state, interval, ship, settings, plan, random)
 
 
-WRAPPERS = {
+_WRAPPERS = {
     (): with_nothing,
     ("random",): with_random,
     ("plan",): with_plan,
@@ -128,10 +126,12 @@ WRAPPERS = {
 def completed(function: Any) -> Any:
     """Wrap a function of a task, so that it is called with tile and lane."""
     code = function.__code__
-    extras = code.co_varnames[N_REQUIRED : code.co_argcount]
+    arguments = code.co_varnames[: code.co_argcount]
+    required = 5
+    extras = arguments[required:]
     if extras == ("tile", "lane"):  # one of the package's
         return function
-    wrapper = WRAPPERS[extras]
+    wrapper = _WRAPPERS[extras]
     hooks = {**wrapper.__globals__, "wrapped_function": function}
     return FunctionType(wrapper.__code__, hooks, wrapper.__name__)
 

@@ -11,7 +11,7 @@ functions that load and store records.
 
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from types import GenericAlias
@@ -110,8 +110,10 @@ def members(kind: Any) -> list[tuple[str, Any]]:
     """Names and types of the parts of a record, array or table; of a number none."""
     if is_record(kind):
         return list(field_types(kind).items())
-    parts = get_args(kind) if is_array(kind) else ()
-    if is_table(kind):
+    parts: Sequence[Any] = ()
+    if is_array(kind):
+        parts = get_args(kind)
+    elif is_table(kind):
         parts = (float,) * kind.rows
     return [(str(number), part) for number, part in enumerate(parts)]
 
@@ -123,7 +125,8 @@ def leaves(record: Record, prefix: str = "") -> tuple[str, ...]:
     for name, kind in members(record):
         path = prefix + name
         if members(kind):
-            paths += leaves(kind, f"{path}.")
+            within = leaves(kind, f"{path}.")
+            paths += within
         else:
             paths.append(path)
     return tuple(paths)

@@ -17,7 +17,7 @@ from shipgym.engine.episode_program import EpisodeProgram, episode_program
 from shipgym.engine.episodes import BEGIN, BEGIN_NEXT, OBSERVE, STEP, STEP_AND_BEGIN
 from shipgym.engine.records import LANES
 from shipgym.envs.goals import Goals
-from shipgym.envs.lanes import Lanes
+from shipgym.envs.lanes import Contents, Lanes
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES
 from shipgym.envs.plain_python import plain_loop
 from shipgym.envs.randomisation import Pool, Randomisation
@@ -115,17 +115,8 @@ class Engine(Lanes):
             len(settings) == 1,
             task.current,
         )
-        super().__init__(
-            program,
-            model,
-            task,
-            num_envs,
-            own,
-            drawn,
-            threads,
-            settings,
-            scale_task,
-        )
+        contents = Contents(own, drawn, settings, scale_task)
+        super().__init__(program, model, task, num_envs, contents, threads)
         self._watch(scale_task)
         self._begin_all(loop or self._compiled)
 

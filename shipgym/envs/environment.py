@@ -115,13 +115,23 @@ def given_orders(
     if len(orders) > 1:
         shape = (*shape, len(orders))
     is_whole = array.shape == shape and array.dtype.kind in "iu"
-    of_rows = array.reshape(-1, len(orders)) if is_whole else np.array([[-1]])
-    ordered = []
-    for known, chosen in zip(orders, of_rows.T, strict=False):
-        if chosen.min() < 0 or chosen.max() >= len(known):
-            raise unexpected(where, _orders_in_words(orders, shape), numbers)
-        ordered.append(known[chosen])
+    if not is_whole or array.min() < 0 or _is_beyond(array, orders):
+        raise unexpected(where, _orders_in_words(orders, shape), numbers)
+    if len(orders) == 1:
+        one: NDArray[np.float32] = orders[0][array.reshape(-1, 1)]
+        return one
+    columns = array.reshape(-1, len(orders)).T
+    ordered = [known[chosen] for known, chosen in zip(orders, columns, strict=True)]
     return np.stack(ordered, axis=-1)
+
+
+def _is_beyond(numbers: NDArray[Any], orders: Sequence[NDArray[np.float32]]) -> bool:
+    """Return whether a number is beyond the orders of its command."""
+    counts = [len(known) for known in orders]
+    if len(counts) == 1:  # in every step of a ship
+        return bool(numbers.max() >= counts[0])
+    is_beyond = numbers >= counts
+    return bool(is_beyond.any())
 
 
 def _orders_in_words(

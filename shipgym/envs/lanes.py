@@ -1,7 +1,7 @@
 """State of many ships by lane: layout, reading, writing and copies between steps."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,6 +25,16 @@ from shipgym.tasks.shapes import Shape, shapes_of
 from shipgym.tasks.task import Task
 
 
+class Contents(NamedTuple):
+    """Ships, seas and settings of lanes."""
+
+    # one ship and sea for all lanes or one each, or the pool
+    own: Pool
+    drawn: bool  # whether each episode draws a ship and a sea of a pool
+    settings: Sequence[Any]  # of the task, one for all lanes or one each
+    scale_task: Task  # that gives the scales of observations
+
+
 class Lanes:
     """The arrays that loops work on; `Engine` steps them.
 
@@ -36,16 +46,9 @@ class Lanes:
         The ship, or the first of them.
     task : Task
     num_envs : int
-    own : Pool
-        Ships and seas of the lanes, one for all or one each; or, if `drawn`, the pool
-        of which each episode draws one.
-    drawn : bool
+    contents : Contents
     threads : int
         That share the lanes.
-    settings : sequence of NamedTuple
-        Settings of the task, one for all lanes or one each.
-    scale_task : Task
-        Task that gives the scales of observations.
     """
 
     outputs: Outputs  # of the last step
@@ -56,11 +59,8 @@ class Lanes:
         model: ShipModel,
         task: Task,
         num_envs: int,
-        own: Pool,
-        drawn: bool,
+        contents: Contents,
         threads: int,
-        settings: Sequence[Any],
-        scale_task: Task,
     ) -> None:
         self.program = program
         self.model = model
@@ -74,15 +74,9 @@ class Lanes:
         n_tiles = -(-num_envs // LANES)
         shares = lane_shares(n_tiles, threads)
         self.n_shares = len(shares)
-        columns = ship_columns(own, self.windy, task, model, drawn, scale_task)
-        of_task = np.array([flat(one) for one in settings])
-        n_ship_rows = columns.shape[1]
-        pool = columns if drawn else np.zeros((0, n_ship_rows))
         tables = self._allocate(
-            ships=ship_tiles(columns, n_tiles, len(own) > 1),
-            pool=pool.reshape(1, -1),
+            **self._filled_tables(contents, n_tiles),
             settings=np.array([self._settings()]),
-            task_settings=ship_tiles(of_task, n_tiles, len(settings) > 1),
             shares=shares,
             **self._empty_tables(n_tiles),
             **self._output_rows(),
@@ -104,6 +98,21 @@ class Lanes:
             n_outcomes=ANSWER_OUTCOMES + len(task.info_names),
             n_flags=ANSWER_FLAGS + len(self.flag_names),
         )
+
+    def _filled_tables(self, contents: Contents, n_tiles: int) -> dict[str, Floats]:
+        """Tables of ships, of their pool, and of settings of the task."""
+        own, drawn, settings, scale_task = contents
+        columns = ship_columns(
+            own, self.windy, self.task, self.model, drawn, scale_task
+        )
+        n_ship_rows = columns.shape[1]
+        pool = columns if drawn else np.zeros((0, n_ship_rows))
+        of_task = np.array([flat(one) for one in settings])
+        return {
+            "ships": ship_tiles(columns, n_tiles, len(own) > 1),
+            "pool": pool.reshape(1, -1),
+            "task_settings": ship_tiles(of_task, n_tiles, len(settings) > 1),
+        }
 
     def _empty_tables(self, n_tiles: int) -> dict[str, NDArray[Any]]:
         """Zeros of states, random numbers, results, actions and chosen lanes."""

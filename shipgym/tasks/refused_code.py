@@ -16,8 +16,8 @@ from shipgym.errors import InputError
 from shipgym.python_files import LIBRARIES
 
 #: Modules of random numbers that depend on more than key and number of an episode.
-MODULES = {"numpy.random": np.random, "random": random}
-GENERATORS = (np.random.RandomState, np.random.Generator, random.Random)
+_MODULES = {"numpy.random": np.random, "random": random}
+_GENERATORS = (np.random.RandomState, np.random.Generator, random.Random)
 
 
 def refuse_foreign_random(function: FunctionType) -> None:
@@ -36,11 +36,13 @@ def refuse_foreign_random(function: FunctionType) -> None:
 
 def _foreign_random(function: Any, known: set[Any]) -> Iterator[tuple[str, str]]:
     """Places, and modules, of random numbers in a function and those that it calls."""
+    names = function.__globals__
     for code in nested_code(function.__code__):
-        for line, value in _named_values(code, function.__globals__):
+        for line, value in _named_values(code, names):
             module = _module_of(value)
             if module:
-                yield f"{code.co_filename}, line {line}, in {code.co_name}", module
+                place = f"{code.co_filename}, line {line}, in {code.co_name}"
+                yield place, module
             elif _is_users(value) and value not in known:
                 known.add(value)
                 yield from _foreign_random(value, known)
@@ -65,11 +67,11 @@ def _named_values(code: CodeType, names: dict[str, Any]) -> Iterator[tuple[int, 
 def _module_of(value: Any) -> str:
     """Name of the module whose random numbers a value draws; empty if it draws none."""
     owner = getattr(value, "__self__", value)
-    for name, module in MODULES.items():
+    for name, module in _MODULES.items():
         is_member = getattr(value, "__module__", None) == name
         if value is module or (is_member and callable(value)):
             return name
-    if isinstance(owner, GENERATORS):
+    if isinstance(owner, _GENERATORS):
         return "random" if isinstance(owner, random.Random) else "numpy.random"
     return ""
 

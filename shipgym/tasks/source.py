@@ -74,12 +74,14 @@ def check_namespace(
         if name in optional and not hasattr(namespace, name):
             continue
         extras = EXTRAS if takes_extras(arguments) else ()
-        what = f"a function {name}({', '.join(arguments)})"
+        listed = ", ".join(arguments)
+        what = f"a function {name}({listed})"
         if extras:
-            what += f", with or without {' and '.join(extras)} behind them"
+            what += ", with or without random and plan behind them"
         function = _named(namespace, name, where, what)
         refuse_closure(function)
-        check_function(function, len(arguments), f"{where}: {name}", what, extras)
+        place = f"{where}: {name}"
+        check_function(function, len(arguments), place, what, extras)
         refuse_foreign_random(function)
         if extras:
             refuse_writes_to_plan(function)
@@ -146,7 +148,8 @@ def _check_kind(kind: Any, name: str, place: str) -> None:
 
 def _check_list(kind: Any, default: Any, place: str, is_last_setting: bool) -> None:
     """Refuse a list that is not the last of settings, and an array without a size."""
-    if get_origin(kind) is tuple or not (is_last_setting or "Settings" in place):
+    is_setting = "Settings" in place
+    if get_origin(kind) is tuple or not is_setting:
         raise not_of_numbers(place, kind)
     if isinstance(default, str) or not is_last_setting:
         raise unexpected(place, "a number, or a list as the last field", default)
@@ -172,7 +175,8 @@ def field_place(record: Any, field: str, where: str) -> str:
     except (OSError, TypeError):
         return where
     for number, line in enumerate(lines, max(first, 1)):
-        if line.strip().partition(":")[0].rstrip() == field:
+        name, _, _ = line.strip().partition(":")
+        if name.rstrip() == field:
             return f"{file}, line {number}"
     return where
 
@@ -267,19 +271,19 @@ def _setting_of(kind: Any, value: Any, name: str, bounds: Setting) -> Any:
     parts = members(kind)
     if not parts:
         return checked_setting(value, name, bounds)
-    if is_array(kind):
-        expected = f"{len(parts)} numbers, or lists of numbers, in a list"
-        labels = [f"number {part}" for part, _ in parts]
-    else:
-        labels = [f"the {part}" for part, _ in parts]
-        expected = " and ".join(labels)
-
+    article = "number" if is_array(kind) else "the"
+    labels = [f"{article} {part}" for part, _ in parts]
     is_sequence = isinstance(value, Sequence | np.ndarray)
     if not is_sequence or isinstance(value, str) or len(value) != len(parts):
+        expected = " and ".join(labels)
+        if is_array(kind):
+            expected = f"{len(parts)} numbers, or lists of numbers, in a list"
         raise unexpected(name, expected, value)
+
     made = []
-    for (_, part), label, item in zip(parts, labels, value, strict=True):
-        made.append(_setting_of(part, item, f"{name}: {label}", bounds))
+    for label, (_, part), item in zip(labels, parts, value, strict=True):
+        place = f"{name}: {label}"
+        made.append(_setting_of(part, item, place, bounds))
     return kind(*made) if is_record(kind) else tuple(made)
 
 

@@ -370,9 +370,11 @@ class Task:
         """Orders of each command of a discrete action; empty if it is continuous."""
         if not self.action.endswith("discrete"):
             return ()
+        if self.n_commands == 1:
+            return (RUDDER_ORDERS,)
         least = self.least_shaft(model)
-        shaft = tuple(order for order in _SHAFT_ORDERS if order >= least)
-        return (RUDDER_ORDERS, shaft)[: self.n_commands]
+        shaft_orders = tuple(order for order in _SHAFT_ORDERS if order >= least)
+        return RUDDER_ORDERS, shaft_orders
 
     @property
     def half_reward_cost(self) -> float:
