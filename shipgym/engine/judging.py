@@ -244,7 +244,7 @@ def bounded_reward(
     scale = max(rules.half_reward_cost, 1e-300)  # 0 where this is not used
     rate = 1.0 - cost / (scale + fabs(cost))
     arrived = terminated - wrecked
-    return going * pick(wrecked > 0.0, 0.0, rate) + arrived * rules.loss_horizon
+    return (going - wrecked) * rate + arrived * rules.loss_horizon
 
 
 def store_task(tile: Tile, lane: int, task_state: Any) -> None:
