@@ -43,9 +43,9 @@ def evaluate(agent: Any) -> tuple[float, float]:
 def main() -> None:
     """Train, and print a row for each part of the training."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--steps", type=int, default=350_000)
-    parser.add_argument("--parts", type=int, default=6)
-    parser.add_argument("--bounded", type=float, default=1.0)
+    parser.add_argument("--steps", type=int, default=400_000)
+    parser.add_argument("--parts", type=int, default=8)
+    parser.add_argument("--bounded", type=float, default=0.1)
     given = parser.parse_args()
     bounded = given.bounded or False
     shipgym.register_task("harbour/Encounter-v0", TASK, dt=5.0, bounded=bounded)
