@@ -5,8 +5,6 @@ from typing import Any
 from shipgym.engine.hooks import goal_reward, load_goal, load_task_settings
 from shipgym.engine.records import LANES
 
-SIGNATURE = "void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])"
-
 
 def reward_goals(achieved: Any, desired: Any, settings: Any, rewards: Any) -> None:
     """Reward goals achieved for those desired.

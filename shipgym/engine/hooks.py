@@ -48,7 +48,6 @@ SHIP = "given by the ship when a loop is compiled"
 SEA = "given by the sea when a loop is compiled"
 SENSORS = "given by the sensor set when a loop is compiled"
 TASK = "given by the task when a loop is compiled"
-OPTIONAL = "given by what has it when a loop is compiled"
 
 # Records of a lane, in its tile of states
 
@@ -338,7 +337,7 @@ def current_at(x: float, y: float, settings: Any) -> tuple[float, float]:
 
     Given by the task, whose settings it takes, or by a file of the sea.
     """
-    raise NotImplementedError(OPTIONAL)
+    raise NotImplementedError("given by a task that has it")
 
 
 @called
@@ -424,12 +423,12 @@ def goals_of(
     lane: int,
 ) -> Any:
     """Return the goals achieved and desired (`shipgym.tasks.goals`)."""
-    raise NotImplementedError(OPTIONAL)
+    raise NotImplementedError("given by a task that has it")
 
 
 def goal_reward(achieved: Any, desired: Any, settings: Any) -> float:
     """Return the reward of a goal achieved for one desired."""
-    raise NotImplementedError(OPTIONAL)
+    raise NotImplementedError("given by a task that has it")
 
 
 def due(

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from shipgym.arrays import Floats
 from shipgym.checks import unexpected
 from shipgym.engine.compiling import compiled
-from shipgym.engine.goal_rewards import SIGNATURE, reward_goals
+from shipgym.engine.goal_rewards import reward_goals
 from shipgym.engine.record_code import loader
 from shipgym.engine.records import LANES, Layout, flat
 from shipgym.ships import ShipModel
@@ -182,4 +182,6 @@ def _compiled(definition: TaskDefinition, lanes: int) -> Any:
         "load_task_settings": loader(settings, lanes),
     }
     what = f"the goals of {definition.name}"
-    return compiled(reward_goals, SIGNATURE, hooks, what)
+    tiles = "float64[:, ::1]"
+    signature = f"void({tiles}, {tiles}, {tiles}, {tiles})"
+    return compiled(reward_goals, signature, hooks, what)

@@ -15,14 +15,12 @@ from shipgym.envs.environment import DEFAULT_MODEL, given_orders, read_options, 
 from shipgym.errors import InputError
 from shipgym.extras import library
 from shipgym.tasks import shared_water
-from shipgym.tasks.encounters import ABSENT, IMAZU
+from shipgym.tasks.encounters import IMAZU
 from shipgym.tasks.task import Task
 
 ParallelEnv: Any = library(
     "pettingzoo", "marl", "several ships in one environment need it"
 ).ParallelEnv
-
-MOST_SHIPS = 4  # whom each other sees
 
 
 class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked here
@@ -45,7 +43,8 @@ class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked h
     render_mode : {None, "rgb_array"}
         Whether `render` gives a picture around the first ship.
     **options
-        Keywords of environments and settings of the task; the sea is calm.
+        Keywords of environments and settings of the task; the sea is calm, and
+        `episode_steps` 150 by default.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
@@ -62,9 +61,10 @@ class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked h
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        check_whole(n_ships, "n_ships", at_least=2, at_most=MOST_SHIPS)
+        check_whole(n_ships, "n_ships", at_least=2, at_most=4)
         if render_mode not in (None, "rgb_array"):
             raise unexpected("render_mode", "'rgb_array' or None", render_mode)
+        options.setdefault("episode_steps", 150)
         self.model, self.task, randomisation = read_options(
             task=shared_water,
             model=model,
@@ -235,7 +235,7 @@ class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked h
         drift = np.arctan2(v, u)
         speed = np.hypot(u, v)
         return {
-            "x": np.where(here, x, shared_water.ABSENT_X),
+            "x": np.where(here, x, shared_water.absent().x),
             "y": np.where(here, y, 0.0),
             "course": psi + drift,
             "speed": np.where(here, speed, 0.0),
@@ -289,7 +289,7 @@ def imazu_courses(case: Any, n_ships: int) -> tuple[Floats, Floats]:
     """Courses of the ships in a case, rad, and the parts of the distance of each."""
     check_whole(case, "options: case", at_least=1, at_most=len(IMAZU))
     degrees = IMAZU[case - 1]
-    others = degrees[degrees != ABSENT]
+    others = degrees[np.isfinite(degrees)]
     if len(others) != n_ships - 1:
         raise InputError(
             f"options: case: expected one of {n_ships} ships, got {case}, of"

@@ -9,25 +9,23 @@ from shipgym.engine.motion import Ship
 from shipgym.tasks.contract import ObservationSpec, Random, drawn
 from shipgym.tasks.traffic import Target, advance, approach
 
-#: Course of a ship that a case does not have.
-ABSENT = 999.0
 #: Courses of the other ships, degrees, in each of the 22 cases of Imazu (1987), as
 #: Sawada, Sato & Majima 2021 (J. Mar. Sci. Technol. 26) have them. Own ship sails
 #: north; the others meet her at one place and time, on her own course at 0.7 of her
-#: speed.
+#: speed. NaN: no ship.
 IMAZU = np.array(
     [
-        [180.0, ABSENT, ABSENT],
-        [-90.0, ABSENT, ABSENT],
-        [0.0, ABSENT, ABSENT],
-        [45.0, ABSENT, ABSENT],
-        [180.0, -90.0, ABSENT],
-        [-10.0, -45.0, ABSENT],
-        [0.0, -45.0, ABSENT],
-        [180.0, -90.0, ABSENT],
-        [-30.0, -90.0, ABSENT],
-        [-90.0, 15.0, ABSENT],
-        [90.0, -30.0, ABSENT],
+        [180.0, np.nan, np.nan],
+        [-90.0, np.nan, np.nan],
+        [0.0, np.nan, np.nan],
+        [45.0, np.nan, np.nan],
+        [180.0, -90.0, np.nan],
+        [-10.0, -45.0, np.nan],
+        [0.0, -45.0, np.nan],
+        [180.0, -90.0, np.nan],
+        [-30.0, -90.0, np.nan],
+        [-90.0, 15.0, np.nan],
+        [90.0, -30.0, np.nan],
         [180.0, -45.0, -10.0],
         [180.0, 10.0, 45.0],
         [-10.0, -45.0, -90.0],
@@ -77,7 +75,7 @@ def imazu_target(case: int, number: int, distance: float, ship: Ship) -> Target:
     too far away to be met.
     """
     degrees = IMAZU[case - 1, number]
-    if degrees == ABSENT:
+    if np.isnan(degrees):
         too_far = 1000.0 * distance
         return Target(too_far, 0.0, 0.0, 0.0)
     slower = 0.7 if degrees == 0.0 else 1.0

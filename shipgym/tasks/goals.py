@@ -20,9 +20,6 @@ from shipgym.engine.extra_arguments import completed
 from shipgym.engine.records import Record
 from shipgym.errors import InputError
 
-#: What a task with goals defines in addition to others.
-GOAL_NAMES = ("Goal", "achieved", "desired", "goal_reward")
-
 
 class Goals(NamedTuple):
     """The goals of a task without any; with them each is a `Goal`."""
@@ -113,12 +110,13 @@ def goals_function(goal: Record | None, achieved: Any, desired: Any) -> Any:
 
 def check_goal_names(namespace: Any, where: str) -> bool:
     """Return whether a task has goals; InputError if a part of them is missing."""
-    missing = [name for name in GOAL_NAMES if not hasattr(namespace, name)]
-    if len(missing) == len(GOAL_NAMES):
+    names = ("Goal", "achieved", "desired", "goal_reward")
+    missing = [name for name in names if not hasattr(namespace, name)]
+    if len(missing) == len(names):
         return False
     if missing:
         raise InputError(
-            f"{where}: expected all of {', '.join(GOAL_NAMES)} in a task with goals,"
+            f"{where}: expected all of {', '.join(names)} in a task with goals,"
             f" got no {missing[0]!r}"
         )
     return True

@@ -2,7 +2,8 @@
 
 A task file may define `draw(motion, state, ship, settings)`, plain Python that is
 called for each picture and returns a list of shapes, drawn one over another beneath the
-ship. Places are m north and east, colours a name of `COLOURS` or red, green, blue.
+ship. Places are m north and east, colours red, green, blue or
+of the names ink, faint, land, safe, warning and danger.
 """
 
 from collections.abc import Sequence
@@ -13,9 +14,9 @@ from shipgym.checks import check_choice, check_finite, check_number, unexpected
 from shipgym.errors import InputError
 from shipgym.python_files import asked, place_of
 
-RGB = tuple[int, int, int]
+Rgb = tuple[int, int, int]
 #: Colours by name.
-COLOURS: dict[str, RGB] = {
+_COLOURS: dict[str, Rgb] = {
     "ink": (28, 40, 48),
     "faint": (104, 122, 134),
     "land": (226, 219, 200),
@@ -23,7 +24,7 @@ COLOURS: dict[str, RGB] = {
     "warning": (200, 120, 10),
     "danger": (200, 60, 40),
 }
-Colour = str | RGB
+Colour = str | Rgb
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,16 +94,16 @@ Shape = Line | Circle | ShipOutline | ChartWidth
 def check_colour(colour: Any, where: str) -> None:
     """Refuse anything but the name of a colour, or three numbers from 0 to 255."""
     if isinstance(colour, str):
-        check_choice(colour, COLOURS, where)
+        check_choice(colour, _COLOURS, where)
         return
     is_rgb = isinstance(colour, tuple) and len(colour) == 3
     if not is_rgb or not all(number in range(256) for number in colour):
         raise unexpected(where, "a name or red, green, blue from 0 to 255", colour)
 
 
-def rgb(colour: Colour) -> RGB:
+def rgb(colour: Colour) -> Rgb:
     """Red, green and blue of a colour."""
-    return COLOURS[colour] if isinstance(colour, str) else colour
+    return _COLOURS[colour] if isinstance(colour, str) else colour
 
 
 def shapes_of(draw: Any, *arguments: Any) -> tuple[Shape, ...]:

@@ -24,9 +24,6 @@ from shipgym.tasks.encounters import Seen, Unit, seen_three
 from shipgym.tasks.shapes import ChartWidth, Circle, Line, Shape, ShipOutline
 from shipgym.tasks.traffic import Target, advance, distance_to, own_velocity
 
-EPISODE_STEPS = 150
-ABSENT_X = 1e6  # m, north, of a ship that is not there
-
 
 class Settings(NamedTuple):
     """Settings of the task."""
@@ -84,6 +81,16 @@ def along_and_across(x: float, y: float, course: float) -> tuple[float, float]:
     return along, across
 
 
+def absent() -> Target:
+    """A ship that is too far away to be met."""
+    return Target(
+        x=1e6,
+        y=0.0,
+        course=0.0,
+        speed=0.0,
+    )
+
+
 def begin(
     ship: Ship,
     settings: Settings,
@@ -91,17 +98,12 @@ def begin(
     plan: Any,
 ) -> tuple[Motion, State]:
     """Begin south of the crossing, alone; the environment places the ships."""
-    absent = Target(
-        x=ABSENT_X,
-        y=0.0,
-        course=0.0,
-        speed=0.0,
-    )
+    nobody = absent()
     run = settings.distance * ship.length
     motion = at_service_speed(-run, 0.0, 0.0, ship)
     state = State(
         course=0.0,
-        others=(absent, absent, absent),
+        others=(nobody, nobody, nobody),
     )
     return motion, state
 

@@ -179,18 +179,18 @@ def sail_steps(motion: Motion, rudder: float, shaft: float, dt: float) -> Motion
 
     A loop in which hooks are filled by `vessel`.
     """
-    h = dt / TARGET_STEPS
+    h = dt / _TARGET_STEPS
     after = motion
-    for _ in range(TARGET_STEPS):
-        after = sail(after, rudder, shaft, h, CALM, TARGET_COEFFICIENTS, TARGET_SHIP)
+    for _ in range(_TARGET_STEPS):
+        after = sail(after, rudder, shaft, h, CALM, _TARGET_COEFFICIENTS, _TARGET_SHIP)
     gone = float("nan")
     adrift = Motion(gone, gone, gone, gone, gone, gone, gone, gone, gone, gone, gone)
-    return pick(lost(after, TARGET_SHIP), adrift, after)
+    return pick(lost(after, _TARGET_SHIP), adrift, after)
 
 
-TARGET_STEPS = 1
-TARGET_COEFFICIENTS: Any = None
-TARGET_SHIP: Any = None
+_TARGET_STEPS = 1
+_TARGET_COEFFICIENTS: Any = None
+_TARGET_SHIP: Any = None
 
 
 class _OfTarget(Specialisation):
@@ -236,9 +236,9 @@ def vessel(source: Any, steps: int = 2) -> Callable[..., Motion]:
     numbers = model.ship_numbers(float("inf"), 1.0)
     ship = as_numbers(ship_of(model, float("inf")))
     hooks |= {
-        "TARGET_STEPS": steps,
-        "TARGET_SHIP": ship,
-        "TARGET_COEFFICIENTS": as_numbers(hooks["load_coefficients"](numbers)),
+        "_TARGET_STEPS": steps,
+        "_TARGET_SHIP": ship,
+        "_TARGET_COEFFICIENTS": as_numbers(hooks["load_coefficients"](numbers)),
     }
     made: Any = _OfTarget(hooks).copy(sail_steps)
     made.equations = place_of(hooks["accelerations"])
