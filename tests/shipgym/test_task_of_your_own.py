@@ -911,7 +911,7 @@ def test_a_list_stands_last_and_in_settings_alone():
     ):
         check_namespace(SimpleNamespace(Settings=ListBefore), "own", ("Settings",), {})
     with pytest.raises(
-        InputError, match=r"^own: State.inner.listed: expected a float, got"
+        InputError, match=r"^own: State.inner.listed: expected an array of a"
     ):
         check_namespace(SimpleNamespace(State=WithInner), "own", ("State",), {})
     assert check_namespace(
