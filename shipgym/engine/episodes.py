@@ -174,9 +174,11 @@ def begin_lane(tile: Tile, lane: int) -> None:
     ship = load_ship(tile.ships, lane)
     plan = plan_of(state, lane)
     motion, task_state = task_begin(ship, settings.task, random, plan)
+    has_shaft = ship.shaft > 0.0
+    part_of_service = motion.n / pick(has_shaft, ship.shaft, 1.0)
     commands = Commands(
         rudder_command=0.0,
-        shaft_command=pick(ship.shaft > 0.0, motion.n / ship.shaft, 1.0),
+        shaft_command=pick(has_shaft, part_of_service, 1.0),
         rudder_before=0.0,
     )
     store_motion(state, lane, motion)

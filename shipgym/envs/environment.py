@@ -291,7 +291,8 @@ class ShipsEnv:
                 expected = "integers, as `get_state` gave them"
                 raise unexpected(f"state: {name}", expected, state[name])
 
-        asked = check_table(state["asked"], "state: asked")
+        settings = self.task.definition.settings
+        asked = check_table(state["asked"], "state: asked", [*settings, "model_index"])
         engine = self._engine_for(asked)
         engine.set_state(state["engine"])
         # nothing is refused from here on

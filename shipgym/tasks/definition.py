@@ -343,7 +343,7 @@ def _check_reported(namespace: Any, where: str) -> None:
     """Check which fields of a state are to be reported."""
     reported = getattr(namespace, "REPORTED", ())
     where = f"{where}: REPORTED"
-    expected = f"a tuple of fields of State that are numbers, none of {TAKEN}"
+    expected = f"a tuple of fields of State, none of {TAKEN}, each a number"
     if not isinstance(reported, tuple | list):
         raise unexpected(where, expected, reported)
     kinds = field_types(namespace.State)

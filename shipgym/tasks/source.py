@@ -168,7 +168,9 @@ def not_of_numbers(place: str, kind: Any) -> InputError:
 
 
 def field_place(record: Any, field: str, where: str) -> str:
-    """Return file and line of a field of a record; `where` alone if unknown."""
+    """Return file and line of a field of a record; `where` alone if it is no file."""
+    if ".py" not in where:
+        return where
     try:
         lines, first = getsourcelines(record)
         file = getsourcefile(record)

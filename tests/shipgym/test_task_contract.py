@@ -200,7 +200,7 @@ WRONG = {
         ("headings: tuple[float, str]", "State.headings: expected a float, got"),
     ],
     "    luck: float": [
-        ("    luck: tuple[float, float]", "REPORTED: expected .* that are numbers"),
+        ("    luck: tuple[float, float]", "REPORTED: expected .* each a number"),
     ],
     "    bonus: float = 0.5": [
         (
