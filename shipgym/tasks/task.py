@@ -132,7 +132,12 @@ class Task:
         check_choice(self.measurement, measurements, "measurement")
         check_number(self.noise, "noise", at_least=0.0)
         if not isinstance(self.bounded, bool):
-            check_number(self.bounded, "bounded", above=0.0, hint="or True or False")
+            check_number(
+                self.bounded,
+                "bounded",
+                above=0.0,
+                hint="or True or False",
+            )
         if self.loss_horizon is not None:
             check_number(self.loss_horizon, "loss_horizon", at_least=0.0)
         if self.sensors is not None and (self.noise > 0.0 or self.measurement != "raw"):
