@@ -205,6 +205,13 @@ def default_curves(names: list[str]) -> None:
             write_json(run | {"classical": cost}, file)
 
 
+def evaluated(asked: DefaultRun) -> list[dict[str, Any]]:
+    """Evaluations of one learner, of each seed that was run."""
+    files = [default_file(asked, seed) for seed in SEEDS]
+    found = [file for file in files if file.exists()]
+    return [dict(read_json(file, "results", "remove it")) for file in found]
+
+
 def draw_defaults() -> None:
     """Cost against steps, a line a seed, for each learner that was evaluated."""
     import matplotlib
@@ -212,26 +219,27 @@ def draw_defaults() -> None:
     matplotlib.use("agg")
     from matplotlib import pyplot as plt
 
-    size = (3.2 * len(DEFAULTS), 3.4)
-    figure, axes = plt.subplots(1, len(DEFAULTS), figsize=size, layout="constrained")
-    for axis, asked in zip(axes, DEFAULTS, strict=True):
-        for seed in SEEDS:
-            file = default_file(asked, seed)
-            if not file.exists():
-                continue
-            run = dict(read_json(file, "results", "remove it"))
+    found = {asked: evaluated(asked) for asked in DEFAULTS}
+    found = {asked: runs for asked, runs in found.items() if runs}
+    size = (1.0 + 3.2 * len(found), 3.4)
+    figure, axes = plt.subplots(
+        1, len(found), figsize=size, layout="constrained", squeeze=False
+    )
+    for axis, (asked, runs) in zip(axes[0], found.items(), strict=True):
+        for run in runs:
             steps = [row["steps"] / 1e3 for row in run["curve"]]
             costs = [row["cost"] for row in run["curve"]]
-            axis.plot(steps, costs, lw=1.1, label=f"seed {seed}")
-            print(file.stem, run["classical"], run["processor_s"], run["curve"][-1])
-        axis.axhline(
-            run["classical"], color="k", lw=1.0, label=asked.classical.__name__
-        )
+            axis.plot(steps, costs, lw=1.1, label=f"seed {run['seed']}")
+            last = run["curve"][-1]
+            share = last["cost"] / run["classical"]
+            print(asked.algorithm, asked.env_id, run["seed"], last, f"{share:.2f}")
+        classical = asked.classical.__name__
+        axis.axhline(runs[0]["classical"], color="k", lw=1.0, label=classical)
         axis.set_title(f"{asked.algorithm}, {asked.env_id}", fontsize=8)
         axis.set(xlabel="steps, thousands", yscale="log")
+        axis.set_ylabel("cost of an episode")
         axis.grid(alpha=0.3, which="both")
         axis.legend(fontsize=8)
-    axes[0].set_ylabel("cost of an episode")
     figure.savefig(DEFAULTS_PICTURE, dpi=100, metadata={"Software": None})
 
 

@@ -96,20 +96,23 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self._masks = {f"_{name}": self._engine.all_lanes for name in self._names}
         self._own_reward = not self.task.definition.shipped
         self._some_over = False  # NEXT_STEP: whether episodes ended in the last step
-        self._over = np.zeros(self.num_envs, dtype=np.bool_)  # DISABLED: rows to reset
+        self._keeps_ends = mode is AutoresetMode.DISABLED
+        self._over = np.zeros(self.num_envs, dtype=np.bool_)  # then, rows to reset
         self._made()
 
     def _counters(self) -> dict[str, Any]:
-        counters = {**super()._counters(), "some_over": np.array(self._some_over)}
-        if self.autoreset_mode is AutoresetMode.DISABLED:
+        counters = super()._counters()
+        counters["some_over"] = np.array(self._some_over)
+        if self._keeps_ends:
             counters["over"] = self._over.copy()
         return counters
 
     def _recall(self, counters: Mapping[str, Any]) -> None:
         super()._recall(counters)
         self._some_over = bool(counters["some_over"])
-        if self.autoreset_mode is AutoresetMode.DISABLED:
-            self._over = np.array(counters["over"], dtype=np.bool_)
+        if self._keeps_ends:
+            over = counters["over"]
+            self._over = over.astype(np.bool_)
 
     def reset(
         self,
@@ -237,7 +240,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         """
         if not self._begun:
             self._refuse_step()
-        if self.autoreset_mode is AutoresetMode.DISABLED and self._over.any():
+        if self._keeps_ends and self._over.any():
             self._refuse_over()
         if self._orders:
             actions = given_orders(self._orders, actions, (self.num_envs,), "actions")
@@ -255,7 +258,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         elif n_ended and self.autoreset_mode is AutoresetMode.SAME_STEP:
             infos |= self._final()
             engine.begin_next(outputs.terminated | outputs.truncated)
-        elif n_ended and self.autoreset_mode is AutoresetMode.DISABLED:
+        elif self._keeps_ends and n_ended:
             self._over = outputs.terminated | outputs.truncated
         self._draw()
         return (

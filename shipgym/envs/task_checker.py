@@ -265,15 +265,36 @@ class RewardDistribution(NamedTuple):
 
 
 def reward_distribution(engine: Engine) -> RewardDistribution:
-    """Distribution of the rewards of an engine's ships under random orders.
+    """Distribution of the rewards of an engine's ships under random orders."""
+    rewards = np.concatenate(_random_rewards(engine))
+    size = np.abs(rewards)
+    total = float(size.sum())
+    median = float(np.median(size))
+    is_rare = size > RARE * median
+
+    rare_share = 0.0
+    if total > 0.0:
+        rare_share = float(size[is_rare].sum()) / total
+    largest = size.argmax()
+    return RewardDistribution(
+        median=median,
+        rare_share=rare_share,
+        largest=float(rewards[largest]),
+    )
+
+
+def _random_rewards(engine: Engine) -> list[Floats]:
+    """Rewards of ships in each step up to their ends, under random orders.
 
     Each order is held for twenty control intervals.
     """
     held = 20
     random = np.random.default_rng(0)
-    shape = (engine.num_envs, engine.task.n_commands)
-    engine.reset(np.arange(engine.num_envs))
-    sailing = np.ones(engine.num_envs, dtype=np.bool_)
+    n_ships = engine.num_envs
+    shape = (n_ships, engine.task.n_commands)
+    sailing = np.ones(n_ships, dtype=np.bool_)
+    engine.reset(np.arange(n_ships))
+
     earned = []
     for step in range(engine.task.episode_steps):
         if step % held == 0:
@@ -283,17 +304,7 @@ def reward_distribution(engine: Engine) -> RewardDistribution:
         sailing &= ~(terminated | truncated)
         if not sailing.any():
             break
-
-    rewards = np.concatenate(earned)
-    size = np.abs(rewards)
-    median = float(np.median(size))
-    total = size.sum()
-    rare = size[size > RARE * median].sum()
-    return RewardDistribution(
-        median=median,
-        rare_share=float(rare / total) if total > 0.0 else 0.0,
-        largest=float(rewards[size.argmax()]),
-    )
+    return earned
 
 
 def _hard_to_learn(engine: Engine) -> Iterator[str]:
@@ -302,16 +313,19 @@ def _hard_to_learn(engine: Engine) -> Iterator[str]:
     faint = 0.02  # bounded reward that most steps should earn
     median, rare_share, largest = reward_distribution(engine)
     if rare_share > most:
+        expected = f"{100.0 * most:.0f} %"
+        found = f"{100.0 * rare_share:.0f} %"
         yield (
-            f"reward: expected at most {100.0 * most:.0f} % of all reward in steps of"
-            f" more than {RARE:g} times the median, {median:.3g}, got"
-            f" {100.0 * rare_share:.0f} % under random orders, in one step"
-            f" {largest:.4g}: one event drowns the rest; leave bounded=True, or lower"
-            " loss_horizon"
+            f"reward: expected at most {expected} of all reward in steps of more than"
+            f" {RARE:g} times the median, {median:.3g}, got {found} under random"
+            f" orders, in one step {largest:.4g}: one event drowns the rest; leave"
+            " bounded=True, or lower loss_horizon"
         )
+
     scale = engine.task.half_reward_cost
     if scale > 0.0 and median < faint:
-        cost = scale / max(median, 1e-9) - scale
+        least = max(median, 1e-9)
+        cost = scale / least - scale
         yield (
             f"reward: expected a median above {faint:g} under random orders, got"
             f" {median:.2g}: a step costs {cost:.3g}, which earns next to nothing with"

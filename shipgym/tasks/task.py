@@ -138,7 +138,12 @@ class Task:
         check_choice(self.measurement, measurements, "measurement")
         check_number(self.noise, "noise", at_least=0.0)
         if not isinstance(self.bounded, bool):
-            check_number(self.bounded, "bounded", above=0.0, hint="or True or False")
+            check_number(
+                self.bounded,
+                "bounded",
+                above=0.0,
+                hint="or True or False",
+            )
         if self.definition.has_goals and self.options.get("bounded"):
             source = self.definition.source
             raise InputError(

@@ -211,7 +211,8 @@ def test_a_file_that_was_changed_is_read_and_compiled_anew(tmp_path):
     for env in (first, second):
         env.reset(seed=1)
     action = np.array([0.3], dtype=np.float32)
-    assert second.step(action)[1] - first.step(action)[1] == pytest.approx(7.0)
+    costs = [env.step(action)[-1]["cost"] for env in (first, second)]
+    assert costs[0] - costs[1] == pytest.approx(7.0)
     assert Task.of("CourseKeeping", reward=path).definition is second.task.definition
 
 
