@@ -254,7 +254,7 @@ class ShipsParallelEnv(ParallelEnv):  # type: ignore[misc]  # not type-checked h
     def _infos(self, agents: list[str]) -> dict[str, dict[str, Any]]:
         infos: dict[str, dict[str, Any]] = {agent: {} for agent in agents}
         for name in self.task.info_names:
-            values = self._engine.info(name)
+            values: Any = self._engine.info(name)
             if name in self.task.flags:
                 values = values > 0.0
             for agent, value in self._by_agent(agents, values).items():
