@@ -254,6 +254,9 @@ class Voyage:
     def physical_state(self):
         return {name: np.array([99.0, value]) for name, value in self.state.items()}
 
+    def shapes(self, lane):
+        return ()
+
     def waypoints(self, lane):
         return None
 
