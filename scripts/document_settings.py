@@ -25,7 +25,7 @@ SIGNS = {"above": "above", "at_least": "at least", "at_most": "at most"}
 def table(task: str) -> str:
     """The settings of a task as Markdown."""
     lines = ["| argument | default | bounds | meaning |", "| --- | --- | --- | --- |"]
-    for name, setting, default in keywords(read_definition(task).Settings):
+    for name, _, setting, default in keywords(read_definition(task).Settings):
         bounds = [
             f"{sign} {getattr(setting, key):g}"
             for key, sign in SIGNS.items()

@@ -3,6 +3,7 @@ from . import manoeuvres as manoeuvres
 from . import plots as plots
 from .envs.checker import check_vector_env as check_vector_env
 from .envs.episode import Episode as Episode
+from .envs.parallel import parallel_env as parallel_env
 from .envs.recording import RecordEpisode as RecordEpisode
 from .envs.registration import register_task as register_task
 from .envs.sb3 import ShipVecEnv as ShipVecEnv
@@ -14,6 +15,7 @@ from .errors import UnstableModelError as UnstableModelError
 from .examples import example_ship as example_ship
 from .manoeuvres import towing_tank as towing_tank
 from .sea.conditions import Weather as Weather
+from .sea.current_field import CurrentField as CurrentField
 from .sea.current_wind_waves import Current as Current
 from .sea.current_wind_waves import Waves as Waves
 from .sea.current_wind_waves import Wind as Wind

@@ -240,8 +240,8 @@ def _observations(env: gymnasium.Env[Any, Any], episode: Episode, where: str) ->
     rounding = 1e-6  # relative: another processor rounds differently
     if not np.allclose(rewards, episode.rewards, rtol=rounding, atol=rounding):
         raise InputError(
-            f"{where}: expected the recorded cost, {-episode.rewards.sum():.6g}, got"
-            f" {-sum(rewards):.6g} when run again; record without wrappers that change"
+            f"{where}: expected the recorded return, {episode.rewards.sum():.6g}, got"
+            f" {sum(rewards):.6g} when run again; record without wrappers that change"
             " actions or rewards"
         )
     return np.array(observations)

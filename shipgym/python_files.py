@@ -2,7 +2,7 @@
 
 import hashlib
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from inspect import (
     CO_ASYNC_GENERATOR,
@@ -82,8 +82,17 @@ def _not_executed(path: Path, resolved: str, error: BaseException) -> InputError
     return InputError(f"{place}: cannot be executed: {why}")
 
 
-def check_function(value: Any, count: int, where: str, what: str) -> None:
-    """Refuse anything but a plain function of `count` arguments; `what` is expected."""
+def check_function(
+    value: Any,
+    count: int,
+    where: str,
+    what: str,
+    extras: Collection[str] = (),
+) -> None:
+    """Refuse anything but a plain function of `count` arguments; `what` is expected.
+
+    Behind them it may take some of `extras`, by these names.
+    """
     if not isinstance(value, FunctionType):
         raise InputError(f"{where}: expected {what}, got no plain function")
     code = value.__code__
@@ -95,10 +104,14 @@ def check_function(value: Any, count: int, where: str, what: str) -> None:
             f"{where}: expected {what}, got one with variable arguments, a generator or"
             " a coroutine"
         )
-    if code.co_argcount != count:
+    names = code.co_varnames[: code.co_argcount]
+    unknown = set(names[count:]) - set(extras)
+    if len(names) < count or (unknown and not extras):
         raise InputError(
             f"{where}: expected {what}, got one of {code.co_argcount} arguments"
         )
+    if unknown:
+        raise InputError(f"{where}: expected {what}, got one with {unknown.pop()!r}")
 
 
 def refuse_closure(function: Any) -> None:

@@ -164,7 +164,7 @@ def ranking_table(result: BenchmarkResult) -> SortableTable:
 def costs_table(result: BenchmarkResult) -> SortableTable:
     """Return the cost of each controller in each task; the lowest is marked."""
     caption = (
-        "Mean cost of an episode (minus the sum of its rewards; less is better) and its"
+        "Mean cost of an episode (the sum of the steps'; less is better) and its"
         " bootstrap 95 % interval. ★ marks the lowest, among those usable at sea."
     )
     names = result.ranking

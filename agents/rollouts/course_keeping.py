@@ -32,7 +32,7 @@ class Episodes:
     Attributes
     ----------
     cost : array
-        Steering cost of the episode: minus the sum of its rewards.
+        Steering cost of the episode.
     heading_cost, rudder_cost, rudder_rate_cost, end_cost : array
         Its parts; the last is the cost of losing control.
     heading_rmse_deg : array

@@ -124,7 +124,7 @@ def episode_of(
             infos[name] = values
 
     states = history.at_samples(run.states)
-    arguments = plain({"model": task.model, **task.arguments})
+    arguments = plain({"model": task.model, **task.arguments, "bounded": False})
     return Episode(
         environment=task.env_id,
         model=ship.name,

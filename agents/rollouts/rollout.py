@@ -30,7 +30,7 @@ class Rollout:
         Control interval, s.
     seeds : int array of shape (n,)
     costs : array of shape (n,)
-        Minus the sum of the rewards, up to where the policy failed.
+        Sum of the steering costs (`info["cost"]`), up to where the policy failed.
     sailing : bool array of shape (n_steps, n)
         Whether the episode was running in the interval; what is recorded of the others
         is meaningless.
@@ -41,7 +41,8 @@ class Rollout:
     seconds_per_action : float
         Process time of `predict` over the number of commands it gave, in a batch.
     actions, rewards : array of shape (n_steps, n, n_commands), and (n_steps, n)
-        Of each interval; without steps if nothing was recorded.
+        Of each interval; without steps if nothing was recorded. The rewards are those
+        of an environment made with `bounded=False`, minus the costs.
     states, infos : dict of str to array of shape (n_steps + 1, n)
         Physical states and entries of `info` that were recorded, from the beginning on.
     """
@@ -115,14 +116,14 @@ def rollout(
         log.give_up(command.missing)
         if not log.sailing.any():  # the policy has failed in all episodes
             break
-        observations, rewards, terminated, truncated = engine.step(command.values)
-        log.note(command.values, rewards, terminated, truncated)
+        observations, _, terminated, truncated = engine.step(command.values)
+        log.note(command.values, terminated, truncated)
         starts = np.zeros_like(starts)
     return log.rollout(np.asarray(seeds), helmsman)
 
 
 def episode_costs(policy: Policy, engine: Engine, seeds: NDArray[np.int64]) -> Floats:
-    """Cost of each episode, minus the sum of its rewards, shape (n,); see `rollout`."""
+    """Steering cost of each episode, shape (n,); see `rollout`."""
     return rollout(policy, engine, seeds).costs
 
 
@@ -260,11 +261,11 @@ class _Log:
     def note(
         self,
         command: NDArray[np.float32],
-        rewards: Floats,
         terminated: Flags,
         truncated: Flags,
     ) -> None:
         """Note what came of an interval."""
+        rewards = -self.engine.info("cost")
         self.sailed.append(self.sailing)
         self.costs -= np.where(self.sailing, rewards, 0.0)
         self.terminated = self.terminated | (self.sailing & terminated)

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 from agents.controllers.interface import model_hash
+from agents.policies.policy import OUTPUTS
 from agents.policies.weights_file import as_json
 from agents.suites.suite import BenchmarkTask
 from agents.training.settings import LearningSettings, make_settings, settings_of
 from shipgym import ShipModel
-from shipgym.checks import check_keys, check_whole
+from shipgym.checks import check_choice, check_keys, check_whole
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather, as_weather
 from shipgym.sea.weather_column import weather_column
@@ -75,6 +76,7 @@ class TrainingPlan:
     def _check_action(self) -> None:
         action = self.task.task.action
         base = self.settings.base
+        check_choice(action, OUTPUTS, "action")
         if action == "rudder-discrete" and self.algorithm != "ppo":
             raise InputError(
                 f"action: expected one that {self.algorithm} learns, got '{action}';"
@@ -141,6 +143,7 @@ def _read_option(value: Any, name: str) -> Any:
 def training_options(plan: TrainingPlan) -> dict[str, Any]:
     """Keywords of the environment that the ships learn in.
 
+    They earn what the setting `reward` says, unless the task's options do.
     With `randomise`, or the setting `model_uncertainty`, each episode has a ship drawn
     from the model's covariance, where it has one; with `randomise` also an approach
     speed of 0.8 to 1.1 times the service speed, and any of the sea states that the
@@ -148,6 +151,7 @@ def training_options(plan: TrainingPlan) -> dict[str, Any]:
     """
     task = plan.task
     options = task.arguments
+    options.setdefault("bounded", plan.settings.reward == "bounded")
     uncertain = plan.settings.model_uncertainty == "covariance"
     has_covariance = task.ship.covariance is not None
     if has_covariance and (plan.randomise or uncertain):

@@ -102,6 +102,11 @@ class LearningSettings(ABC):
         " speeds as the task has them",
         options=("none", "covariance"),
     )
+    reward: str = setting(
+        "what ships earn: minus the steering cost, which reward_scale suits, or the"
+        " bounded reward that environments give by default",
+        options=("cost", "bounded"),
+    )
     reward_scale: float | str = setting(
         "divisor of rewards before they are limited to [-10, 10]; running is the"
         " standard deviation of their discounted sum so far",

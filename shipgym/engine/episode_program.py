@@ -1,5 +1,6 @@
 """Episodes compiled for a ship, a sea, a sensor set and a task."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
@@ -8,6 +9,7 @@ from shipgym.engine import episodes, sailing, stages, tiles
 from shipgym.engine.compiled_ship import CompiledShip
 from shipgym.engine.compiling import compiled, plain_python
 from shipgym.engine.envelope import Envelope
+from shipgym.engine.extra_arguments import completed
 from shipgym.engine.lane_records import (
     Commands,
     EpisodeCounters,
@@ -21,7 +23,7 @@ from shipgym.engine.record_code import clipped_storer, loader, storer, summed, z
 from shipgym.engine.records import LANES, Layout
 from shipgym.instruments.sensor_set import SensorSet
 from shipgym.sea import open_sea
-from shipgym.tasks.contract import Random
+from shipgym.tasks.contract import ObservationSpec, Random
 from shipgym.tasks.definition import TaskDefinition
 
 
@@ -38,6 +40,10 @@ class EpisodeProgram:
         Whether there is current, wind or waves.
     shared : bool
         Whether all lanes have the same ship and sea.
+    shared_settings : bool
+        Whether all lanes have the same settings of the task.
+    current : callable or None
+        `current(x, y, settings)`, of a current that differs from place to place.
     """
 
     ship: CompiledShip
@@ -45,6 +51,8 @@ class EpisodeProgram:
     sensors: SensorSet
     windy: bool
     shared: bool
+    shared_settings: bool = True
+    current: Any = None
 
     @cached_property
     def state_rows(self) -> Layout:
@@ -66,6 +74,7 @@ class EpisodeProgram:
             reward=self.task.Reward,
             reported=(self.task.State, self.task.reported),
             observation=self.task.Observation,
+            goals=self._goals,
             **(stages.BETWEEN_STAGES if self.ship.staged else {}),
         )
 
@@ -78,7 +87,14 @@ class EpisodeProgram:
             envelope=Envelope,
             sea_parameters=open_sea.sea_records(self.windy)[1],
             scale=self.task.Observation,
+            goal_scale=self._goals,
         )
+
+    @property
+    def _goals(self) -> Any:
+        """Record of goals for a `Layout`; no rows where the task has none."""
+        record = self.task.goals_record
+        return record if self.task.has_goals else (record, ())
 
     @cached_property
     def random_rows(self) -> Layout:
@@ -87,12 +103,13 @@ class EpisodeProgram:
 
     @cached_property
     def settings_rows(self) -> Layout:
-        """Rows of the settings of engine, sensor set and task."""
-        return Layout(
-            rules=Rules,
-            sensor_settings=self.sensors.Settings,
-            task_settings=self.task.Settings,
-        )
+        """Rows of the settings of engine and sensor set."""
+        return Layout(rules=Rules, sensor_settings=self.sensors.Settings)
+
+    @cached_property
+    def task_settings_rows(self) -> Layout:
+        """Rows of the settings of the task."""
+        return Layout(task_settings=self.task.Settings)
 
     def row(self, name: str) -> int:
         """Row of a number of the state by its name: `u`, `course`, `steps`."""
@@ -108,7 +125,7 @@ class EpisodeProgram:
         part = name.removeprefix("reward_")
         if name in self.task.reported:
             return rows["reported"].row(name)
-        if name in Outcome._fields or part == "end":
+        if name in Outcome._fields or part in self.task.parts_of_engine:
             return rows["outcome"].row(part)
         parts = self.task.reward_names
         return rows["reward"].first + parts.index(part)
@@ -117,9 +134,11 @@ class EpisodeProgram:
     def hooks(self) -> dict[str, Any]:
         """Functions and values for the hooks and constants of loops, by name."""
         of_ships = 1 if self.shared else LANES
+        of_settings = 1 if self.shared_settings else LANES
         return {
             "GROUP": 1 if plain_python() else tiles.GROUP,
             "SHARED_SHIP": self.shared,
+            "SHARED_SETTINGS": self.shared_settings,
             "PLAN_ROW": self.state_rows.n_rows,
             **_loaders(self.state_rows, LANES),
             **_storers(self.state_rows, LANES),
@@ -129,6 +148,7 @@ class EpisodeProgram:
             **_storers(self.random_rows, LANES),
             **_loaders(self.ship_rows, of_ships),
             **_loaders(self.settings_rows, 1),
+            **_loaders(self.task_settings_rows, of_settings),
             **_loaders(Layout(arguments=Arguments), 1),
             **self._task_hooks(),
             "measure": self.sensors.measure,
@@ -139,25 +159,30 @@ class EpisodeProgram:
             **self.ship.hooks(shared=self.shared),
             **self.ship.staged,
             **open_sea.sea_functions(self.windy),
+            "CURRENT_BY_PLACE": self.current is not None,
+            **({} if self.current is None else {"current_at": self.current}),
         }
 
     def _task_hooks(self) -> dict[str, Any]:
         """Functions of the task, and what its records are used for."""
         task = self.task
-        bounds = {
-            path: (spec.low, spec.high) for path, spec in task.observations.items()
-        }
         return {
             "task_begin": task.begin,
-            "task_step": task.step,
-            "observe": task.observe,
-            "due": task.due,
+            "task_step": completed(task.step),
+            "observe": completed(task.observe),
+            "goals_of": task.goals_of,
+            "due": completed(task.due),
             "on_event": task.on_event,
             "worst_cost": task.worst_cost,
             "no_reward": zeros(task.Reward),
             "total_reward": summed(task.Reward),
             "store_observation": clipped_storer(
-                self.result_rows["observation"], bounds
+                self.result_rows["observation"],
+                bounds_of(task.observations),
+            ),
+            "store_goals": clipped_storer(
+                self.result_rows["goals"],
+                bounds_of(task.goals),
             ),
         }
 
@@ -169,6 +194,13 @@ class EpisodeProgram:
 
 
 episode_program = cache(EpisodeProgram)  # compiled once in a process
+
+
+def bounds_of(
+    specs: Mapping[str, ObservationSpec],
+) -> dict[str, tuple[float, float]]:
+    """Bounds of observations by their paths."""
+    return {path: (spec.low, spec.high) for path, spec in specs.items()}
 
 
 def _loaders(layout: Layout, lanes: int) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from shipgym.engine.hooks import (
     begin_sea,
+    current_at,
     load_arguments,
     load_counters,
     load_outcome,
@@ -19,6 +20,7 @@ from shipgym.engine.hooks import (
     load_rules,
     load_sea_parameters,
     load_ship,
+    load_task_settings,
     sail_lanes,
     store_commands,
     store_memory,
@@ -38,8 +40,9 @@ from shipgym.engine.judging import (
     take_events,
 )
 from shipgym.engine.lane_records import Commands, SeaRandom
+from shipgym.engine.mathematics import pick
 from shipgym.engine.memory import bool_in, float32_in, int64_row_in
-from shipgym.engine.motion import HAS_SEA, Motion
+from shipgym.engine.motion import CURRENT_BY_PLACE, HAS_SEA, Motion
 from shipgym.engine.random import BEGIN_WORDS, rng_state, uniform
 from shipgym.engine.records import LANES
 from shipgym.engine.sailing import are_finite, take_commands
@@ -54,10 +57,13 @@ from shipgym.engine.tiles import (
     tile_of,
     write_outputs,
 )
+from shipgym.sea.open_sea import add_current
 from shipgym.tasks.contract import Random
 
 SIGNATURE = "int64(float64[::1], float64[::1], int64, int64)"
-STEP, STEP_AND_BEGIN, BEGIN, BEGIN_NEXT = range(4)  # what `run` may be asked for
+STEP, STEP_AND_BEGIN, BEGIN, BEGIN_NEXT, OBSERVE = range(
+    5
+)  # what `run` may be asked for
 REFUSED = -1  # answer of a step to commands that are not finite
 # number of the draw of an episode's ship, apart from those of its task
 SHIP_DRAW = np.uint64(1 << 40)
@@ -75,7 +81,8 @@ def run(memory: Any, output_memory: Any, share: int, asked: int) -> int:
         Number of the share, whose thread this is.
     asked : int
         `STEP`; `STEP_AND_BEGIN`, in which lanes whose episode was over do not stay as
-        they are, but begin the next one; `BEGIN` or `BEGIN_NEXT` in the chosen lanes.
+        they are, but begin the next one; `BEGIN` or `BEGIN_NEXT` in the chosen lanes;
+        `OBSERVE`, after numbers of the state were written.
 
     Returns
     -------
@@ -89,6 +96,9 @@ def run(memory: Any, output_memory: Any, share: int, asked: int) -> int:
     if asked >= BEGIN:
         for number in range(at.states.rows):
             tile = tile_of(memory, at, share, number)
+            if asked == OBSERVE:
+                observe_lanes(tile, outputs)
+                continue
             begin_lanes(tile, outputs, chosen, asked == BEGIN_NEXT)
         return 0
 
@@ -114,6 +124,14 @@ def run(memory: Any, output_memory: Any, share: int, asked: int) -> int:
             choose_ended(tile, chosen)
             begin_lanes(tile, outputs, chosen, asked == STEP_AND_BEGIN)
     return n_ended
+
+
+@called
+def observe_lanes(tile: Tile, outputs: OutputTables) -> None:
+    """Observe the ships of a tile, and write their outputs."""
+    for lane in range(tile.lanes):
+        observe_lane(tile, lane)
+        write_outputs(tile, outputs, lane, lane + 1)
 
 
 def choose_ended(tile: Tile, chosen: Any) -> None:
@@ -152,13 +170,15 @@ def begin_lane(tile: Tile, lane: int) -> None:
     clear_lane(state, lane)
     clear_lane(tile.result, lane)
 
-    settings = settings_of(tile)
+    settings = settings_of(tile, lane)
     ship = load_ship(tile.ships, lane)
     plan = plan_of(state, lane)
     motion, task_state = task_begin(ship, settings.task, random, plan)
+    has_shaft = ship.shaft > 0.0
+    part_of_service = motion.n / pick(has_shaft, ship.shaft, 1.0)
     commands = Commands(
         rudder_command=0.0,
-        shaft_command=1.0,
+        shaft_command=pick(has_shaft, part_of_service, 1.0),
         rudder_before=0.0,
     )
     store_motion(state, lane, motion)
@@ -178,6 +198,10 @@ def begin_sea_of(tile: Tile, lane: int, motion: Motion, random: Random) -> None:
     word = rng_state(random.key, random.episode)
     parameters = load_sea_parameters(tile.ships, lane)
     sea = begin_sea(motion, word, parameters)
+    if CURRENT_BY_PLACE:
+        settings = load_task_settings(tile.task_settings, lane)
+        here = current_at(motion.x, motion.y, settings)
+        sea = add_current(sea, here[0], here[1])
     store_sea(tile.state, lane, sea)
     store_sea_random(tile.random, lane, SeaRandom(word + BEGIN_WORDS))
 

@@ -140,6 +140,16 @@ def store_observation(result: Floats, lane: int, observation: Any, scale: Any) -
     raise NotImplementedError(RECORDS)
 
 
+def store_goals(result: Floats, lane: int, goals: Any, scale: Any) -> None:
+    """Write the task's goals times `scale`, clipped to their bounds, if it has any."""
+    raise NotImplementedError(RECORDS)
+
+
+def load_goal(tile: Floats, lane: int) -> Any:
+    """Read a `Goal` of the task."""
+    raise NotImplementedError(RECORDS)
+
+
 def no_reward() -> Any:
     """Make a `Reward` of zeros."""
     raise NotImplementedError(RECORDS)
@@ -178,6 +188,11 @@ def load_scale(ships: Floats, lane: int) -> Any:
     raise NotImplementedError(RECORDS)
 
 
+def load_goal_scale(ships: Floats, lane: int) -> Any:
+    """Read the factors by which goals are multiplied, a pair of goals."""
+    raise NotImplementedError(RECORDS)
+
+
 def load_random(random: Words, lane: int) -> Random:
     """Read what the random numbers of the episode follow from."""
     raise NotImplementedError(RECORDS)
@@ -208,8 +223,8 @@ def load_sensor_settings(settings: Floats) -> Any:
     raise NotImplementedError(RECORDS)
 
 
-def load_task_settings(settings: Floats) -> Any:
-    """Read the `Settings` of the task."""
+def load_task_settings(task_settings: Floats, lane: int) -> Any:
+    """Read the `Settings` of the task in a lane."""
     raise NotImplementedError(RECORDS)
 
 
@@ -317,6 +332,14 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
     raise NotImplementedError(SEA)
 
 
+def current_at(x: float, y: float, settings: Any) -> tuple[float, float]:
+    """Current that differs from place to place, north and east, m/s.
+
+    Given by the task, whose settings it takes, or by a file of the sea.
+    """
+    raise NotImplementedError("given by a task that has it")
+
+
 @called
 def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
     """Return the sea at the beginning of an episode."""
@@ -349,7 +372,8 @@ def readings(motion: Motion, sea: Sea, memory: Any) -> Readings:
     raise NotImplementedError(SENSORS)
 
 
-# The task (interface: `shipgym.tasks.contract`)
+# The task (interface: `shipgym.tasks.contract`). Functions that are given tile and lane
+# take from them what else they name (`shipgym.engine.extra_arguments`).
 
 
 @called
@@ -369,6 +393,8 @@ def task_step(
     interval: Interval,
     ship: Ship,
     settings: Any,
+    tile: Tile,
+    lane: int,
 ) -> tuple[Any, Any, bool, bool]:
     """Return state and reward of an interval, whether it failed, and has arrived."""
     raise NotImplementedError(TASK)
@@ -380,9 +406,29 @@ def observe(
     interval: Interval,
     ship: Ship,
     settings: Any,
+    tile: Tile,
+    lane: int,
 ) -> Any:
     """Return the observations of the autopilot, an `Observation` in SI units."""
     raise NotImplementedError(TASK)
+
+
+def goals_of(
+    motion: Motion,
+    task_state: Any,
+    interval: Interval,
+    ship: Ship,
+    settings: Any,
+    tile: Tile,
+    lane: int,
+) -> Any:
+    """Return the goals achieved and desired (`shipgym.tasks.goals`)."""
+    raise NotImplementedError("given by a task that has it")
+
+
+def goal_reward(achieved: Any, desired: Any, settings: Any) -> float:
+    """Return the reward of a goal achieved for one desired."""
+    raise NotImplementedError("given by a task that has it")
 
 
 def due(
@@ -391,6 +437,8 @@ def due(
     interval: Interval,
     ship: Ship,
     settings: Any,
+    tile: Tile,
+    lane: int,
 ) -> bool:
     """Return whether an event is due, such as a new set-point."""
     raise NotImplementedError(TASK)
@@ -424,6 +472,8 @@ def step_of_task(
     interval: Interval,
     ship: Ship,
     settings: Any,
+    tile: Tile,
+    lane: int,
 ) -> tuple[Any, Any, bool, bool]:
     """Return the same as `task_step`, with a reward that is not used."""
     raise NotImplementedError(TASK)
@@ -435,6 +485,8 @@ def reward_of_another(
     interval: Interval,
     ship: Ship,
     settings: Any,
+    tile: Tile,
+    lane: int,
 ) -> Any:
     """Return the `Reward` of the other file."""
     raise NotImplementedError(TASK)

@@ -5,15 +5,18 @@ What every interval needs is one loop over lanes, which is vectorised (see
 lane by lane.
 """
 
+from math import fabs
 from typing import Any, NamedTuple
 
 from shipgym.engine.envelope import Envelope, envelope_distance, outside_range
 from shipgym.engine.hooks import (
     due,
     encounter_frequency,
+    goals_of,
     load_commands,
     load_counters,
     load_envelope,
+    load_goal_scale,
     load_memory,
     load_motion,
     load_outcome,
@@ -32,6 +35,7 @@ from shipgym.engine.hooks import (
     on_event,
     readings,
     store_counters,
+    store_goals,
     store_memory,
     store_observation,
     store_outcome,
@@ -46,7 +50,14 @@ from shipgym.engine.lane_records import EpisodeCounters, Outcome, Rules
 from shipgym.engine.mathematics import pick
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.specialise import called
-from shipgym.engine.tiles import FIRST_LANE, GROUP, SHARED_SHIP, Tile, plan_of
+from shipgym.engine.tiles import (
+    FIRST_LANE,
+    GROUP,
+    SHARED_SETTINGS,
+    SHARED_SHIP,
+    Tile,
+    plan_of,
+)
 from shipgym.tasks.contract import Interval
 
 
@@ -75,12 +86,12 @@ def view_of(tile: Tile, lane: int) -> LaneView:
     )
 
 
-def settings_of(tile: Tile) -> AllSettings:
-    """Return the settings of all ships."""
+def settings_of(tile: Tile, lane: int) -> AllSettings:
+    """Return the settings of a lane."""
     return AllSettings(
         rules=load_rules(tile.settings),
         sensors=load_sensor_settings(tile.settings),
-        task=load_task_settings(tile.settings),
+        task=load_task_settings(tile.task_settings, lane),
     )
 
 
@@ -92,12 +103,13 @@ def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
     just ended; lanes beyond them, up to so many groups, fill vectors.
     """
     state = tile.state
-    settings = settings_of(tile)
+    first_settings = settings_of(tile, FIRST_LANE)
     shared = view_of(tile, FIRST_LANE)
     n_due = 0
     n_ended = 0
     for lane in range(groups * GROUP):
         ship, data, scale = shared if SHARED_SHIP else view_of(tile, lane)
+        settings = first_settings if SHARED_SETTINGS else settings_of(tile, lane)
         motion = load_motion(state, lane)
         over = load_counters(state, lane).ended != 0.0
         interval = past_interval(tile, lane, motion, data, settings.rules)
@@ -107,10 +119,14 @@ def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
         memory = pick(over, load_memory(state, lane), memory)
         store_memory(state, lane, memory)
         seen = readings(motion, load_sea(state, lane), memory)
-        observation = observe(seen, task_state, interval, ship, settings.task)
+        observation = observe(
+            seen, task_state, interval, ship, settings.task, tile, lane
+        )
         store_observation(tile.result, lane, observation, scale)
+        goals = goals_of(motion, task_state, interval, ship, settings.task, tile, lane)
+        store_goals(tile.result, lane, goals, load_goal_scale(tile.ships, lane))
 
-        is_due = due(motion, task_state, interval, ship, settings.task)
+        is_due = due(motion, task_state, interval, ship, settings.task, tile, lane)
         goes_on = not (over | just_ended)
         real = lane < tile.lanes
         n_due += 1 if is_due & goes_on & real else 0
@@ -157,7 +173,7 @@ def judge(
     over = counters.ended != 0.0
     before = load_task_state(tile.state, lane)
     after, reward, failed, arrived = task_step(
-        motion, before, interval, ship, settings.task
+        motion, before, interval, ship, settings.task, tile, lane
     )
     task_state = pick(over, before, after)
     reward = pick(over, no_reward(), reward)
@@ -196,15 +212,39 @@ def outcome_of(
     terminated = max(wrecked, going * pick(arrived, 1.0, 0.0))
     late = pick(counters.steps >= rules.time_limit, going, 0.0)
     steps_left = rules.time_limit - counters.steps
-    end = -(wrecked * worst_cost(settings.task) * steps_left)
+    worst = worst_cost(settings.task)
+    end = -(wrecked * worst * steps_left)
+    seen_end = -(wrecked * worst * min(steps_left, rules.loss_horizon))
+    bounded = bounded_reward(-earned, going, wrecked, terminated, rules)
     return Outcome(
-        reward=earned + end,
+        reward=pick(rules.half_reward_cost > 0.0, bounded, earned + seen_end),
         terminated=terminated,
         truncated=late * (1.0 - terminated),
         envelope_distance=interval.envelope_distance,
         extrapolating=interval.extrapolating,
         end=end,
+        cost=-(earned + end),
+        goal=0.0,
     )
+
+
+def bounded_reward(
+    cost: float,
+    going: float,
+    wrecked: float,
+    terminated: float,
+    rules: Rules,
+) -> float:
+    """Reward from 0 to 1 of an interval with a cost, to 2 where the cost is negative.
+
+    A lost ship earns nothing any more, which no ship that goes on falls below at any
+    discount. One that has arrived is paid the reward of no cost for the intervals
+    that the end stands for, so that she does not linger.
+    """
+    scale = max(rules.half_reward_cost, 1e-300)  # 0 where this is not used
+    rate = 1.0 - cost / (scale + fabs(cost))
+    arrived = terminated - wrecked
+    return (going - wrecked) * rate + arrived * rules.loss_horizon
 
 
 def store_task(tile: Tile, lane: int, task_state: Any) -> None:
@@ -233,14 +273,14 @@ def sample(
 def take_events(tile: Tile) -> None:
     """Take events, such as a new set-point, in the lanes in which one is due."""
     state = tile.state
-    settings = load_task_settings(tile.settings)
     for lane in range(tile.lanes):
+        settings = load_task_settings(tile.task_settings, lane)
         ship = load_ship(tile.ships, lane)
         motion = load_motion(state, lane)
         before = load_task_state(state, lane)
         interval = last_interval(tile, lane)
         going = load_counters(state, lane).ended == 0.0
-        if going and due(motion, before, interval, ship, settings):
+        if going and due(motion, before, interval, ship, settings, tile, lane):
             random = load_random(tile.random, lane)
             plan = plan_of(state, lane)
             after = on_event(motion, before, interval, ship, settings, random, plan)
@@ -273,8 +313,10 @@ def observe_lane(tile: Tile, lane: int) -> None:
     task_state = load_task_state(state, lane)
 
     ship, _, scale = view_of(tile, lane)
-    settings = load_task_settings(tile.settings)
+    settings = load_task_settings(tile.task_settings, lane)
     interval = last_interval(tile, lane)
     seen = readings(motion, sea, memory)
-    observation = observe(seen, task_state, interval, ship, settings)
+    observation = observe(seen, task_state, interval, ship, settings, tile, lane)
     store_observation(tile.result, lane, observation, scale)
+    goals = goals_of(motion, task_state, interval, ship, settings, tile, lane)
+    store_goals(tile.result, lane, goals, load_goal_scale(tile.ships, lane))

@@ -11,6 +11,8 @@ class Rules(NamedTuple):
     time_limit: float  # control intervals
     largest_distance: float  # from the data of the model at which an episode ends
     least_shaft: float  # least command of the shaft, part of service speed
+    half_reward_cost: float  # that halves a bounded reward; 0 where it has no bounds
+    loss_horizon: float  # control intervals that the end of an episode stands for
 
 
 class Commands(NamedTuple):
@@ -38,6 +40,8 @@ class Outcome(NamedTuple):
     envelope_distance: float
     extrapolating: float  # 1 or 0
     end: float  # part of the reward: the rest of an episode that failed
+    cost: float  # minus the sum of all parts
+    goal: float  # part of the reward of a task with goals, which is added afterwards
 
 
 class SeaRandom(NamedTuple):

@@ -15,6 +15,10 @@ PLAINLY = {
     r"Unknown attribute '(\w+)' of type Module\(<module '((?!numpy|math)[\w.]+)'.*": (
         r"expected \1 to be imported by name, got \2.\1; write from \2 import \1"
     ),
+    r"Unknown attribute '_replace' of type \w+.*": (
+        "expected a record that is made anew, got _replace, which cannot be compiled;"
+        " write Motion(...), or under_way(...) for a starting state"
+    ),
     r".*: setitem\(readonly array.*": (
         "expected global arrays to be only read, got one that is written"
     ),

@@ -22,6 +22,7 @@ Tracebacks, debuggers and `inspect.getsource` show the source.
 
 import hashlib
 import linecache
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -32,11 +33,12 @@ from shipgym.engine.records import (
     Record,
     Rows,
     Table,
-    field_types,
+    is_array,
     is_list,
     is_record,
     is_table,
     leaves,
+    members,
 )
 
 Function = Callable[..., Any]
@@ -57,11 +59,13 @@ def loader(rows: Rows, lanes: int = LANES) -> Function:
             return f"Table(array, {in_lane}, {lanes})"
         if path not in rows.present:
             return "0.0"
+        if is_list(kind) and lanes > 1:
+            return f"array[{rows.row(path) * lanes} + lane :: {lanes}]"
         if is_list(kind):
             return f"array[{rows.row(path)}:]"
         return _entry(rows.row(path), lanes, names)
 
-    made = _constructed(rows.record, number, names)
+    made = _constructed(rows.record, "", number, names)
     name = f"load_{rows.record.__name__}"
     arguments = "array, lane" if lanes > 1 else "array, lane=0"
     return _function(name, arguments, [f"return {made}"], names)
@@ -73,7 +77,7 @@ def storer(rows: Rows, lanes: int = LANES) -> Function:
     lines = []
     for path, row in rows.numbers.items():
         entry = _entry(row, lanes, names)
-        lines.append(f"{entry} = record.{path}")
+        lines.append(f"{entry} = {_part('record', path)}")
     name = f"store_{rows.record.__name__}"
     return _function(name, "array, lane, record", lines, names)
 
@@ -88,7 +92,7 @@ def clipped_storer(rows: Rows, bounds: Mapping[str, tuple[float, float]]) -> Fun
     for path, row in rows.numbers.items():
         low, high = bounds[path]
         entry = _entry(row, LANES, names)
-        scaled = f"record.{path} * scale.{path}"
+        scaled = f"{_part('record', path)} * {_part('scale', path)}"
         at_least = f"max({scaled}, {float(low)!r})"
         lines.append(f"{entry} = min({at_least}, {float(high)!r})")
     name = f"store_{rows.record.__name__}"
@@ -98,15 +102,20 @@ def clipped_storer(rows: Rows, bounds: Mapping[str, tuple[float, float]]) -> Fun
 def zeros(record: Record) -> Function:
     """Write `none()`, a record of zeros."""
     names: dict[str, Any] = {}
-    made = _constructed(record, lambda path, kind: "0.0", names)
+    made = _constructed(record, "", lambda path, kind: "0.0", names)
     return _function(f"no_{record.__name__}", "", [f"return {made}"], names)
 
 
 def summed(record: Record) -> Function:
     """Write `total(record)`, the sum of its numbers, one after another."""
-    terms = [f"record.{path}" for path in leaves(record)]
+    terms = [_part("record", path) for path in leaves(record)]
     body = [f"return {' + '.join(terms)}"]
     return _function(f"total_{record.__name__}", "record", body, {})
+
+
+def _part(record: str, path: str) -> str:
+    """Source of a number of a record at a path: `record.targets[0].x`."""
+    return re.sub(r"\.(\d+)", r"[\1]", f"{record}.{path}")
 
 
 def _entry(row: int, lanes: int, names: dict[str, Any]) -> str:
@@ -118,29 +127,35 @@ def _entry(row: int, lanes: int, names: dict[str, Any]) -> str:
 
 
 def _constructed(
-    record: Record,
+    kind: Any,
+    prefix: str,
     number: Callable[[str, Any], str],
     names: dict[str, Any],
-    prefix: str = "",
     indent: str = "    ",
 ) -> str:
-    """Source of the call that makes a record, `number` that of a number at a path.
+    """Source that makes a record or an array, `number` that of a number at a path.
 
     `names` receives the record's class, under another name if two have the same.
     """
     inner = indent + "    "
     lines = []
-    for name, kind in field_types(record).items():
+    for name, part in members(kind):
         path = prefix + name
-        if is_record(kind):
-            source = _constructed(kind, number, names, f"{path}.", inner)
+        if is_record(part) or is_array(part):
+            source = _constructed(part, f"{path}.", number, names, inner)
         else:
-            source = number(path, kind)
-        lines.append(f"{inner}{name}={source},\n")
+            source = number(path, part)
+        keyword = f"{name}=" if is_record(kind) else ""
+        lines.append(f"{inner}{keyword}{source},\n")
+    called = _class_name(kind, names) if is_record(kind) else ""
+    return f"{called}(\n{''.join(lines)}{indent})"
+
+
+def _class_name(record: Record, names: dict[str, Any]) -> str:
     called = record.__name__
     while names.setdefault(called, record) is not record:
         called += "_"
-    return f"{called}(\n{''.join(lines)}{indent})"
+    return called
 
 
 def _function(

@@ -1,6 +1,7 @@
 """Records and the rows in which their numbers lie.
 
-A record is a `NamedTuple` of numbers, and of other records. Numbers of many ships lie
+A record is a `NamedTuple` of numbers, of arrays of a fixed size, which are tuples, and
+of other records. Numbers of many ships lie
 in tiles of 64 lanes, one lane a ship, row after row: a tile is a contiguous
 one-dimensional array, and lane `i` of row `k` is its entry `64 k + i`. The numbers of a
 single ship are a vector with one entry a row. The order of the fields is that of the
@@ -9,10 +10,12 @@ functions that load and store records.
 """
 
 import sys
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, NamedTuple, get_type_hints
+from types import GenericAlias
+from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -27,6 +30,13 @@ class Table(NamedTuple):
     array: Any  # the tile or vector in which it lies
     first: int  # entry of its first number
     step: int  # entries from one number to the next
+
+
+@dataclass(frozen=True)
+class Size:
+    """Number of entries of an array, `Annotated[tuple[float, ...], Size(8)]`."""
+
+    entries: int
 
 
 class TableField:
@@ -60,36 +70,96 @@ def is_table(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, TableField)
 
 
+def is_array(kind: Any) -> bool:
+    """Return whether a field is an array of a fixed size: `tuple[float, float]`."""
+    entries = get_args(kind)
+    return get_origin(kind) is tuple and bool(entries) and Ellipsis not in entries
+
+
 def is_list(kind: Any) -> bool:
     """Return whether a field is a list of numbers; only the last of settings may be."""
     if kind in (float, int, bool, Any):
         return False
-    return not is_record(kind) and not is_table(kind)
+    return not is_table(kind) and not members(kind)
 
 
 @cache
 def field_types(record: Record, notes: bool = False) -> dict[str, Any]:
     """Types of a record's fields by name; `notes`: with what `Annotated` adds."""
-    return get_type_hints(
-        record,
-        globalns=vars(sys.modules[record.__module__]),
-        include_extras=notes,
-    )
+    names = vars(sys.modules[record.__module__])
+    with_notes = get_type_hints(record, globalns=names, include_extras=True)
+    if notes:
+        return with_notes
+    types = get_type_hints(record, globalns=names)
+    for name, kind in types.items():
+        for note in getattr(with_notes[name], "__metadata__", ()):
+            if isinstance(note, Size):
+                types[name] = _of_size(kind, note.entries)
+    return types
+
+
+def _of_size(kind: Any, entries: int) -> Any:
+    """Return tuple[float, float] for tuple[float, ...]; other kinds as they are."""
+    arguments = get_args(kind)
+    if get_origin(kind) is not tuple or arguments[1:] != (Ellipsis,):
+        return kind
+    return GenericAlias(tuple, arguments[:1] * entries)
+
+
+def members(kind: Any) -> list[tuple[str, Any]]:
+    """Names and types of the parts of a record, array or table; of a number none."""
+    if is_record(kind):
+        return list(field_types(kind).items())
+    parts: Sequence[Any] = ()
+    if is_array(kind):
+        parts = get_args(kind)
+    elif is_table(kind):
+        parts = (float,) * kind.rows
+    return [(str(number), part) for number, part in enumerate(parts)]
 
 
 @cache
 def leaves(record: Record, prefix: str = "") -> tuple[str, ...]:
-    """Paths of all numbers of a record and those within it: `u`, `helm.gain`."""
+    """Paths of all numbers of a record: `u`, `helm.gain`, `targets.0.x`."""
     paths: list[str] = []
-    for name, kind in field_types(record).items():
+    for name, kind in members(record):
         path = prefix + name
-        if is_record(kind):
-            paths += leaves(kind, f"{path}.")
-        elif is_table(kind):
-            paths += [f"{path}.{row}" for row in range(kind.rows)]
+        if members(kind):
+            within = leaves(kind, f"{path}.")
+            paths += within
         else:
             paths.append(path)
     return tuple(paths)
+
+
+def short_names(record: Record) -> dict[str, str]:
+    """Names of the numbers of a record by their paths.
+
+    They are those of the fields. Fields of a record that occurs more than once, and
+    entries of an array, are prefixed: `starboard_range` of `starboard.range`, `range_0`
+    of `range.0`.
+    """
+    kinds = Counter(_records_within(record))
+    names = _short_names(record, "", kinds)
+    return dict(zip(leaves(record), names, strict=True))
+
+
+def _records_within(kind: Any) -> Iterator[Record]:
+    for _, part in members(kind):
+        if is_record(part):
+            yield part
+        yield from _records_within(part)
+
+
+def _short_names(kind: Any, prefix: str, kinds: Mapping[Any, int]) -> Iterator[str]:
+    for name, part in members(kind):
+        is_single = is_record(kind) and is_record(part) and kinds[part] == 1
+        if not members(part):
+            yield prefix + name
+        elif is_single:
+            yield from _short_names(part, prefix, kinds)
+        else:
+            yield from _short_names(part, f"{prefix}{name}_", kinds)
 
 
 @dataclass(frozen=True)
@@ -133,10 +203,10 @@ class Layout:
 
 
 def flat(record: Any) -> list[float]:
-    """Numbers of a record and those within it, in order."""
+    """Numbers of a record or array and those within it, in order."""
     numbers: list[float] = []
     for value in record:
-        if is_record(type(value)):
+        if isinstance(value, tuple):
             numbers += flat(value)
         elif isinstance(value, Iterable):
             numbers += [float(number) for number in value]

@@ -75,6 +75,7 @@ def scene(engine: Engine, lane: int, wake: Floats) -> Scene:
         corridor=engine.path_metres("corridor"),
         wind=wind,
         current=current,
+        shapes=engine.shapes(lane),
         readouts=_readouts(engine, lane, state),
     )
 

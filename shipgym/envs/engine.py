@@ -14,9 +14,10 @@ from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_number, check_whole
 from shipgym.engine.compiling import entry_of
 from shipgym.engine.episode_program import EpisodeProgram, episode_program
-from shipgym.engine.episodes import BEGIN, BEGIN_NEXT, STEP, STEP_AND_BEGIN
+from shipgym.engine.episodes import BEGIN, BEGIN_NEXT, OBSERVE, STEP, STEP_AND_BEGIN
 from shipgym.engine.records import LANES
-from shipgym.envs.lanes import Lanes
+from shipgym.envs.goals import Goals
+from shipgym.envs.lanes import Contents, Lanes
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES
 from shipgym.envs.plain_python import plain_loop
 from shipgym.envs.randomisation import Pool, Randomisation
@@ -53,6 +54,10 @@ class Engine(Lanes):
         Number of the ship, of those that are drawn from, that all episodes have.
     loop : callable, optional
         Makes the loop that steps the ships; by default it is compiled.
+    lane_settings : sequence of NamedTuple, optional
+        Settings of the task in each lane, in place of the task's.
+    scale_task : Task, optional
+        Task that gives the scales of observations; by default `task`.
     """
 
     def __init__(
@@ -65,9 +70,19 @@ class Engine(Lanes):
         threads: int = 1,
         model_index: int | None = None,
         loop: Callable[[EpisodeProgram], Any] | None = None,
+        lane_settings: Sequence[Any] | None = None,
+        scale_task: Task | None = None,
     ) -> None:
         check_whole(num_envs, "num_envs", at_least=1)
         check_whole(threads, "threads", at_least=1)
+        ships = [models] if isinstance(models, ShipModel) else list(models)
+        _check_ships(ships, num_envs, allow_unstable)
+        model = ships[0]
+        task = task or course_keeping_task()
+        task.check_fits(model)
+        settings = lane_settings or [task.settings]
+        scale_task = scale_task or task
+
         self.rebuild: Callable[..., Engine] = partial(
             Engine,
             models,
@@ -75,17 +90,12 @@ class Engine(Lanes):
             randomisation=randomisation,
             allow_unstable=allow_unstable,
             threads=threads,
+            scale_task=scale_task,
         )
-        ships = [models] if isinstance(models, ShipModel) else list(models)
-        _check_ships(ships, num_envs, allow_unstable)
-        model = ships[0]
-        task = task or course_keeping_task()
-        task.check_fits(model)
-
         randomisation = randomisation or Randomisation()
         self.pool = randomisation.ships(model, task.seas)
         drawn = len(self.pool) > 1
-        windy = any(not sea.calm for _, sea in self.pool)
+        windy = _any_weather(self.pool, task)
         if model_index is not None:
             self.pool = _only(model_index, self.pool)
         own = [(ship, task.seas[0]) for ship in ships]
@@ -102,9 +112,21 @@ class Engine(Lanes):
             task.instruments(windy),
             windy,
             len(own) == 1,
+            len(settings) == 1,
+            task.current,
         )
-        super().__init__(program, model, task, num_envs, own, drawn, threads)
+        contents = Contents(own, drawn, settings, scale_task)
+        super().__init__(program, model, task, num_envs, contents, threads)
+        self._watch(scale_task)
         self._begin_all(loop or self._compiled)
+
+    def _watch(self, scale_task: Task) -> None:
+        """Prepare what is done after steps of a task with goals or other ships."""
+        task = self.task
+        self.goals: Goals | None = None
+        if task.definition.has_goals:
+            self.goals = Goals(task, self.model, scale_task, self.task_settings)
+        self._is_watched = bool(self.goals or task.definition.targets)
 
     def _begin_all(self, loop: Callable[[EpisodeProgram], Any]) -> None:
         """Begin an episode in each lane, with the loop of the program."""
@@ -160,10 +182,10 @@ class Engine(Lanes):
         if anew:
             self.renew_outputs()
         asked = STEP_AND_BEGIN if begin_ended else STEP
+        step: Callable[[], int] = partial(self._run_shares, asked)
         if self.n_shares == 1:
-            n_ended: int = self._run(self._memory, self.outputs.memory, 0, asked)
-        else:
-            n_ended = self._run_shares(asked)
+            step = partial(self._run, self._memory, self.outputs.memory, 0, asked)
+        n_ended = self._watched(step) if self._is_watched else step()
         if n_ended < 0:  # `REFUSED`, in every share
             self.outputs = before
             self._refuse_orders()
@@ -196,7 +218,39 @@ class Engine(Lanes):
         The step returns the number of episodes that ended, or
         `shipgym.engine.episodes.REFUSED`.
         """
-        return partial(self._run, self._memory, self.outputs.memory, 0, STEP)
+        step = partial(self._run, self._memory, self.outputs.memory, 0, STEP)
+        return partial(self._watched, step) if self._is_watched else step
+
+    def _watched(self, step: Callable[[], int]) -> int:
+        """Take a step of a task with goals, or other ships, and look after both."""
+        over = self.read("ended") > 0.0
+        n_ended = step()
+        if n_ended < 0:
+            return n_ended
+        if self.task.definition.targets:
+            self.refuse_lost_targets()
+        if self.goals is not None:
+            self._reward_goals(self.goals, over)
+        return n_ended
+
+    def _reward_goals(self, goals: Goals, over: Flags) -> None:
+        """Add the rewards of goals in lanes that had not ended.
+
+        A lost ship is charged for the intervals of `Task.end_intervals`.
+        """
+        task = self.task
+        end = self.info("reward_end")
+        left = np.maximum(task.episode_steps - self.steps, 1.0)
+        end *= np.minimum(task.end_intervals / left, 1.0)
+
+        outputs = self.outputs
+        earned = goals.of_rows(outputs.observations)
+        earned[over] = 0.0
+        parts = {name: self.info(name) for name in task.reward_parts}
+        parts["reward_goal"][:] = earned
+        rewards = goals.sum_of_others(parts) + earned
+        outputs.outcomes[0] = rewards
+        self.info("cost")[:] = -rewards
 
     def reset(self, seeds: ArrayLike) -> Observation:
         """Begin in each lane the episode of the single environment's `reset(seed=...)`.
@@ -238,6 +292,15 @@ class Engine(Lanes):
         self._begin(chosen, BEGIN_NEXT)
         outputs.outcomes[:ANSWER_OUTCOMES] = answer
         outputs.flags[:ANSWER_FLAGS] = ends
+
+    def observe_again(self) -> None:
+        """Observe after numbers of the state were written; nothing else changes."""
+        outputs = self.outputs
+        outcomes = outputs.outcomes.copy()
+        flags = outputs.flags.copy()
+        self._run(self._memory, outputs.memory, 0, OBSERVE)
+        outputs.outcomes[:] = outcomes
+        outputs.flags[:] = flags
 
     def _begin(self, chosen: Flags, asked: int) -> None:
         self._chosen[:] = chosen
@@ -315,6 +378,13 @@ class Engine(Lanes):
     def reward_parts(self) -> Floats:
         """Parts of the last rewards, shape (num_envs, n_parts)."""
         return np.stack([self.info(name) for name in self.task.reward_parts], axis=-1)
+
+
+def _any_weather(pool: Pool, task: Task) -> bool:
+    """Return whether there is current, wind or waves in any episode."""
+    if task.current is not None:
+        return True
+    return any(not sea.calm for _, sea in pool)
 
 
 def _only(model_index: int, pool: Pool) -> Pool:

@@ -23,20 +23,23 @@ from shipgym.checks import (
     unexpected,
 )
 from shipgym.envs.engine import Engine, as_array, episode_key
+from shipgym.envs.goals import Goals, box_of
 from shipgym.envs.randomisation import Randomisation
+from shipgym.envs.row_settings import parted, row_settings
 from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import read_sensors
 from shipgym.ships import ShipModel, load_model
 from shipgym.tasks.definition import read_definition
-from shipgym.tasks.task import RUDDER_ORDERS, Task
+from shipgym.tasks.task import Task
 
 if TYPE_CHECKING:
     from shipgym.envs.artist import Artist
 
-Space = gymnasium.spaces.Box | gymnasium.spaces.Discrete
+Space = (
+    gymnasium.spaces.Box | gymnasium.spaces.Discrete | gymnasium.spaces.MultiDiscrete
+)
 DEFAULT_MODEL = "mariner-tls-svm"
 DEFAULT_TASK = "CourseKeeping"
-ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
 
 
 class UnknownKeywordError(InputError, TypeError):
@@ -86,39 +89,60 @@ def read_options(
     return ship, Task.of(definition, **rest), randomisation
 
 
-def spaces(task: Task, model: ShipModel) -> tuple[gymnasium.spaces.Box, Space]:
+def spaces(task: Task, model: ShipModel, goals: Goals | None) -> tuple[Any, Space]:
     """Observation and action space of a task for a ship."""
-    observed = task.observed(model)
-    observations = gymnasium.spaces.Box(
-        low=np.array([quantity.low for quantity in observed], dtype=np.float32),
-        high=np.array([quantity.high for quantity in observed], dtype=np.float32),
-        dtype=np.float32,
-    )
-    if task.action == "rudder-discrete":
-        return observations, gymnasium.spaces.Discrete(len(RUDDER_ORDERS))
+    observations = goals.space() if goals else box_of(task.observed(model))
+    counts = [len(orders) for orders in task.orders(model)]
+    if len(counts) == 1:
+        return observations, gymnasium.spaces.Discrete(counts[0])
+    if counts:
+        return observations, gymnasium.spaces.MultiDiscrete(counts)
     shape = (task.n_commands,)
     return observations, gymnasium.spaces.Box(-1.0, 1.0, shape, dtype=np.float32)
 
 
-def rudder_orders(
+def given_orders(
+    orders: Sequence[NDArray[np.float32]],
     numbers: Any,
     shape: tuple[int, ...],
     where: str,
 ) -> NDArray[np.float32]:
-    """Discrete rudder orders by their numbers, as a column for each row.
+    """Discrete orders by their numbers, a column for each command.
 
-    InputError for other numbers, or another shape.
+    `shape` is that of the rows. InputError for other numbers, or another shape.
     """
     array = as_array(numbers)
-    last = len(ORDERS) - 1
+    if len(orders) > 1:
+        shape = (*shape, len(orders))
     is_whole = array.shape == shape and array.dtype.kind in "iu"
-    if not is_whole or array.min() < 0 or array.max() > last:
-        expected = f"an integer from 0 to {last}: a rudder order"
-        if shape:
-            expected = f"integers of shape {shape} from 0 to {last}: rudder orders"
-        raise unexpected(where, expected, numbers)
-    ordered: NDArray[np.float32] = ORDERS[array.reshape(-1, 1)]
-    return ordered
+    if not is_whole or array.min() < 0 or _is_beyond(array, orders):
+        raise unexpected(where, _orders_in_words(orders, shape), numbers)
+    if len(orders) == 1:
+        one: NDArray[np.float32] = orders[0][array.reshape(-1, 1)]
+        return one
+    columns = array.reshape(-1, len(orders)).T
+    ordered = [known[chosen] for known, chosen in zip(orders, columns, strict=True)]
+    return np.stack(ordered, axis=-1)
+
+
+def _is_beyond(numbers: NDArray[Any], orders: Sequence[NDArray[np.float32]]) -> bool:
+    """Return whether a number is beyond the orders of its command."""
+    counts = [len(known) for known in orders]
+    if len(counts) == 1:  # in every step of a ship
+        return bool(numbers.max() >= counts[0])
+    is_beyond = numbers >= counts
+    return bool(is_beyond.any())
+
+
+def _orders_in_words(
+    orders: Sequence[NDArray[np.float32]],
+    shape: tuple[int, ...],
+) -> str:
+    last = " and ".join(f"0 to {len(known) - 1}" for known in orders)
+    if not shape:
+        return f"an integer from {last}: a rudder order"
+    kind = "rudder orders" if len(orders) == 1 else "orders of rudder and shaft"
+    return f"integers of shape {shape} from {last}: {kind}"
 
 
 class ShipsEnv:
@@ -134,6 +158,8 @@ class ShipsEnv:
     observation_names : tuple of str
     observation_scales : array of shape (n_observations,)
         Physical value of an observation of 1, SI units.
+    compute_reward : callable
+        Of a task with goals alone (`shipgym.envs.goals.Goals.compute_reward`).
     render_mode : str or None
     """
 
@@ -146,7 +172,7 @@ class ShipsEnv:
         arguments: dict[str, Any],
         taken: Sequence[str],
         render_modes: Sequence[str],
-    ) -> tuple[gymnasium.spaces.Box, Space]:
+    ) -> tuple[Any, Space]:
         """Read the arguments of the environment; return the spaces of one ship."""
         options = arguments.pop("options")
         given = dict(arguments)
@@ -181,11 +207,21 @@ class ShipsEnv:
         observed = self.task.observed(self.model)
         self.observation_names = tuple(quantity.name for quantity in observed)
         self.observation_scales = np.array([quantity.scale for quantity in observed])
-        self._discrete = self.task.action == "rudder-discrete"
+        # of each command of a discrete action
+        self._orders: list[NDArray[np.float32]] = []
+        for orders in self.task.orders(self.model):
+            self._orders.append(np.array(orders, dtype=np.float32))
         self._begun = False  # and not closed since
         self._keys: NDArray[np.uint64] | None = None  # of each row's episodes
         self._use(self._own_engine)
-        return spaces(self.task, self.model)
+        self._goals = self._own_engine.goals
+        if self._goals:  # by having it an environment says that it has goals
+            self.compute_reward = self._goals.compute_reward
+        return spaces(self.task, self.model, self._goals)
+
+    def _shown(self, rows: NDArray[np.float32]) -> Any:
+        """Observations as they are returned: an array, or a dictionary with goals."""
+        return rows if self._goals is None else self._goals.split(rows)
 
     def _made(self) -> None:
         """End the construction: attributes that are added later are the user's."""
@@ -255,7 +291,8 @@ class ShipsEnv:
                 expected = "integers, as `get_state` gave them"
                 raise unexpected(f"state: {name}", expected, state[name])
 
-        asked = check_table(state["asked"], "state: asked")
+        settings = self.task.definition.settings
+        asked = check_table(state["asked"], "state: asked", [*settings, "model_index"])
         engine = self._engine_for(asked)
         engine.set_state(state["engine"])
         # nothing is refused from here on
@@ -271,16 +308,18 @@ class ShipsEnv:
         self._keys = counters["row_keys"].copy()
 
     def _engine_for(self, asked: Mapping[str, Any]) -> Engine:
-        """Return the engine, or one with other waypoints or a certain ship."""
+        """Return the engine, or one with other settings or a certain ship."""
         own = self._own_engine
         if not asked:
             return own
-        task = self.task
-        if "waypoints" in asked:
-            task = task.changed(waypoints=asked["waypoints"])
+        given = dict(asked)
+        model_index = given.pop("model_index", None)
+        shared, by_row = parted(self.task.definition, given, own.num_envs)
+        task = self.task.changed(**shared) if shared else self.task
         return own.rebuild(
             task=task,
-            model_index=asked.get("model_index"),
+            model_index=model_index,
+            lane_settings=row_settings(task, self.model, by_row, own.num_envs),
         )
 
     def _take(self, options: Mapping[str, Any] | None, *more: str) -> Any:
@@ -292,9 +331,7 @@ class ShipsEnv:
         for name, value in (options or {}).items():
             if value is not None:
                 asked[name] = value
-        known = ["model_index", "state", *more]
-        if self.task.follows_path:
-            known.insert(0, "waypoints")
+        known = [*self.task.definition.settings, "model_index", "state", *more]
         check_keys(asked, known, "options")
 
         state = asked.pop("state", None)
@@ -318,6 +355,14 @@ class ShipsEnv:
             "step: no episode has begun, or the environment was closed; call reset"
             " first"
         )
+
+    def _warn_of_no_mode(self) -> None:
+        """Warn, as Gymnasium's environments do, that nothing can be rendered."""
+        if self.render_mode is None:
+            gymnasium.logger.warn(
+                "render: expected a render_mode, got none; give it where the"
+                " environment is made, such as render_mode='rgb_array'"
+            )
 
     def _drawn_keys(self) -> NDArray[np.uint64]:
         """Keys of episodes from the environment's own random numbers."""

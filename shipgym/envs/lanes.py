@@ -1,7 +1,7 @@
 """State of many ships by lane: layout, reading, writing and copies between steps."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +17,22 @@ from shipgym.engine.records import LANES, flat, leaves
 from shipgym.envs.outputs import ANSWER_FLAGS, ANSWER_OUTCOMES, OutputPool, Outputs
 from shipgym.envs.randomisation import Pool
 from shipgym.errors import InputError
+from shipgym.python_files import place_of
 from shipgym.sea.weather_column import weather_column
 from shipgym.ships import ShipModel
+from shipgym.tasks.contract import ObservationSpec
+from shipgym.tasks.shapes import Shape, shapes_of
 from shipgym.tasks.task import Task
+
+
+class Contents(NamedTuple):
+    """Ships, seas and settings of lanes."""
+
+    # one ship and sea for all lanes or one each, or the pool
+    own: Pool
+    drawn: bool  # whether each episode draws a ship and a sea of a pool
+    settings: Sequence[Any]  # of the task, one for all lanes or one each
+    scale_task: Task  # that gives the scales of observations
 
 
 class Lanes:
@@ -33,10 +46,7 @@ class Lanes:
         The ship, or the first of them.
     task : Task
     num_envs : int
-    own : Pool
-        Ships and seas of the lanes, one for all or one each; or, if `drawn`, the pool
-        of which each episode draws one.
-    drawn : bool
+    contents : Contents
     threads : int
         That share the lanes.
     """
@@ -49,8 +59,7 @@ class Lanes:
         model: ShipModel,
         task: Task,
         num_envs: int,
-        own: Pool,
-        drawn: bool,
+        contents: Contents,
         threads: int,
     ) -> None:
         self.program = program
@@ -60,22 +69,13 @@ class Lanes:
         self.windy = program.windy
         self.dt = task.interval(model)
         self.flag_names = [name for name in task.info_names if name in task.flags]
-        self._output_pool = OutputPool(
-            num_envs,
-            n_observed=len(task.observed(model)),
-            n_outcomes=ANSWER_OUTCOMES + len(task.info_names),
-            n_flags=ANSWER_FLAGS + len(self.flag_names),
-        )
+        self._output_pool = self._pool_of_outputs()
 
         n_tiles = -(-num_envs // LANES)
         shares = lane_shares(n_tiles, threads)
         self.n_shares = len(shares)
-        columns = ship_columns(own, self.windy, task, model, drawn)
-        n_ship_rows = columns.shape[1]
-        pool = columns if drawn else np.zeros((0, n_ship_rows))
         tables = self._allocate(
-            ships=ship_tiles(columns, n_tiles, len(own) > 1),
-            pool=pool.reshape(1, -1),
+            **self._filled_tables(contents, n_tiles),
             settings=np.array([self._settings()]),
             shares=shares,
             **self._empty_tables(n_tiles),
@@ -84,8 +84,35 @@ class Lanes:
         self._states = tables["states"]
         self._random = lanes_of(tables["random"])
         self._ships = tables["ships"]
+        self.task_settings = tables["task_settings"]
         self._actions = tables["actions"]
         self._chosen = tables["chosen"][0]
+
+    def _pool_of_outputs(self) -> OutputPool:
+        """Make the pool of the arrays that steps return."""
+        task = self.task
+        n_goals = len(task.goals(self.model))
+        return OutputPool(
+            self.num_envs,
+            n_observed=len(task.observed(self.model)) + n_goals,
+            n_outcomes=ANSWER_OUTCOMES + len(task.info_names),
+            n_flags=ANSWER_FLAGS + len(self.flag_names),
+        )
+
+    def _filled_tables(self, contents: Contents, n_tiles: int) -> dict[str, Floats]:
+        """Tables of ships, of their pool, and of settings of the task."""
+        own, drawn, settings, scale_task = contents
+        columns = ship_columns(
+            own, self.windy, self.task, self.model, drawn, scale_task
+        )
+        n_ship_rows = columns.shape[1]
+        pool = columns if drawn else np.zeros((0, n_ship_rows))
+        of_task = np.array([flat(one) for one in settings])
+        return {
+            "ships": ship_tiles(columns, n_tiles, len(own) > 1),
+            "pool": pool.reshape(1, -1),
+            "task_settings": ship_tiles(of_task, n_tiles, len(settings) > 1),
+        }
 
     def _empty_tables(self, n_tiles: int) -> dict[str, NDArray[Any]]:
         """Zeros of states, random numbers, results, actions and chosen lanes."""
@@ -122,7 +149,7 @@ class Lanes:
         return tables
 
     def _settings(self) -> list[float]:
-        """Settings of engine, sensor set and task, one after another."""
+        """Settings of engine and sensor set, one after another."""
         task = self.task
         rules = Rules(
             dt=self.dt,
@@ -130,13 +157,15 @@ class Lanes:
             time_limit=task.episode_steps,
             largest_distance=task.max_envelope_distance,
             least_shaft=task.least_shaft(self.model),
+            half_reward_cost=task.half_reward_cost,
+            loss_horizon=task.end_intervals,
         )
         sensors = self.program.sensors
         sensor_settings = task.sensor_settings
         if sensor_settings is None:
             noise = bridge_noise(task.noise) if sensors.noise else {}
             sensor_settings = sensors.make_settings(noise)
-        return [*flat(rules), *flat(sensor_settings), *flat(task.settings)]
+        return [*flat(rules), *flat(sensor_settings)]
 
     def _output_rows(self) -> dict[str, NDArray[np.int64]]:
         """Entries of a tile's results at which rows of outputs begin, shape (1, n)."""
@@ -144,6 +173,8 @@ class Lanes:
         observed = []
         for quantity in self.task.observed(self.model):
             observed.append(rows["observation"].row(quantity.path))
+        for goal in self.task.goals(self.model):
+            observed.append(rows["goals"].row(goal.path))
         outcomes = ("reward", "terminated", "truncated")
         answer = [rows["outcome"].row(name) for name in outcomes]
         info = [self.program.info_row(name) for name in self.task.info_names]
@@ -256,6 +287,50 @@ class Lanes:
         if lengths is None:
             return None
         return float(lengths * self.model.particulars["length"])
+
+    def shapes(self, lane: int) -> tuple[Shape, ...]:
+        """Shapes that the task has drawn for a lane (`shipgym.tasks.shapes`)."""
+        draw = self.task.definition.draw
+        if draw is None:
+            return ()
+        tile, lane_in_tile = divmod(lane, LANES)
+        hooks = self.program.hooks
+        ships = self._ships[tile % len(self._ships)]
+        states = self._states[tile]
+        return shapes_of(
+            draw,
+            hooks["load_motion"](states, lane_in_tile),
+            hooks["load_task_state"](states, lane_in_tile),
+            hooks["load_ship"](ships, lane_in_tile),
+            self.settings_of(lane),
+        )
+
+    def settings_of(self, lane: int) -> Any:
+        """Settings of the task in a lane."""
+        tile, lane_in_tile = divmod(lane, LANES)
+        settings = self.task_settings[tile % len(self.task_settings)]
+        return self.program.hooks["load_task_settings"](settings, lane_in_tile)
+
+    def refuse_lost_targets(self) -> None:
+        """Refuse numbers of other ships that are not finite.
+
+        InputError names the task's file and line, the target and her equations.
+        """
+        rows = self.program.state_rows["task_state"]
+        end = rows.first + len(rows.present)
+        by_lane = lanes_of(self._states)[:, rows.first : end].swapaxes(0, 1)
+        numbers = by_lane.reshape(len(rows.present), -1)[:, : self.num_envs]
+        if np.isfinite(numbers).all():
+            return
+        row, lane = np.argwhere(~np.isfinite(numbers))[0]
+        target = rows.present[row].rpartition(".")[0] or rows.present[row]
+        definition = self.task.definition
+        raise InputError(
+            f"{place_of(definition.step)}: State.{target}: expected a target ship"
+            " within the physical range, got one that has left it in lane"
+            f" {lane} at step {self.steps[lane]:g}; look at how she begins, and at her"
+            f" equations ({', '.join(definition.targets)})"
+        )
 
     def get_state(self) -> dict[str, Any]:
         """Return all that `set_state` needs to continue from here, copies by name."""
@@ -378,11 +453,12 @@ def ship_columns(
     task: Task,
     base: ShipModel,
     drawn: bool,
+    scale_task: Task,
 ) -> Floats:
     """Numbers of ships and of the seas around them, a row each.
 
     The sea is computed once for each kind of ship. Ships that are drawn for an
-    episode are seen in the scales of the environment's model.
+    episode are seen in the scales of the environment's model, and of `scale_task`.
     """
     step = task.substep(base)
     known: dict[tuple[int, int], Floats] = {}
@@ -399,17 +475,22 @@ def ship_columns(
         sea_parameters = known.get(kind, np.zeros(0))
 
         ship = Ship(*numbers[: len(Ship._fields)].tolist())
-        factors = _scale_factors(task, ship)
+        factors = _scale_factors(scale_task, ship, task.definition.observations)
+        factors += _scale_factors(scale_task, ship, task.definition.goals)
         envelope = envelope_numbers(model)
         columns.append([*numbers, *envelope, *sea_parameters, *factors])
     return np.stack(columns)
 
 
-def _scale_factors(task: Task, ship: Ship) -> list[float]:
+def _scale_factors(
+    task: Task,
+    ship: Ship,
+    specs: Mapping[str, ObservationSpec],
+) -> list[float]:
     """Observations of quantities of 1; 0 for those that such a ship does not have."""
     factors = []
-    for path in task.definition.observations:
-        scale = task.scale(path, ship)
+    for spec in specs.values():
+        scale = task.scale_of(spec, ship)
         if scale == 0.0:
             factors.append(0.0)
         else:

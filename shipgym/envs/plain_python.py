@@ -3,15 +3,16 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from shipgym.engine import episodes
 from shipgym.engine.compiling import plain
 from shipgym.engine.episode_program import EpisodeProgram
+from shipgym.engine.extra_arguments import innermost
 from shipgym.engine.motion import Motion
-from shipgym.engine.records import Record, field_types, is_record
+from shipgym.engine.records import Record, is_array, is_record, members
 from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
 from shipgym.python_files import asked, place_of
@@ -32,12 +33,15 @@ def plain_loop(
         "task_begin": (Motion, task.State),
         "task_step": (task.State, task.Reward, bool, bool),
         "observe": task.Observation,
+        "goals_of": task.goals_record,
         "due": bool,
         "on_event": task.State,
         "worst_cost": float,
         "measure": program.sensors.Memory,
         "readings": Readings,
     }
+    if program.current is not None:
+        forms["current_at"] = (float, float)
     checked = {name: _checked(program, name, form) for name, form in forms.items()}
     run = plain(episodes.run, {**program.hooks, **checked, **(hooks or {})})
     # words of random numbers overflow, as they do when compiled
@@ -49,19 +53,20 @@ def _checked(program: EpisodeProgram, name: str, form: Any) -> Callable[..., Any
     specialisation = Specialisation(program.hooks)
     function = specialisation.copy(program.hooks[name])
     # of a task with another's reward, the function that differs from its own step
-    namespace = function.__globals__
-    own = namespace.get("reward_of_another", function)
-    return partial(_result_of, function, own, form)
+    names = function.__globals__
+    reward = names.get("reward_of_another") or names.get("achieved_of_task")
+    reward = reward or names.get("current_of_file")
+    return partial(_result_of, function, reward, form)
 
 
-def _result_of(function: Any, own: Any, form: Any, *arguments: Any) -> Any:
+def _result_of(function: Any, reward: Any, form: Any, *arguments: Any) -> Any:
     """Call a function, and refuse a result in another form."""
     given = asked(function, *arguments)
     fault = _fault(given, form, "returned value")
-    if fault and own is not function:
+    if fault and reward is not None:
         fault = fault.replace("result 2", "returned value")  # the reward
     if fault:
-        raise InputError(f"{place_of(own)}: {fault}")
+        raise InputError(f"{place_of(innermost(reward or function))}: {fault}")
     return given
 
 
@@ -70,18 +75,23 @@ def _fault(given: Any, form: Any, name: str) -> str:
 
     A form is a record, float, bool, or a tuple of forms.
     """
+    names: list[str] = []
+    if isinstance(form, tuple):
+        names = [f"result {k + 1}" for k in range(len(form))]
+    if is_array(form):
+        form = get_args(form)
+        names = [f"{name}[{k}]" for k in range(len(form))]
     if isinstance(form, tuple):
         if not isinstance(given, tuple) or len(given) != len(form):
             return _other(given, form, name)
-        return _fault_within(given, form, [f"result {k + 1}" for k in range(len(form))])
+        return _fault_within(given, form, names)
     if is_record(form):
         if type(given) is not form:
             return _other(given, form, name)
         record: Record = form
         kinds = []
-        names = []
-        for field, kind in field_types(record).items():
-            kinds.append(kind if is_record(kind) else float)
+        for field, kind in members(record):
+            kinds.append(kind if members(kind) else float)
             names.append(f"{record.__name__}.{field}")
         return _fault_within(given, kinds, names)
     numbers = Integral if form is bool else Real

@@ -90,7 +90,7 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     given = {"task": kept_source(task), **options}
     given |= {
         name: kept_source(options[name])
-        for name in ("reward", "sensors")
+        for name in ("reward", "sensors", "sea")
         if name in options
     }
     own = {

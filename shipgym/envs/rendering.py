@@ -1,7 +1,7 @@
 """Pictures of a voyage: chart with path, wake and ship, compass, gauge, read-outs."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import cos, degrees, floor, hypot, log10, pi, radians, sin
@@ -14,6 +14,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_choice
 from shipgym.extras import library
 from shipgym.tasks.guidance import track
+from shipgym.tasks.shapes import ChartWidth, Circle, Line, Shape, ShipOutline, rgb
 
 Picture = NDArray[np.uint8]
 Point = tuple[float, float]
@@ -67,6 +68,8 @@ class Scene:
     corridor: float | None = None  # half its width
     wind: tuple[float, float] | None = None  # speed, and direction it comes from
     current: tuple[float, float] | None = None  # speed, and direction it sets towards
+    # of the task, drawn beneath the ship
+    shapes: Sequence[Shape] = ()
     # a quantity, and its value with the unit
     readouts: Mapping[str, str] = field(default_factory=dict)
 
@@ -77,6 +80,9 @@ class _Chart:
     def __init__(self, scene: Scene) -> None:
         chart_lengths = 14.0  # ship lengths across the chart
         width = chart_lengths * scene.length
+        for shape in scene.shapes:
+            if isinstance(shape, ChartWidth):
+                width = shape.width
         self.metres = width / SIZE  # of a pixel
         # of the grid: the largest of 1, 2, 5 times a power of ten that is not above a
         # sixth of the chart
@@ -133,6 +139,8 @@ class Renderer:
         self._draw_path(chart, scene)
         if len(scene.wake) > 1:
             brush.lines(COLOURS.wake, chart.pixels(scene.wake), 2)
+        for shape in scene.shapes:
+            self._draw_shape(chart, shape)
         self._draw_ship(chart, scene)
         self._draw_scale(chart)
         self._draw_compass(scene, centre=(SIZE - 70.0, 70.0), radius=52.0)
@@ -194,6 +202,19 @@ class Renderer:
             brush.circle(COLOURS.water, point, 5)
             brush.circle(COLOURS.path, point, 5, 2)
 
+    def _draw_shape(self, chart: _Chart, shape: Shape) -> None:
+        brush = self._brush
+        if isinstance(shape, Line):
+            brush.lines(rgb(shape.colour), chart.pixels(shape.points), 2)
+        elif isinstance(shape, Circle):
+            centre = chart.pixels([shape.x, shape.y])
+            width = 0 if shape.filled else 2
+            brush.circle(rgb(shape.colour), centre, shape.radius / chart.metres, width)
+        elif isinstance(shape, ShipOutline):
+            beam = shape.beam or shape.length / 7.0
+            hull = _hull(shape.x, shape.y, shape.psi, shape.length, beam)
+            brush.polygon(rgb(shape.colour), chart.pixels(hull))
+
     def _draw_ship(self, chart: _Chart, scene: Scene) -> None:
         brush = self._brush
         length = scene.length
@@ -211,10 +232,8 @@ class Renderer:
         blade = stern - 0.22 * length * _direction(scene.heading - scene.rudder)
         brush.line(COLOURS.rudder, chart.pixels(stern), chart.pixels(blade), 3)
 
-        starboard = [-ahead[1], ahead[0]]
-        outline = HULL_OUTLINE * [length, scene.beam]
-        turned = outline @ np.array([ahead, starboard])
-        brush.polygon(COLOURS.hull, chart.pixels(centre + turned))
+        hull = _hull(scene.x, scene.y, scene.heading, length, scene.beam)
+        brush.polygon(COLOURS.hull, chart.pixels(hull))
 
     def _draw_scale(self, chart: _Chart) -> None:
         left = 14.0
@@ -396,6 +415,15 @@ class _Brush:
 def _fine(points: Any) -> Any:
     """Pixels of the finer surface."""
     return (FINER * np.asarray(points, dtype=float)).tolist()
+
+
+def _hull(x: float, y: float, heading: float, length: float, beam: float) -> Floats:
+    """Outline of a ship, m north and east, shape (n, 2)."""
+    ahead = _direction(heading)
+    starboard = [-ahead[1], ahead[0]]
+    turned = (HULL_OUTLINE * [length, beam]) @ np.array([ahead, starboard])
+    outline: Floats = turned + np.array([x, y])
+    return outline
 
 
 def _direction(angle: float) -> Floats:

@@ -6,6 +6,7 @@ from shipgym.arrays import Floats
 
 #: Attributes that all rows share, by the names of the single environment.
 SHARED = (
+    "compute_reward",
     "dt",
     "metadata",
     "model",

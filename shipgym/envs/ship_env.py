@@ -1,5 +1,6 @@
 """One ship under a task as one of Gymnasium's environments."""
 
+from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Any, SupportsFloat
@@ -16,7 +17,7 @@ from shipgym.envs.environment import (
     DEFAULT_MODEL,
     DEFAULT_TASK,
     ShipsEnv,
-    rudder_orders,
+    given_orders,
 )
 from shipgym.envs.outputs import ANSWER_OUTCOMES
 from shipgym.errors import InputError
@@ -25,6 +26,7 @@ from shipgym.tasks.task import ENV_OPTIONS
 
 Observation = NDArray[np.float32]
 FLOAT32 = np.dtype(np.float32)
+NOT_OVER = (0.0, 0.0)  # neither terminated nor truncated
 
 
 class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
@@ -32,10 +34,11 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
 
     The action is the commanded rudder, -1 to 1 of its limit, positive to starboard. The
     observation holds the quantities of `observation_names`, each divided by its entry
-    of `observation_scales`. The reward is the sum of its parts, which `info` has by
-    name. Settings, observations and reward are defined in the task's file
-    (`shipgym/tasks/course_keeping.py`, `shipgym/tasks/path_following.py`, or one of
-    your own).
+    of `observation_scales`. The reward of a step is `1 - cost / (cost + 0.1)` by its
+    steering cost, which `info` has, and minus its parts by name; with `bounded=False`
+    it is minus the cost. Settings, observations and cost are defined in the task's
+    file (`shipgym/tasks/course_keeping.py`, `shipgym/tasks/path_following.py`, or one
+    of your own).
 
     Raises InputError for an unknown model or keyword, or an argument out of its range.
 
@@ -72,12 +75,20 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         observation_space, action_space = self._make(
             arguments, ENV_OPTIONS, self.metadata["render_modes"]
         )
-        self.observation_space = observation_space  # type: ignore[assignment]
+        self.observation_space = observation_space
         self.action_space = action_space
         self._names = self.task.info_names
         flags = self.task.flags
         self._flags = [name for name in self._names if name in flags]
+        self._note_end()
         self._made()
+
+    def _counters(self) -> dict[str, Any]:
+        return {**super()._counters(), "end": np.array(self._end, dtype=np.bool_)}
+
+    def _recall(self, counters: Mapping[str, Any]) -> None:
+        super()._recall(counters)
+        self._note_end(counters["end"].tolist())
 
     def _use(self, engine: Engine) -> None:
         super()._use(engine)
@@ -116,15 +127,16 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         seed : int, optional
             Fixes this episode and all that follow it.
         options : dict, optional
-            Until the next reset: `waypoints` of the path, or of several; `model_index`,
-            the one of the ships that episodes are drawn from. Or, alone, `state`: go on
-            from what `get_state` gave.
+            Until the next reset: settings of the task by their names, such as
+            `waypoints` of the path, or of several; `model_index`, the one of the ships
+            that episodes are drawn from. Or, alone, `state`: go on from what
+            `get_state` gave. Observations keep the scales of the environment.
 
         Returns
         -------
         observation : float32 array
         info : dict
-            As `step` has it, the parts of the reward 0.
+            As `step` has it, the cost and its parts 0.
         """
         super().reset(seed=seed)
         episodes = self._engine.episodes + np.uint64(1)
@@ -136,10 +148,11 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
                 self._keys = self._drawn_keys()
                 episodes[:] = 0
             self._begun = True
+            self._note_end()
             self._engine.begin(self._keys, episodes)
             self._draw_and_show()
         numbers = self._outcomes[ANSWER_OUTCOMES:].tolist()
-        return self._observation.copy(), self._info(numbers)
+        return self._shown(self._observation.copy()), self._info(numbers)
 
     def step(
         self, action: Any
@@ -147,13 +160,14 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         """Hold a command over one control interval.
 
         Raises InputError if the action is not a finite number for each command, or no
-        episode has begun.
+        episode has begun. An episode that is over stays as it is and earns 0, with a
+        warning.
 
         Parameters
         ----------
         action : array of shape (n_commands,), or int
             Commanded rudder, and shaft speed, parts of their limits, clipped to [-1,
-            1]; or the number of a rudder order.
+            1]; or the number of a rudder order, or of a rudder and a shaft order.
 
         Returns
         -------
@@ -161,7 +175,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         reward : float
         terminated, truncated : bool
         info : dict
-            The parts of the reward, `heading_error` in rad, `envelope_distance`,
+            The cost and its parts, `heading_error` in rad, `envelope_distance`,
             `extrapolating`, and what the environment's page names.
         """
         if not self._begun:
@@ -179,7 +193,31 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         info = self._info(numbers)
         if self._artists:
             self._draw_and_show()
-        return self._observation.copy(), reward, terminated > 0.0, truncated > 0.0, info
+        if self._over:
+            self._warn_of_the_end()
+            terminated, truncated = self._end
+        elif terminated or truncated:
+            self._note_end((terminated, truncated))
+        observation: Any = self._observation.copy()
+        if self._goals is not None:
+            observation = self._goals.split(observation)
+        return observation, reward, terminated > 0.0, truncated > 0.0, info
+
+    def _note_end(self, end: Any = NOT_OVER) -> None:
+        """Note how an episode ended, or that it goes on."""
+        self._end = tuple(end)
+        self._over = any(end)
+        self._warned = False
+
+    def _warn_of_the_end(self) -> None:
+        """Warn once that an episode is over."""
+        if self._warned:
+            return
+        self._warned = True
+        gymnasium.logger.warn(
+            "step: the episode is over, the ship stays where she is and earns 0; call"
+            " reset when terminated or truncated is true"
+        )
 
     def _draw_and_show(self) -> None:
         self._draw()
@@ -196,8 +234,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         """Set the command; InputError for an invalid action."""
         # as in the action space: its numbers need no check
         is_array = isinstance(action, np.ndarray) and action.dtype is FLOAT32
-        if self._discrete:
-            action = rudder_orders(action, (), "action")[0]
+        if self._orders:
+            action = given_orders(self._orders, action, (), "action")[0]
         elif not is_array:
             action = as_numbers(action, "action")
         if action.shape != self._command.shape:
@@ -218,8 +256,9 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     def render(self) -> Any:
         """Picture of the ship on her chart, uint8 array of shape (600, 600, 3).
 
-        None in a window, and without a render mode.
+        None in a window, and without a render mode, with a warning.
         """
+        self._warn_of_no_mode()
         pictures = [artist.picture(self._engine) for artist in self._artists]
         return pictures[0] if self.render_mode == "rgb_array" else None
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -18,7 +18,7 @@ from shipgym.envs.environment import (
     DEFAULT_MODEL,
     DEFAULT_TASK,
     ShipsEnv,
-    rudder_orders,
+    given_orders,
 )
 from shipgym.envs.outputs import named_rows
 from shipgym.envs.rows import FIXED, Row
@@ -98,14 +98,23 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self._masks = {f"_{name}": self._engine.all_lanes for name in self._names}
         self._own_reward = not self.task.definition.shipped
         self._some_over = False  # NEXT_STEP: whether episodes ended in the last step
+        self._keeps_ends = mode is AutoresetMode.DISABLED
+        self._over = np.zeros(self.num_envs, dtype=np.bool_)  # then, rows to reset
         self._made()
 
     def _counters(self) -> dict[str, Any]:
-        return {**super()._counters(), "some_over": np.array(self._some_over)}
+        counters = super()._counters()
+        counters["some_over"] = np.array(self._some_over)
+        if self._keeps_ends:
+            counters["over"] = self._over.copy()
+        return counters
 
     def _recall(self, counters: Mapping[str, Any]) -> None:
         super()._recall(counters)
         self._some_over = bool(counters["some_over"])
+        if self._keeps_ends:
+            over = counters["over"]
+            self._over = over.astype(np.bool_)
 
     def reset(
         self,
@@ -124,8 +133,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             next episodes begin.
         options : dict, optional
             `reset_mask`, bool array of shape (num_envs,): rows in which an episode is
-            to begin, the others go on. Or, for all rows, those of the single
-            environment.
+            to begin, the others go on. Or those of the single environment, a setting
+            being the same for all rows or an array with an entry for each.
 
         Returns
         -------
@@ -139,7 +148,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         state = self._take(options, "reset_mask") if mask.all() else None
         if state is not None:
             self.set_state(state)
-            return self._engine.outputs.observations, self._infos()
+            return self._shown(self._engine.outputs.observations), self._infos()
 
         engine = self._engine
         self._keys, episodes = self._next_episodes(seed, mask, episodes)
@@ -147,12 +156,13 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         engine.renew_outputs()
         engine.outputs.take(shown_before)  # of rows that go on
         self._begun = True
+        self._over = self._over & ~mask
         engine.begin(self._keys, episodes, mask)
         self._draw(mask)
         infos = self._infos()
         for name in self._masks:
             infos[name] = mask.copy()
-        return engine.outputs.observations, infos
+        return self._shown(engine.outputs.observations), infos
 
     def _next_episodes(
         self,
@@ -212,13 +222,14 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         """Take one control interval in all rows.
 
         Raises InputError if an action is not a number or their shape is another, a
-        reward of your own is not finite, or no episode has begun.
+        reward of your own is not finite, no episode has begun, or, without autoreset,
+        some are over.
 
         Parameters
         ----------
         actions : array of shape (num_envs, n_commands)
             See the single environment; rudder orders are an int array of shape
-            (num_envs,).
+            (num_envs,), those of rudder and shaft one of shape (num_envs, 2).
 
         Returns
         -------
@@ -231,8 +242,10 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         """
         if not self._begun:
             self._refuse_step()
-        if self._discrete:
-            actions = rudder_orders(actions, (self.num_envs,), "actions")
+        if self._keeps_ends and self._over.any():
+            self._refuse_over()
+        if self._orders:
+            actions = given_orders(self._orders, actions, (self.num_envs,), "actions")
         engine = self._engine
         engine.order(actions)
         n_ended = engine.advance(self._some_over, anew=True)
@@ -247,13 +260,23 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         elif n_ended and self.autoreset_mode is AutoresetMode.SAME_STEP:
             infos |= self._final()
             engine.begin_next(outputs.terminated | outputs.truncated)
+        elif self._keeps_ends and n_ended:
+            self._over = outputs.terminated | outputs.truncated
         self._draw()
         return (
-            outputs.observations,
+            self._shown(outputs.observations),
             rewards,
             outputs.terminated,
             outputs.truncated,
             infos,
+        )
+
+    def _refuse_over(self) -> NoReturn:
+        """Raise the InputError of rows that nobody has reset."""
+        rows = np.flatnonzero(self._over).tolist()
+        raise InputError(
+            f"step: expected episodes that go on, got ends in rows {rows}:"
+            " reset them (options: reset_mask), or choose another autoreset_mode"
         )
 
     def _final(self) -> Infos:
@@ -262,7 +285,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         ended = outputs.terminated | outputs.truncated
         final_obs = np.full(self.num_envs, None, dtype=object)
         for row in np.flatnonzero(ended).tolist():
-            final_obs[row] = outputs.observations[row].copy()
+            final_obs[row] = self._shown(outputs.observations[row].copy())
 
         # zero in the rows that go on, as in Gymnasium's vector environments
         outcomes = np.where(ended, outputs.outcomes, 0.0)
@@ -351,8 +374,9 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
     def render(self) -> tuple[Any, ...] | None:
         """Picture of each row, uint8 arrays of shape (600, 600, 3).
 
-        None without a render mode.
+        None without a render mode, with a warning.
         """
+        self._warn_of_no_mode()
         if self.render_mode is None:
             return None
         return tuple(artist.picture(self._engine) for artist in self._artists)

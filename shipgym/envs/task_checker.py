@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,8 @@ from shipgym.envs.plain_python import plain_loop
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
 from shipgym.findings import Findings
-from shipgym.python_files import asked
+from shipgym.python_files import asked, place_of
+from shipgym.sea.current_field import function_of_file
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 from shipgym.wrong_types import typed
@@ -27,6 +28,7 @@ PLAIN_STEPS = 40  # in plain Python
 PLAIN_LANES = 3
 AGREEMENT = 1e-5  # of compiled and plain results, whose last digits differ
 BEYOND = 1e-6  # beyond a bound, by rounding
+RARE = 20.0  # times the median of its magnitude that a rare reward is at least
 
 
 class TaskCheck(Findings):
@@ -40,7 +42,8 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
     Its records and functions; compilation; some steps in plain Python, whose errors
     name the line; some hundred steps of many ships under crude orders: rewards, state
     and observations finite and within their bounds; the same results compiled and in
-    plain Python, for one ship and for many.
+    plain Python, for one ship and for many. It remarks on observations that are often
+    clipped, and on rewards, under random orders, that a learner cannot learn from.
 
     The task is a file or module (`shipgym.tasks.contract`), or the name of one of the
     package's; options are keywords of the environment, `model`, `reward` and `sensors`
@@ -51,6 +54,7 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
         model, given, randomisation = read_options(task, ship, options)
         plain, seen = _plain_engine(model, given, randomisation)
         _sail_in_python(plain)
+        plain.shapes(0)
         few = Engine(model, PLAIN_LANES, given, randomisation)
         many = Engine(model, LANES, given, randomisation)
         one = Engine(model, 1, given, randomisation)
@@ -74,7 +78,7 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
         ways=("among many ships", "alone"),
     )
     problems = [*_not_finite(many), *compiled_and_plain, *many_and_one]
-    remarks = _often_clipped(given, seen)
+    remarks = [*_often_clipped(given, seen), *_hard_to_learn(many)]
     return TaskCheck(given.name, tuple(problems), tuple(remarks))
 
 
@@ -164,17 +168,28 @@ def _numbers(
     numbers: dict[str, NDArray[Any]] = {}
     for path in engine.program.state_rows["task_state"].present:
         numbers[f"State.{path}"] = engine.read(path)
+    if engine.task.current is not None:
+        numbers["current: north"] = engine.read("current_north")
+        numbers["current: east"] = engine.read("current_east")
     for name in engine.task.reward_parts:
         numbers[name] = engine.info(name)
-    observed = engine.task.observed(engine.model)
-    for quantity, values in zip(observed, observations.T, strict=True):
-        numbers[f"Observation.{quantity.path}"] = values
+    for name, values in zip(_seen_names(engine), observations.T, strict=True):
+        numbers[name] = values
     return numbers
+
+
+def _seen_names(engine: Engine) -> list[str]:
+    """Names of the columns of the observations, goals among them."""
+    task = engine.task
+    observed = [f"Observation.{one.path}" for one in task.observed(engine.model)]
+    return observed + [f"Goal: {one.path}" for one in task.goals(engine.model)]
 
 
 def _source_of(name: str, task: Task) -> str:
     """File that a number comes from, for messages."""
     definition = task.definition
+    if name.startswith("current"):
+        return place_of(function_of_file(task.current))
     if name.startswith("reward_"):
         return definition.reward_source
     if task.sensors is None or not name.startswith("Observation."):
@@ -191,10 +206,7 @@ def _differ(
     ways: tuple[str, str],
 ) -> Iterator[str]:
     """First difference of an engine's lanes from another's under the same orders."""
-    names = ["reward"]
-    for quantity in one.task.observed(one.model):
-        names.append(f"Observation.{quantity.path}")
-
+    names = ["reward", *_seen_names(one)]
     seeds = np.arange(one.num_envs)
     rewards: Floats = np.zeros(one.num_envs)
     other_rewards: Floats = np.zeros(other.num_envs)
@@ -242,3 +254,80 @@ def _often_clipped(task: Task, seen: dict[str, list[float]]) -> Iterator[str]:
                 f" {100.0 * part:.0f} % of the steps; give it wider bounds or a larger"
                 " scale if the agent is to see more"
             )
+
+
+class RewardDistribution(NamedTuple):
+    """Distribution of rewards under random orders, each held for some intervals."""
+
+    median: float  # of the magnitude of a step's reward
+    rare_share: float  # of all reward in steps of more than `RARE` times the median
+    largest: float  # reward of the largest magnitude
+
+
+def reward_distribution(engine: Engine) -> RewardDistribution:
+    """Distribution of the rewards of an engine's ships under random orders."""
+    rewards = np.concatenate(_random_rewards(engine))
+    size = np.abs(rewards)
+    total = float(size.sum())
+    median = float(np.median(size))
+    is_rare = size > RARE * median
+
+    rare_share = 0.0
+    if total > 0.0:
+        rare_share = float(size[is_rare].sum()) / total
+    largest = size.argmax()
+    return RewardDistribution(
+        median=median,
+        rare_share=rare_share,
+        largest=float(rewards[largest]),
+    )
+
+
+def _random_rewards(engine: Engine) -> list[Floats]:
+    """Rewards of ships in each step up to their ends, under random orders.
+
+    Each order is held for twenty control intervals.
+    """
+    held = 20
+    random = np.random.default_rng(0)
+    n_ships = engine.num_envs
+    shape = (n_ships, engine.task.n_commands)
+    sailing = np.ones(n_ships, dtype=np.bool_)
+    engine.reset(np.arange(n_ships))
+
+    earned = []
+    for step in range(engine.task.episode_steps):
+        if step % held == 0:
+            orders = random.uniform(-1.0, 1.0, shape)
+        _, rewards, terminated, truncated = engine.step(orders)
+        earned.append(rewards[sailing])
+        sailing &= ~(terminated | truncated)
+        if not sailing.any():
+            break
+    return earned
+
+
+def _hard_to_learn(engine: Engine) -> Iterator[str]:
+    """Remark on rewards of which most lies in rare events, or that hardly differ."""
+    most = 0.2  # share of all reward in rare events that learners cope with
+    faint = 0.02  # bounded reward that most steps should earn
+    median, rare_share, largest = reward_distribution(engine)
+    if rare_share > most:
+        expected = f"{100.0 * most:.0f} %"
+        found = f"{100.0 * rare_share:.0f} %"
+        yield (
+            f"reward: expected at most {expected} of all reward in steps of more than"
+            f" {RARE:g} times the median, {median:.3g}, got {found} under random"
+            f" orders, in one step {largest:.4g}: one event drowns the rest; leave"
+            " bounded=True, or lower loss_horizon"
+        )
+
+    scale = engine.task.half_reward_cost
+    if scale > 0.0 and median < faint:
+        least = max(median, 1e-9)
+        cost = scale / least - scale
+        yield (
+            f"reward: expected a median above {faint:g} under random orders, got"
+            f" {median:.2g}: a step costs {cost:.3g}, which earns next to nothing with"
+            f" bounded={scale:g}; give a tenth of that cost as bounded"
+        )

@@ -1,4 +1,5 @@
 from .conditions import Weather as Weather
+from .current_field import CurrentField as CurrentField
 from .current_wind_waves import Current as Current
 from .current_wind_waves import Waves as Waves
 from .current_wind_waves import Wind as Wind

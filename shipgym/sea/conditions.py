@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shipgym.checks import check_table, check_text
@@ -11,6 +12,7 @@ from shipgym.errors import InputError
 from shipgym.wrong_types import typed
 
 if TYPE_CHECKING:
+    from shipgym.sea.current_field import CurrentField
     from shipgym.sea.current_wind_waves import Current, Waves, Wind
 
 
@@ -18,10 +20,13 @@ if TYPE_CHECKING:
 class Weather:
     """Current, wind and waves, each optional, and a name for reports.
 
+    The current is the same everywhere (`Current`) or differs from place to place
+    (`CurrentField`).
+
     Raises InputError for parts that are not of these types.
     """
 
-    current: Current | None = None
+    current: Current | CurrentField | None = None
     wind: Wind | None = None
     waves: Waves | None = None
     name: str = "weather"
@@ -103,7 +108,11 @@ def part_types() -> dict[str, type[Any]]:
 
 
 def _check_part(part: Any, name: str) -> None:
+    from shipgym.sea.current_field import CurrentField
+
     kind = part_types()[name]
+    if name == "current" and isinstance(part, CurrentField):
+        return
     if not isinstance(part, kind):
         raise InputError(
             f"weather {name}: expected shipgym.{kind.__name__}(...) or None, got"
@@ -134,6 +143,8 @@ def as_weather(
 ) -> Weather:
     """Return a weather, that of a sea state by name, or calm for None.
 
+    The path of a Python file stands for its current (`CurrentField`).
+
     InputError, beginning with `where`, for anything else.
     """
     if weather is None:
@@ -147,6 +158,10 @@ def as_weather(
         )
     if weather == "calm":  # the default, which loads no other part of the sea
         return Weather(name="calm")
+    if weather.endswith(".py"):
+        from shipgym.sea.current_field import CurrentField
+
+        return Weather(current=CurrentField(weather), name=Path(weather).stem)
     try:
         return Weather.from_sea_state(weather, from_deg)
     except InputError as error:

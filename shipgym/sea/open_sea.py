@@ -362,6 +362,30 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
     )
 
 
+def add_current(sea: Sea, north: float, east: float) -> Sea:
+    """Sea with a current added, m/s."""
+    return Sea(
+        mean_north=sea.mean_north,
+        mean_east=sea.mean_east,
+        wind_north=sea.wind_north,
+        wind_east=sea.wind_east,
+        waves_north=sea.waves_north,
+        waves_east=sea.waves_east,
+        current_north=sea.current_north + north,
+        current_east=sea.current_east + east,
+        gust=sea.gust,
+        drift=sea.drift,
+        heading_displacement=sea.heading_displacement,
+        heading_velocity=sea.heading_velocity,
+        roll_displacement=sea.roll_displacement,
+        roll_velocity=sea.roll_velocity,
+        psi_wave=sea.psi_wave,
+        r_wave=sea.r_wave,
+        phi_wave=sea.phi_wave,
+        p_wave=sea.p_wave,
+    )
+
+
 def sea_records(windy: bool) -> tuple[Any, Any]:
     """State and parameters of the sea for a `Layout`.
 

@@ -49,11 +49,12 @@ def weather_column(
     `water_depth`, m. Raises InputError if the ship's particulars are not enough.
     """
     # what calm water does without is loaded where it is needed
+    from shipgym.sea.current_wind_waves import Current
     from shipgym.sea.ship_in_weather import with_current, with_waves, with_wind
 
     sea = CALM
     current = weather.current
-    if current is not None and not current.calm:
+    if isinstance(current, Current) and not current.calm:
         sea = with_current(sea, current, step)
     wind = weather.wind
     if wind is not None and not wind.calm:

@@ -2,11 +2,15 @@
 
 A task file defines (`shipgym/tasks/course_keeping.py` is one)
 
-* `Settings`, `State`, `Reward` and `Observation`, named tuples of floats. `Settings`
+* `Settings`, `State`, `Reward` and `Observation`, named tuples of floats, of such
+  records, and of arrays of a fixed size of either, which are tuples:
+  `tuple[Target, Target]`, or `Annotated[tuple[float, ...], Size(8)]`. `Settings`
   has defaults, which are keywords of its environment; a last field annotated `Numbers`
-  is a list. The reward is the sum of the fields of `Reward`, which `info` has as
-  `reward_NAME`. Each field of `Observation` is annotated with an
-  `ObservationSpec`.
+  is a list. The fields of `Reward` are minus the parts of the cost of a step, such as
+  minus the square of an error; `info` has them as `reward_NAME`, and the cost. What a
+  learner earns follows from the cost (see below). Each field of `Observation` is
+  annotated with an `ObservationSpec`; fields of a record that occurs twice, and entries
+  of arrays, are prefixed: `starboard_range`, `targets_0_range`.
 * `begin(ship, settings, random, plan) -> (Motion, State)`: the beginning of an episode.
 * `step(motion, state, interval, ship, settings) -> (State, Reward, failed, arrived)`:
   after an interval.
@@ -19,7 +23,7 @@ and may define
   interval, ship, settings, random, plan) -> State`: rare events, such as the next
   set-point.
 * `worst_cost(settings) -> float`: the largest cost of a step. A lost ship costs
-  as much for the rest of the episode, so that ending early is never an advantage.
+  as much for the rest of the episode, so that ending early never lowers the cost.
 * `NAME`, by default that of the file, and `EPISODE_STEPS`, by default 600.
 * `REPORTED`: names of fields of `State` that `info` has; those annotated `Flag` as
   booleans.
@@ -28,6 +32,22 @@ and may define
 * `check(settings, model)`: raises `InputError` for settings that do not fit, first
   without a ship, `model` None, then with one; `listed(value)`: what a keyword of
   another kind, such as a list of waypoints, means as numbers.
+* `Goal`, `achieved`, `desired` and `goal_reward`: goals (`shipgym.tasks.goals`).
+* `current(x, y, settings) -> (north, east)`: a current by place, m/s.
+* `draw(motion, state, ship, settings)`: shapes for pictures (`shipgym.tasks.shapes`).
+
+Other ships are records in `State` that `step` sails (`shipgym.tasks.traffic`).
+
+`step`, `observe`, `due` and `reward` may take `random`, `plan` or both, by these names,
+behind `settings`. There `plan` is only read, and `random` holds the numbers of the
+interval, not of the episode: `drawn(random, 0, low, high)` is another in each.
+`numpy.random` and `random` are refused.
+
+The engine makes the reward of the cost c of a step, for any task: 1 - c / (c + b),
+where the keyword `bounded` is b, 0.1 by default. A lost ship earns nothing from then
+on, and one that has arrived 1 for each interval of the keyword `loss_horizon`. Let
+c = 1 be the cost of a ship that makes no headway: then lingering does not pay. With
+`bounded=False` the reward is minus the cost.
 
 A field `heading_setpoint` of `State`, rad, is `set_point` in `physical_state()` and in
 pictures.
@@ -52,7 +72,8 @@ from numpy.typing import NDArray
 
 from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
 from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.random import uniform
+from shipgym.engine.random import GOLDEN, NORMAL, episode_word, normal, uniform
+from shipgym.engine.records import Size
 
 #: A last field of `Settings` that holds any number of numbers, and its default, none.
 Numbers = NDArray[np.float64]
@@ -76,6 +97,12 @@ class Random(NamedTuple):
 def drawn(random: Random, number: int, low: float, high: float) -> float:
     """Draw the random number of an episode that has a number, in [low, high)."""
     return uniform(random.key, random.episode, np.uint64(number), low, high)
+
+
+def drawn_normal(random: Random, number: int) -> float:
+    """Draw the normally distributed random number that has a number, of variance 1."""
+    word = episode_word(random.key, random.episode) ^ NORMAL
+    return normal(word, np.uint64(number) * GOLDEN)
 
 
 class Interval(NamedTuple):
@@ -154,9 +181,17 @@ class Setting:
     whole: bool = False
 
 
+def under_way(x: float, y: float, psi: float, speed: float, shaft: float) -> Motion:
+    """Straight ahead at a speed, m/s, the rudder amidships, with a shaft speed, 1/s.
+
+    The shaft keeps that speed until it is commanded another.
+    """
+    return Motion(x, y, psi, speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, shaft)
+
+
 def at_service_speed(x: float, y: float, psi: float, ship: Ship) -> Motion:
     """Straight ahead at service speed, the rudder amidships."""
-    return Motion(x, y, psi, ship.speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ship.shaft)
+    return under_way(x, y, psi, ship.speed, ship.shaft)
 
 
 __all__ = [
@@ -171,11 +206,14 @@ __all__ = [
     "Scale",
     "Setting",
     "Ship",
+    "Size",
     "arctan2",
     "at_service_speed",
     "clip",
     "drawn",
+    "drawn_normal",
     "pick",
     "sin_cos",
+    "under_way",
     "wrap",
 ]

@@ -2,8 +2,7 @@
 
 import importlib
 import sys
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,18 +20,30 @@ from shipgym.checks import (
     quoted,
     unexpected,
 )
+from shipgym.engine.extra_arguments import completed
 from shipgym.engine.hooks import reward_of_another, step_of_task
-from shipgym.engine.records import Record, field_types, is_record, leaves
+from shipgym.engine.records import (
+    Record,
+    field_types,
+    is_array,
+    is_record,
+    members,
+    short_names,
+)
 from shipgym.engine.specialise import is_shipped
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function
 from shipgym.tasks.contract import ObservationSpec
+from shipgym.tasks.goals import check_goal_names, goals_function, goals_record
 from shipgym.tasks.source import (
     Configurable,
     annotated,
     check_namespace,
+    field_place,
+    keywords,
     read_source,
 )
+from shipgym.tasks.traffic import targets_of
 
 RECORDS = ("Settings", "State", "Reward", "Observation")
 MOMENT = ("motion", "state", "interval", "ship", "settings")
@@ -44,6 +55,11 @@ FUNCTIONS = {
     "on_event": (*MOMENT, "random", "plan"),
     "worst_cost": ("settings",),
     "plan_length": ("settings",),
+    "achieved": MOMENT,
+    "desired": MOMENT,
+    "goal_reward": ("achieved", "desired", "settings"),
+    "current": ("x", "y", "settings"),
+    "draw": ("motion", "state", "ship", "settings"),
     "check": ("settings", "model"),
     "listed": ("value",),
 }
@@ -57,6 +73,7 @@ TAKEN = (
     "envelope_distance",
     "extrapolating",
     "end",
+    "cost",
 )
 #: Registered tasks: name to module name.
 TASKS = {
@@ -111,6 +128,12 @@ class TaskDefinition(Configurable):
     Settings, State, Reward, Observation : type
     begin, step, observe : callable
     due, on_event, worst_cost, plan_length, check, listed : callable
+    Goal, achieved, desired, goal_reward : type and callables, or None
+        Of a task with goals (`shipgym.tasks.goals`).
+    current : callable or None
+        Current by place, `current(x, y, settings) -> (north, east)`, m/s.
+    draw : callable or None
+        Shapes for pictures (`shipgym.tasks.shapes`).
     reported : tuple of str
         Fields of the state that `info` has.
     episode_steps : int
@@ -131,6 +154,42 @@ class TaskDefinition(Configurable):
     listed: Callable[[Any], Any] = np.asarray
     reported: tuple[str, ...] = ()
     episode_steps: int = 600
+    Goal: Record | None = None
+    achieved: Callable[..., Any] | None = None
+    desired: Callable[..., Any] | None = None
+    goal_reward: Callable[..., Any] | None = None
+    current: Callable[..., Any] | None = None
+    draw: Callable[..., Any] | None = None
+
+    @cached_property
+    def targets(self) -> tuple[str, ...]:
+        """Equations of the other ships that a step sails (`shipgym.tasks.traffic`)."""
+        return tuple(targets_of(self.step))
+
+    @property
+    def has_goals(self) -> bool:
+        """True where what is achieved and desired are observed."""
+        return self.Goal is not None
+
+    @property
+    def parts_of_engine(self) -> tuple[str, ...]:
+        """Names of the parts of the reward that the engine adds."""
+        return ("end", "goal") if self.has_goals else ("end",)
+
+    @property
+    def goals_record(self) -> Record:
+        """Record of the goals that are achieved and desired."""
+        return goals_record(self.Goal)
+
+    @property
+    def goals_of(self) -> Any:
+        """Function that makes the goals of the task."""
+        return goals_function(self.Goal, self.achieved, self.desired)
+
+    @cached_property
+    def goals(self) -> dict[str, ObservationSpec]:
+        """Bounds, unit and scale of each number of the goals, by its path."""
+        return _observations(self.goals_record) if self.has_goals else {}
 
     @cached_property
     def observations(self) -> dict[str, ObservationSpec]:
@@ -151,7 +210,12 @@ class TaskDefinition(Configurable):
     @cached_property
     def reward_names(self) -> tuple[str, ...]:
         """Names of the parts of its reward."""
-        return last_names(leaves(self.Reward))
+        return tuple(short_names(self.Reward).values())
+
+    @cached_property
+    def observation_names(self) -> dict[str, str]:
+        """Name of each observation by its path in `Observation`."""
+        return short_names(self.Observation)
 
     @property
     def shipped(self) -> bool:
@@ -178,16 +242,20 @@ def _observations(record: Record, prefix: str = "") -> dict[str, Any]:
     """Annotations of the fields of a record, and of those within it, by their paths."""
     specs: dict[str, Any] = {}
     for name, kind, spec in annotated(record, ObservationSpec):
-        if is_record(kind):
-            specs |= _observations(kind, f"{prefix}{name}.")
-        else:
-            specs[prefix + name] = spec
+        specs |= _observations_at(f"{prefix}{name}", kind, spec)
     return specs
 
 
-def last_names(paths: Iterable[str]) -> tuple[str, ...]:
-    """Last names of paths such as `helm.rudder`."""
-    return tuple(path.rpartition(".")[2] for path in paths)
+def _observations_at(path: str, kind: Any, spec: Any) -> dict[str, Any]:
+    """Annotations of a field by their paths; entries of an array have the same."""
+    if is_record(kind):
+        return _observations(kind, f"{path}.")
+    if not is_array(kind):
+        return {path: spec}
+    specs: dict[str, Any] = {}
+    for name, entry in members(kind):
+        specs |= _observations_at(f"{path}.{name}", entry, spec)
+    return specs
 
 
 #: Definitions, each its own key: one that is read again is the same object, so that it
@@ -230,6 +298,10 @@ def _definition(source: Any) -> TaskDefinition:
     definition = _definition_of(namespace, where)
     for path, spec in definition.observations.items():
         _check_observation(spec, f"{where}: Observation.{path}")
+    for path, spec in definition.goals.items():
+        field = path.removeprefix("achieved.").removeprefix("desired.")
+        place = field_place(definition.Goal, field.partition(".")[0], where)
+        _check_observation(spec, f"{place}: Goal.{field}")
     _check_names(definition)
     return definition
 
@@ -237,7 +309,7 @@ def _definition(source: Any) -> TaskDefinition:
 def _definition_of(namespace: Any, where: str) -> TaskDefinition:
     """Return the definition in a namespace, with defaults for absent names."""
     found = {}
-    for name in (*RECORDS, *FUNCTIONS):
+    for name in (*RECORDS, "Goal", *FUNCTIONS):
         if hasattr(namespace, name):
             found[name] = getattr(namespace, name)
     return TaskDefinition(
@@ -255,7 +327,7 @@ def _check_task(namespace: Any, where: str) -> None:
     check_namespace(
         namespace,
         where,
-        records=RECORDS,
+        records=(*RECORDS, "Goal") if check_goal_names(namespace, where) else RECORDS,
         functions=FUNCTIONS,
         optional=[name for name in FUNCTIONS if name not in needed],
     )
@@ -271,12 +343,12 @@ def _check_reported(namespace: Any, where: str) -> None:
     """Check which fields of a state are to be reported."""
     reported = getattr(namespace, "REPORTED", ())
     where = f"{where}: REPORTED"
-    expected = f"a tuple of fields of State, none of {TAKEN}"
+    expected = f"a tuple of fields of State, none of {TAKEN}, each a number"
     if not isinstance(reported, tuple | list):
         raise unexpected(where, expected, reported)
-    fields = namespace.State._fields
+    kinds = field_types(namespace.State)
     for name in reported:
-        if name not in fields or name in TAKEN:
+        if name not in kinds or name in TAKEN or members(kinds[name]):
             raise unexpected(where, expected, name)
 
 
@@ -300,21 +372,35 @@ def _check_observation(spec: ObservationSpec | None, where: str) -> None:
 def _check_names(definition: TaskDefinition) -> None:
     """Refuse two fields of one name; those of records within count as the record's."""
     source = definition.source
-    rewards = ("end", *definition.reward_names)
-    observations = last_names(definition.observations)
-    _check_differ(rewards, f"{definition.reward_source}: Reward")
-    _check_differ(definition.settings, f"{source}: Settings")
-    _check_differ(observations, f"{source}: Observation")
+    rewards = short_names(definition.Reward)
+    _check_differ(
+        definition.Reward,
+        rewards,
+        definition.reward_source,
+        taken=definition.parts_of_engine,
+    )
+    settings = [name for name, *_ in keywords(definition.Settings)]
+    _check_differ(definition.Settings, dict(enumerate(settings)), source)
+    _check_differ(definition.Observation, definition.observation_names, source)
 
 
-def _check_differ(names: Iterable[str], where: str) -> None:
-    for name, count in Counter(list(names)).items():
-        if count < 2:
-            continue
-        also = "; the engine has one of that name" if name == "end" else ""
-        raise InputError(
-            f"{where}: expected names that differ, got two fields {name!r}{also}"
-        )
+def _check_differ(
+    record: Record,
+    names: Mapping[Any, str],
+    where: str,
+    taken: Collection[str] = (),
+) -> None:
+    """Refuse a name that two numbers of a record have, given by their paths."""
+    known: dict[str, Any] = dict.fromkeys(taken)
+    for path, name in names.items():
+        if name in known:
+            field = str(path).partition(".")[0]
+            also = "; the engine has one of that name" if name in taken else ""
+            raise InputError(
+                f"{field_place(record, field, where)}: {record.__name__}: expected"
+                f" names that differ, got two fields {name!r}{also}"
+            )
+        known[name] = path
 
 
 def rewarded_step(
@@ -323,10 +409,14 @@ def rewarded_step(
     interval: Any,
     ship: Any,
     settings: Any,
+    tile: Any,
+    lane: Any,
 ) -> Any:
     """Step of a task with the reward of another file."""
-    after, _, failed, arrived = step_of_task(motion, state, interval, ship, settings)
-    reward = reward_of_another(motion, after, interval, ship, settings)
+    after, _, failed, arrived = step_of_task(
+        motion, state, interval, ship, settings, tile, lane
+    )
+    reward = reward_of_another(motion, after, interval, ship, settings, tile, lane)
     return after, reward, failed, arrived
 
 
@@ -357,8 +447,8 @@ def _filled(step: Any, reward: Any) -> FunctionType:
     """Fill the hooks of `rewarded_step`."""
     hooks = {
         "__name__": __name__,
-        "step_of_task": step,
-        "reward_of_another": reward,
+        "step_of_task": completed(step),
+        "reward_of_another": completed(reward),
     }
     function = FunctionType(rewarded_step.__code__, hooks, "rewarded_step")
     return _FILLED.setdefault((step, reward), function)

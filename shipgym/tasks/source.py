@@ -3,17 +3,28 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from inspect import getsourcefile, getsourcelines
 from numbers import Real
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin
 
 import numpy as np
 
 from shipgym.checks import check_keys, check_number, check_whole, unexpected
-from shipgym.engine.records import Record, field_types, is_list, is_record, leaves
+from shipgym.engine.extra_arguments import EXTRAS, takes_extras
+from shipgym.engine.records import (
+    Record,
+    field_types,
+    is_array,
+    is_list,
+    is_record,
+    leaves,
+    members,
+)
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function, load_file, refuse_closure
 from shipgym.tasks.contract import Setting
+from shipgym.tasks.refused_code import refuse_foreign_random, refuse_writes_to_plan
 
 UNBOUNDED = Setting("")
 
@@ -62,10 +73,18 @@ def check_namespace(
     for name, arguments in functions.items():
         if name in optional and not hasattr(namespace, name):
             continue
-        what = f"a function {name}({', '.join(arguments)})"
+        extras = EXTRAS if takes_extras(arguments) else ()
+        listed = ", ".join(arguments)
+        what = f"a function {name}({listed})"
+        if extras:
+            what += ", with or without random and plan behind them"
         function = _named(namespace, name, where, what)
         refuse_closure(function)
-        check_function(function, len(arguments), f"{where}: {name}", what)
+        place = f"{where}: {name}"
+        check_function(function, len(arguments), place, what, extras)
+        refuse_foreign_random(function)
+        if extras:
+            refuse_writes_to_plan(function)
         found[name] = function
     return found
 
@@ -92,29 +111,76 @@ def _check_record(record: Any, name: str, where: str) -> None:
         )
 
     if name == "Settings":
-        for field, setting, default in keywords(record):
-            if isinstance(default, float | int):
-                checked_setting(default, f"{where}: Settings.{field}: default", setting)
         for field in kinds:
             if field not in record._field_defaults:
                 raise InputError(
-                    f"{where}: Settings.{field}: expected a default, got none"
+                    f"{field_place(record, field, where)}: Settings.{field}: expected"
+                    " a default, got none"
                 )
-
     for field, kind in kinds.items():
-        place = f"{where}: {name}.{field}"
+        place = f"{field_place(record, field, where)}: {name}.{field}"
         default = record._field_defaults.get(field)
-        if is_record(kind):
-            _check_record(kind, f"{name}.{field}", where)
-        elif not is_list(kind):
-            if not isinstance(default, Real | None):
-                raise unexpected(
-                    place, "a number, or a list as the last field", default
-                )
-        elif not name.startswith("Settings"):
-            raise unexpected(place, "a float", kind)
-        elif isinstance(default, str) or field != list(kinds)[-1]:
+        is_last_setting = name.startswith("Settings") and field == list(kinds)[-1]
+        if is_list(kind):
+            _check_list(kind, default, place, is_last_setting)
+        else:
+            _check_kind(kind, f"{name}.{field}", place)
+        if kind in (float, int, bool) and not isinstance(default, Real | None):
             raise unexpected(place, "a number, or a list as the last field", default)
+
+    if name == "Settings":
+        for field, kind, setting, default in keywords(record):
+            if not is_list(kind):
+                place = f"{field_place(record, field, where)}: Settings.{field}"
+                _setting_of(kind, default, f"{place}: default", setting)
+
+
+def _check_kind(kind: Any, name: str, place: str) -> None:
+    """Refuse a field that is neither a number nor made of numbers."""
+    if is_record(kind):
+        _check_record(kind, name, place.removesuffix(f": {name}"))
+    elif is_array(kind):
+        for entry in dict.fromkeys(get_args(kind)):
+            _check_kind(entry, name, place)
+    elif is_list(kind):
+        raise not_of_numbers(place, kind)
+
+
+def _check_list(kind: Any, default: Any, place: str, is_last_setting: bool) -> None:
+    """Refuse a list that is not the last of settings, and an array without a size."""
+    is_setting = "Settings" in place
+    if get_origin(kind) is tuple or not is_setting:
+        raise not_of_numbers(place, kind)
+    if isinstance(default, str) or not is_last_setting:
+        raise unexpected(place, "a number, or a list as the last field", default)
+
+
+def not_of_numbers(place: str, kind: Any) -> InputError:
+    """Make the error for a field that is neither a number nor made of numbers."""
+    is_array_of_any_size = get_origin(kind) in (tuple, list, np.ndarray)
+    if kind in (tuple, list, np.ndarray) or is_array_of_any_size:
+        expected = (
+            "an array of a fixed size, as tuple[float, float] or"
+            " Annotated[tuple[float, ...], Size(8)]"
+        )
+        return unexpected(place, expected, kind)
+    return unexpected(place, "a float", kind)
+
+
+def field_place(record: Any, field: str, where: str) -> str:
+    """Return file and line of a field of a record; `where` alone if it is no file."""
+    if ".py" not in where:
+        return where
+    try:
+        lines, first = getsourcelines(record)
+        file = getsourcefile(record)
+    except (OSError, TypeError):
+        return where
+    for number, line in enumerate(lines, max(first, 1)):
+        name, _, _ = line.strip().partition(":")
+        if name.rstrip() == field:
+            return f"{file}, line {number}"
+    return where
 
 
 @dataclass(frozen=True)
@@ -137,7 +203,7 @@ class Configurable:
     @cached_property
     def settings(self) -> dict[str, Setting]:
         """Bounds of each setting by its keyword."""
-        return {name: setting for name, setting, _ in keywords(self.Settings)}
+        return {name: setting for name, _, setting, _ in keywords(self.Settings)}
 
     def make_settings(self, options: Mapping[str, Any]) -> Any:
         """Make settings by keywords.
@@ -153,18 +219,17 @@ class Configurable:
 
 def annotated(record: Record, kind: type) -> Iterator[tuple[str, Any, Any]]:
     """Name, type and annotation, if any, of a kind of each field of a record."""
+    field_type = field_types(record)
     for name, hint in field_types(record, notes=True).items():
-        notes = getattr(hint, "__metadata__", ())
-        field_type = hint.__origin__ if notes else hint
         found = None
-        for note in notes:
+        for note in getattr(hint, "__metadata__", ()):
             if isinstance(note, kind):
                 found = found or note
-        yield name, field_type, found
+        yield name, field_type[name], found
 
 
-def keywords(record: Record) -> Iterator[tuple[str, Setting, Any]]:
-    """Name, bounds and default of each keyword.
+def keywords(record: Record) -> Iterator[tuple[str, Any, Setting, Any]]:
+    """Name, type, bounds and default of each keyword.
 
     Keywords are the fields, and those of records within that have defaults.
     """
@@ -174,7 +239,7 @@ def keywords(record: Record) -> Iterator[tuple[str, Setting, Any]]:
         if has_keywords:
             yield from keywords(kind)
         else:
-            yield name, setting or UNBOUNDED, defaults.get(name)
+            yield name, kind, setting or UNBOUNDED, defaults.get(name)
 
 
 def make_settings(
@@ -198,11 +263,30 @@ def make_settings(
         value = options[name]
         if is_list(kind):
             values[name] = _list_of_numbers(value, name, bounds, listed)
-        elif is_record(kind):
-            values[name] = _small_record(kind, value, name, bounds)
         else:
-            values[name] = checked_setting(value, name, bounds)
+            values[name] = _setting_of(kind, value, name, bounds)
     return record(**values)
+
+
+def _setting_of(kind: Any, value: Any, name: str, bounds: Setting) -> Any:
+    """Make a number, or a record or array of numbers, of a value."""
+    parts = members(kind)
+    if not parts:
+        return checked_setting(value, name, bounds)
+    article = "number" if is_array(kind) else "the"
+    labels = [f"{article} {part}" for part, _ in parts]
+    is_sequence = isinstance(value, Sequence | np.ndarray)
+    if not is_sequence or isinstance(value, str) or len(value) != len(parts):
+        expected = " and ".join(labels)
+        if is_array(kind):
+            expected = f"{len(parts)} numbers, or lists of numbers, in a list"
+        raise unexpected(name, expected, value)
+
+    made = []
+    for label, (_, part), item in zip(labels, parts, value, strict=True):
+        place = f"{name}: {label}"
+        made.append(_setting_of(part, item, place, bounds))
+    return kind(*made) if is_record(kind) else tuple(made)
 
 
 def checked_setting(value: Any, name: str, bounds: Setting) -> float:
@@ -216,20 +300,6 @@ def checked_setting(value: Any, name: str, bounds: Setting) -> float:
         at_least=bounds.at_least,
         at_most=bounds.at_most,
     )
-
-
-def _small_record(kind: Any, value: Any, name: str, bounds: Setting) -> Any:
-    """Make a record, such as a range, of a sequence of its numbers."""
-    fields = kind._fields
-    is_sequence = isinstance(value, Sequence) and not isinstance(value, str)
-    if not is_sequence or len(value) != len(fields):
-        expected = " and ".join(f"the {field}" for field in fields)
-        raise unexpected(name, expected, value)
-    numbers = []
-    for field, number in zip(fields, value, strict=True):
-        place = f"{name}: the {field}"
-        numbers.append(checked_setting(number, place, bounds))
-    return kind(*numbers)
 
 
 def _list_of_numbers(

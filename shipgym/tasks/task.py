@@ -15,6 +15,7 @@ from shipgym.python_files import asked
 from shipgym.sea.conditions import Weather, as_weather
 from shipgym.ships import ShipModel
 from shipgym.ships.manoeuvring_model import ship_of
+from shipgym.tasks.contract import ObservationSpec
 from shipgym.tasks.definition import TaskDefinition, read_definition
 from shipgym.tasks.scales import control_interval
 
@@ -30,9 +31,18 @@ VECTOR_OPTIONS = (
     "max_episode_steps",
 )
 
-ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft")
+ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft", "rudder-shaft-discrete")
+#: Cost of a step that earns half of a bounded reward, and control intervals that the
+#: end of an episode stands for, by default.
+HALF_REWARD_COST = 0.1
+LOSS_HORIZON = 100.0
 #: Rudder orders of a discrete action, parts of the rudder limit.
 RUDDER_ORDERS = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0)
+#: Shaft orders of a discrete action, parts of the speed at service speed, as of an
+#: engine telegraph; those astern only where the propeller is known astern.
+_SHAFT_ORDERS = (-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
+#: Options of a reset that are not settings of the task.
+_RESET_OPTIONS = ("model_index", "state", "reset_mask")
 
 
 class Observed(NamedTuple):
@@ -66,10 +76,10 @@ class Task:
     max_envelope_distance : float
         Distance from the training data at which an episode ends, in multiples of their
         extent (see `Envelope.distance`).
-    action : {"rudder", "rudder-discrete", "rudder-shaft"}
-        Commands: the rudder, one of the orders in `RUDDER_ORDERS`, or rudder and shaft
-        speed. A shaft whose propeller is known ahead only is stopped by an
-        order astern.
+    action : {"rudder", "rudder-discrete", "rudder-shaft", "rudder-shaft-discrete"}
+        Commands: the rudder, one of the orders in `RUDDER_ORDERS`, rudder and shaft
+        speed, or an order of each (`orders`). A shaft whose propeller is known ahead
+        only is stopped by an order astern.
     roll : bool
         Whether roll angle and rate are observed.
     noise : float
@@ -80,6 +90,16 @@ class Task:
         through a notch filter at the frequency of encounter.
     water_depth : float
         m; for ships that know shallow water.
+    bounded : bool or float
+        Whether the reward of a step is bounded, 1 - cost / (cost + scale); a number
+        is the scale, the cost of a step that earns a half, `HALF_REWARD_COST` by
+        default. False for minus the cost.
+    loss_horizon : float or None
+        Control intervals that the end of an episode stands for: a bounded reward pays
+        a ship that has arrived 1 for each, and one that is lost nothing; minus the
+        cost charges a lost one the worst. By default `LOSS_HORIZON`, the horizon
+        1 / (1 - 0.99) of a learner's discount, or, of minus the cost, the rest of the
+        episode.
     sensors : SensorSet, optional
         Instruments of a user's own in place of `noise` and `measurement`; as a keyword,
         their file.
@@ -100,6 +120,8 @@ class Task:
     noise: float = 0.0
     measurement: str = "raw"
     water_depth: float = float("inf")
+    bounded: bool | float = True
+    loss_horizon: float | None = None
     sensors: SensorSet | None = None
     sensor_settings: Any = None
     options: Mapping[str, Any] = field(default_factory=dict, compare=False)
@@ -115,6 +137,21 @@ class Task:
         measurements = ("raw", "filtered")
         check_choice(self.measurement, measurements, "measurement")
         check_number(self.noise, "noise", at_least=0.0)
+        if not isinstance(self.bounded, bool):
+            check_number(
+                self.bounded,
+                "bounded",
+                above=0.0,
+                hint="or True or False",
+            )
+        if self.definition.has_goals and self.options.get("bounded"):
+            source = self.definition.source
+            raise InputError(
+                f"bounded: expected none with the goals of {source}, whose reward"
+                f" compute_reward gives, got {self.bounded!r}; leave it out"
+            )
+        if self.loss_horizon is not None:
+            check_number(self.loss_horizon, "loss_horizon", at_least=0.0)
         if self.sensors is not None and (self.noise > 0.0 or self.measurement != "raw"):
             raise InputError(
                 "sensors: expected either these or noise and measurement, got"
@@ -168,7 +205,8 @@ class Task:
         if sensors is not None:
             names += sensors.settings
         for name in names:
-            if names.count(name) > 1 or name in VECTOR_OPTIONS:
+            taken = name in VECTOR_OPTIONS or name in _RESET_OPTIONS
+            if names.count(name) > 1 or taken:
                 source = definition.source
                 if sensors is not None and name in sensors.settings:
                     source = sensors.source
@@ -205,6 +243,25 @@ class Task:
         """Weather of the task, the first of several."""
         return self.seas[0]
 
+    @cached_property
+    def current(self) -> Any:
+        """Current that differs from place to place, a function, or None.
+
+        It is the task's or that of all seas; InputError for several.
+        """
+        found = {self.definition.current} - {None}
+        for sea in self.seas:
+            found.add(getattr(sea.current, "function", None))
+        found_by_sea = found - {self.definition.current}
+        if found_by_sea == {None}:
+            return self.definition.current
+        if len(found) > 1:
+            raise InputError(
+                "sea: expected one current by place in all episodes, the task's or"
+                " that of every sea, got several"
+            )
+        return found.pop()
+
     def interval(self, model: ShipModel) -> float:
         """Control interval for a ship, s."""
         return control_interval(model) if self.dt is None else float(self.dt)
@@ -236,16 +293,19 @@ class Task:
                 "roll: expected a ship with 4 degrees of freedom, got"
                 f" {model.name!r}, which does not roll; leave it out"
             )
-        if self.action == "rudder-shaft" and not model.service_shaft_speed > 0.0:
+        if self.n_commands > 1 and not model.service_shaft_speed > 0.0:
             raise InputError(
                 "action: expected one without a shaft for a ship without shaft speed,"
-                f" {model.name!r}, got 'rudder-shaft'"
+                f" {model.name!r}, got {self.action!r}"
             )
 
         source = self.definition.source
         asked(self.definition.check, self.settings, model)
-        for quantity in self.observed(model):
-            where = f"{source}: Observation.{quantity.path}: scale for {model.name!r}"
+        for quantity in (*self.observed(model), *self.goals(model)):
+            record = (
+                "Goals" if quantity.path in self.definition.goals else "Observation"
+            )
+            where = f"{source}: {record}.{quantity.path}: scale for {model.name!r}"
             check_number(quantity.scale, where, above=0.0)
         length = asked(self.definition.plan_length, self.settings)
         check_whole(length, f"{source}: plan_length", at_least=0)
@@ -255,7 +315,7 @@ class Task:
         options = [""]
         if self.roll:
             options.append("roll")
-        if self.action == "rudder-shaft":
+        if self.n_commands > 1:
             options.append("shaft")
             if "n" in model.state_names:
                 options.append("shaft speed")
@@ -266,7 +326,7 @@ class Task:
             if spec.option not in options:
                 continue
             quantity = Observed(
-                name=path.rpartition(".")[2],
+                name=self.definition.observation_names[path],
                 low=spec.low,
                 high=spec.high,
                 scale=self.scale(path, ship),
@@ -274,6 +334,22 @@ class Task:
             )
             observed.append(quantity)
         return tuple(observed)
+
+    def goals(self, model: ShipModel) -> tuple[Observed, ...]:
+        """Numbers of the goals achieved and desired, in order; none without goals."""
+        ship = ship_of(model, self.water_depth)
+        quantities = []
+        for path, spec in self.definition.goals.items():
+            kind, _, name = path.partition(".")
+            quantity = Observed(
+                name=f"{kind}_goal.{name}",
+                low=spec.low,
+                high=spec.high,
+                scale=self.scale_of(spec, ship),
+                path=path,
+            )
+            quantities.append(quantity)
+        return tuple(quantities)
 
     def instruments(self, windy: bool) -> SensorSet:
         """Sensor set of the ship, in weather or in calm water."""
@@ -283,13 +359,46 @@ class Task:
 
     def scale(self, path: str, ship: Ship) -> float:
         """Physical value of an observation of 1."""
-        scale = self.definition.observations[path].scale
+        return self.scale_of(self.definition.observations[path], ship)
+
+    def scale_of(self, spec: ObservationSpec, ship: Ship) -> float:
+        """Physical value of an observation of 1, by its specification."""
+        scale = spec.scale
         return asked(scale, ship, self.settings) if callable(scale) else scale
 
     @property
     def n_commands(self) -> int:
         """Number of commands: rudder, and shaft."""
-        return 2 if self.action == "rudder-shaft" else 1
+        return 2 if "shaft" in self.action else 1
+
+    def orders(self, model: ShipModel) -> tuple[tuple[float, ...], ...]:
+        """Orders of each command of a discrete action; empty if it is continuous."""
+        if not self.action.endswith("discrete"):
+            return ()
+        if self.n_commands == 1:
+            return (RUDDER_ORDERS,)
+        least = self.least_shaft(model)
+        shaft_orders = tuple(order for order in _SHAFT_ORDERS if order >= least)
+        return RUDDER_ORDERS, shaft_orders
+
+    @property
+    def half_reward_cost(self) -> float:
+        """Cost of a step that earns half of a bounded reward; 0 for minus the cost.
+
+        The reward of a task with goals is minus the cost.
+        """
+        if self.definition.has_goals:
+            return 0.0
+        if isinstance(self.bounded, bool):
+            return HALF_REWARD_COST if self.bounded else 0.0
+        return float(self.bounded)
+
+    @property
+    def end_intervals(self) -> float:
+        """Control intervals that the end of an episode stands for."""
+        if self.loss_horizon is not None:
+            return float(self.loss_horizon)
+        return LOSS_HORIZON if self.bounded else float("inf")
 
     def least_shaft(self, model: ShipModel) -> float:
         """Least command of the shaft, part of service speed; 0 if it stays ahead."""
@@ -298,7 +407,7 @@ class Task:
     @cached_property
     def info_names(self) -> tuple[str, ...]:
         """Names of the numbers in `info`."""
-        engine = ("envelope_distance", "extrapolating")
+        engine = ("envelope_distance", "extrapolating", "cost")
         return (*self.definition.reported, *engine, *self.reward_parts)
 
     @cached_property
@@ -309,7 +418,8 @@ class Task:
     @property
     def reward_parts(self) -> tuple[str, ...]:
         """Names of the parts of the reward among them."""
-        parts = (*self.definition.reward_names, "end")
+        definition = self.definition
+        parts = (*definition.reward_names, *definition.parts_of_engine)
         return tuple(f"reward_{name}" for name in parts)
 
     def __getattr__(self, name: str) -> Any:

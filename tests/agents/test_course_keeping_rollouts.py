@@ -93,10 +93,10 @@ def test_costs_add_up_and_are_those_of_the_environment():
     observation, _ = env.reset(seed=0)
     cost, errors, over = 0.0, [], False
     while not over:
-        observation, reward, terminated, truncated, info = env.step(
+        observation, _, terminated, truncated, info = env.step(
             PILOT.predict(observation)[0]
         )
-        cost -= reward
+        cost += info["cost"]
         errors.append(info["heading_error"])
         over = terminated or truncated
     episode = sail(PILOT, MARINER, SHORT, seeds=0)
@@ -104,6 +104,14 @@ def test_costs_add_up_and_are_those_of_the_environment():
     assert episode.heading_rmse_deg == pytest.approx(
         np.degrees(np.sqrt(np.mean(np.square(errors)))), rel=1e-6
     )
+
+
+@pytest.mark.parametrize("bounded", [False, 0.5])
+def test_the_cost_does_not_depend_on_the_reward(bounded):
+    costs = []
+    for task in (SHORT, SHORT.changed(bounded=bounded)):
+        costs.append(sail(PILOT, [MARINER, TURNED], task, seeds=[1, 1]).cost)
+    np.testing.assert_array_equal(*costs)
 
 
 def test_a_lost_ship_is_counted_and_pays_for_the_rest_of_the_episode():

@@ -35,8 +35,8 @@ def cross_track(controller, task, n=1):
     seen, state, errors, total = engine.reset(np.arange(n)), None, [], np.zeros(n)
     for step in range(task.episode_steps):
         action, state = controller.predict(seen, state, np.full(n, step == 0))
-        seen, rewards, *_ = engine.step(action)
-        total += rewards
+        seen, *_ = engine.step(action)
+        total -= engine.info("cost")
         errors.append(engine.info("cross_track").copy())
     return np.array(errors), total
 

@@ -285,7 +285,7 @@ def test_what_is_not_asked_for_is_as_it_was():
     assert (other.settings.gamma, other.settings.n_epochs) == (0.8, 1)
     another = make_plan(TrainingRequest("sac", settings=FREE), first)
     assert type(another.settings) is SACSettings
-    assert training_options(first) == own
+    assert training_options(first) == {**own, "bounded": False}
     assert training_options(other)["speed_range"] == (0.8, 1.1)
     assert make_plan(TrainingRequest("ppo")).configuration()["task"] == ""
 
@@ -336,8 +336,11 @@ def test_domain_randomisation_draws_ships_seas_and_speeds_and_leaves_what_was_as
     assert drawn["model_uncertainty"] == "covariance"
     asked = {"speed_range": (0.5, 0.6)}
     assert asked.items() <= options(options=asked, randomise=True).items()
-    alone = {"model_uncertainty": "covariance"}
-    assert options(settings=alone) == alone  # neither seas nor speeds
+    alone = {"model_uncertainty": "covariance", "reward": "bounded"}
+    assert options(settings=alone) == {
+        "model_uncertainty": "covariance",  # neither seas nor speeds
+        "bounded": True,
+    }
     assert options("mariner", settings=alone) == {}
     bare = nomoto1_ship(0.1, 20.0, {"length": 160.0, "speed": 7.0})
     bare.save(tmp_path / "ship.json")

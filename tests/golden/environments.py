@@ -58,7 +58,7 @@ class Case:
     def make(self, stretch: float = 0.0) -> Any:
         """The environment, with ships that are longer by a part `stretch` of their
         length."""
-        options = dict(self.options)
+        options = {"bounded": False, **self.options}  # the reward is minus the cost
         if stretch:
             name = options.get(
                 "model", gymnasium.spec(self.id).kwargs.get("model", "mariner-tls-svm")
@@ -252,7 +252,7 @@ def told(shown: Any, names: list[str], env: Any) -> dict[str, Any]:
             found |= {
                 f"final {key}": last
                 for key, last in values.items()
-                if not key.startswith("_")
+                if not key.startswith("_") and key != "cost"
             }
         elif name == "final_obs":
             ended = np.stack(
@@ -262,7 +262,7 @@ def told(shown: Any, names: list[str], env: Any) -> dict[str, Any]:
                 f"final seen {key}": column
                 for key, column in zip(names, ended.T, strict=True)
             }
-        elif not name.startswith("_"):
+        elif not name.startswith("_") and name != "cost":
             found[f"info {name}"] = values
     return found
 

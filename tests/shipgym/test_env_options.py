@@ -663,6 +663,7 @@ def test_info_has_what_the_task_reports_and_the_parts_of_its_reward():
         "heading_error",
         "envelope_distance",
         "extrapolating",
+        "cost",
         *task.reward_parts,
     )
     assert task.flags == {"extrapolating"}

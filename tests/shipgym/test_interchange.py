@@ -124,7 +124,9 @@ def test_rewards_that_are_run_again_may_differ_by_rounding_alone(store, episodes
     rounded = replace(episode, rewards=episode.rewards * (1.0 + 5e-7))
     interchange.to_minari([rounded], "shipgym/mariner/rounded-v0", **CARD)
     other = replace(episode, rewards=episode.rewards - 3e-6)
-    with pytest.raises(InputError, match=r"episodes\[0\]: expected the recorded cost"):
+    with pytest.raises(
+        InputError, match=r"episodes\[0\]: expected the recorded return"
+    ):
         interchange.to_minari([other], "shipgym/mariner/other-v0", **CARD)
 
 

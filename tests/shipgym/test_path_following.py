@@ -46,8 +46,9 @@ def pd(seen):
 
 
 def sail(policy=lambda seen, step, env: [pd(seen)], seed=0, **options):
-    """One episode: rewards, infos, and the environment."""
-    env = gymnasium.make(ID, **{"model": "mariner", **options}).unwrapped
+    """One episode: rewards, minus the costs by default, infos, and the environment."""
+    made = {"model": "mariner", "bounded": False, **options}
+    env = gymnasium.make(ID, **made).unwrapped
     (seen, _), over = env.reset(seed=seed), False
     rewards, infos = [], []
     while not over:
@@ -357,10 +358,9 @@ def test_observations_stay_in_their_space_and_are_never_nan(seed, actions, troub
     env.reset(seed=seed)
     for action in actions * 10:
         order = np.array([action], dtype=np.float32)
-        observation, reward, terminated, *_ = env.step(order)
+        observation, reward, terminated, _, info = env.step(order)
         assert observation in env.observation_space
-        assert np.isfinite(reward)
-        assert reward <= 0.0
+        assert 0.0 <= reward <= 1.0 or info["success"]
         if terminated:
             break
 
@@ -490,6 +490,27 @@ def test_gaming_the_reward_does_not_pay(policy, options, times):
         assert played.sum() < times * honest.sum()
         assert all(-2.0 <= info["reward_progress"] <= 0.0 for info in infos)
         assert played.max() <= 0.0  # so that arriving pays, and the sooner the better
+
+
+@pytest.mark.parametrize(
+    ("policy", "since"),
+    [
+        (lambda seen, step, env: [1.0], 0),
+        (lambda seen, step, env: [pd(seen) if step < 400 else -1.0], 400),
+        (lambda seen, step, env: [pd(seen) if step < 600 else 1.0], 600),
+        (lambda seen, step, env: [pd(seen) + 0.5 * np.sin(step / 8.0)], 0),
+    ],
+    ids=["circles", "circles after a while", "circles before the end", "weaves"],
+)
+def test_gaming_the_bounded_reward_does_not_pay_a_learner(policy, since):
+    asked = {"bounded": True, "waypoints": HOOK, **WIDE}
+    returns = []
+    for helmsman in (lambda seen, step, env: [pd(seen)], policy):
+        rewards, _, _ = sail(helmsman, **asked)
+        later = rewards[since:]
+        returns.append(later @ 0.99 ** np.arange(len(later)))
+    honest, played = returns
+    assert played < 0.95 * honest
 
 
 @pytest.mark.parametrize(

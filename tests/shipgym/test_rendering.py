@@ -164,10 +164,10 @@ def test_rendering_changes_nothing_of_the_voyage():
     shown, blind = (
         make(COURSE_KEEPING, render_mode=mode) for mode in ("rgb_array", None)
     )
-    for env in (shown, blind):
-        sailed(env)
+    sailed(shown)
+    with pytest.warns(UserWarning, match="expected a render_mode"):
+        assert sailed(blind) is None
     assert shown.unwrapped.physical_state() == blind.unwrapped.physical_state()
-    assert blind.unwrapped.render() is None
 
 
 def test_a_window_opens_and_closes_without_a_screen(monkeypatch):
@@ -197,7 +197,6 @@ def test_rows_of_a_vector_environment_have_their_own_pictures():
     assert len(pictures) == 3
     np.testing.assert_array_equal(pictures[1], single.render())
     assert not np.array_equal(pictures[0], pictures[1])
-    assert gymnasium.make_vec(PATH_FOLLOWING, 1, model="mariner").render() is None
 
 
 def test_videos_are_recorded(tmp_path):
@@ -263,6 +262,9 @@ class Voyage:
 
     def physical_state(self):
         return {name: np.array([99.0, value]) for name, value in self.state.items()}
+
+    def shapes(self, lane):
+        return ()
 
     def waypoints(self, lane):
         return None

@@ -1,0 +1,105 @@
+"""Code of tasks that is refused: foreign random numbers, writing to a plan."""
+
+import ast
+import inspect
+import random
+from collections.abc import Iterator
+from dis import get_instructions
+from textwrap import dedent
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+
+from shipgym.engine.specialise import nested_code
+from shipgym.errors import InputError
+from shipgym.python_files import LIBRARIES
+
+#: Modules of random numbers that depend on more than key and number of an episode.
+_MODULES = {"numpy.random": np.random, "random": random}
+_GENERATORS = (np.random.RandomState, np.random.Generator, random.Random)
+
+
+def refuse_foreign_random(function: FunctionType) -> None:
+    """Refuse random numbers of `numpy.random` or `random`, with file and line.
+
+    The functions that it calls are searched too. Such numbers are neither those of the
+    episode's seed nor the same for one ship and many.
+    """
+    for place, found in _foreign_random(function, {function}):
+        raise InputError(
+            f"{place}: expected random numbers of the episode, got those of {found};"
+            " take the argument `random` and draw them with drawn(random, number, low,"
+            " high)"
+        )
+
+
+def _foreign_random(function: Any, known: set[Any]) -> Iterator[tuple[str, str]]:
+    """Places, and modules, of random numbers in a function and those that it calls."""
+    names = function.__globals__
+    for code in nested_code(function.__code__):
+        for line, value in _named_values(code, names):
+            module = _module_of(value)
+            if module:
+                place = f"{code.co_filename}, line {line}, in {code.co_name}"
+                yield place, module
+            elif _is_users(value) and value not in known:
+                known.add(value)
+                yield from _foreign_random(value, known)
+
+
+def _named_values(code: CodeType, names: dict[str, Any]) -> Iterator[tuple[int, Any]]:
+    """Line and value of each global that code names, and of attributes of modules."""
+    value: Any = None
+    for instruction in get_instructions(code):
+        if instruction.opname == "LOAD_GLOBAL":
+            value = names.get(instruction.argval)
+        elif instruction.opname in ("LOAD_ATTR", "LOAD_METHOD"):
+            is_module = isinstance(value, ModuleType)
+            value = getattr(value, instruction.argval, None) if is_module else None
+        else:
+            value = None
+        positions = instruction.positions
+        line = positions.lineno if positions else None
+        yield line or code.co_firstlineno, value
+
+
+def _module_of(value: Any) -> str:
+    """Name of the module whose random numbers a value draws; empty if it draws none."""
+    owner = getattr(value, "__self__", value)
+    for name, module in _MODULES.items():
+        is_member = getattr(value, "__module__", None) == name
+        if value is module or (is_member and callable(value)):
+            return name
+    if isinstance(owner, _GENERATORS):
+        return "random" if isinstance(owner, random.Random) else "numpy.random"
+    return ""
+
+
+def refuse_writes_to_plan(function: FunctionType) -> None:
+    """Refuse a function that writes to `plan`, with file and line.
+
+    Next to a plan are the numbers of other ships.
+    """
+    code = function.__code__
+    try:
+        tree = ast.parse(dedent(inspect.getsource(function)))
+    except (OSError, SyntaxError):
+        return
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Subscript) or isinstance(node.ctx, ast.Load):
+            continue
+        if ast.unparse(node.value) == "plan":
+            line = code.co_firstlineno + node.lineno - 1
+            raise InputError(
+                f"{code.co_filename}, line {line}, in {code.co_name}: expected a plan"
+                " that is only read here, got one that is written; write it in begin or"
+                " on_event"
+            )
+
+
+def _is_users(value: Any) -> bool:
+    """Return whether a value is a function of a user's own."""
+    if not isinstance(value, FunctionType):
+        return False
+    return not value.__code__.co_filename.startswith(LIBRARIES)

@@ -1,0 +1,123 @@
+"""Shapes that a task has drawn in pictures of its environment.
+
+A task file may define `draw(motion, state, ship, settings)`, plain Python that is
+called for each picture and returns a list of shapes, drawn one over another beneath the
+ship. Places are m north and east, colours red, green, blue or
+of the names ink, faint, land, safe, warning and danger.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from shipgym.checks import check_choice, check_finite, check_number, unexpected
+from shipgym.errors import InputError
+from shipgym.python_files import asked, place_of
+
+Rgb = tuple[int, int, int]
+#: Colours by name.
+_COLOURS: dict[str, Rgb] = {
+    "ink": (28, 40, 48),
+    "faint": (104, 122, 134),
+    "land": (226, 219, 200),
+    "safe": (60, 110, 70),
+    "warning": (200, 120, 10),
+    "danger": (200, 60, 40),
+}
+Colour = str | Rgb
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """Line through points, shape (n, 2)."""
+
+    points: Any
+    colour: Colour = "ink"
+
+    def __post_init__(self) -> None:
+        points = check_finite(self.points, "Line: points")
+        if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
+            raise unexpected("Line: points", "two points or more", self.points)
+        check_colour(self.colour, "Line: colour")
+
+
+@dataclass(frozen=True, eq=False)
+class Circle:
+    """Circle, its line or, `filled`, its area."""
+
+    x: float  # m, of its centre
+    y: float
+    radius: float  # m
+    colour: Colour = "ink"
+    filled: bool = False
+
+    def __post_init__(self) -> None:
+        check_number(self.x, "Circle: x")
+        check_number(self.y, "Circle: y")
+        check_number(self.radius, "Circle: radius", above=0.0)
+        check_colour(self.colour, "Circle: colour")
+
+
+@dataclass(frozen=True, eq=False)
+class ShipOutline:
+    """Another ship from above."""
+
+    x: float  # m
+    y: float
+    psi: float  # rad, heading
+    length: float  # m
+    beam: float | None = None  # m, by default a seventh of the length
+    colour: Colour = "ink"
+
+    def __post_init__(self) -> None:
+        for name in ("x", "y", "psi"):
+            check_number(getattr(self, name), f"ShipOutline: {name}")
+        check_number(self.length, "ShipOutline: length", above=0.0)
+        if self.beam is not None:
+            check_number(self.beam, "ShipOutline: beam", above=0.0)
+        check_colour(self.colour, "ShipOutline: colour")
+
+
+@dataclass(frozen=True, eq=False)
+class ChartWidth:
+    """Width of the chart, in place of fourteen ship lengths; the last one counts."""
+
+    width: float  # m
+
+    def __post_init__(self) -> None:
+        check_number(self.width, "ChartWidth: width", above=0.0)
+
+
+Shape = Line | Circle | ShipOutline | ChartWidth
+
+
+def check_colour(colour: Any, where: str) -> None:
+    """Refuse anything but the name of a colour, or three numbers from 0 to 255."""
+    if isinstance(colour, str):
+        check_choice(colour, _COLOURS, where)
+        return
+    is_rgb = isinstance(colour, tuple) and len(colour) == 3
+    if not is_rgb or not all(number in range(256) for number in colour):
+        raise unexpected(where, "a name or red, green, blue from 0 to 255", colour)
+
+
+def rgb(colour: Colour) -> Rgb:
+    """Red, green and blue of a colour."""
+    return _COLOURS[colour] if isinstance(colour, str) else colour
+
+
+def shapes_of(draw: Any, *arguments: Any) -> tuple[Shape, ...]:
+    """Ask a task for its shapes; InputError, with file and line, for anything else."""
+    try:
+        shapes = asked(draw, *arguments)
+    except InputError as error:
+        if error.__cause__ is not None:  # it names the place
+            raise
+        raise InputError(f"{place_of(draw, error)}: {error}") from None
+    expected = "a list of Line, Circle, ShipOutline and ChartWidth"
+    if not isinstance(shapes, Sequence):
+        raise unexpected(place_of(draw), expected, shapes)
+    for shape in shapes:
+        if not isinstance(shape, Shape):
+            raise unexpected(place_of(draw), expected, shape)
+    return tuple(shapes)

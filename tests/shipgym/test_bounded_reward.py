@@ -1,0 +1,161 @@
+"""The reward of a step is bounded, and apart from its cost; ends are ends."""
+
+import gymnasium
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import shipgym
+
+COURSE = "shipgym/CourseKeeping-v0"
+PATH = "shipgym/PathFollowing-v0"
+LOST_BY = {COURSE: {}, PATH: {"ground": 1.5}}  # hard over
+EPISODE_STEPS = {COURSE: 600, PATH: 1500}
+HARD_OVER = np.ones(1, np.float32)
+DISCOUNTS = st.floats(0.95, 0.999)
+
+
+def episode(env_id, policy, **options):
+    """Rewards and infos of an episode."""
+    env = gymnasium.make(env_id, **options)
+    seen, _ = env.reset(seed=3)
+    rewards, infos, over = [], [], False
+    while not over:
+        seen, reward, terminated, truncated, info = env.step(policy(seen))
+        over = terminated or truncated
+        rewards.append(reward)
+        infos.append(info)
+    return np.array(rewards), infos
+
+
+def hard_over(seen):
+    """Lose control."""
+    return HARD_OVER
+
+
+def steered(seen):
+    """Feed back heading error and yaw rate."""
+    error = np.arctan2(seen[0], seen[1])
+    return np.clip([1.5 * error - 0.7 * seen[2]], -1.0, 1.0).astype(np.float32)
+
+
+def costs_of(infos):
+    return np.array([info["cost"] for info in infos])
+
+
+@pytest.mark.parametrize("env_id", [COURSE, PATH])
+@pytest.mark.parametrize("scale", [True, 0.5])
+def test_a_step_earns_one_less_a_bounded_part_for_its_cost(env_id, scale):
+    rewards, infos = episode(env_id, hard_over, **LOST_BY[env_id], bounded=scale)
+    costs, half = costs_of(infos)[:-1], 0.1 if scale is True else scale
+    np.testing.assert_allclose(rewards[:-1], 1.0 - costs / (costs + half), rtol=1e-12)
+    assert rewards[-1] == 0.0  # lost
+    assert infos[-1]["cost"] > 1000.0
+
+
+@pytest.mark.parametrize("env_id", [COURSE, PATH])
+def test_the_cost_is_what_it_was_and_minus_it_is_the_other_reward(env_id):
+    _, infos = episode(env_id, hard_over, **LOST_BY[env_id])
+    rewards, others = episode(env_id, hard_over, **LOST_BY[env_id], bounded=False)
+    np.testing.assert_array_equal(rewards, -costs_of(others))
+    assert infos == others
+    for info in infos:
+        parts = [value for name, value in info.items() if name.startswith("reward_")]
+        assert info["cost"] == pytest.approx(-sum(parts))
+
+    shorter, _ = episode(
+        env_id, hard_over, **LOST_BY[env_id], bounded=False, loss_horizon=50
+    )
+    left = EPISODE_STEPS[env_id] - len(shorter)
+    end = infos[-1]["reward_end"]
+    assert shorter[-1] - rewards[-1] == pytest.approx((50.0 / left - 1.0) * end)
+
+
+LOST, _ = episode(COURSE, hard_over)
+ARRIVED, ARRIVAL = episode(PATH, steered, model="mariner-tls-svm")
+
+
+@given(DISCOUNTS, st.integers(0, 500))
+def test_to_be_lost_never_pays(discount, more):
+    """A ship that goes on earns something at the worst cost, a lost one nothing."""
+    before = LOST[:-1]
+    worst = 1.0 - 9.0 / 9.1  # at the largest heading error
+    going_on = np.concatenate([before, np.full(1 + more, worst)])
+    weights = discount ** np.arange(len(going_on))
+    assert weights[: len(LOST)] @ LOST < weights @ going_on
+
+
+@given(st.floats(0.95, 0.99), st.integers(1, 500))
+def test_to_arrive_pays_more_than_to_linger(discount, more):
+    """A step without progress costs 1; the end stands for a hundred perfect ones."""
+    assert ARRIVAL[-1]["success"]
+    arrival = ARRIVED[-1]
+    assert arrival == pytest.approx(100.0, abs=1.0)
+    lingering = np.append(np.full(more, 0.1 / 1.1), arrival)
+    assert arrival > discount ** np.arange(1 + more) @ lingering
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"bounded": "yes"}, "bounded: expected a number"),
+        ({"bounded": 0}, "bounded: expected a number"),
+        ({"loss_horizon": -1}, "loss_horizon: expected a number"),
+    ],
+)
+def test_a_reward_that_cannot_be_is_refused(options, words):
+    with pytest.raises(shipgym.InputError, match=words):
+        gymnasium.make(COURSE, **options)
+
+
+def test_a_check_says_when_one_event_drowns_the_rest():
+    for bounded in (True, False):
+        remarks = shipgym.check_task("PathFollowing", bounded=bounded).remarks
+        drowned = [remark for remark in remarks if "drowns the rest" in remark]
+        assert len(drowned) == (0 if bounded else 1)
+    remarks = shipgym.check_task("CourseKeeping", bounded=1e-4).remarks
+    assert any("next to nothing with bounded=0.0001" in remark for remark in remarks)
+
+
+def test_an_episode_that_is_over_stays_over_and_warns_once():
+    env = gymnasium.make(COURSE, episode_steps=2).unwrapped
+    env.reset(seed=0)
+    env.step(HARD_OVER)
+    seen, _, *flags, _ = env.step(HARD_OVER)
+    assert flags == [False, True]
+    state = env.get_state()
+    with pytest.warns(UserWarning, match="the episode is over") as noted:
+        again = [env.step(HARD_OVER) for _ in range(3)]
+    assert len(noted) == 1
+    for same, reward, *still, _ in again:
+        np.testing.assert_array_equal(same, seen)
+        assert (reward, still) == (0.0, flags)
+
+    env.reset()
+    env.set_state(state)
+    with pytest.warns(UserWarning, match="the episode is over"):
+        assert list(env.step(HARD_OVER)[2:4]) == flags
+    env.reset()
+    assert list(env.step(HARD_OVER)[2:4]) == [False, False]
+
+
+def test_rows_that_are_over_have_to_be_reset_without_autoreset():
+    envs = gymnasium.make_vec(
+        COURSE, num_envs=2, autoreset_mode="Disabled", episode_steps=2
+    )
+    orders = np.zeros((2, 1), np.float32)
+    envs.reset(seed=0)
+    envs.step(orders)
+    envs.reset(options={"reset_mask": np.array([True, False])})
+    _, _, _, truncated, _ = envs.step(orders)
+    with pytest.raises(shipgym.InputError, match=r"ends in rows \[1\]"):
+        envs.step(orders)
+    envs.reset(options={"reset_mask": truncated})
+    envs.step(orders)
+
+
+def test_rendering_without_a_mode_warns():
+    for env in (gymnasium.make(COURSE).unwrapped, gymnasium.make_vec(COURSE)):
+        with pytest.warns(UserWarning, match="expected a render_mode, got none"):
+            assert env.render() is None

@@ -1,0 +1,302 @@
+"""Arrays, plan, random numbers and repeated records in a task; settings at a reset."""
+
+import re
+
+import gymnasium
+import numpy as np
+import pytest
+
+import shipgym
+from shipgym import InputError, register_task
+from shipgym.engine.records import leaves, short_names
+from shipgym.engine.specialise import is_shipped
+from shipgym.tasks.contract import Random, drawn, drawn_normal, under_way
+from shipgym.tasks.definition import read_definition
+from shipgym.tasks.task import Task
+
+COURSE = "shipgym/CourseKeeping-v0"
+TASK = """
+from typing import Annotated, NamedTuple
+
+from shipgym.tasks.contract import (
+    ObservationSpec, Setting, Size, drawn, drawn_normal, under_way
+)
+
+REPORTED = ("luck", "gate")
+
+
+def length(ship, settings):
+    return ship.length
+
+
+class Target(NamedTuple):
+    x: float
+    y: float
+
+
+class Seen(NamedTuple):
+    north: Annotated[float, ObservationSpec(-99.0, 99.0, "m", length)]
+    east: Annotated[float, ObservationSpec(-99.0, 99.0, "m", length)]
+
+
+class Settings(NamedTuple):
+    speeds: Annotated[tuple[float, float], Setting("Of the targets.", at_most=9.0)] = (
+        1.0, 2.0
+    )
+    bonus: float = 0.5
+    part: float = 0.5
+
+
+class State(NamedTuple):
+    targets: tuple[Target, Target]
+    headings: Annotated[tuple[float, ...], Size(4)]
+    luck: float
+    gate: float
+
+
+class Reward(NamedTuple):
+    near: float
+
+
+class Observation(NamedTuple):
+    targets: tuple[Seen, Seen]
+    nearest: Seen
+    headings: Annotated[tuple[float, float], ObservationSpec(-9.0, 9.0)]
+    noise: Annotated[float, ObservationSpec(-9.0, 9.0)]
+
+
+def plan_length(settings):
+    return 2
+
+
+def begin(ship, settings, random, plan):
+    plan[0] = drawn(random, 0, 1.0, 2.0)
+    plan[1] = 3.0
+    targets = (Target(0.0, plan[0]), Target(9.0, 9.0))
+    part = settings.part
+    motion = under_way(0.0, 0.0, 0.0, part * ship.speed, part * ship.shaft)
+    return motion, State(targets, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0)
+
+
+def moved(target, speed, interval):
+    return Target(target.x + speed * interval.dt, target.y)
+
+
+def step(motion, state, interval, ship, settings, plan, random):
+    first, second = state.targets
+    targets = (
+        moved(first, settings.speeds[0], interval),
+        moved(second, settings.speeds[1], interval),
+    )
+    total = 0.0
+    for heading in state.headings:
+        total += heading
+    for target in targets:
+        total += target.x
+    headings = state.headings[1:] + (motion.psi,)
+    after = State(targets, headings, drawn(random, 0, 0.0, 1.0), plan[0] + plan[1])
+    return after, Reward(settings.bonus - 0.001 * total), False, False
+
+
+def seen_of(target, readings):
+    return Seen(target.x - readings.x, target.y - readings.y)
+
+
+def observe(readings, state, interval, ship, settings, random):
+    first, second = state.targets
+    return Observation(
+        (seen_of(first, readings), seen_of(second, readings)),
+        seen_of(first, readings),
+        state.headings[2:],
+        drawn_normal(random, 1),
+    )
+"""
+NAMES = (
+    *("targets_0_north", "targets_0_east", "targets_1_north", "targets_1_east"),
+    *("nearest_north", "nearest_east", "headings_0", "headings_1", "noise"),
+)
+
+
+@pytest.fixture(scope="module")
+def task(tmp_path_factory):
+    path = tmp_path_factory.mktemp("task") / "convoy.py"
+    path.write_text(TASK, encoding="utf-8")
+    return path
+
+
+def sailed(env, steps):
+    """Observations, rewards and luck under one and the same orders."""
+    record = []
+    for k in range(steps):
+        order = np.full(env.action_space.shape, 0.3 * np.sin(k / 4.0), np.float32)
+        observation, reward, _, _, info = env.step(order)
+        record.append((observation, reward, info["luck"], info["gate"]))
+    return [np.array(column) for column in zip(*record, strict=True)]
+
+
+def test_arrays_plan_and_random_numbers_are_the_same_for_one_ship_and_many(task):
+    many = gymnasium.make_vec(COURSE, num_envs=66, task=task)
+    one = gymnasium.make(COURSE, task=task).unwrapped
+    assert one.observation_names == NAMES
+    assert not is_shipped(one.task.definition.step)
+    first = many.reset(seed=4)[0]
+    np.testing.assert_array_equal(first[65], one.reset(seed=69)[0])
+    of_many = sailed(many, 30)
+    of_one = sailed(one, 30)
+    for all_rows, row in zip(of_many, of_one, strict=True):
+        np.testing.assert_array_equal(all_rows[:, 65], row)
+    observations, _, luck, gate = of_one
+    assert len(np.unique(luck)) == 30  # a number of its own for each interval
+    assert 0.0 <= luck.min() <= luck.max() < 1.0
+    assert 4.0 <= gate[0] < 5.0
+    assert np.ptp(gate) == 0.0
+    headings = observations[:, NAMES.index("headings_0")]
+    np.testing.assert_array_equal(headings[1:], observations[:-1, 7])
+    one.reset(seed=69)
+    np.testing.assert_array_equal(sailed(one, 30)[0], observations)  # again
+    assert abs(np.mean(of_many[0][..., 8])) < 0.1  # 1980 normal numbers
+    assert np.std(of_many[0][..., 8]) == pytest.approx(1.0, abs=0.1)
+
+
+def test_settings_apply_until_the_next_reset(task):
+    rows = np.array([0.0, 1.0, 2.0])
+    speeds = np.array([[1.0, 1.0], [2.0, 3.0], [4.0, 5.0]])
+    many = gymnasium.make_vec(COURSE, num_envs=3, task=task)
+    one = gymnasium.make(COURSE, task=task).unwrapped
+    many.reset(seed=2, options={"bonus": rows, "speeds": speeds, "part": 0.25})
+    of_many = sailed(many, 12)
+    for row in range(3):
+        options = {"bonus": rows[row], "speeds": speeds[row], "part": 0.25}
+        one.reset(seed=2 + row, options=options)
+        assert one.physical_state()["u"] < 0.3 * one.model.particulars["speed"]
+        for all_rows, alone in zip(of_many, sailed(one, 12), strict=True):
+            np.testing.assert_array_equal(all_rows[:, row], alone)
+    one.reset(seed=2)
+    many.reset(seed=2)
+    np.testing.assert_array_equal(sailed(many, 3)[1][:, 0], sailed(one, 3)[1])
+    assert one.step(one.action_space.sample())[1] < 0.5
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"bonsu": 1.0}, "options: unknown key 'bonsu'. Did you mean 'bonus'"),
+        ({"speeds": [1.0, 2.0, 3.0]}, "speeds: expected 2 numbers"),
+        ({"speeds": [1.0, 99.0]}, "speeds: number 1: expected a number <= 9"),
+        ({"bonus": [1.0, 2.0]}, "options: bonus: expected one value .* for each of 3"),
+        ({"bonus": [1.0, 2.0, "x"]}, "options: row 2: bonus: expected a number"),
+    ],
+)
+def test_options_of_a_reset_are_checked(task, options, message):
+    many = gymnasium.make_vec(COURSE, num_envs=3, task=task)
+    with pytest.raises(InputError, match=message):
+        many.reset(options=options)
+
+
+WRONG = {
+    "headings: Annotated[tuple[float, ...], Size(4)]": [
+        ("headings: tuple[float, ...]", "State.headings: expected an array of a fixed"),
+        ("headings: list[float]", "State.headings: expected an array of a fixed size"),
+        ("headings: tuple[float, str]", "State.headings: expected a float, got"),
+    ],
+    "    luck: float": [
+        ("    luck: tuple[float, float]", "REPORTED: expected .* each a number"),
+    ],
+    "    bonus: float = 0.5": [
+        (
+            "    bonus: tuple[float, float] = (1.0,)",
+            "Settings.bonus: default: expected",
+        ),
+        ("    bonus: tuple[float, ...] = (1.0,)", "Settings.bonus: expected an array"),
+        ("    state: float = 0.5", "Settings.state: expected a name of its own"),
+    ],
+    "    noise: Anno": [
+        ("    nearest_east: Anno", "Observation: .* got two fields 'nearest_east'"),
+    ],
+    "    total = 0.0\n": [
+        ("    plan[0] = 1.0\n", "in step: expected a plan that is only read"),
+    ],
+    "plan, random):\n    first": [
+        ("plan, chance):\n    first", "with or without random and plan .* 'chance'"),
+    ],
+}
+CASES = [(old, new, message) for old, many in WRONG.items() for new, message in many]
+RANDOM = {
+    "import numpy as np": ("np.random.uniform()", "numpy.random"),
+    "from numpy.random import normal": ("normal()", "numpy.random"),
+    "import numpy.random as chance": ("chance.rand()", "numpy.random"),
+    "from random import gauss": ("gauss(0.0, 1.0)", "random"),
+    "import random as dice\n\n\ndef luck():\n    return dice.random()": (
+        "luck()",
+        "random",
+    ),
+    "import numpy as np\nRNG = np.random.default_rng(1)": (
+        "RNG.normal()",
+        "numpy.random",
+    ),
+}
+for head, (call, module) in RANDOM.items():
+    new = f"    total = {call}\n"
+    wanted = f"in (?:step|luck): expected random .* got those of {module};"
+    CASES.append(("    total = 0.0\n", new + f"# {head}", wanted))
+
+
+@pytest.mark.parametrize(("old", "new", "message"), CASES)
+def test_what_a_task_may_not_hold_is_named_with_file_and_line(
+    tmp_path, old, new, message
+):
+    new, _, head = new.partition("# ")
+    assert old in TASK
+    path = tmp_path / "wrong.py"
+    path.write_text(f"{head}\n{TASK.replace(old, new, 1)}", encoding="utf-8")
+    place = "" if "REPORTED" in message or "with or" in message else r", line \d+"
+    if "name of its own" in message:
+        place = ""
+    with pytest.raises(InputError, match=rf"wrong.py{place}.* {message}"):
+        register_task("harbour/Wrong-v0", path)
+    assert "harbour/Wrong-v0" not in gymnasium.registry
+
+
+def test_names_are_prefixed_where_a_record_occurs_twice(task):
+    definition = read_definition(task)
+    assert tuple(short_names(definition.Observation).values()) == NAMES
+    assert leaves(definition.State)[:3] == ("targets.0.x", "targets.0.y", "targets.1.x")
+    own = read_definition("CourseKeeping")
+    names = short_names(own.Observation)
+    assert set(names.values()) == {path.rpartition(".")[2] for path in names}
+
+
+def test_random_numbers_are_a_function_of_key_episode_and_number():
+    random = Random(np.uint64(3), np.uint64(4))
+    with np.errstate(over="ignore"):
+        normal = [drawn_normal(random, k) for k in range(4000)]
+        again = [drawn_normal(random, k) for k in range(10)]
+        uniform = [drawn(random, k, -1.0, 1.0) for k in range(4000)]
+    assert again == normal[:10]
+    assert np.mean(normal) == pytest.approx(0.0, abs=0.05)
+    assert np.std(normal) == pytest.approx(1.0, abs=0.05)
+    assert abs(np.corrcoef(normal, uniform)[0, 1]) < 0.05
+    assert under_way(1.0, 2.0, 0.5, 3.0, 1.5)[:4] == (1.0, 2.0, 0.5, 3.0)
+
+
+def test_rudder_and_shaft_are_ordered_by_numbers():
+    options = {"model": "kvlcc2", "action": "rudder-shaft-discrete"}
+    orders = Task.of("CourseKeeping", action=options["action"]).orders(
+        shipgym.load_model("kvlcc2")
+    )
+    env = gymnasium.make(COURSE, **options).unwrapped
+    many = gymnasium.make_vec(COURSE, num_envs=2, **options)
+    continuous = gymnasium.make(COURSE, model="kvlcc2", action="rudder-shaft").unwrapped
+    assert env.action_space.nvec.tolist() == [len(known) for known in orders]
+    for one in (env, many, continuous):
+        one.reset(seed=0)
+    action = np.array([7, 2])
+    command = np.array([orders[0][7], orders[1][2]], dtype=np.float32)
+    expected = continuous.step(command)[0]
+    np.testing.assert_array_equal(env.step(action)[0], expected)
+    np.testing.assert_array_equal(many.step(np.tile(action, (2, 1)))[0][0], expected)
+    for wrong in ([9, 0], [0, 9], 3, [0.5, 0.0]):
+        with pytest.raises(InputError, match="action: expected integers of shape"):
+            env.step(wrong)
+    with pytest.raises(InputError, match=re.escape("actions: expected integers")):
+        many.step(action)
