@@ -83,6 +83,7 @@ def step(motion, state, interval, ship, settings):
     limit = ship.speed * pick(inside, settings.speed_limit, 1.0)
     over = max(motion.u - limit, 0.0) / ship.speed
     delay = 1.0 - clip(motion.u / limit, 0.0, 1.0)
+    # minus the parts of the cost, from which the engine makes the bounded reward
     reward = Reward(-off * off, -delay, -settings.over_speed_weight * over * over)
     after = State(0.0, motion.y, limit, pick(over > 0.01, 1.0, 0.0))
     return after, reward, fabs(off) > 1.0, x > settings.zone_ends + 8.0
