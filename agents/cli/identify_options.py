@@ -54,6 +54,10 @@ def identify_options(
         float | None,
         Option(help="Strength of that pull; default: by cross-validation."),
     ] = None,
+    uncertainty: Annotated[
+        str | None,
+        Option(help="Source of the covariance: analytic, bootstrap or posterior."),
+    ] = None,
     set_: Annotated[
         list[str] | None,
         Option(
@@ -77,6 +81,7 @@ def identify_options(
         "kernel": kernel,
         "prior": prior,
         "prior_strength": prior_strength,
+        "uncertainty": uncertainty,
     }
     found = named_values(set_ or (), "--set", "seed=3")
     for name, value in by_flag.items():

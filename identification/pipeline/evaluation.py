@@ -124,6 +124,13 @@ def with_uncertainty(
     if error:
         provenance = provenance | {"model_error": error}
     model = replace(fit.model, covariance=covariance)
+    if options.uncertainty.by_sampling:
+        from identification.uncertainty.posterior import table_prior, with_posterior
+
+        prior = table_prior(model)
+        asked = options.uncertainty
+        model, report = with_posterior(model, problem.used, prior, asked)
+        provenance = provenance | {"posterior": report}
     return evaluated(model, fit, problem, provenance, options)
 
 
@@ -252,6 +259,8 @@ def evaluated(
     metrics = _stability(complete, lost)
     if bias is not None:
         metrics["rudder_bias"] = bias.plain()
+    if "posterior" in complete:
+        metrics["posterior"] = complete["posterior"]
     metrics |= _accuracy(model, problem, trials, predictions)
     return IdentificationResult(
         model=model,

@@ -49,9 +49,8 @@ class IndexInterval:
         if not len(self.values):
             return None
         low, high = self.quantiles(*LEVELS_95)
-        if self.value is None:
-            never_completed = low is None or not self.is_size
-            return None if never_completed else (low, None)
+        if self.value is None:  # the model itself did not complete it
+            return None if low is None or not self.is_size else (low, None)
         if high is None and not self.is_size:
             return None
         lower = self.value if low is None else min(low, self.value)

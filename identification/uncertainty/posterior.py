@@ -1,0 +1,330 @@
+"""Posterior of the coefficients by sampling.
+
+Prior times the likelihood of whole trials, raised to a power below one (coarsened
+posterior, Miller & Dunson 2019, Journal of the American Statistical Association 114):
+equations that are not the ship's make errors that are not noise.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from identification.arrays import by_name
+from identification.simulation_error.coefficient_prior import CoefficientPrior
+from identification.simulation_error.whole_trials import WholeTrials
+from identification.uncertainty.ensemble import LogDensity, sample_ensemble
+from identification.uncertainty.mixing import Mixing, mixing_of
+from identification.uncertainty.model_error import FEWEST_TRIALS, model_error
+from identification.uncertainty.quadratic_map import QuadraticMap, quadratic_map
+from identification.uncertainty.uncertainty import Uncertainty
+from shipgym import InputError, ShipModel, Trial
+from shipgym.arrays import Flags, Floats
+from shipgym.manoeuvres.execution import usual_rudder
+
+
+class Mode(NamedTuple):
+    """The most probable point, and the Gauss-Newton covariance there."""
+
+    point: Floats
+    covariance: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class CoarsenedPosterior:
+    """Prior times the likelihood of whole trials to a power."""
+
+    trials: WholeTrials
+    scales: Floats  # of the errors by channel
+    power: float
+
+    @property
+    def all_parts(self) -> Flags:
+        """Parts of all trials."""
+        return np.ones(len(self.trials.parts), dtype=np.bool_)
+
+    def log_density(self, points: Floats, kept: Flags | None = None) -> Floats:
+        """Logarithm of the density but for a constant, shape (n_points,)."""
+        if kept is None:
+            kept = self.all_parts
+        misfits = self.trials.misfits(points, self.scales, kept)
+        from_prior = np.sum(points**2, axis=1)
+        return np.asarray(-0.5 * (self.power * misfits + from_prior))
+
+    def mode(self, start: Floats, kept: Flags | None = None) -> Mode:
+        """The most probable point by Gauss-Newton steps; `kept` are parts of trials."""
+        if kept is None:
+            kept = self.all_parts
+        point = start
+        lengths = 0.5 ** np.arange(12)
+        best = float(self.log_density(point[None], kept)[0])
+        for _ in range(10):
+            covariance, gradient = self._quadratic(point, kept)
+            step = covariance @ gradient
+            reached = point - lengths[:, None] * step
+            values = self.log_density(reached, kept)
+            taken = int(values.argmax())
+            gain = values[taken] - best
+            if gain > 0.0:
+                point, best = reached[taken], float(values[taken])
+            if gain < 1e-2:
+                break
+        return Mode(point, self._quadratic(point, kept)[0])
+
+    def map(self, mode: Mode) -> QuadraticMap:
+        """Coordinates in which the density is nearly standard normal."""
+        root = np.sqrt(self.power)
+        kept = self.all_parts
+        slopes = self.trials.slopes(mode.point, self.scales, kept)
+        jacobian = root * slopes.jacobian
+
+        def errors(points: Floats) -> Floats:
+            return root * self.trials.scaled_errors(points, self.scales, kept)
+
+        return quadratic_map(mode.point, jacobian.T @ jacobian, jacobian, errors)
+
+    def _quadratic(self, point: Floats, kept: Flags) -> tuple[Floats, Floats]:
+        """Gauss-Newton covariance, and gradient of minus the log density."""
+        errors, jacobian = self.trials.slopes(point, self.scales, kept)
+        information = self.power * jacobian.T @ jacobian + np.eye(len(point))
+        gradient = self.power * jacobian.T @ errors + point
+        inverse = np.linalg.inv(information)
+        return 0.5 * (inverse + inverse.T), gradient
+
+    def model(self, mode: Mode) -> ShipModel:
+        """The model of a mode, with its covariance."""
+        prior = self.trials.prior
+        values = prior.coefficients(mode.point[None])[0]
+        model = self.trials.blank.with_coefficients(values)
+        return replace(model, covariance=prior.covariance(mode.covariance), draws=None)
+
+
+def check_trials(trials: Sequence[Trial]) -> None:
+    """Refuse trials too few or too alike to tell how much their likelihood counts."""
+    n_trials = len(trials)
+    if n_trials < FEWEST_TRIALS:
+        raise InputError(
+            f"uncertainty: expected at least {FEWEST_TRIALS} trials to fit for a"
+            " posterior, whose likelihood counts by how trials left out in turn are"
+            f" predicted, got {n_trials}; add trials, or choose 'analytic'"
+        )
+    first = trials[0]
+    if all(_alike(first, trial) for trial in trials[1:]):
+        angle = np.degrees(usual_rudder(first))
+        raise InputError(
+            "uncertainty: expected trials that differ in kind, rudder angle or side for"
+            f" a posterior, got {n_trials} alike ({first.kind or 'trials'} with"
+            f" {angle:.0f} deg to the same side first), of which one left out tells"
+            " nothing; add another trial, or choose 'analytic'"
+        )
+
+
+def _alike(one: Trial, other: Trial) -> bool:
+    """Whether two trials are the same manoeuvre to a degree and begin to one side."""
+    angles = np.degrees([usual_rudder(one), usual_rudder(other)])
+    same_angle = abs(angles[0] - angles[1]) <= 1.0
+    same_side = _first_side(one) == _first_side(other)
+    return bool(one.kind == other.kind and same_angle and same_side)
+
+
+def _first_side(trial: Trial) -> float:
+    """Sign of the first rudder angle that is half the usual one."""
+    delta = trial["delta"]
+    large = np.abs(delta) >= 0.5 * usual_rudder(trial)
+    return float(np.sign(delta[large.argmax()]))
+
+
+def table_prior(model: ShipModel) -> CoefficientPrior:
+    """Weak prior of a table: its estimate, three times as uncertain as estimated.
+
+    Directions that the estimate leaves no uncertainty, such as those that a truncation
+    dropped, stay as they are.
+    """
+    widening = 3.0
+    mean = np.array(list(model.coefficients.values()))
+    covariance = np.asarray(model.covariance)
+    deviations = np.sqrt(np.diag(covariance))
+    units = np.where(deviations > 0.0, deviations, 1.0)
+    correlations = covariance / np.outer(units, units)
+    values, vectors = np.linalg.eigh(correlations)
+    kept = values > 1e-9 * values.max()
+    root = units[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+    source = f"{widening:g} times the standard errors about the least-squares estimate"
+    return CoefficientPrior(source, mean, widening * root)
+
+
+def with_posterior(
+    model: ShipModel,
+    trials: Sequence[Trial],
+    prior: CoefficientPrior,
+    asked: Uncertainty,
+) -> tuple[ShipModel, dict[str, Any]]:
+    """The model with draws of its posterior, and a report for the provenance.
+
+    `model`, with the covariance that it keeps where the walkers do not mix, was
+    identified from `trials`. Raises InputError for trials too few or too alike.
+    """
+    check_trials(trials)
+    bare = replace(model, covariance=None, draws=None)
+    whole = WholeTrials(bare, trials, prior)
+    start = _point_of(model, prior)
+    scales = whole.scales(start)
+    if not np.isfinite(scales).all():
+        remark = (
+            "posterior: not sampled, the model runs away in a trial; covariance kept"
+        )
+        return model, {"kept": False, "remarks": [remark]}
+
+    first = CoarsenedPosterior(whole, scales, power=1.0)
+    scales = whole.scales(first.mode(start).point)
+    posterior, error = coarsened(CoarsenedPosterior(whole, scales, 1.0), trials, start)
+    return _sampled(model, posterior, error, start, asked)
+
+
+def _point_of(model: ShipModel, prior: CoefficientPrior) -> Floats:
+    """The point of a model's coefficients."""
+    values = np.array(list(model.coefficients.values()))
+    units = prior.deviations
+    known = units > 0.0
+    scaled_root = prior.root[known] / units[known, None]
+    off = (values - prior.mean)[known] / units[known]
+    point, *_ = np.linalg.lstsq(scaled_root, off, rcond=1e-12)
+    return np.asarray(point)
+
+
+def coarsened(
+    posterior: CoarsenedPosterior, trials: Sequence[Trial], start: Floats
+) -> tuple[CoarsenedPosterior, dict[str, Any]]:
+    """The posterior of the power at which trials left out have errors of size one.
+
+    Errors are those of `model_error`, of modes and their Gauss-Newton covariances. Its
+    last report is returned too.
+    """
+    of_parts = posterior.trials.of_trials
+    error: dict[str, Any] = {}
+    for _ in range(3):
+        own = posterior.mode(start)
+        left_out = []
+        for trial in range(len(trials)):
+            mode = posterior.mode(own.point, kept=of_parts != trial)
+            left_out.append(posterior.model(mode))
+        error = model_error(posterior.model(own), left_out, trials)
+        factor: float = error["factor"]
+        near_enough = 1.1
+        if factor <= near_enough:
+            break
+        posterior = replace(posterior, power=posterior.power / factor**2)
+    return posterior, error
+
+
+def _sampled(
+    model: ShipModel,
+    posterior: CoarsenedPosterior,
+    error: dict[str, Any],
+    start: Floats,
+    asked: Uncertainty,
+) -> tuple[ShipModel, dict[str, Any]]:
+    """The model with draws where the walkers mixed, and the report."""
+    rng = np.random.default_rng(asked.seed)
+    shape = posterior.map(posterior.mode(start))
+
+    def log_density(coordinates: Floats) -> Floats:
+        return posterior.log_density(shape.points(coordinates))
+
+    chains = sample_ensemble(
+        log_density,
+        _walkers(log_density, len(start), rng),
+        steps=asked.steps,
+        warm_up=asked.steps // 2,
+        seed=asked.seed,
+    )
+    mixing = mixing_of(chains)
+    whole = posterior.trials
+    points = shape.points(chains.flat)
+    report: dict[str, Any] = {
+        "kept": mixing.is_enough,
+        "prior": whole.prior.source,
+        "power": posterior.power,
+        "left_out": error,
+        "parameters": whole.prior.n_parameters,
+        **mixing.plain(),
+        "error_scales": by_name(whole.channels, posterior.scales),
+    }
+    remarks = contradictions(whole, points)
+    if not mixing.is_enough:
+        report["remarks"] = [*remarks, _not_mixed(mixing)]
+        return model, report
+
+    coefficients = whole.prior.coefficients(points)
+    n_draws = 256
+    chosen = rng.choice(len(points), n_draws, replace=False)
+    chosen.sort()
+    sampled = replace(
+        model,
+        covariance=np.cov(coefficients.T),
+        draws=_rounded(coefficients[chosen]),
+    )
+    report |= {"draws": n_draws, "remarks": remarks}
+    return sampled, report
+
+
+def _walkers(
+    log_density: LogDensity, n_parameters: int, rng: np.random.Generator
+) -> Floats:
+    """Walkers of a density that is nearly standard normal.
+
+    They are chosen among five times as many normal points by what these weigh in the
+    density (sampling importance resampling, Rubin 1988).
+    """
+    whole_batches = 128
+    fewest = 2 * n_parameters
+    n_walkers = whole_batches * -(-fewest // whole_batches)
+    points = rng.standard_normal((5 * n_walkers, n_parameters))
+    points[0] = 0.0  # the mode
+    log_weights = log_density(points) + 0.5 * np.sum(points**2, axis=1)
+    # the largest of weights times exponential numbers are a draw without replacement
+    order = np.argsort(log_weights + rng.gumbel(size=len(points)))
+    chosen = points[order[-n_walkers:]]
+    lost = ~np.isfinite(log_density(chosen))
+    chosen[lost] *= 0.01
+    return np.asarray(chosen)
+
+
+def contradictions(whole: WholeTrials, points: Floats) -> list[str]:
+    """A remark where the trials contradict the prior, on what is farthest off."""
+    prior = whole.prior
+    deviations = prior.deviations
+    known = deviations > 0.0
+    mean = prior.coefficients(points.mean(axis=0)[None])[0]
+    off = np.zeros(len(mean))
+    off[known] = (mean - prior.mean)[known] / deviations[known]
+    worst = int(np.abs(off).argmax())
+    limit = 3.0
+    if abs(off[worst]) <= limit:
+        return []
+    name = list(whole.blank.coefficients)[worst]
+    return [
+        f"prior: expected coefficients within {limit:g} standard deviations of the"
+        f" prior ({prior.source}), got {name} {off[worst]:+.1f} from its mean by the"
+        " trials; check the particulars, or choose another prior"
+    ]
+
+
+def _not_mixed(mixing: Mixing) -> str:
+    """A remark on walkers that did not mix."""
+    fewest = mixing.fewest_times
+    hundreds = np.ceil(2.0 * fewest * mixing.autocorrelation_time / 100.0)
+    more = max(100 * int(hundreds), 2 * mixing.steps)
+    return (
+        f"posterior: expected walkers that mix, {fewest:g} autocorrelation times and"
+        f" a split R-hat up to {mixing.largest_r_hat:g}, got {mixing.steps} steps of"
+        f" {mixing.autocorrelation_time:.0f} each and {mixing.r_hat:.2f}; the"
+        f" covariance is kept: try uncertainty.steps = {more}"
+    )
+
+
+def _rounded(values: Floats) -> Floats:
+    """Values to eight significant digits, for a small file."""
+    written = [float(f"{value:.8g}") for value in values.ravel()]
+    return np.array(written).reshape(values.shape)
