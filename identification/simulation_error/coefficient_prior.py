@@ -22,7 +22,7 @@ class CoefficientPrior:
     @property
     def n_parameters(self) -> int:
         """Directions in which the coefficients are uncertain."""
-        return self.root.shape[1]
+        return int(self.root.shape[1])
 
     @property
     def deviations(self) -> Floats:

@@ -119,7 +119,7 @@ class WholeTrials:
         with np.errstate(invalid="ignore", over="ignore"):
             errors = self.scaled_errors(points, scales, kept)
             total = np.einsum("ij,ij->j", errors, errors)
-        return np.nan_to_num(total, nan=np.inf)
+        return np.asarray(np.nan_to_num(total, nan=np.inf))
 
     def scaled_errors(self, points: Floats, scales: Floats, kept: Flags) -> Floats:
         """Errors in their scales of the parts kept, shape (n_rows, n_points)."""

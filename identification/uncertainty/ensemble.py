@@ -66,7 +66,7 @@ def stretch(walkers: Floats, others: Floats, rng: np.random.Generator) -> Propos
     largest = 2.0
     share = rng.random(n_walkers)
     # density 1 / sqrt(z) between 1 / largest and largest
-    z = (1.0 + share * (largest - 1.0)) ** 2 / largest
+    z: Floats = (1.0 + share * (largest - 1.0)) ** 2 / largest
     partners = others[rng.integers(len(others), size=n_walkers)]
     points = partners + z[:, None] * (walkers - partners)
     return Proposal(points, (n_parameters - 1) * np.log(z))

@@ -1,103 +1,22 @@
-"""Posterior of the coefficients by sampling.
-
-Prior times the likelihood of whole trials, raised to a power below one (coarsened
-posterior, Miller & Dunson 2019, Journal of the American Statistical Association 114):
-equations that are not the ship's make errors that are not noise.
-"""
+"""Posterior of the coefficients by sampling, draws of which the model keeps."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from identification.arrays import by_name
 from identification.simulation_error.coefficient_prior import CoefficientPrior
 from identification.simulation_error.whole_trials import WholeTrials
-from identification.uncertainty.ensemble import LogDensity, sample_ensemble
+from identification.uncertainty.coarsened import CoarsenedPosterior
+from identification.uncertainty.ensemble import Chains, LogDensity, sample_ensemble
 from identification.uncertainty.mixing import Mixing, mixing_of
 from identification.uncertainty.model_error import FEWEST_TRIALS, model_error
-from identification.uncertainty.quadratic_map import QuadraticMap, quadratic_map
 from identification.uncertainty.uncertainty import Uncertainty
 from shipgym import InputError, ShipModel, Trial
-from shipgym.arrays import Flags, Floats
+from shipgym.arrays import Floats
 from shipgym.manoeuvres.execution import usual_rudder
-
-
-class Mode(NamedTuple):
-    """The most probable point, and the Gauss-Newton covariance there."""
-
-    point: Floats
-    covariance: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class CoarsenedPosterior:
-    """Prior times the likelihood of whole trials to a power."""
-
-    trials: WholeTrials
-    scales: Floats  # of the errors by channel
-    power: float
-
-    @property
-    def all_parts(self) -> Flags:
-        """Parts of all trials."""
-        return np.ones(len(self.trials.parts), dtype=np.bool_)
-
-    def log_density(self, points: Floats, kept: Flags | None = None) -> Floats:
-        """Logarithm of the density but for a constant, shape (n_points,)."""
-        if kept is None:
-            kept = self.all_parts
-        misfits = self.trials.misfits(points, self.scales, kept)
-        from_prior = np.sum(points**2, axis=1)
-        return np.asarray(-0.5 * (self.power * misfits + from_prior))
-
-    def mode(self, start: Floats, kept: Flags | None = None) -> Mode:
-        """The most probable point by Gauss-Newton steps; `kept` are parts of trials."""
-        if kept is None:
-            kept = self.all_parts
-        point = start
-        lengths = 0.5 ** np.arange(12)
-        best = float(self.log_density(point[None], kept)[0])
-        for _ in range(10):
-            covariance, gradient = self._quadratic(point, kept)
-            step = covariance @ gradient
-            reached = point - lengths[:, None] * step
-            values = self.log_density(reached, kept)
-            taken = int(values.argmax())
-            gain = values[taken] - best
-            if gain > 0.0:
-                point, best = reached[taken], float(values[taken])
-            if gain < 1e-2:
-                break
-        return Mode(point, self._quadratic(point, kept)[0])
-
-    def map(self, mode: Mode) -> QuadraticMap:
-        """Coordinates in which the density is nearly standard normal."""
-        root = np.sqrt(self.power)
-        kept = self.all_parts
-        slopes = self.trials.slopes(mode.point, self.scales, kept)
-        jacobian = root * slopes.jacobian
-
-        def errors(points: Floats) -> Floats:
-            return root * self.trials.scaled_errors(points, self.scales, kept)
-
-        return quadratic_map(mode.point, jacobian.T @ jacobian, jacobian, errors)
-
-    def _quadratic(self, point: Floats, kept: Flags) -> tuple[Floats, Floats]:
-        """Gauss-Newton covariance, and gradient of minus the log density."""
-        errors, jacobian = self.trials.slopes(point, self.scales, kept)
-        information = self.power * jacobian.T @ jacobian + np.eye(len(point))
-        gradient = self.power * jacobian.T @ errors + point
-        inverse = np.linalg.inv(information)
-        return 0.5 * (inverse + inverse.T), gradient
-
-    def model(self, mode: Mode) -> ShipModel:
-        """The model of a mode, with its covariance."""
-        prior = self.trials.prior
-        values = prior.coefficients(mode.point[None])[0]
-        model = self.trials.blank.with_coefficients(values)
-        return replace(model, covariance=prior.covariance(mode.covariance), draws=None)
 
 
 def check_trials(trials: Sequence[Trial]) -> None:
@@ -176,10 +95,28 @@ def with_posterior(
         )
         return model, {"kept": False, "remarks": [remark]}
 
-    first = CoarsenedPosterior(whole, scales, power=1.0)
-    scales = whole.scales(first.mode(start).point)
-    posterior, error = coarsened(CoarsenedPosterior(whole, scales, 1.0), trials, start)
-    return _sampled(model, posterior, error, start, asked)
+    by_scatter = CoarsenedPosterior(whole, scales, power=1.0)
+    mode = by_scatter.mode(start)
+    remarks = contradictions(whole, mode.point)
+    by_scatter = replace(by_scatter, scales=whole.scales(mode.point))
+    posterior, error = coarsened(by_scatter, trials, start)
+
+    chains = _chains(posterior, start, asked)
+    mixing = mixing_of(chains)
+    if not mixing.is_enough:
+        remarks.append(_not_mixed(mixing))
+    else:
+        model = _with_draws(model, prior, chains.flat, asked.seed)
+    return model, {
+        "kept": mixing.is_enough,
+        "prior": prior.source,
+        "power": posterior.power,
+        "left_out": error,
+        "parameters": prior.n_parameters,
+        **mixing.plain(),
+        "error_scales": by_name(whole.channels, posterior.scales),
+        "remarks": remarks,
+    }
 
 
 def _point_of(model: ShipModel, prior: CoefficientPrior) -> Floats:
@@ -218,20 +155,14 @@ def coarsened(
     return posterior, error
 
 
-def _sampled(
-    model: ShipModel,
-    posterior: CoarsenedPosterior,
-    error: dict[str, Any],
-    start: Floats,
-    asked: Uncertainty,
-) -> tuple[ShipModel, dict[str, Any]]:
-    """The model with draws where the walkers mixed, and the report."""
-    rng = np.random.default_rng(asked.seed)
+def _chains(posterior: CoarsenedPosterior, start: Floats, asked: Uncertainty) -> Chains:
+    """Points of the posterior that walkers went through."""
     shape = posterior.map(posterior.mode(start))
 
     def log_density(coordinates: Floats) -> Floats:
         return posterior.log_density(shape.points(coordinates))
 
+    rng = np.random.default_rng(asked.seed)
     chains = sample_ensemble(
         log_density,
         _walkers(log_density, len(start), rng),
@@ -239,34 +170,24 @@ def _sampled(
         warm_up=asked.steps // 2,
         seed=asked.seed,
     )
-    mixing = mixing_of(chains)
-    whole = posterior.trials
     points = shape.points(chains.flat)
-    report: dict[str, Any] = {
-        "kept": mixing.is_enough,
-        "prior": whole.prior.source,
-        "power": posterior.power,
-        "left_out": error,
-        "parameters": whole.prior.n_parameters,
-        **mixing.plain(),
-        "error_scales": by_name(whole.channels, posterior.scales),
-    }
-    remarks = contradictions(whole, points)
-    if not mixing.is_enough:
-        report["remarks"] = [*remarks, _not_mixed(mixing)]
-        return model, report
+    return replace(chains, points=points.reshape(chains.points.shape))
 
-    coefficients = whole.prior.coefficients(points)
+
+def _with_draws(
+    model: ShipModel, prior: CoefficientPrior, points: Floats, seed: int
+) -> ShipModel:
+    """The model with the covariance of points of the posterior, and some of them."""
     n_draws = 256
+    rng = np.random.default_rng(seed)
     chosen = rng.choice(len(points), n_draws, replace=False)
     chosen.sort()
-    sampled = replace(
+    of_points = np.atleast_2d(np.cov(points.T))
+    return replace(
         model,
-        covariance=np.cov(coefficients.T),
-        draws=_rounded(coefficients[chosen]),
+        covariance=prior.covariance(of_points),
+        draws=_rounded(prior.coefficients(points[chosen])),
     )
-    report |= {"draws": n_draws, "remarks": remarks}
-    return sampled, report
 
 
 def _walkers(
@@ -283,7 +204,7 @@ def _walkers(
     points = rng.standard_normal((5 * n_walkers, n_parameters))
     points[0] = 0.0  # the mode
     log_weights = log_density(points) + 0.5 * np.sum(points**2, axis=1)
-    # the largest of weights times exponential numbers are a draw without replacement
+    # the largest of log weights and Gumbel numbers are a draw without replacement
     order = np.argsort(log_weights + rng.gumbel(size=len(points)))
     chosen = points[order[-n_walkers:]]
     lost = ~np.isfinite(log_density(chosen))
@@ -291,14 +212,18 @@ def _walkers(
     return np.asarray(chosen)
 
 
-def contradictions(whole: WholeTrials, points: Floats) -> list[str]:
-    """A remark where the trials contradict the prior, on what is farthest off."""
+def contradictions(whole: WholeTrials, point: Floats) -> list[str]:
+    """A remark where the trials contradict the prior, on what is farthest off.
+
+    `point` is the most probable one by the scatter of the errors alone: where the
+    likelihood counts for less, a narrow prior would hide that it is wrong.
+    """
     prior = whole.prior
     deviations = prior.deviations
     known = deviations > 0.0
-    mean = prior.coefficients(points.mean(axis=0)[None])[0]
-    off = np.zeros(len(mean))
-    off[known] = (mean - prior.mean)[known] / deviations[known]
+    values = prior.coefficients(point[None])[0]
+    off = np.zeros(len(values))
+    off[known] = (values - prior.mean)[known] / deviations[known]
     worst = int(np.abs(off).argmax())
     limit = 3.0
     if abs(off[worst]) <= limit:
