@@ -64,7 +64,7 @@ def stretch(walkers: Floats, others: Floats, rng: np.random.Generator) -> Propos
     """Stretch move (Goodman & Weare 2010, Comm. App. Math. Comp. Sci. 5, eq. 7)."""
     n_walkers, n_parameters = walkers.shape
     largest = 2.0
-    share = rng.random(n_walkers)
+    share = np.asarray(rng.random(n_walkers))
     # density 1 / sqrt(z) between 1 / largest and largest
     z: Floats = (1.0 + share * (largest - 1.0)) ** 2 / largest
     partners = others[rng.integers(len(others), size=n_walkers)]
