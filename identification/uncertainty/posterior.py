@@ -140,6 +140,8 @@ def coarsened(
     """
     of_parts = posterior.trials.of_trials
     error: dict[str, Any] = {}
+    slope = 0.5  # of the factor by the power, logarithms: of normal distributions
+    earlier: tuple[float, float] | None = None
     for _ in range(3):
         own = posterior.mode(start)
         left_out = []
@@ -151,7 +153,12 @@ def coarsened(
         near_enough = 1.1
         if factor <= near_enough:
             break
-        posterior = replace(posterior, power=posterior.power / factor**2)
+        logs = float(np.log(posterior.power)), float(np.log(factor))
+        if earlier is not None:
+            by_secant = (logs[1] - earlier[1]) / (logs[0] - earlier[0])
+            slope = min(max(by_secant, 0.1), 0.5)
+        earlier = logs
+        posterior = replace(posterior, power=float(np.exp(logs[0] - logs[1] / slope)))
     return posterior, error
 
 
