@@ -33,7 +33,10 @@ from identification import identify  # noqa: E402
 from identification.simulation_error.whole_trials import WholeTrials  # noqa: E402
 from identification.uncertainty.coarsened import CoarsenedPosterior  # noqa: E402
 from identification.uncertainty.ensemble import sample_ensemble  # noqa: E402
-from identification.uncertainty.mixing import mixing_of  # noqa: E402
+from identification.uncertainty.mixing import (  # noqa: E402
+    autocorrelation_times,
+    mixing_of,
+)
 from identification.uncertainty.posterior import table_prior  # noqa: E402
 from shipgym import Particulars, ShipModel, SteeringGear, Trial  # noqa: E402
 from shipgym.arrays import Floats  # noqa: E402
@@ -162,7 +165,7 @@ def _print_sampler(
 def by_gradients(
     posterior: CoarsenedPosterior, draws: int
 ) -> tuple[Floats, float, float]:
-    """Points, effective samples and seconds of four chains of blackjax."""
+    """Points, effective samples and seconds of a chain of blackjax."""
     import blackjax
     import jax
     import jax.numpy as jnp
@@ -171,24 +174,20 @@ def by_gradients(
     log_density = _in_jax(posterior, jax, jnp)
     n_parameters = posterior.trials.prior.n_parameters
     begun = time.process_time()
-    chains = []
-    for seed in range(4):
-        key = jax.random.key(seed)
-        warm, run = jax.random.split(key)
-        adaptation = blackjax.window_adaptation(blackjax.nuts, log_density)
-        (state, settings), _ = adaptation.run(warm, jnp.zeros(n_parameters), 500)
-        step = blackjax.nuts(log_density, **settings).step
+    warm, run = jax.random.split(jax.random.key(0))
+    adaptation = blackjax.window_adaptation(blackjax.nuts, log_density)
+    (state, settings), _ = adaptation.run(warm, jnp.zeros(n_parameters), 200)
+    step = blackjax.nuts(log_density, **settings).step
 
-        def one(state: Any, key: Any, step: Any = step) -> Any:
-            state, _ = step(key, state)
-            return state, state.position
+    def one(state: Any, key: Any) -> Any:
+        state, _ = step(key, state)
+        return state, state.position
 
-        _, points = jax.lax.scan(one, state, jax.random.split(run, draws))
-        chains.append(np.asarray(points))
+    _, chain = jax.lax.scan(one, state, jax.random.split(run, draws))
+    points = np.asarray(chain)
     seconds = time.process_time() - begun
-    stacked = np.stack(chains)
-    samples = float(np.min(blackjax.diagnostics.effective_sample_size(stacked)))
-    return stacked.reshape(-1, n_parameters), samples, seconds
+    times = autocorrelation_times(points[:, None])
+    return points, draws / float(times.max()), seconds
 
 
 def _in_jax(posterior: CoarsenedPosterior, jax: Any, jnp: Any) -> Any:

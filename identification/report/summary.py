@@ -59,11 +59,16 @@ def mixing_in_words(posterior: Mapping[str, Any]) -> str:
     time = posterior["autocorrelation_time"]
     r_hat = posterior["r_hat"]
     samples = posterior["effective_samples"]
-    return (
-        f"likelihood to the power {power:.2g}, {walkers} walkers, {steps} steps,"
-        f" acceptance {acceptance:.2f}, autocorrelation time {time:.0f} steps, split"
-        f" R-hat {r_hat:.3f}, {samples:.0f} effective samples"
-    )
+    parts = [
+        f"likelihood to the power {power:.2g}",
+        f"{walkers} walkers",
+        f"{steps} steps",
+        f"acceptance {acceptance:.2f}",
+        f"autocorrelation time {time:.0f} steps",
+        f"split R-hat {r_hat:.3f}",
+        f"{samples:.0f} effective samples",
+    ]
+    return ", ".join(parts)
 
 
 def _headline(fit: Fit) -> str:

@@ -73,20 +73,29 @@ class WholeTrials:
         for part in self.parts:
             tiles = []
             for begin in range(0, n_points, LANES):
-                tile = ships[:, begin : begin + LANES]
-                tiles.append(self._tile_errors(part, tile))
-            by_part.append(np.concatenate(tiles, axis=2))
+                end = begin + LANES
+                tile = ships[:, begin:end]
+                errors = self._tile_errors(part, tile)
+                tiles.append(errors)
+            of_part = np.concatenate(tiles, axis=2)
+            by_part.append(of_part)
         return by_part
 
     def _tile_errors(self, part: Segment, ships: Floats) -> Floats:
         """Errors of at most as many ships as there are lanes."""
         n_ships = ships.shape[1]
-        spare = np.repeat(ships[:, -1:], LANES - n_ships, axis=1)
+        n_spare = LANES - n_ships
+        spare = np.repeat(
+            ships[:, -1:],
+            n_spare,
+            axis=1,
+        )
+        starts = in_all_lanes(part.start)
         states = sail_lanes(
             self.blank,
             part,
             ships=np.hstack([ships, spare]),
-            starts=in_all_lanes(part.start),
+            starts=starts,
             offsets=np.zeros(LANES),
         )
         # at the first sample the ships have not moved yet
@@ -123,11 +132,16 @@ class WholeTrials:
 
     def scaled_errors(self, points: Floats, scales: Floats, kept: Flags) -> Floats:
         """Errors in their scales of the parts kept, shape (n_rows, n_points)."""
+        n_points = len(points)
+        column = scales[:, None]
+        by_part = self.errors(points)
         rows = []
-        for errors, counts in zip(self.errors(points), kept, strict=True):
-            if counts:
-                scaled = errors / scales[:, None]
-                rows.append(scaled.reshape(-1, len(points)))
+        for errors, counts in zip(by_part, kept, strict=True):
+            if not counts:
+                continue
+            scaled = errors / column
+            in_rows = scaled.reshape(-1, n_points)
+            rows.append(in_rows)
         return np.concatenate(rows)
 
     def slopes(self, point: Floats, scales: Floats, kept: Flags) -> Slopes:

@@ -56,12 +56,15 @@ class CoarsenedPosterior:
             reached = point - lengths[:, None] * step
             values = self.log_density(reached, kept)
             taken = int(values.argmax())
-            gain = values[taken] - best
+            value = float(values[taken])
+            gain = value - best
             if gain > 0.0:
-                point, best = reached[taken], float(values[taken])
+                point = reached[taken]
+                best = value
             if gain < 1e-2:
                 break
-        return Mode(point, self._quadratic(point, kept)[0])
+        covariance, _ = self._quadratic(point, kept)
+        return Mode(point, covariance)
 
     def map(self, mode: Mode) -> QuadraticMap:
         """Coordinates in which the density is nearly standard normal."""

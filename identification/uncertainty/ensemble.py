@@ -4,6 +4,7 @@ Each half of the walkers moves by the other half, all of them at once: a density
 takes many points in one call is evaluated for half the walkers at a time.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -174,8 +175,11 @@ class Ensemble:
         """Lengthen moves that are taken more often than they need be."""
         usual = 0.3
         gain = 0.2
-        longer = self.longest * np.exp(gain * (acceptance - usual))
-        self.longest = min(max(float(longer), 0.01), 1.0)
+        shortest = 0.01
+        change = gain * (acceptance - usual)
+        longer = self.longest * math.exp(change)
+        longer = max(longer, shortest)
+        self.longest = min(longer, 1.0)
 
 
 def sample_ensemble(
@@ -191,22 +195,32 @@ def sample_ensemble(
     least twice that of parameters. In the warm-up the normal distribution of a move is
     renewed three times.
     """
-    ensemble = Ensemble(log_density, start.copy(), np.random.default_rng(seed))
+    rng = np.random.default_rng(seed)
+    ensemble = Ensemble(
+        log_density,
+        walkers=start.copy(),
+        rng=rng,
+    )
+    n_parameters = start.shape[1]
     for share in (0.2, 0.3, 0.5):
-        begun = _points(ensemble, max(int(share * warm_up), 2))
-        n_steps = len(begun)
+        n_steps = max(int(share * warm_up), 2)
+        begun = _points(ensemble, n_steps)
         later = begun[n_steps // 2 :]
-        ensemble.adapt(later.reshape(-1, start.shape[1]))
+        points = later.reshape(-1, n_parameters)
+        ensemble.adapt(points)
     ensemble.is_tuned = True
 
+    reports = 10
+    bounds = np.linspace(0, steps, reports + 1).astype(int)
+    counts = np.diff(bounds)
     parts = []
-    most = 10
-    bounds = np.linspace(0, steps, most + 1).astype(int)
-    for n_steps in counted("posterior", np.diff(bounds).tolist()):
-        parts.append(_points(ensemble, n_steps))
+    for n_steps in counted("posterior", counts.tolist()):
+        part = _points(ensemble, n_steps)
+        parts.append(part)
+    acceptance = ensemble.taken / max(ensemble.moves, 1)
     return Chains(
         points=np.concatenate(parts),
-        acceptance=ensemble.taken / max(ensemble.moves, 1),
+        acceptance=acceptance,
     )
 
 

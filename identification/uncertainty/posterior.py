@@ -1,5 +1,6 @@
 """Posterior of the coefficients by sampling, draws of which the model keeps."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -207,14 +208,21 @@ def _walkers(
     """
     whole_batches = 128
     fewest = 2 * n_parameters
-    n_walkers = whole_batches * -(-fewest // whole_batches)
-    points = rng.standard_normal((5 * n_walkers, n_parameters))
+    batches = math.ceil(fewest / whole_batches)
+    n_walkers = whole_batches * batches
+    n_points = 5 * n_walkers
+    points = rng.standard_normal((n_points, n_parameters))
     points[0] = 0.0  # the mode
-    log_weights = log_density(points) + 0.5 * np.sum(points**2, axis=1)
+
+    squares = np.sum(points**2, axis=1)
+    log_weights = log_density(points) + 0.5 * squares
     # the largest of log weights and Gumbel numbers are a draw without replacement
-    order = np.argsort(log_weights + rng.gumbel(size=len(points)))
-    chosen = points[order[-n_walkers:]]
-    lost = ~np.isfinite(log_density(chosen))
+    chances = rng.gumbel(size=n_points)
+    order = np.argsort(log_weights + chances)
+    best = order[-n_walkers:]
+    chosen = points[best]
+    values = log_density(chosen)
+    lost = ~np.isfinite(values)
     chosen[lost] *= 0.01
     return np.asarray(chosen)
 
@@ -246,12 +254,15 @@ def contradictions(whole: WholeTrials, point: Floats) -> list[str]:
 def _not_mixed(mixing: Mixing) -> str:
     """A remark on walkers that did not mix."""
     fewest = mixing.fewest_times
-    hundreds = np.ceil(2.0 * fewest * mixing.autocorrelation_time / 100.0)
-    more = max(100 * int(hundreds), 2 * mixing.steps)
+    steps = mixing.steps
+    time = mixing.autocorrelation_time
+    needed = 2.0 * fewest * time
+    hundreds = math.ceil(needed / 100.0)
+    more = max(100 * hundreds, 2 * steps)
     return (
         f"posterior: expected walkers that mix, {fewest:g} autocorrelation times and"
-        f" a split R-hat up to {mixing.largest_r_hat:g}, got {mixing.steps} steps of"
-        f" {mixing.autocorrelation_time:.0f} each and {mixing.r_hat:.2f}; the"
+        f" a split R-hat up to {mixing.largest_r_hat:g}, got {steps} steps of"
+        f" {time:.0f} each and {mixing.r_hat:.2f}; the"
         f" covariance is kept: try uncertainty.steps = {more}"
     )
 

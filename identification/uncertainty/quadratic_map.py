@@ -56,10 +56,14 @@ def quadratic_map(
         """Gauss-Newton steps of each coordinate, shape (n_points, n_parameters)."""
         found = []
         at_once = 512
-        for begin in range(0, len(coordinates), at_once):
-            part = coordinates[begin : begin + at_once]
-            reached = errors(mode + part @ axes.T)
-            found.append(-reached.T @ along)
+        n_points = len(coordinates)
+        for begin in range(0, n_points, at_once):
+            end = begin + at_once
+            part = coordinates[begin:end]
+            points = mode + part @ axes.T
+            reached = errors(points)
+            step = -reached.T @ along
+            found.append(step)
         return np.concatenate(found)
 
     n_parameters = len(mode)
