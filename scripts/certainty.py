@@ -51,6 +51,7 @@ from shipgym.manoeuvres.intervals import (  # noqa: E402
     IndexInterval,
     attempt,
     intervals_of,
+    own_indices,
 )
 from shipgym.manoeuvres.registry import standard_time  # noqa: E402
 from shipgym.trials.sensors import Sensors  # noqa: E402
@@ -179,9 +180,8 @@ def true_indices(ship: ShipModel) -> Key[float]:
 def index_intervals(model: ShipModel, draws: int, seed: int = 1) -> Key[IndexInterval]:
     """The same indices of a model, with intervals over draws from its covariance."""
     tests = compared(model)
-    own = {run: one.no_indices for run, one in tests.items()}
     found = intervals_of(
-        own,
+        own_indices(model, tests),
         model.sample(draws, seed),
         {run: one.evaluate for run, one in tests.items()},
     )
@@ -198,7 +198,8 @@ def holds(found: Key[IndexInterval], truth: Key[float]) -> Key[bool]:
     return {
         key: (
             one.interval is not None
-            and one.interval[0] <= truth[key] <= one.interval[1]
+            and one.interval[0] <= truth[key]
+            and (one.interval[1] is None or truth[key] <= one.interval[1])
         )
         for key, one in found.items()
     }
@@ -250,7 +251,7 @@ def coverage(ship: ShipModel, model: ShipModel, draws: int) -> dict[str, object]
         widths = [
             np.ptp(one.interval) / 2.0 / truth[key]
             for key, one in found.items()
-            if one.interval
+            if one.interval and one.interval[1] is not None
         ]
         row[f"{label} width"] = float(np.median(widths))
     return row

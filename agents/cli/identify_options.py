@@ -6,6 +6,19 @@ from typer import Option
 
 from agents.cli.parameters import with_options
 
+Source = Annotated[
+    str | None,
+    Option(help="Source of the covariance: analytic, bootstrap or posterior."),
+]
+Settings = Annotated[
+    list[str] | None,
+    Option(
+        "--set",
+        metavar="OPTION=VALUE",
+        help="Any option of the table [identify], or stage.option; repeatable.",
+    ),
+]
+
 
 def identify_options(
     structure: Annotated[
@@ -54,14 +67,8 @@ def identify_options(
         float | None,
         Option(help="Strength of that pull; default: by cross-validation."),
     ] = None,
-    set_: Annotated[
-        list[str] | None,
-        Option(
-            "--set",
-            metavar="OPTION=VALUE",
-            help="Any option of the table [identify], or stage.option; repeatable.",
-        ),
-    ] = None,
+    uncertainty: Source = None,
+    set_: Settings = None,
 ) -> dict[str, Any]:
     """Options given on the command line, by name; a flag goes before `--set`."""
     from shipgym.files import named_values, toml_value
@@ -77,6 +84,7 @@ def identify_options(
         "kernel": kernel,
         "prior": prior,
         "prior_strength": prior_strength,
+        "uncertainty": uncertainty,
     }
     found = named_values(set_ or (), "--set", "seed=3")
     for name, value in by_flag.items():

@@ -42,11 +42,12 @@ def number(value: float | None, decimals: int) -> str:
 
 
 def between(ends: tuple[float | None, float | None] | None, decimals: int) -> str:
-    """An interval with decimals, a dash for None."""
-    if ends is None or None in ends:
+    """An interval with decimals, a dash for one without a lower end."""
+    if ends is None or ends[0] is None:
         return "-"
-    low, high = (number(end, decimals) for end in ends)
-    return f"{low} to {high}"
+    low, high = ends
+    upper = "no upper bound" if high is None else number(high, decimals)
+    return f"{number(low, decimals)} to {upper}"
 
 
 def prediction_table(result: IdentificationResult, note: str = "") -> Table:

@@ -14,6 +14,7 @@ from shipgym.manoeuvres.imo_rules import imo_manoeuvres
 from shipgym.manoeuvres.intervals import (
     IndexInterval,
     intervals_of,
+    is_size,
     own_indices,
 )
 from shipgym.manoeuvres.turning import full_rudder_deg
@@ -159,7 +160,12 @@ def uncertainty_of(
         ran_away = sailed.ran_away[name]
         intervals[name] = {}
         for index, value in indices.items():
-            interval = IndexInterval(value, values[index], ran_away)
+            interval = IndexInterval(
+                value=value,
+                values=values[index],
+                ran_away=ran_away,
+                is_size=is_size(index),
+            )
             intervals[name][index] = interval
 
     criteria = {}

@@ -103,7 +103,7 @@ def draw_jobs(
 
     These are drawn here: another computer may draw others in the last digit.
     """
-    own = replace(model, covariance=None).to_dict()
+    own = replace(model, covariance=None, draws=None).to_dict()
     pilots = [controller.to_dict() for controller in controllers]
     jobs = []
     for first in range(0, len(drawn), DRAWS_A_JOB):

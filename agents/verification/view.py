@@ -227,7 +227,8 @@ def _criterion_row(name: str, criterion: Criterion) -> CriterionRow:
     interval = NONE
     if criterion.interval is not None:
         low, high = criterion.interval
-        interval = f"{fixed(low)} to {fixed(high)}"
+        upper = "no upper bound" if high is None else fixed(high)
+        interval = f"{fixed(low)} to {upper}"
     notes = criterion.source
     if criterion.note:
         notes += f"; {criterion.note}"

@@ -302,6 +302,7 @@ class _Search:
             structure=table.name,
             dynamics=table,
             covariance=None,
+            draws=None,
             provenance=None,
             coefficients=dict.fromkeys(table.coefficient_names, 0.0),
         )

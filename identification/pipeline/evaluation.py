@@ -136,6 +136,13 @@ def with_uncertainty(
         provenance = provenance | {"model_error": error}
         covariance = covariance + np.outer(by_clock, by_clock)
     model = replace(fit.model, covariance=covariance)
+    if options.uncertainty.by_sampling:
+        from identification.uncertainty.posterior import table_prior, with_posterior
+
+        prior = table_prior(model)
+        asked = options.uncertainty
+        model, report = with_posterior(model, problem.used, prior, asked)
+        provenance = provenance | {"posterior": report}
     return evaluated(model, fit, problem, provenance, options)
 
 
@@ -278,6 +285,8 @@ def evaluated(
     metrics = _stability(complete, lost)
     if bias is not None:
         metrics["rudder_bias"] = bias.plain()
+    if "posterior" in complete:
+        metrics["posterior"] = complete["posterior"]
     metrics |= _accuracy(model, problem, trials, predictions)
     return IdentificationResult(
         model=model,

@@ -104,6 +104,11 @@ def by_kernel(
     trials: Sequence[Trial], options: Options, kernel: KernelResidual
 ) -> IdentificationResult:
     """A reference ship, fitted or named, and a kernel on what she leaves."""
+    if options.uncertainty.by_sampling:
+        raise InputError(
+            "uncertainty: expected 'analytic' or 'bootstrap' with a kernel, got"
+            " 'posterior'; choose one of these, or leave the kernel out"
+        )
     beneath = reference_options(options)
     problem = pose(trials, beneath)
     reference, box = _reference_box(trials, beneath, problem)
@@ -234,6 +239,13 @@ class SimulationFit:
         fit = _guard_report(model, estimators, self.reasons)
         provenance = provenance_of(options, MAP, fit, problem)
         provenance |= self.fit.report
+        if options.uncertainty.by_sampling:
+            from identification.uncertainty.posterior import with_posterior
+
+            prior = self.fit.posterior.coefficient_prior
+            asked = options.uncertainty
+            model, report = with_posterior(model, problem.used, prior, asked)
+            provenance |= {"uncertainty": "posterior", "posterior": report}
         return evaluated(model, fit, problem, provenance, options)
 
 

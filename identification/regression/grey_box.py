@@ -119,7 +119,7 @@ def bare_metrics(model: ShipModel, trials: Sequence[Trial]) -> dict[str, Any]:
     box = model.table
     assert isinstance(box, GreyBox)
     no_correction = dict.fromkeys(model.coefficients, 0.0)
-    bare = replace(model, coefficients=no_correction, covariance=None)
+    bare = replace(model, coefficients=no_correction, covariance=None, draws=None)
     metrics = {}
     for trial in trials:
         predicted = predict(bare, trial)

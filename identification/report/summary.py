@@ -31,8 +31,12 @@ def summary_table(fit: Fit) -> str:
         _inertia(fit),
         _equations(fit),
     ]
+    posterior = provenance.get("posterior")
     error = provenance.get("model_error")
-    if error:
+    if posterior and posterior["kept"]:
+        words = mixing_in_words(posterior)
+        shown.append(f"Standard errors are those of a posterior by sampling: {words}.")
+    elif error:
         shown.append(
             f"Standard errors are scaled by {error['factor']:.2g} for model error"
             f" ({error['how']})."
@@ -44,6 +48,27 @@ def summary_table(fit: Fit) -> str:
     if "reference" in fit.metrics:
         shown.append(_against_reference(fit))
     return as_text(*shown)
+
+
+def mixing_in_words(posterior: Mapping[str, Any]) -> str:
+    """Size and diagnostics of a posterior by sampling, from its report."""
+    power = posterior["power"]
+    walkers = posterior["walkers"]
+    steps = posterior["steps"]
+    acceptance = posterior["acceptance"]
+    time = posterior["autocorrelation_time"]
+    r_hat = posterior["r_hat"]
+    samples = posterior["effective_samples"]
+    parts = [
+        f"likelihood to the power {power:.2g}",
+        f"{walkers} walkers",
+        f"{steps} steps",
+        f"acceptance {acceptance:.2f}",
+        f"autocorrelation time {time:.0f} steps",
+        f"split R-hat {r_hat:.3f}",
+        f"{samples:.0f} effective samples",
+    ]
+    return ", ".join(parts)
 
 
 def _headline(fit: Fit) -> str:

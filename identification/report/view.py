@@ -10,7 +10,11 @@ import numpy as np
 from identification.fit import Fit
 from identification.report.predictions import overview_figure, prediction_figure
 from identification.report.sea import sea_sentences, track_figure
-from identification.report.summary import are_derivatives, kernel_text
+from identification.report.summary import (
+    are_derivatives,
+    kernel_text,
+    mixing_in_words,
+)
 from identification.report.tables import (
     CoefficientRow,
     ErrorRow,
@@ -252,6 +256,9 @@ def _coefficient_notes(fit: Fit, tables: Mapping[str, list[CoefficientRow]]) -> 
 
 def _error_source(provenance: Mapping[str, Any]) -> str:
     """Where the standard errors come from."""
+    posterior = provenance.get("posterior")
+    if posterior and posterior["kept"]:
+        return f"a posterior by sampling ({mixing_in_words(posterior)})"
     source = "the residuals of the fit, correlated in time and between the equations"
     if provenance.get("uncertainty") == "bootstrap":
         source = "refits to blocks of time drawn with replacement"

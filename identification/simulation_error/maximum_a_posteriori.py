@@ -16,7 +16,6 @@ from identification.simulation_error.hull_formulas import YOSHIMURA
 from identification.simulation_error.mmg_prior import MMGPrior, mmg_prior
 from identification.simulation_error.posterior import Estimate, HeldOutError, Posterior
 from identification.simulation_error.prior_knowledge import PriorKnowledge
-from identification.uncertainty.uncertainty import Uncertainty
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
@@ -43,9 +42,9 @@ def checked_mmg(options: Options) -> Options:
             " settings out, or choose another structure"
         )
     covariance = options.uncertainty.covariance
-    if covariance != Uncertainty.covariance:
+    if covariance == "bootstrap":
         raise InputError(
-            "uncertainty: expected 'analytic' with structure 'mmg', got"
+            "uncertainty: expected 'analytic' or 'posterior' with structure 'mmg', got"
             f" {covariance!r}; leave it out, or choose another structure"
         )
     prior = None if options.prior is None else options.prior.source

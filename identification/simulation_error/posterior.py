@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.arrays import by_name
+from identification.simulation_error.coefficient_prior import CoefficientPrior
 from identification.simulation_error.least_squares import (
     Linearised,
     fit_least_squares,
@@ -100,6 +101,15 @@ class Posterior:
         values = self.mean + z * self.prior.deviation
         coefficients = self.prior.mean | by_name(IDENTIFIED, values)
         return replace(self.blank, coefficients=coefficients)
+
+    @property
+    def coefficient_prior(self) -> CoefficientPrior:
+        """The prior of all coefficients; those known beforehand do not vary."""
+        names = list(self.blank.coefficients)
+        mean = np.array([self.prior.mean[name] for name in names])
+        root = np.zeros((len(names), len(IDENTIFIED)))
+        root[: len(IDENTIFIED)] = np.diag(self.prior.deviation)
+        return CoefficientPrior(self.prior.source, mean, root)
 
     def errors(self, z: Floats, which: Integers) -> tuple[Floats, Floats]:
         """Errors of the simulated channels, and their slopes by z, of some segments.

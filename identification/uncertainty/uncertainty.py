@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from shipgym.checks import check_choice, check_flag
+from shipgym.checks import check_choice, check_flag, check_whole
 
 
 @dataclass(frozen=True)
@@ -11,18 +11,32 @@ class Uncertainty:
 
     Parameters
     ----------
-    covariance : {"analytic", "bootstrap"}
+    covariance : {"analytic", "bootstrap", "posterior"}
         From the residuals, taken as correlated between the equations and over the time
-        to sail one ship length; or from refits to blocks of that length drawn with
-        replacement.
+        to sail one ship length; from refits to blocks of that length drawn with
+        replacement; or from a posterior by sampling, draws of which the model keeps.
     model_error : bool
         Whether the covariance is scaled until trials left out in turn are predicted
-        within it.
+        within it; a posterior always is.
+    steps : int, from 20
+        Steps of the walkers that sample a posterior, after half as many to warm up.
+    seed : int, at least 0
+        Of the walkers.
     """
 
     covariance: str = "analytic"
     model_error: bool = True
+    steps: int = 800
+    seed: int = 0
 
     def __post_init__(self) -> None:
-        check_choice(self.covariance, ("analytic", "bootstrap"), "uncertainty")
+        kinds = ("analytic", "bootstrap", "posterior")
+        check_choice(self.covariance, kinds, "uncertainty")
         check_flag(self.model_error, "model_error")
+        check_whole(self.steps, "uncertainty.steps", at_least=20)
+        check_whole(self.seed, "uncertainty.seed", at_least=0)
+
+    @property
+    def by_sampling(self) -> bool:
+        """Whether it is a posterior by sampling."""
+        return self.covariance == "posterior"

@@ -41,6 +41,7 @@ def model_warnings(fit: Fit) -> list[str]:
         *_shaft_ignored(fit),
         *provenance.get("sea_remarks", []),
         *provenance.get("prior_remarks", []),
+        *provenance.get("posterior", {}).get("remarks", []),
         *provenance.get("kernel", {}).get("remarks", []),
         *exactly_collinear(fit),
         *_lost_headings(fit),

@@ -167,4 +167,4 @@ def _loaded(ship: ShipModel, displacement: float) -> ShipModel:
     lighter = {}
     for name, value in ship.coefficients.items():
         lighter[name] = value / displacement
-    return replace(ship, coefficients=lighter, covariance=None)
+    return replace(ship, coefficients=lighter, covariance=None, draws=None)

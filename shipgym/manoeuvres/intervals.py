@@ -32,16 +32,30 @@ class IndexInterval:
     #: (n_draws,)
     values: Floats
     ran_away: Flags  # draws that ran away in the manoeuvre, shape (n_draws,)
+    #: whether it is a length, an angle or a time that is never negative, and has no
+    #: bound for a ship that does not complete her manoeuvre
+    is_size: bool = True
 
     @property
-    def interval(self) -> tuple[float, float] | None:
+    def interval(self) -> tuple[float, float | None] | None:
         """The 95 % interval: quantiles of 2.5 and 97.5 per cent of the draws.
 
-        Draws that ran away or were not completed are left out: see their counts.
-        None without any.
+        It contains the value of the model itself. Draws that ran away or were not
+        completed count at the upper end of a size, and the upper end is None where they
+        reach it: there is no upper bound. Those of another index, such as a drift
+        angle, may lie at either end, and the interval is None where they reach them;
+        so it is without draws.
         """
+        if not len(self.values):
+            return None
         low, high = self.quantiles(*LEVELS_95)
-        return None if low is None or high is None else (low, high)
+        if self.value is None:  # the model itself did not complete it
+            return None if low is None or not self.is_size else (low, None)
+        if high is None and not self.is_size:
+            return None
+        lower = self.value if low is None else min(low, self.value)
+        upper = None if high is None else max(high, self.value)
+        return lower, upper
 
     @property
     def n_ran_away(self) -> int:
@@ -55,8 +69,25 @@ class IndexInterval:
         return int(without.sum())
 
     def quantiles(self, *levels: float) -> tuple[float | None, ...]:
-        """Quantiles over the draws that have a value; None where none has."""
-        return quantiles(self.values, *levels)
+        """Quantiles over the draws; None where there is no bound, or no draw.
+
+        Of a draw without value a size is larger than any; another index lies below low
+        levels and above high ones, and does not count in the median.
+        """
+        without = np.isnan(self.values)
+        if self.is_size:
+            sizes = np.maximum(self.values, 0.0)
+            sizes[without] = np.inf
+            return quantiles(sizes, *levels)
+
+        found: list[float | None] = []
+        for level in levels:
+            values = self.values.copy()
+            values[without] = np.copysign(np.inf, level - 0.5)
+            if level == 0.5:
+                values = self.values[~without]
+            found += quantiles(values, level)
+        return tuple(found)
 
     def to_dict(self) -> dict[str, Any]:
         """Value, interval and counts, as JSON knows them."""
@@ -73,14 +104,15 @@ class IndexInterval:
         interval = self.interval
         if interval is not None:
             low, high = interval
-            text += f" [{low:.4g}, {high:.4g}]"
+            upper = "no upper bound" if high is None else f"{high:.4g}"
+            text += f" [{low:.4g}, {upper}]"
         if self.lost_in_words:
             text += f" ({self.lost_in_words})"
         return text
 
     @property
     def lost_in_words(self) -> str:
-        """Say how many draws have no value, and are not part of the interval."""
+        """Say how many draws have no value."""
         draws = len(self.values)
         lost = []
         if self.n_ran_away:
@@ -191,9 +223,36 @@ def _without_draws(
     """Intervals of a manoeuvre whose draws are still to be filled in."""
     ran_away = np.zeros(count, dtype=np.bool_)
     return {
-        index: IndexInterval(value, np.full(count, np.nan), ran_away)
+        index: IndexInterval(
+            value=value,
+            values=np.full(count, np.nan),
+            ran_away=ran_away,
+            is_size=is_size(index),
+        )
         for index, value in indices.items()
     }
+
+
+def is_size(index: str) -> bool:
+    """Return whether an index is a length, an angle or a time, larger for worse ships.
+
+    Others, such as a drift angle or a speed, have a sign or no worse end.
+    """
+    sizes = (
+        "advance_lengths",
+        "tactical_diameter_lengths",
+        "steady_diameter_lengths",
+        "overshoot_1_deg",
+        "overshoot_2_deg",
+        "initial_turning_lengths",
+        "period_s",
+        "loop_width_deg",
+        "loop_height_deg_s",
+        "track_reach_lengths",
+        "distance_lengths",
+        "time_s",
+    )
+    return index in sizes
 
 
 def attempt(
@@ -226,4 +285,5 @@ def worst(runs: Sequence[IndexInterval]) -> IndexInterval:
         value=max(own) if is_complete else None,
         values=np.max(draws, axis=0),
         ran_away=np.any(ran_away, axis=0),
+        is_size=all(run.is_size for run in runs),
     )

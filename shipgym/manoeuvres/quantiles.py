@@ -11,12 +11,15 @@ NORMAL_95 = 1.96
 
 
 def quantiles(values: Floats, *levels: float) -> tuple[float | None, ...]:
-    """Quantiles of the values that are finite; None for each where none is."""
-    known = values[np.isfinite(values)]
-    if not known.size:
+    """Quantiles of values, infinite ones at their end; None for one without bound.
+
+    None too without values.
+    """
+    if not values.size:
         return (None,) * len(levels)
-    found = np.quantile(known, levels)
-    return tuple(found.tolist())
+    with np.errstate(invalid="ignore"):  # between a value and infinity
+        found = np.quantile(values, levels)
+    return tuple(end if np.isfinite(end) else None for end in found.tolist())
 
 
 def upper_95(values: Floats) -> float:

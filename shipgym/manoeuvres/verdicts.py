@@ -46,7 +46,7 @@ class Criterion:
     manoeuvre: str = ""
 
     @property
-    def interval(self) -> tuple[float, float] | None:
+    def interval(self) -> tuple[float, float | None] | None:
         """95 % interval over the draws (`IndexInterval.interval`)."""
         return None if self.drawn is None else self.drawn.interval
 

@@ -238,7 +238,7 @@ def grey_box(
             terms = read_terms(terms)
         table[equation] = tuple(terms)
 
-    bare = replace(ship, covariance=None, envelope=None, provenance=None)
+    bare = replace(ship, covariance=None, draws=None, envelope=None, provenance=None)
     return GreyBox(
         name=name,
         source=SOURCE,

@@ -43,6 +43,8 @@ class ManoeuvringModel:
     # by default, and for a copy with another structure, what is registered by its name
     dynamics: Structure | ShipEquations = None  # type: ignore[assignment]
     service_shaft_speed: float = 0.0
+    #: coefficients drawn from a posterior, shape (n_draws, n_coefficients)
+    draws: Floats | None = None
 
     def __post_init__(self) -> None:
         self.particulars.require("speed")
@@ -66,6 +68,17 @@ class ManoeuvringModel:
             raise InputError(
                 f"covariance of {self.name!r}: expected shape {square}, one row and"
                 f" column a coefficient, got {self.covariance.shape}"
+            )
+        if self.draws is not None:
+            self._check_draws(self.draws)
+
+    def _check_draws(self, draws: Floats) -> None:
+        """Refuse draws of another shape."""
+        n = len(self.coefficients)
+        if draws.ndim != 2 or draws.shape[1] != n or len(draws) < 2:
+            raise InputError(
+                f"draws of {self.name!r}: expected at least two rows of {n}"
+                f" coefficients, got shape {draws.shape}"
             )
 
     def _checked_coefficients(self) -> dict[str, float]:
@@ -270,7 +283,7 @@ class ManoeuvringModel:
         """Content of a model file, ready for JSON (see `shipgym.ships.model_file`)."""
         covariance = self.covariance
         envelope = self.envelope
-        return {
+        fields = {
             "format": MODEL_FORMAT,
             "name": self.name,
             "structure": self.dynamics.to_dict(),
@@ -283,6 +296,9 @@ class ManoeuvringModel:
             "envelope": None if envelope is None else envelope.to_dict(),
             "provenance": self.provenance,
         }
+        if self.draws is not None:
+            fields["draws"] = self.draws.tolist()
+        return fields
 
     def check_depth(self, water_depth: float) -> None:
         """Refuse water too shallow, or shallow water for a deep-water model."""

@@ -19,14 +19,16 @@ Format 1 has these fields:
 * `steering`: {"rudder_limit_deg", "rudder_rate_deg_s", "time_constant"}.
 * `envelope`: null or {"channels", "low", "high", "centre", "shape"} of u, v, r, delta.
 * `provenance`: null or an object.
-* `sha256`: of coefficients and covariance (`numbers_hash`); may be absent.
+* `draws`: rows of coefficients drawn from a posterior, in their order; absent where
+  there are none.
+* `sha256`: of coefficients, covariance and draws (`numbers_hash`); may be absent.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -62,6 +64,7 @@ OPTIONAL = (
     "service_shaft_speed",
     "envelope",
     "provenance",
+    "draws",
     "sha256",
 )
 
@@ -92,6 +95,7 @@ def read_model(
     if covariance is not None:
         n = len(dynamics.coefficient_names)
         covariance = _read_covariance(covariance, n, f"{where}: covariance")
+    draws = _read_draws(fields, dynamics.coefficient_names, f"{where}: draws")
     envelope = fields.get("envelope")
     if envelope is not None:
         envelope = Envelope.from_dict(envelope, f"{where}: envelope")
@@ -118,6 +122,7 @@ def read_model(
         provenance=provenance,
         dynamics=dynamics,
         service_shaft_speed=shaft_speed,
+        draws=draws,
     )
     if "sha256" in fields:
         _check_hash(model, fields["sha256"], f"{where}: sha256")
@@ -131,7 +136,7 @@ def _check_hash(model: ManoeuvringModel, given: Any, where: str) -> None:
     if given != expected:
         raise unexpected(
             where,
-            f"{expected!r}, that of the file's coefficients and covariance",
+            f"{expected!r}, that of the file's coefficients, covariance and draws",
             given,
             "they were changed after the file was written; take another copy, or, if"
             " the change is yours, leave out the field sha256",
@@ -139,11 +144,14 @@ def _check_hash(model: ManoeuvringModel, given: Any, where: str) -> None:
 
 
 def numbers_hash(model: ManoeuvringModel) -> str:
-    """SHA-256 of coefficients and covariance, in the order of the structure."""
+    """SHA-256 of coefficients, covariance and draws, in the order of the structure."""
     covariance = None
     if model.covariance is not None:
         covariance = model.covariance.tolist()
-    text = json.dumps([model.coefficients, covariance])
+    numbers = [model.coefficients, covariance]
+    if model.draws is not None:
+        numbers.append(model.draws.tolist())
+    text = json.dumps(numbers)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -198,6 +206,18 @@ def _read_reference(
     with placed(place):
         fields = check_table(table.get("reference"), place)
         return read_model(fields, place, make)
+
+
+def _read_draws(
+    fields: Mapping[str, Any], names: Sequence[str], where: str
+) -> Floats | None:
+    """Draws of a posterior; None where there are none."""
+    rows = fields.get("draws")
+    if rows is None:
+        return None
+    if fields.get("covariance") is None:
+        raise unexpected(where, "none without their covariance", rows)
+    return check_array(rows, (None, len(names)), where)
 
 
 def _read_covariance(value: Any, n: int, where: str) -> Floats:

@@ -93,15 +93,22 @@ def scale_model(
 
 
 def _with_coefficients(model: ShipModel, factors: dict[str, float]) -> ShipModel:
-    """Copy whose coefficients, and their covariance, are those by some factors."""
+    """Copy whose coefficients, covariance and draws are those by some factors."""
     coefficients = {}
     for name, value in model.coefficients.items():
         coefficients[name] = value * factors[name]
-    covariance = model.covariance
+    covariance, draws = model.covariance, model.draws
+    scale = np.array(list(factors.values()))
     if covariance is not None:
-        scale = np.array(list(factors.values()))
         covariance = covariance * np.outer(scale, scale)
-    return replace(model, coefficients=coefficients, covariance=covariance)
+    if draws is not None:
+        draws = draws * scale
+    return replace(
+        model,
+        coefficients=coefficients,
+        covariance=covariance,
+        draws=draws,
+    )
 
 
 def _envelope(envelope: Envelope | None, fast: float, quick: float) -> Envelope | None:

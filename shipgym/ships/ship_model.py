@@ -54,6 +54,9 @@ class ShipModel(ManoeuvringModel):
         is shipped or registered under the structure's name.
     service_shaft_speed : float
         Shaft speed at service speed, 1/s; 0 where the model knows no shaft.
+    draws : array of shape (n_draws, n_coefficients) or None
+        Coefficients drawn from a posterior by sampling, whose covariance is
+        `covariance`.
     """
 
     def simulate(
@@ -104,7 +107,8 @@ class ShipModel(ManoeuvringModel):
     def sample(self, n: int, seed: int | np.random.Generator) -> list[Self]:
         """Draw n models whose coefficients follow the identified covariance.
 
-        Raises InputError if the model has no covariance.
+        Those of a model with draws of a posterior are among these, none twice while
+        there are enough. Raises InputError if the model has no covariance.
         """
         if self.covariance is None:
             raise InputError(
@@ -112,9 +116,7 @@ class ShipModel(ManoeuvringModel):
                 " models have, to sample from, got none"
             )
         rng = np.random.default_rng(seed)
-        mean = list(self.coefficients.values())
-        normal = rng.standard_normal((n, len(mean)))
-        draws = mean + normal @ _square_root(self.covariance).T
+        draws = self._drawn_coefficients(self.covariance, n, rng)
         tables = self._drawn_tables(n, rng)
         models = []
         for i in range(n):
@@ -122,11 +124,24 @@ class ShipModel(ManoeuvringModel):
                 self,
                 name=f"{self.name}-draw-{i}",
                 covariance=None,
+                draws=None,
                 dynamics=tables[i],
             )
             drawn = drawn.with_coefficients(draws[i])
             models.append(drawn)
         return models
+
+    def _drawn_coefficients(
+        self, covariance: Floats, n: int, rng: np.random.Generator
+    ) -> Floats:
+        """Coefficients of n models, shape (n, n_coefficients)."""
+        if self.draws is not None:
+            n_kept = len(self.draws)
+            chosen = rng.choice(n_kept, n, replace=n > n_kept)
+            return np.asarray(self.draws[chosen])
+        mean = list(self.coefficients.values())
+        normal = rng.standard_normal((n, len(mean)))
+        return np.asarray(mean + normal @ _square_root(covariance).T)
 
     def _drawn_tables(
         self, n: int, rng: np.random.Generator

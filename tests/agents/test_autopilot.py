@@ -262,7 +262,7 @@ def test_a_criterion_without_value_has_no_quantile_and_does_not_pass():
     drawn = IndexInterval(3.0, np.array([3.0, np.nan]), np.array([False, True]))
     criterion = Criterion(3.0, 4.5, True, "ship lengths", "5.3.1", drawn)
     assert criterion.share_passed == 0.5
-    assert criterion.interval == (3.0, 3.0)
+    assert criterion.interval == (3.0, None)
     assert criterion.to_dict()["without_value"] == criterion.to_dict()["ran_away"] == 1
 
 

@@ -26,7 +26,7 @@ from tests.agents.small_suite import write_suite
 LINEAR = (
     "--structure abkowitz --method ridge --preprocessing savgol --hold-out"
     " zigzag_15_15.csv --current none --wind none --prior auto --prior-strength 1"
-    " --set alpha=0.01"
+    " --uncertainty analytic --set alpha=0.01"
 )
 GREY = "--structure grey-box --reference-model mariner"
 WRONG = "--structure abkowitz --reference-model mariner --kernel none-such"

@@ -166,9 +166,12 @@ def test_wrong_arguments(identified):
         manoeuvres.imo_assessment(load_model("mariner"), n_draws=10)
 
 
-def index(value, values, ran_away=()):
+def index(value, values, ran_away=(), is_size=True):
     return IndexInterval(
-        value, np.array(values, dtype=float), np.isin(np.arange(len(values)), ran_away)
+        value,
+        np.array(values, dtype=float),
+        np.isin(np.arange(len(values)), ran_away),
+        is_size,
     )
 
 
@@ -176,12 +179,13 @@ def test_an_interval_is_told_in_numbers_and_words():
     """41 draws from 7 to 9, one that ran away and one that did not finish."""
     values = [*np.linspace(7.0, 9.0, 41), np.nan, np.nan]
     found = index(7.77777, values, ran_away=[41])
-    assert found.interval == pytest.approx((7.05, 8.95))
-    assert found.quantiles(0.0, 0.5, 1.0) == pytest.approx((7.0, 8.0, 9.0))
+    low, high = found.interval
+    assert (low, high) == (pytest.approx(7.0525), None)
+    assert found.quantiles(0.0, 0.5, 1.0) == (7.0, pytest.approx(8.05), None)
     assert (found.n_ran_away, found.n_never_reached) == (1, 1)
-    assert (
-        str(found)
-        == "7.778 [7.05, 8.95] (1 of 43 draws ran away, 1 of 43 draws did not finish)"
+    assert str(found) == (
+        "7.778 [7.053, no upper bound]"
+        " (1 of 43 draws ran away, 1 of 43 draws did not finish)"
     )
     assert found.to_dict() == {
         "value": 7.77777,
@@ -192,8 +196,38 @@ def test_an_interval_is_told_in_numbers_and_words():
     }
     assert str(index(None, [])) == "-"
     assert str(index(2.0, [1.0, 3.0])).startswith("2 [1.05, 2.95]")
-    assert index(2.0, [np.nan]).interval is None
-    assert index(2.0, [np.nan]).quantiles(0.5, 0.9) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("value", "draws", "is_size", "interval"),
+    [
+        (5.35, [0.0, 4.0], True, (0.1, 5.35)),  # it contains its own estimate
+        (1.0, [2.0, 4.0], True, (1.0, 3.95)),
+        (2.0, [-1.0, 4.0], True, (0.1, 3.9)),  # no negative bound of a diameter
+        (2.0, [np.nan, np.nan], True, (2.0, None)),
+        (None, [2.0, 2.0], True, (2.0, None)),  # the model itself ran away
+        (None, [np.nan, np.nan], True, None),
+        (-1.0, [-3.0, 3.0], False, (-2.85, 2.85)),  # a drift angle has a sign
+        (1.0, [2.0, np.nan], False, None),  # and no end where runaways belong
+        (None, [2.0, 2.0], False, None),
+        (1.0, [], True, None),
+    ],
+)
+def test_an_interval_counts_all_draws_and_contains_its_estimate(
+    value, draws, is_size, interval
+):
+    found = index(value, draws, is_size=is_size).interval
+    assert found == (interval if interval is None else pytest.approx(interval))
+
+
+def test_a_few_runaways_leave_an_upper_bound():
+    """Two of a hundred draws are beyond 97.5 per cent of them."""
+    draws = [*np.linspace(1.0, 2.0, 98), np.nan, np.nan]
+    low, high = index(1.5, draws).interval
+    assert (low, high) == (pytest.approx(1.0255, abs=1e-3), pytest.approx(1.995, 1e-3))
+    signed = index(1.5, draws, is_size=False)
+    assert signed.interval is not None
+    assert signed.quantiles(0.5) == (1.5,)
 
 
 def test_the_worst_of_two_runs_is_the_larger_draw_by_draw():

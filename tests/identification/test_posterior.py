@@ -1,0 +1,199 @@
+"""A posterior by sampling: the sampler, its diagnostics, and models that keep draws."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification import Uncertainty, identify
+from identification.simulation_error.coefficient_prior import CoefficientPrior
+from identification.uncertainty.ensemble import Chains, sample_ensemble
+from identification.uncertainty.mixing import autocorrelation_times, mixing_of
+from identification.uncertainty.posterior import with_posterior
+from identification.uncertainty.quadratic_map import quadratic_map
+from identification.validation.warnings import model_warnings
+from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
+from shipgym.manoeuvres import zigzag
+from shipgym.trials.sensors import Sensors
+
+COVARIANCE = np.array([[4.0, 1.8, 0.0], [1.8, 1.0, 0.0], [0.0, 0.0, 0.01]])
+MEAN = np.array([1.0, -2.0, 3.0])
+
+
+def normal(points):
+    off = points - MEAN
+    return -0.5 * np.sum(off * np.linalg.solve(COVARIANCE, off.T).T, axis=1)
+
+
+def test_walkers_sample_a_known_normal_distribution():
+    """From a start that is far off and too narrow; the numbers are those of a seed."""
+    start = np.random.default_rng(0).normal(0.0, 0.1, (64, 3))
+    chains = sample_ensemble(normal, start, steps=400, warm_up=200, seed=1)
+    mixing = mixing_of(chains)
+    assert mixing.is_enough
+    assert mixing.r_hat < 1.05
+    assert mixing.effective_samples > 1000.0
+    assert 0.3 < mixing.acceptance < 0.95
+    errors = np.sqrt(np.diag(COVARIANCE) / mixing.effective_samples)
+    assert (np.abs(chains.flat.mean(axis=0) - MEAN) < 4.0 * errors).all()
+    np.testing.assert_allclose(np.cov(chains.flat.T), COVARIANCE, rtol=0.1, atol=0.02)
+    other = sample_ensemble(normal, start, steps=4, warm_up=4, seed=2)
+    same = sample_ensemble(normal, start, steps=4, warm_up=4, seed=2)
+    np.testing.assert_array_equal(other.points, same.points)
+
+
+def test_the_autocorrelation_time_is_that_of_an_autoregression():
+    """With x_k = 0.8 x_(k-1) + e it is (1 + 0.8) / (1 - 0.8) = 9."""
+    rng = np.random.default_rng(0)
+    points = np.zeros((2000, 40, 2))
+    for k in range(1, len(points)):
+        points[k] = [0.8, 0.0] * points[k - 1] + rng.standard_normal((40, 2))
+    assert autocorrelation_times(points) == pytest.approx([9.0, 1.0], rel=0.1)
+    stuck = np.repeat(rng.standard_normal((1, 40, 2)), 50, axis=0)
+    assert not mixing_of(Chains(stuck, 0.0)).is_enough
+
+
+def test_the_map_straightens_a_curved_valley():
+    """Of errors (x, 100 (y - x^2)): its points lie on the parabola."""
+
+    def errors(points):
+        x, y = points.T
+        return np.array([x, 100.0 * (y - x**2)])
+
+    jacobian = np.array([[1.0, 0.0], [0.0, 100.0]])
+    shape = quadratic_map(np.zeros(2), jacobian.T @ jacobian, jacobian, errors)
+    coordinates = np.array([[1.0, 0.0], [-2.0, 0.0], [0.5, 1.0]])
+    x, y = shape.points(coordinates).T
+    assert np.abs(y - x**2).max() < 0.011
+
+
+@pytest.fixture(scope="module")
+def nomoto() -> ShipModel:
+    """A stable ship of 100 m by the first-order equation."""
+    return ShipModel(
+        "first-order",
+        "nomoto",
+        Particulars(length=100.0, speed=8.0),
+        SteeringGear(),
+        {"c_r": -0.06, "c_d": 0.004},
+    )
+
+
+@pytest.fixture(scope="module")
+def trials(nomoto: ShipModel) -> list[Trial]:
+    sensors = Sensors(sampling_s=2.0)
+    found = []
+    for seed, (angle, port) in enumerate([(10.0, False), (20.0, True), (15.0, False)]):
+        run = zigzag(nomoto, angle, angle, port, 240.0, 0.5)
+        found.append(sensors.measure(run, seed).with_(name=f"trial {seed}"))
+    return found
+
+
+def identified(nomoto, trials, **settings):
+    asked = Uncertainty("posterior", **{"steps": 100, **settings})
+    return identify(
+        trials,
+        "nomoto",
+        particulars=nomoto.particulars,
+        steering=nomoto.steering,
+        uncertainty=asked,
+    )
+
+
+@pytest.fixture(scope="module")
+def result(nomoto, trials):
+    return identified(nomoto, trials)
+
+
+def test_the_truth_lies_in_the_posterior_of_a_first_order_ship(nomoto, result):
+    """The model keeps draws; their covariance is the model's; the report says how."""
+    model = result.model
+    low, high = np.quantile(model.draws, (0.005, 0.995), axis=0)
+    true = np.array(list(nomoto.coefficients.values()))
+    assert ((low < true) & (true < high)).all()
+    spread = np.sqrt(np.diag(model.covariance))
+    np.testing.assert_allclose(model.draws.std(axis=0), spread, rtol=0.25)
+    report = result.metrics["posterior"]
+    assert report["kept"]
+    assert 0.0 < report["power"] <= 1.0
+    assert report["r_hat"] < 1.2
+    assert len(model.draws) == 256
+    assert "effective samples" in result.summary()
+    assert not [text for text in model_warnings(result) if "posterior" in text]
+
+
+def test_draws_of_a_posterior_are_sampled_saved_and_of_a_seed(
+    nomoto, trials, result, tmp_path
+):
+    model = result.model
+    drawn = model.sample(200, seed=3)
+    kept = {tuple(row) for row in model.draws.tolist()}
+    found = {tuple(one.coefficients.values()) for one in drawn}
+    assert len(found) > 180  # a walker may stay where it is for a while
+    assert found <= kept
+    assert len(model.sample(300, 0)) == 300
+    assert drawn[0].draws is None
+
+    model.save(tmp_path / "model.json")
+    assert (tmp_path / "model.json").stat().st_size < 100_000
+    loaded = ShipModel.load(tmp_path / "model.json")
+    np.testing.assert_array_equal(loaded.draws, model.draws)
+    assert loaded.sample(1, 7)[0].coefficients == model.sample(1, 7)[0].coefficients
+
+    again = identified(nomoto, trials).model
+    np.testing.assert_array_equal(again.draws, model.draws)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"draws": [[1.0]]}, r"draws\[0\]: expected a list of 2 numbers"),
+        ({"draws": "many"}, r"draws: expected a list"),
+        ({"draws": []}, r"draws of .*: expected at least two rows of 2"),
+        ({"covariance": None}, "draws: expected none without their covariance"),
+    ],
+)
+def test_wrong_draws_in_a_model_file(result, change, message):
+    fields = result.model.to_dict() | change
+    with pytest.raises(InputError, match=message):
+        ShipModel.from_dict(fields)
+
+
+def test_trials_too_few_or_too_alike_are_refused(nomoto, trials):
+    with pytest.raises(InputError, match="at least 3 trials to fit for a posterior"):
+        identified(nomoto, trials[:2])
+    copies = [trials[0].with_(name=f"copy {k}") for k in range(3)]
+    with pytest.raises(InputError, match=r"trials that differ .* got 3 alike"):
+        identified(nomoto, copies)
+
+
+def test_walkers_that_do_not_mix_leave_the_covariance(nomoto, trials):
+    found = identified(nomoto, trials, steps=20)
+    assert found.model.draws is None
+    assert found.model.covariance is not None
+    (warning,) = [text for text in model_warnings(found) if "posterior" in text]
+    assert "the covariance is kept: try uncertainty.steps =" in warning
+
+
+def test_a_prior_that_trials_contradict_is_named(result, trials):
+    """The first coefficient is expected where it is not, to a hundredth."""
+    model = result.model
+    mean = np.array(list(model.coefficients.values()))
+    off = mean * [1.5, 1.0]
+    prior = CoefficientPrior("a guess", off, np.diag(np.abs(mean) * [0.01, 0.5]))
+    asked = Uncertainty("posterior", steps=100)
+    _, report = with_posterior(replace(model, draws=None), trials, prior, asked)
+    (remark,) = report["remarks"]
+    name = next(iter(model.coefficients))
+    assert remark.startswith("prior: expected coefficients within 3 standard")
+    assert f"(a guess), got {name}" in remark
+
+
+def test_a_posterior_is_not_for_a_kernel(nomoto, trials):
+    with pytest.raises(InputError, match="'analytic' or 'bootstrap' with a kernel"):
+        identify(trials, kernel="rbf", uncertainty="posterior")
+    for settings in ({"steps": 3}, {"seed": -1}):
+        with pytest.raises(InputError, match=r"uncertainty\.(steps|seed): expected"):
+            Uncertainty("posterior", **settings)
