@@ -70,6 +70,7 @@ class CriterionRow:
     notes: str  # paragraph, and remarks
     passed: bool | None  # None where it is not decided
     measured: float | None
+    measured_error: str  # with the side, in words
     value: float | None
     interval: str
     lost: str  # draws without a value, in words
@@ -253,6 +254,7 @@ def _criterion_row(name: str, criterion: Criterion) -> CriterionRow:
         notes=notes,
         passed=criterion.passed,
         measured=criterion.measured,
+        measured_error=_measured_error(criterion),
         value=criterion.value,
         interval=interval,
         lost="" if drawn is None else drawn.lost_in_words,
@@ -260,6 +262,13 @@ def _criterion_row(name: str, criterion: Criterion) -> CriterionRow:
         unit=criterion.unit,
         probability=criterion.probability,
     )
+
+
+def _measured_error(criterion: Criterion) -> str:
+    """Standard error of the measured index and its side; empty without one."""
+    if criterion.measured_error is None:
+        return ""
+    return f"± {fixed(criterion.measured_error)}, {criterion.side}"
 
 
 def _introduction(found: Verification, designed: Mapping[str, Controller]) -> str:

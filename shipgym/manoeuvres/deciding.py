@@ -1,0 +1,127 @@
+"""The trial that would decide a criterion, tried on the models drawn first.
+
+Each model drawn is taken for the ship once: the index that she would measure, with its
+error, updates the models drawn as a filter does (ensemble square-root filter, Whitaker
+& Hamill 2002), and the criterion is judged again.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from shipgym.arrays import Floats
+from shipgym.manoeuvres.evidence import Side, chances_of
+from shipgym.manoeuvres.intervals import IndexInterval
+from shipgym.manoeuvres.measured import MeasuredIndex
+
+#: Share of the cases in which a trial has to decide before it is named.
+OFTEN = 0.8
+
+
+class Remedy(NamedTuple):
+    """Sides to run a manoeuvre to, so that a criterion is decided."""
+
+    run: list[str]  # one side where that decides it, else both, or none
+    likeliest: str  # the one side that decides it most often; empty without any
+    share: float  # of the cases in which that side decides it
+
+
+def remedy_for(sides: Sequence[Side], limit: float, error: float) -> Remedy:
+    """The trials that would decide a criterion, each tried on the models drawn.
+
+    `error`: standard error of the index that a trial measures.
+    """
+    shares = {"": 0.0}
+    open_sides = [side.name for side in sides if side.measured is None]
+    for name in open_sides:
+        shares[name] = _share_decided(sides, [name], limit, error)
+    best = max(shares, key=lambda name: shares[name])
+    run = []
+    if shares[best] >= OFTEN:
+        run = [best]
+    elif _share_decided(sides, open_sides, limit, error) >= OFTEN:
+        run = open_sides
+    return Remedy(run, best, shares[best])
+
+
+def _share_decided(
+    sides: Sequence[Side], run: Sequence[str], limit: float, error: float
+) -> float:
+    """Share of the models drawn on which trials to some sides decide."""
+    values = np.array([side.drawn.values for side in sides])
+    enough = 60
+    known = np.flatnonzero(np.isfinite(values).all(axis=0))[:enough]
+    if not run or not len(known):
+        return 0.0
+    weights = _likelihoods(sides, values[:, known], error)
+    decided = []
+    for draw in known.tolist():
+        after = after_trials(sides, run, draw, error)
+        decided.append(chances_of(after, limit).is_sure)
+    return float(np.average(decided, weights=weights))
+
+
+def _likelihoods(sides: Sequence[Side], values: Floats, error: float) -> Floats:
+    """Weights of draws by the trials that there are; `values`: of each side."""
+    exponents = np.zeros(values.shape[1])
+    for side, drawn in zip(sides, values, strict=True):
+        if side.measured is not None:
+            # half the spread at least, so that some draws are left
+            spread = max(error, 0.5 * float(np.std(drawn)))
+            distance = np.abs(drawn - side.measured.value)
+            beyond = distance - distance.min()
+            exponents -= 0.5 * (beyond / max(spread, 1e-9)) ** 2
+    return np.exp(exponents)
+
+
+def after_trials(
+    sides: Sequence[Side], run: Sequence[str], draw: int, error: float
+) -> list[Side]:
+    """Evidence after trials to some sides of a ship that is one of the draws."""
+    after = []
+    for side in sides:
+        if side.name in run:
+            value = float(side.drawn.values[draw])
+            measured = MeasuredIndex(value, error, side.name)
+            after.append(side._replace(measured=measured))
+        else:
+            after.append(side)
+
+    for name in run:
+        (source,) = [side for side in sides if side.name == name]
+        value = float(source.drawn.values[draw])
+        after = [
+            side._replace(drawn=updated(side.drawn, source.drawn, value, error))
+            for side in after
+        ]
+    return after
+
+
+def updated(
+    drawn: IndexInterval, source: IndexInterval, value: float, error: float
+) -> IndexInterval:
+    """Draws of an index after another one was measured.
+
+    One more trial halves the variance of what it measures at most, because the error of
+    the equations stays.
+    """
+    known = np.isfinite(drawn.values) & np.isfinite(source.values)
+    if known.sum() < 2:
+        return drawn
+    of_source = source.values[known]
+    deviations = of_source - of_source.mean()
+    variance = float(np.mean(deviations**2))
+    if variance == 0.0:
+        return drawn
+    covariance = float(np.mean(deviations * drawn.values[known]))
+    noise = error**2 + variance
+    gain = covariance / (variance + noise)
+    of_deviations = gain / (1.0 + np.sqrt(noise / (variance + noise)))
+
+    values = drawn.values.copy()
+    values[known] += gain * (value - of_source.mean()) - of_deviations * deviations
+    own = drawn.value
+    if own is not None and source.value is not None:
+        own += gain * (value - source.value)
+    return IndexInterval(own, values, drawn.ran_away)
