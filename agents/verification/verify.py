@@ -13,14 +13,16 @@ from agents.controllers.controller import Controller
 from agents.controllers.registry import controller_class
 from agents.jobs import HERE, JobEngine
 from agents.rollouts.course_keeping import Episodes, sail, step_response
+from agents.verification.closed_loop import ClosedLoop
 from agents.verification.monte_carlo import monte_carlo
 from agents.verification.result import STEP_DEG, Pilot, Verification
-from agents.verification.tracks import Track, keep_track, track_task
+from agents.verification.tracks import track_task
 from identification.progress import Progress
 from shipgym.checks import quoted
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import nomoto
+from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from agents.agent_file import Agent
@@ -36,13 +38,15 @@ def verify(
     where: JobEngine = HERE,
     guests: Sequence[Agent] = (),
     designs: Sequence[str] = DESIGNS,
+    trials: Sequence[Trial] = (),
 ) -> Verification:
     """Design autopilots on a model and run them over models drawn from its covariance.
 
-    `model`: with a covariance; `draws`, `seed`, `where`, `designs`: see
-    `build_autopilot`; `tell`: called with the progress; `guests`: further autopilots.
-    Raises UnstableModelError if the model itself runs away; InputError if no autopilot
-    can be designed on it.
+    A design that loses too many of them is retuned on them. `model`: with a covariance;
+    `draws`, `seed`, `where`, `designs`: see `build_autopilot`; `tell`: called with the
+    progress; `guests`: further autopilots; `trials`: that the ship was put through: a
+    model drawn that runs away in one of them does not count. Raises UnstableModelError
+    if the model itself runs away; InputError if no autopilot can be designed on it.
     """
     tell("models drawn", 0, draws)
     designed = design_autopilots(model, designs)
@@ -54,15 +58,25 @@ def verify(
         where=where,
         progress=lambda done: tell("models drawn", done, draws),
     )
-    episodes = list(found.episodes)
+    seeds = seed + np.arange(draws)
+    loop = ClosedLoop(model, found.draws, seeds, trials)
+    kept = []
+    for controller, first in zip(designed.controllers, found.episodes, strict=True):
+        kept.append(loop.keep_course(controller, first))
+    led = [loop.keep_track(guide) for guide in designed.guides]
+    autopilots: list[Agent] = [held.controller for held in kept]
+    episodes = [held.outcome for held in kept]
     for guest in guests:
-        episodes.append(sail(guest, found.draws, seeds=seed + np.arange(draws)))
+        autopilots.append(guest)
+        episodes.append(sail(guest, found.draws, seeds=seeds))
 
     stable = np.flatnonzero(~found.manoeuvres.unstable)
     ships = [model, *[found.draws[i] for i in stable]]
-    autopilots = [*designed.controllers, *guests]
     pilots = run_pilots(autopilots, episodes, ships, tell)
-    tracks, late = kept_tracks(designed.guides, ships)
+    retuned = {}
+    for held in (*kept, *led):
+        if held.share != 1.0:
+            retuned[str(held.controller.kind)] = held.in_words
     return Verification(
         draws=draws,
         seed=seed,
@@ -70,8 +84,10 @@ def verify(
         course_unstable=found.course_unstable,
         nomoto=nomoto(model),
         pilots=tuple(sorted(pilots, key=_mean_cost)),
-        refused={**designed.refused, **late},
-        tracks=tracks,
+        refused=designed.refused,
+        tracks=tuple(held.outcome for held in led),
+        counted=loop.counted,
+        retuned=retuned,
     )
 
 
@@ -133,25 +149,6 @@ def design_autopilots(model: ShipModel, designs: Sequence[str]) -> Designed:
             f"no autopilot that keeps a heading could be designed on it: {why}"
         )
     return found
-
-
-def kept_tracks(
-    guides: Sequence[Controller], ships: Sequence[ShipModel]
-) -> tuple[tuple[Track, ...], dict[str, str]]:
-    """The track of each path autopilot, and reasons to refuse those that fail.
-
-    One fails that does not arrive on the first ship.
-    """
-    tracks = []
-    late = {}
-    for guide in guides:
-        track = keep_track(guide, ships)
-        tracks.append(track)
-        if not track.arrived[0]:
-            late[track.key] = (
-                "it does not reach the end of the track on the identified model"
-            )
-    return tuple(tracks), late
 
 
 def unique_keys(names: Sequence[str]) -> list[str]:

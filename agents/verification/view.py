@@ -104,6 +104,7 @@ class VerificationView:
     pilots: dict[str, dict[str, Any]]  # metrics by name, the best first
     cheaper: dict[str, float]  # share of the models on which the best costs less
     refused: dict[str, str]
+    retuned: dict[str, str]
     tracks: dict[str, dict[str, Any]]
     standards: Sequence[Requirement]
 
@@ -140,6 +141,7 @@ def verification_view(found: Verification, length: float) -> VerificationView:
         pilots=pilots,
         cheaper=_cheaper(found),
         refused=found.refused,
+        retuned=found.retuned,
         tracks={track.key.upper(): track_metrics(track) for track in found.tracks},
         standards=found.standards,
     )
@@ -173,6 +175,11 @@ def headline(found: Verification) -> str:
     sentences.append(
         f"{best.name} steers best and {control} {found.draws} models drawn."
     )
+    if found.left_out:
+        sentences.append(
+            f"{found.left_out} of the models run away whatever steers them, in the"
+            " trials themselves or straight ahead, and do not count."
+        )
     return " ".join(sentences)
 
 
