@@ -46,6 +46,7 @@ from agents.controllers.pid import PID  # noqa: E402
 from agents.rollouts.course_keeping import sail  # noqa: E402
 from agents.verification.closed_loop import ClosedLoop  # noqa: E402
 from agents.verification.refusal import why_refused  # noqa: E402
+from agents.verification.tracks import judged_task  # noqa: E402
 from identification import IdentificationResult, Preprocessing, identify  # noqa: E402
 from identification.regression.still_water import in_still_water  # noqa: E402
 from identification.validation.warnings import why_unstable  # noqa: E402
@@ -241,7 +242,7 @@ def autopilots(
             continue
         seeds = np.arange(40)
         loop = ClosedLoop(result.model, draws, seeds, result.trials)
-        drawn = sail(pilot, draws, seeds=seeds, allow_unstable=True)
+        drawn = sail(pilot, draws, judged_task(), seeds, allow_unstable=True)
         if loop.loses_too_many(drawn.terminated):
             found[design.__name__] = "refused"
             continue

@@ -9,12 +9,16 @@ judged on 60 models drawn. What was designed, given or not, then steers the ship
 herself: one that keeps a heading steers if it keeps control in 8 episodes of course
 keeping in calm water, one that keeps a track if it leads her to its end.
 
+A second kind of trials is poor on purpose: one zigzag 10/10 of fifteen ship lengths
+with five times the noise, from which not every design steers.
+
 Rows are kept in a file; a second call does what is left.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import sys
 import time
@@ -32,7 +36,7 @@ from agents.verification.chain import examined
 from agents.verification.verify import DESIGNS, design_autopilots, verify
 from identification import IdentificationResult, identify
 from identification.validation.selection import RESPONSES, whole_trials
-from shipgym import ShipModel
+from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from tests.ships.opened_once import OPENED_ONCE
 
@@ -48,28 +52,54 @@ SHIPS = (
     *OPENED_ONCE,
 )
 STRUCTURES = ("nomoto", "abkowitz", "cubic", "mmg", "auto")
+KINDS = ("zigzags", "one poor zigzag")
 DRAWS = 60
+CASE = ("ship", "structure", "trials", "seed")
 
 
-def identified(ship: ShipModel, structure: str, seed: int) -> IdentificationResult:
+def poor_zigzag(ship: ShipModel, seed: int) -> list[Trial]:
+    """A short zigzag with five times the noise of sensors."""
+    trial, *_ = sea_trials(ship, "zigzags", seed)
+    rng = np.random.default_rng(seed)
+    noise = {
+        "psi": np.radians(0.5),
+        "r": np.radians(0.1),
+        "u": 0.15,
+        "v": 0.1,
+    }
+    kept = trial.t <= trial.t[0] + 15.0 * ship.travel_time
+    channels = {}
+    for name, values in trial.channels.items():
+        size = noise.get(name, 0.0)
+        channels[name] = (values + size * rng.standard_normal(len(trial)))[kept]
+    return [Trial(trial.t[kept], channels, name=trial.name, kind=trial.kind)]
+
+
+def identified(
+    ship: ShipModel, structure: str, kind: str, seed: int
+) -> IdentificationResult:
     """A ship identified from noisy zigzags, as `shipgym autopilot` does it."""
+    trials = (
+        sea_trials(ship, kind, seed) if kind == KINDS[0] else poor_zigzag(ship, seed)
+    )
     settings: dict[str, Any] = {"structure": structure}
     if structure in RESPONSES:
         settings["method"] = whole_trials()
     return identify(
-        sea_trials(ship, "zigzags", seed),
+        trials,
         particulars=ship.particulars,
         steering=ship.steering,
         **settings,
     )
 
 
-def examined_case(name: str, structure: str, seed: int) -> dict[str, Any]:
-    """One ship, structure and seed: which designs are given, and which steer her."""
+def examined_case(name: str, structure: str, kind: str, seed: int) -> dict[str, Any]:
+    """Which designs are given for one ship, and which of all steer her."""
     ship = OPENED_ONCE[name]() if name in OPENED_ONCE else ship_of(name)
-    row: dict[str, Any] = {"ship": name, "structure": structure, "seed": seed}
+    row: dict[str, Any] = {"ship": name, "structure": structure}
+    row |= {"trials": kind, "seed": seed}
     try:
-        fit = identified(ship, structure, seed)
+        fit = identified(ship, structure, kind, seed)
     except InputError as error:
         return row | {"failed": str(error)}
     began = time.process_time()
@@ -121,15 +151,19 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
     """Counts by structure and of all, in Markdown."""
     lines = [
         (
-            "| structure | ships with an autopilot | given: steer, lost |"
+            "| structure, trials | ships with an autopilot | given: steer, lost |"
             " refused: would steer, would not | retuned |"
         ),
         "| --- | --- | --- | --- | --- |",
     ]
-    groups = {
-        f"`{structure}`": [row for row in rows if row["structure"] == structure]
-        for structure in STRUCTURES
-    }
+    groups = {}
+    for kind in KINDS:
+        for structure in STRUCTURES:
+            groups[f"`{structure}`, {kind}"] = [
+                row
+                for row in rows
+                if (row["structure"], row["trials"]) == (structure, kind)
+            ]
     for name, group in {**groups, "**all**": rows}.items():
         n = counted(group)
         lines.append(
@@ -148,6 +182,7 @@ def main() -> None:
     parser.add_argument("--rows", type=Path, default=Path("given_autopilots.jsonl"))
     parser.add_argument("--seeds", type=int, default=1, help="of the noise")
     parser.add_argument("--ships", default=",".join(SHIPS))
+    parser.add_argument("--trials", default=",".join(KINDS))
     parser.add_argument("--structures", default=",".join(STRUCTURES))
     given = parser.parse_args()
     warnings.simplefilter("ignore")
@@ -155,17 +190,21 @@ def main() -> None:
     rows = []
     if given.rows.exists():
         rows = [json.loads(line) for line in given.rows.read_text().splitlines()]
-    done = {(row["ship"], row["structure"], row["seed"]) for row in rows}
-    for structure in given.structures.split(","):
-        for name in given.ships.split(","):
-            for seed in range(given.seeds):
-                if (name, structure, seed) in done:
-                    continue
-                row = examined_case(name, structure, seed)
-                rows.append(row)
-                with given.rows.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(row, default=np.ndarray.tolist) + "\n")
-                print(row, file=sys.stderr, flush=True)
+    done = {tuple(row[name] for name in CASE) for row in rows}
+    cases = itertools.product(
+        given.trials.split(","),
+        given.structures.split(","),
+        given.ships.split(","),
+        range(given.seeds),
+    )
+    for kind, structure, name, seed in cases:
+        if (name, structure, kind, seed) in done:
+            continue
+        row = examined_case(name, structure, kind, seed)
+        rows.append(row)
+        with given.rows.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row, default=np.ndarray.tolist) + "\n")
+        print(row, file=sys.stderr, flush=True)
     print(table(rows))
 
 

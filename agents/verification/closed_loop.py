@@ -14,7 +14,7 @@ from agents.controllers.controller import Controller
 from agents.controllers.designs import with_bandwidth
 from agents.rollouts.course_keeping import Episodes, sail
 from agents.verification.possible_draws import is_possible
-from agents.verification.tracks import Track, keep_track, track_task
+from agents.verification.tracks import Track, judged_task, keep_track, track_task
 from shipgym.arrays import Flags, Integers
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
@@ -67,7 +67,7 @@ class ClosedLoop:
         """A heading autopilot with its episodes, retuned if it loses too many."""
         return self._held(
             Held(controller, episodes),
-            run=lambda other: sail(other, self.draws, seeds=self.seeds),
+            run=lambda other: sail(other, self.draws, judged_task(), self.seeds),
             lost=lambda outcome: outcome.terminated,
         )
 

@@ -16,7 +16,7 @@ from agents.rollouts.course_keeping import Episodes, sail, step_response
 from agents.verification.closed_loop import ClosedLoop
 from agents.verification.monte_carlo import monte_carlo
 from agents.verification.result import STEP_DEG, Pilot, Verification
-from agents.verification.tracks import track_task
+from agents.verification.tracks import judged_task, track_task
 from identification.progress import Progress
 from shipgym.checks import quoted
 from shipgym.errors import InputError
@@ -68,7 +68,7 @@ def verify(
     episodes = [held.outcome for held in kept]
     for guest in guests:
         autopilots.append(guest)
-        episodes.append(sail(guest, found.draws, seeds=seeds))
+        episodes.append(sail(guest, found.draws, judged_task(), seeds))
 
     stable = np.flatnonzero(~found.manoeuvres.unstable)
     ships = [model, *[found.draws[i] for i in stable]]
