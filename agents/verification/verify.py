@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from agents.controllers.controller import Controller
 from agents.controllers.registry import controller_class
 from agents.jobs import HERE, JobEngine
 from agents.rollouts.course_keeping import Episodes, sail, step_response
-from agents.verification.closed_loop import ClosedLoop
-from agents.verification.monte_carlo import monte_carlo
+from agents.verification.closed_loop import ClosedLoop, Held
+from agents.verification.monte_carlo import MonteCarlo, monte_carlo
 from agents.verification.result import STEP_DEG, Pilot, Verification
 from agents.verification.tracks import judged_task, track_task
 from identification.progress import Progress
@@ -58,25 +58,22 @@ def verify(
         where=where,
         progress=lambda done: tell("models drawn", done, draws),
     )
-    seeds = seed + np.arange(draws)
-    loop = ClosedLoop(model, found.draws, seeds, trials)
-    kept = []
-    for controller, first in zip(designed.controllers, found.episodes, strict=True):
-        kept.append(loop.keep_course(controller, first))
-    led = [loop.keep_track(guide) for guide in designed.guides]
-    autopilots: list[Agent] = [held.controller for held in kept]
-    episodes = [held.outcome for held in kept]
+    loop = ClosedLoop(
+        model=model,
+        draws=found.draws,
+        seeds=seed + np.arange(draws),
+        trials=trials,
+    )
+    judged = judged_designs(loop, designed, found)
+    autopilots: list[Agent] = [held.controller for held in judged.courses]
+    episodes = [held.outcome for held in judged.courses]
     for guest in guests:
         autopilots.append(guest)
-        episodes.append(sail(guest, found.draws, judged_task(), seeds))
+        episodes.append(sail(guest, loop.draws, judged_task(), loop.seeds))
 
     stable = np.flatnonzero(~found.manoeuvres.unstable)
     ships = [model, *[found.draws[i] for i in stable]]
     pilots = run_pilots(autopilots, episodes, ships, tell)
-    retuned = {}
-    for held in (*kept, *led):
-        if held.share != 1.0:
-            retuned[str(held.controller.kind)] = held.in_words
     return Verification(
         draws=draws,
         seed=seed,
@@ -85,10 +82,36 @@ def verify(
         nomoto=nomoto(model),
         pilots=tuple(sorted(pilots, key=_mean_cost)),
         refused=designed.refused,
-        tracks=tuple(held.outcome for held in led),
+        tracks=tuple(held.outcome for held in judged.tracks),
         counted=loop.counted,
-        retuned=retuned,
+        retuned=judged.retuned,
     )
+
+
+class Judged(NamedTuple):
+    """Designs as they are given or refused, after they were judged."""
+
+    courses: list[Held]  # that keep a heading
+    tracks: list[Held]  # that keep a track
+
+    @property
+    def retuned(self) -> dict[str, str]:
+        """How designs were changed, by their kind."""
+        words = {}
+        for held in (*self.courses, *self.tracks):
+            if held.share != 1.0:
+                words[str(held.controller.kind)] = held.in_words
+        return words
+
+
+def judged_designs(loop: ClosedLoop, designed: Designed, found: MonteCarlo) -> Judged:
+    """Designs after the closed loop with the models drawn, some of them retuned."""
+    courses = []
+    for controller, first in zip(designed.controllers, found.episodes, strict=True):
+        held = loop.keep_course(controller, first)
+        courses.append(held)
+    tracks = [loop.keep_track(guide) for guide in designed.guides]
+    return Judged(courses, tracks)
 
 
 def run_pilots(

@@ -1,8 +1,7 @@
 """The trial that would decide a criterion, tried on the models drawn first.
 
 Each model drawn is taken for the ship once: the index that she would measure, with its
-error, updates the models drawn as a filter does (ensemble square-root filter, Whitaker
-& Hamill 2002), and the criterion is judged again.
+error, is added, and the criterion is judged again.
 """
 
 from collections.abc import Sequence
@@ -12,11 +11,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.manoeuvres.evidence import Side, chances_of
-from shipgym.manoeuvres.intervals import IndexInterval
 from shipgym.manoeuvres.measured import MeasuredIndex
-
-#: Share of the cases in which a trial has to decide before it is named.
-OFTEN = 0.8
 
 
 class Remedy(NamedTuple):
@@ -32,15 +27,16 @@ def remedy_for(sides: Sequence[Side], limit: float, error: float) -> Remedy:
 
     `error`: standard error of the index that a trial measures.
     """
+    often = 0.8  # share of the cases in which a trial has to decide
     shares = {"": 0.0}
     open_sides = [side.name for side in sides if side.measured is None]
     for name in open_sides:
         shares[name] = _share_decided(sides, [name], limit, error)
     best = max(shares, key=lambda name: shares[name])
     run = []
-    if shares[best] >= OFTEN:
+    if shares[best] >= often:
         run = [best]
-    elif _share_decided(sides, open_sides, limit, error) >= OFTEN:
+    elif _share_decided(sides, open_sides, limit, error) >= often:
         run = open_sides
     return Remedy(run, best, shares[best])
 
@@ -64,15 +60,17 @@ def _share_decided(
 
 def _likelihoods(sides: Sequence[Side], values: Floats, error: float) -> Floats:
     """Weights of draws by the trials that there are; `values`: of each side."""
-    exponents = np.zeros(values.shape[1])
+    squares = np.zeros(values.shape[1])
     for side, drawn in zip(sides, values, strict=True):
-        if side.measured is not None:
-            # half the spread at least, so that some draws are left
-            spread = max(error, 0.5 * float(np.std(drawn)))
-            distance = np.abs(drawn - side.measured.value)
-            beyond = distance - distance.min()
-            exponents -= 0.5 * (beyond / max(spread, 1e-9)) ** 2
-    return np.exp(exponents)
+        if side.measured is None:
+            continue
+        # half the spread at least, so that some draws are left
+        half_spread = 0.5 * np.std(drawn)
+        spread = max(error, half_spread, 1e-9)
+        distance = np.abs(drawn - side.measured.value)
+        beyond = distance - distance.min()
+        squares += (beyond / spread) ** 2
+    return np.asarray(np.exp(-0.5 * squares))
 
 
 def after_trials(
@@ -87,41 +85,4 @@ def after_trials(
             after.append(side._replace(measured=measured))
         else:
             after.append(side)
-
-    for name in run:
-        (source,) = [side for side in sides if side.name == name]
-        value = float(source.drawn.values[draw])
-        after = [
-            side._replace(drawn=updated(side.drawn, source.drawn, value, error))
-            for side in after
-        ]
     return after
-
-
-def updated(
-    drawn: IndexInterval, source: IndexInterval, value: float, error: float
-) -> IndexInterval:
-    """Draws of an index after another one was measured.
-
-    One more trial halves the variance of what it measures at most, because the error of
-    the equations stays.
-    """
-    known = np.isfinite(drawn.values) & np.isfinite(source.values)
-    if known.sum() < 2:
-        return drawn
-    of_source = source.values[known]
-    deviations = of_source - of_source.mean()
-    variance = float(np.mean(deviations**2))
-    if variance == 0.0:
-        return drawn
-    covariance = float(np.mean(deviations * drawn.values[known]))
-    noise = error**2 + variance
-    gain = covariance / (variance + noise)
-    of_deviations = gain / (1.0 + np.sqrt(noise / (variance + noise)))
-
-    values = drawn.values.copy()
-    values[known] += gain * (value - of_source.mean()) - of_deviations * deviations
-    own = drawn.value
-    if own is not None and source.value is not None:
-        own += gain * (value - source.value)
-    return IndexInterval(own, values, drawn.ran_away)

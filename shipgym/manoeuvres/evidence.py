@@ -8,9 +8,6 @@ import numpy as np
 from shipgym.manoeuvres.intervals import IndexInterval, worst
 from shipgym.manoeuvres.measured import MeasuredIndex
 
-#: Certainty from which on a criterion is decided.
-SURE = 0.975
-
 
 class Side(NamedTuple):
     """Evidence about an index on one side."""
@@ -33,7 +30,8 @@ class Chances(NamedTuple):
     @property
     def is_sure(self) -> bool:
         """True if one of them decides."""
-        return max(self.passes, self.fails) >= SURE
+        sure = 0.975
+        return max(self.passes, self.fails) >= sure
 
 
 def chances_of(sides: Sequence[Side], limit: float) -> Chances:

@@ -24,12 +24,6 @@ from shipgym.manoeuvres.zigzags import (
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
 
-# Motions of this many ship lengths are halved by the smoothing, those of ten are kept
-# to 3e-5.
-HALVED_LENGTHS = 0.7
-#: Channels that are smoothed.
-SMOOTHED = ("psi", "x", "y")
-
 
 @dataclass(frozen=True)
 class MeasuredIndex:
@@ -67,11 +61,14 @@ def _with_errors(
     fewest_samples = 5  # for a smoothing spline
     if not rules or len(trial) < fewest_samples:
         return {}
-    smooth, noise = smoothed(trial, model.travel_time)
+    # Motions that last so long are halved, those of ten ship lengths kept to 3e-5.
+    period = 0.7 * model.travel_time
+    smooth, noise = smoothed(trial, period)
     values = _values(model, smooth, rules)
     repeated = []
-    for again in _repetitions(smooth, noise, model.travel_time):
-        repeated.append(_values(model, again, rules))
+    for again in _repetitions(smooth, noise, period):
+        found_again = _values(model, again, rules)
+        repeated.append(found_again)
 
     found = {}
     for name, value in values.items():
@@ -92,8 +89,12 @@ def _values(model: ShipModel, trial: Trial, rules: dict[str, Rule]) -> dict[str,
         indices = zigzag_indices(trial, length, heading_deg)
     else:
         indices = turning_indices(trial, length)
-    values = {name: getattr(indices, rule.index) for name, rule in rules.items()}
-    return {name: value for name, value in values.items() if value is not None}
+    values = {}
+    for name, rule in rules.items():
+        value = getattr(indices, rule.index)
+        if value is not None:
+            values[name] = value
+    return values
 
 
 def _standard_heading(trial: Trial) -> float:
@@ -102,44 +103,54 @@ def _standard_heading(trial: Trial) -> float:
     return min(STANDARD_DEG, key=lambda angle: abs(angle - found))
 
 
-def smoothed(trial: Trial, travel_time: float) -> tuple[Trial, dict[str, float]]:
-    """Trial with a smooth heading and track, and the noise of each channel."""
+def smoothed(trial: Trial, period: float) -> tuple[Trial, dict[str, float]]:
+    """Trial with a smooth heading and track, and the noise of each channel.
+
+    `period`: of motions that are halved, s.
+    """
+    t = trial.t
     # degrees of freedom of the spline, of each sample: the mean of its low pass
-    freedom = np.pi * _step(trial.t) / (np.sqrt(2.0) * HALVED_LENGTHS * travel_time)
+    freedom = np.pi * _step(t) / (np.sqrt(2.0) * period)
     unbiased = 1.0 / np.sqrt(1.0 - min(freedom, 0.9))
+
     smooth = {}
     noise = {}
-    for name in SMOOTHED:
+    for name in ("psi", "x", "y"):
         if name not in trial:
             continue
-        smooth[name] = _low_pass(name, trial.t, trial[name], travel_time)
-        residuals = trial[name] - smooth[name]
+        channel = trial[name]
+        smooth[name] = _low_pass(name, t, channel, period)
+        residuals = channel - smooth[name]
         noise[name] = float(np.std(residuals)) * unbiased
     return trial.with_channels(smooth), noise
 
 
-def _low_pass(name: str, t: Floats, values: Floats, travel_time: float) -> Floats:
-    """Smoothing spline along the first axis; `HALVED_LENGTHS`.
+def _low_pass(name: str, t: Floats, values: Floats, period: float) -> Floats:
+    """Smoothing spline along the first axis that halves motions of a period, s.
 
     The heading is continued before the start by its mirror image: a spline is straight
     at its ends, a heading is not where a trial begins with the order.
     """
-    halved = 2.0 * np.pi / (HALVED_LENGTHS * travel_time)  # rad/s
-    penalty = 1.0 / (_step(t) * halved**4)
+    frequency = 2.0 * np.pi / period  # rad/s
+    penalty = 1.0 / (_step(t) * frequency**4)
     times = t
     if name == "psi":
-        n_mirrored = int(np.searchsorted(t, t[0] + travel_time))
+        start = t[0]
+        n_mirrored = int(np.searchsorted(t, start + period))
         mirrored = slice(n_mirrored, 0, -1)
-        before = 2.0 * t[0] - t[mirrored]
+        before = 2.0 * start - t[mirrored]
         times = np.concatenate([before, t])
         values = np.concatenate([values[mirrored], values])
-    spline = make_smoothing_spline(times, values, lam=penalty)
+
+    spline = make_smoothing_spline(
+        times,
+        values,
+        lam=penalty,
+    )
     return np.asarray(spline(t))
 
 
-def _repetitions(
-    smooth: Trial, noise: dict[str, float], travel_time: float
-) -> list[Trial]:
+def _repetitions(smooth: Trial, noise: dict[str, float], period: float) -> list[Trial]:
     """A smooth trial as it would have been with other noise, smoothed likewise."""
     rng = np.random.default_rng(0)
     repetitions = 30
@@ -147,7 +158,7 @@ def _repetitions(
     left = {}
     for name, size in noise.items():
         white = size * rng.standard_normal(shape)
-        left[name] = _low_pass(name, smooth.t, white, travel_time)
+        left[name] = _low_pass(name, smooth.t, white, period)
 
     trials = []
     for k in range(repetitions):
@@ -183,7 +194,8 @@ def first_side(trial: Trial) -> str:
     """Side to which the rudder was first held, "starboard" or "port"."""
     delta = rudder(trial)
     half = 0.5 * usual_rudder(trial)
-    first = int(np.argmax(np.abs(delta) > half))
+    is_held = np.abs(delta) > half
+    first = int(np.argmax(is_held))
     return "starboard" if delta[first] > 0.0 else "port"
 
 

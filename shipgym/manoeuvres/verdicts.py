@@ -18,9 +18,6 @@ from shipgym.ships.envelope import ENVELOPE_CHANNELS
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
 
-#: Standard errors of indices that are still to be measured, by their unit.
-USUAL_ERRORS = {"deg": 0.2, "ship lengths": 0.03}
-
 
 @dataclass(frozen=True)
 class Criterion:
@@ -170,7 +167,7 @@ def _undecided(criterion: Criterion) -> Criterion:
     sides = criterion.sides
     error = criterion.measured_error
     if error is None:
-        error = USUAL_ERRORS[criterion.unit]
+        error = 0.2 if criterion.unit == "deg" else 0.03  # usual ones
     remedy = remedy_for(sides, criterion.limit, error)
     trials = [side_in_words(criterion.manoeuvre, name) for name in remedy.run]
     return replace(
