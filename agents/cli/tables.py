@@ -190,11 +190,11 @@ def _criterion_cells(name: str, criterion: Criterion) -> dict[str, str | Text]:
 
 
 def measured_in_words(criterion: Criterion) -> str:
-    """The measured index with its standard error and side; a dash without one."""
+    """The measured index with its standard error; a dash without one."""
     measured = number(criterion.measured, 2)
     if criterion.measured_error is None:
         return measured
-    return f"{measured} ± {criterion.measured_error:.2f} {criterion.side}"
+    return f"{measured}±{criterion.measured_error:.2f}"
 
 
 def _verdict(criterion: Criterion) -> str | Text:

@@ -38,23 +38,29 @@ def remedy_for(sides: Sequence[Side], limit: float, error: float) -> Remedy:
         run = [best]
     elif _share_decided(sides, open_sides, limit, error) >= often:
         run = open_sides
-    return Remedy(run, best, shares[best])
+    return Remedy(
+        run=run,
+        likeliest=best,
+        share=shares[best],
+    )
 
 
 def _share_decided(
     sides: Sequence[Side], run: Sequence[str], limit: float, error: float
 ) -> float:
     """Share of the models drawn on which trials to some sides decide."""
-    values = np.array([side.drawn.values for side in sides])
     enough = 60
-    known = np.flatnonzero(np.isfinite(values).all(axis=0))[:enough]
+    values = np.array([side.drawn.values for side in sides])
+    has_values = np.isfinite(values).all(axis=0)
+    known = np.flatnonzero(has_values)[:enough]
     if not run or not len(known):
         return 0.0
-    weights = _likelihoods(sides, values[:, known], error)
     decided = []
     for draw in known.tolist():
         after = after_trials(sides, run, draw, error)
-        decided.append(chances_of(after, limit).is_sure)
+        chances = chances_of(after, limit)
+        decided.append(chances.is_sure)
+    weights = _likelihoods(sides, values[:, known], error)
     return float(np.average(decided, weights=weights))
 
 
@@ -81,7 +87,11 @@ def after_trials(
     for side in sides:
         if side.name in run:
             value = float(side.drawn.values[draw])
-            measured = MeasuredIndex(value, error, side.name)
+            measured = MeasuredIndex(
+                value=value,
+                error=error,
+                side=side.name,
+            )
             after.append(side._replace(measured=measured))
         else:
             after.append(side)

@@ -54,7 +54,10 @@ def chances_of(sides: Sequence[Side], limit: float) -> Chances:
 
     model = _chances_by_model(unmeasured, limit, offsets)
     holds = passes * (1.0 - model.fails)
-    return Chances(passes * model.passes, 1.0 - holds)
+    return Chances(
+        passes=passes * model.passes,
+        fails=1.0 - holds,
+    )
 
 
 def _chances_by_model(
@@ -66,13 +69,16 @@ def _chances_by_model(
     """
     inside = [side.drawn for side in sides if not side.outside]
     if not sides:
-        return Chances(1.0, 0.0)
+        return Chances(passes=1.0, fails=0.0)
     if not inside:
-        return Chances(0.0, 0.0)
+        return Chances(passes=0.0, fails=0.0)
     drawn = worst(inside)
     if len(drawn.values):
-        meets = drawn.values + max(offsets) <= limit
-        misses = ~(drawn.values + min(offsets) <= limit) & ~drawn.ran_away
+        high = drawn.values + max(offsets)
+        low = drawn.values + min(offsets)
+        meets = high <= limit
+        is_beyond = ~(low <= limit)  # or has no value
+        misses = is_beyond & ~drawn.ran_away
         passes = float(meets.mean())
         fails = float(misses.mean())
     else:

@@ -83,8 +83,12 @@ def imo_criteria(
         for name in outside:
             if name.startswith(rule.manoeuvre):
                 side = "port" if "port" in name else "starboard"
-                drawn = found[name][rule.index]
-                sides.append(Side(side, drawn, outside[name]))
+                known = Side(
+                    name=side,
+                    drawn=found[name][rule.index],
+                    outside=outside[name],
+                )
+                sides.append(known)
         trial = trial_in_words(model, rule.manoeuvre)
         criteria[criterion] = criterion_of(rule, sides, trial)
     stop = found.get(STOPPING.manoeuvre)
@@ -101,8 +105,13 @@ def stopping_criterion(
             "where large displacement makes 15 lengths impracticable, the"
             " Administration may allow up to 20"
         )
-        side = Side("", stop[STOPPING.index])
-        return criterion_of(STOPPING, [side], STOPPING.manoeuvre, note)
+        side = Side(name="", drawn=stop[STOPPING.index])
+        return criterion_of(
+            STOPPING,
+            [side],
+            manoeuvre=STOPPING.manoeuvre,
+            note=note,
+        )
     why = "its equations hold for a shaft turning ahead only"
     if "n" not in model.command_names:
         why = (

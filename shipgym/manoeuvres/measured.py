@@ -71,12 +71,17 @@ def _with_errors(
         repeated.append(found_again)
 
     found = {}
+    side = first_side(trial)
     for name, value in values.items():
-        others = [again[name] for again in repeated if name in again]
-        scatter = float(np.std(others)) if others else 0.0
+        others = [again.get(name, value) for again in repeated]
+        scatter = float(np.std(others))
         unseen = _unseen_error(model, trial, noise, rules[name])
         error = float(np.hypot(scatter, unseen))
-        found[name] = MeasuredIndex(value, error, first_side(trial))
+        found[name] = MeasuredIndex(
+            value=value,
+            error=error,
+            side=side,
+        )
     return found
 
 
@@ -111,7 +116,8 @@ def smoothed(trial: Trial, period: float) -> tuple[Trial, dict[str, float]]:
     t = trial.t
     # degrees of freedom of the spline, of each sample: the mean of its low pass
     freedom = np.pi * _step(t) / (np.sqrt(2.0) * period)
-    unbiased = 1.0 / np.sqrt(1.0 - min(freedom, 0.9))
+    kept = 1.0 - min(freedom, 0.9)
+    unbiased = 1.0 / np.sqrt(kept)
 
     smooth = {}
     noise = {}
@@ -136,8 +142,8 @@ def _low_pass(name: str, t: Floats, values: Floats, period: float) -> Floats:
     times = t
     if name == "psi":
         start = t[0]
-        n_mirrored = int(np.searchsorted(t, start + period))
-        mirrored = slice(n_mirrored, 0, -1)
+        end = np.searchsorted(t, start + period)
+        mirrored = slice(int(end), 0, -1)
         before = 2.0 * start - t[mirrored]
         times = np.concatenate([before, t])
         values = np.concatenate([values[mirrored], values])
@@ -162,8 +168,11 @@ def _repetitions(smooth: Trial, noise: dict[str, float], period: float) -> list[
 
     trials = []
     for k in range(repetitions):
-        channels = {name: smooth[name] + left[name][:, k] for name in noise}
-        trials.append(smooth.with_channels(channels))
+        channels = {}
+        for name, columns in left.items():
+            channels[name] = smooth[name] + columns[:, k]
+        again = smooth.with_channels(channels)
+        trials.append(again)
     return trials
 
 
@@ -178,7 +187,9 @@ def _unseen_error(
     if rule.unit == "deg":
         return 0.0
     length = model.particulars["length"]
-    of_order = _step(trial.t) * model.particulars["speed"] / np.sqrt(12.0)
+    step = _step(trial.t)
+    speed = model.particulars["speed"]
+    of_order = step * speed / np.sqrt(12.0)
     wander = 0.0
     if rule.manoeuvre == "turning circle":
         wander = 2.0 * noise.get("x", 0.0)
