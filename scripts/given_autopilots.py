@@ -166,6 +166,8 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
             ]
     for name, group in {**groups, "**all**": rows}.items():
         n = counted(group)
+        if not group:
+            continue
         lines.append(
             f"| {name} | {n['ships with one']} of {n['ships']} |"
             f" {n['steer given']}, {n['lost given']} |"
