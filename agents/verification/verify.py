@@ -16,7 +16,7 @@ from agents.rollouts.course_keeping import Episodes, sail, step_response
 from agents.verification.closed_loop import ClosedLoop, Held
 from agents.verification.monte_carlo import MonteCarlo, monte_carlo
 from agents.verification.result import STEP_DEG, Pilot, Verification
-from agents.verification.tracks import judged_task, track_task
+from agents.verification.tracks import Track, judged_task, track_task
 from identification.progress import Progress
 from shipgym.checks import quoted
 from shipgym.errors import InputError
@@ -71,8 +71,7 @@ def verify(
         autopilots.append(guest)
         episodes.append(sail(guest, loop.draws, judged_task(), loop.seeds))
 
-    stable = np.flatnonzero(~found.manoeuvres.unstable)
-    ships = [model, *[found.draws[i] for i in stable]]
+    ships = [model, *stable_draws(found)]
     pilots = run_pilots(autopilots, episodes, ships, tell)
     return Verification(
         draws=draws,
@@ -82,7 +81,7 @@ def verify(
         nomoto=nomoto(model),
         pilots=tuple(sorted(pilots, key=_mean_cost)),
         refused=designed.refused,
-        tracks=tuple(held.outcome for held in judged.tracks),
+        tracks=judged.kept_tracks,
         counted=loop.counted,
         retuned=judged.retuned,
     )
@@ -95,6 +94,11 @@ class Judged(NamedTuple):
     tracks: list[Held]  # that keep a track
 
     @property
+    def kept_tracks(self) -> tuple[Track, ...]:
+        """The tracks themselves."""
+        return tuple(held.outcome for held in self.tracks)
+
+    @property
     def retuned(self) -> dict[str, str]:
         """How designs were changed, by their kind."""
         words = {}
@@ -102,6 +106,12 @@ class Judged(NamedTuple):
             if held.share != 1.0:
                 words[str(held.controller.kind)] = held.in_words
         return words
+
+
+def stable_draws(found: MonteCarlo) -> list[ShipModel]:
+    """Models drawn that run away in no manoeuvre."""
+    stable = np.flatnonzero(~found.manoeuvres.unstable)
+    return [found.draws[number] for number in stable.tolist()]
 
 
 def judged_designs(loop: ClosedLoop, designed: Designed, found: MonteCarlo) -> Judged:
