@@ -44,7 +44,9 @@ from real_ships.section import table  # noqa: E402
 from agents.controllers.lq import LQ  # noqa: E402
 from agents.controllers.pid import PID  # noqa: E402
 from agents.rollouts.course_keeping import sail  # noqa: E402
-from agents.verification.refusal import lost_control, why_refused  # noqa: E402
+from agents.verification.closed_loop import ClosedLoop  # noqa: E402
+from agents.verification.refusal import why_refused  # noqa: E402
+from agents.verification.tracks import judged_task  # noqa: E402
 from identification import IdentificationResult, Preprocessing, identify  # noqa: E402
 from identification.regression.still_water import in_still_water  # noqa: E402
 from identification.validation.warnings import why_unstable  # noqa: E402
@@ -238,9 +240,10 @@ def autopilots(
         except InputError:
             found[design.__name__] = "refused"
             continue
-        if lost_control(
-            sail(pilot, draws, seeds=np.arange(40), allow_unstable=True).terminated
-        ):
+        seeds = np.arange(40)
+        loop = ClosedLoop(result.model, draws, seeds, result.trials)
+        drawn = sail(pilot, draws, judged_task(), seeds, allow_unstable=True)
+        if loop.loses_too_many(drawn.terminated):
             found[design.__name__] = "refused"
             continue
         episodes = sail(

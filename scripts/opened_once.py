@@ -137,7 +137,12 @@ def case(name: str, structure: str, kind: str, seed: int, draws: int) -> dict[st
     drawn = {
         key: one.to_dict() for key, one in imo_assessment(result.model, 100).items()
     }
-    chain = examined(None, result, [], lambda: verify(result.model, DRAWS, 0))
+    chain = examined(
+        None,
+        result,
+        [],
+        lambda: verify(result.model, DRAWS, 0, trials=result.trials),
+    )
     found = chain.verification
     row |= {
         "by models": verdicts(drawn, ship),

@@ -117,6 +117,8 @@ def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
     for warning in model_warnings(result.identification):
         warn(warning)
     if result.verification is not None:
+        for name, how in result.verification.retuned.items():
+            say(f"{name.upper()} was retuned to hold the models drawn: {how}")
         for name, reason in result.verification.refused.items():
             warn(f"no {name.upper()} autopilot: {reason}")
     say(f"report: {report}")

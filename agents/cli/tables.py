@@ -178,7 +178,7 @@ def _criterion_cells(name: str, criterion: Criterion) -> dict[str, str | Text]:
     _, _, paragraph = criterion.source.rpartition(" ")
     return {
         "criterion": name,
-        ">measured": number(criterion.measured, 2),
+        ">measured": measured_in_words(criterion),
         ">value": number(criterion.value, 2),
         ">95 % interval": between(criterion.interval, 2),
         ">limit": number(criterion.limit, 2),
@@ -188,6 +188,14 @@ def _criterion_cells(name: str, criterion: Criterion) -> dict[str, str | Text]:
         "manoeuvre": criterion.manoeuvre,
         "paragraph": paragraph,
     }
+
+
+def measured_in_words(criterion: Criterion) -> str:
+    """The measured index with its standard error; a dash without one."""
+    measured = number(criterion.measured, 2)
+    if criterion.measured_error is None:
+        return measured
+    return f"{measured}±{criterion.measured_error:.2f}"
 
 
 def _verdict(criterion: Criterion) -> str | Text:

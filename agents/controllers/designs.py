@@ -15,6 +15,7 @@ from agents.suites.reference import load_tuned
 from agents.suites.suite import BenchmarkTask
 from shipgym import InputError, ShipModel
 from shipgym.checks import quoted
+from shipgym.tasks.task import Task
 
 #: Of these, no bases for policies unless asked for by name: MPC simulates, an action
 #: takes it 97 us where wheel-over needs 2.
@@ -84,6 +85,51 @@ def _divided(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any
 def _designed(kind: Any, ship: _Ship, dt: float, settings: str) -> Controller:
     made: Controller = kind.from_model(ship.model, dt=dt, **json.loads(settings))
     return made
+
+
+def with_bandwidth(
+    controller: Controller, model: ShipModel, share: float, task: Task | None = None
+) -> Controller | None:
+    """A design of the same kind with a share of the bandwidth, about that share.
+
+    Guidance is given an autopilot of that bandwidth to lead, along the paths of `task`.
+    None for a kind that has no bandwidth to set. Raises InputError if there is no such
+    design, as `from_model`.
+    """
+    made: Any = type(controller)
+    if controller.has_autopilot:
+        autopilot = getattr(controller, "autopilot", None)
+        if not isinstance(autopilot, Controller):
+            return None
+        led = with_bandwidth(autopilot, model, share)
+        if led is None:
+            return None
+        guide: Controller = made.from_model(model, autopilot=led, task=task)
+        return guide
+
+    settings = bandwidth_settings(controller.design, share)
+    if not settings:
+        return None
+    dt = controller.design["dt"]
+    other: Controller = made.from_model(model, dt=dt, **settings)
+    return other
+
+
+def bandwidth_settings(design: Mapping[str, float], share: float) -> dict[str, float]:
+    """Settings for a share of the bandwidth of a design; empty if it has none.
+
+    Poles are moved in proportion. Of a regulator the weights rise: a heading follows a
+    rudder rate as a triple integrator and a rudder as a double one, whose bandwidths
+    fall with the sixth and the fourth root of their weights.
+    """
+    if "frequency" in design:
+        return {"frequency": share * design["frequency"]}
+    if "rate_weight_s2" in design:
+        return {
+            "rudder_weight": design["rudder_weight"] / share**4,
+            "rate_weight_s2": design["rate_weight_s2"] / share**6,
+        }
+    return {}
 
 
 def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:

@@ -17,6 +17,7 @@ from agents.jobs import HERE, EngineError, JobEngine
 from agents.output import whole_folder
 from agents.verification.refusal import (
     refused_designs,
+    remark_on_damping,
     simpler_structures,
     why_refused,
 )
@@ -95,7 +96,9 @@ def build_autopilot(
         def examined_fit(fit: IdentificationResult) -> AutopilotResult:
             others = [guest for _, guest in guests]
             work = int(draws), int(seed), tell, where, others, designs
-            return examined(ship, fit, guests, lambda: verify(fit.model, *work))
+            return examined(
+                ship, fit, guests, lambda: verify(fit.model, *work, trials=fit.trials)
+            )
 
         def of_structure(structure: str) -> AutopilotResult:
             named = arguments | {"structure": structure}
@@ -170,7 +173,8 @@ def examined(
     found = _measured(found, fit)
     refusals = refused_designs(found, fit)
     refused = {**found.refused, **refusals.by_design}
-    return result(None, replace(found, refused=refused), refusals.of_all)
+    told = result(None, replace(found, refused=refused), refusals.of_all)
+    return replace(told, remark=remark_on_damping(fit))
 
 
 def or_simpler(
@@ -194,7 +198,8 @@ def or_simpler(
                 f"{chosen} predicts best, but no autopilot is given on it"
                 f" ({result.refusal}): the model and the autopilots are {structure}'s"
             )
-            return replace(simpler, remark=reason)
+            remarks = [reason, *filter(None, [simpler.remark])]
+            return replace(simpler, remark="; ".join(remarks))
         refused.append(structure)
     if not refused:
         return result

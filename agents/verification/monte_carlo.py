@@ -22,6 +22,7 @@ from agents.verification.index_uncertainty import (
     sail_draws,
     uncertainty_of,
 )
+from agents.verification.tracks import judged_task
 from shipgym.arrays import Flags
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
@@ -131,7 +132,7 @@ def do_draws(job: dict[str, Any]) -> dict[str, Any]:
     episodes = []
     for content in job["controllers"]:
         controller = read_controller(content, "controller")
-        sailed = sail(controller, draws, seeds=seeds)
+        sailed = sail(controller, draws, judged_task(), seeds)
         episodes.append(asdict(sailed))
     course_unstable = [not keeps_course(draw) for draw in draws]
     return {

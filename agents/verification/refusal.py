@@ -5,7 +5,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from agents.rollouts.course_keeping import Episodes
+from agents.verification.closed_loop import MOST_LOST, loses_too_many
 from agents.verification.result import Verification
+from agents.verification.tracks import Track
 from identification.design.experiment import advise
 from identification.fit import Fit
 from shipgym.arrays import Flags, Floats
@@ -13,9 +16,6 @@ from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import steering_state_space
 from shipgym.trials.trial import Trial
-
-#: Share of the models drawn that an autopilot may lose control of.
-MOST_LOST = 0.05
 
 
 class Steering(NamedTuple):
@@ -32,28 +32,41 @@ class Steering(NamedTuple):
 
 
 def why_refused(fit: Fit) -> str | None:
-    """Reason against designs on a stable model, with the trial that would help.
+    """Reason against any design on a stable model, with the trial that would help.
 
-    Its steering at low frequency has another sign than in the trials, or a damping
-    derivative has, significantly, a sign that no ship has. None if there is no reason.
+    Its steering at low frequency has another sign than in the trials. None if there is
+    no reason; what a model drawn does by itself is none, designs are judged in closed
+    loop.
     """
-    model = fit.model
-    try:
-        drawn = []
-        for ship in (model, *model.sample(60, 0)):
-            A, B = steering_state_space(ship)
-            steering = Steering(A, B)
-            drawn.append(steering)
-    except InputError:  # no straight course: the designs say so
+    steering = _steering_of(fit.model)
+    if steering is None:  # no straight course: the designs say so
         return None
+    why = _steers_to_other_side(fit, steering)
+    return None if why is None else f"{why}; run {helpful_trial(fit)}"
 
-    why = _steers_to_other_side(fit, drawn[0])
+
+def remark_on_damping(fit: Fit) -> str | None:
+    """Remark on a damping derivative that has, significantly, the sign of no ship."""
+    model = fit.model
     equations = getattr(model.dynamics, "equations", ("v",))
-    if why is None and "v" in equations:
-        why = why_driven(drawn)
-    if why is None:
+    if "v" not in equations:
         return None
-    return f"{why}; run {helpful_trial(fit)}"
+    drawn = []
+    for ship in (model, *model.sample(60, 0)):
+        steering = _steering_of(ship)
+        if steering is None:
+            return None
+        drawn.append(steering)
+    return why_driven(drawn)
+
+
+def _steering_of(model: ShipModel) -> Steering | None:
+    """A model's steering; None if it has no straight course."""
+    try:
+        A, B = steering_state_space(model)
+    except InputError:
+        return None
+    return Steering(A, B)
 
 
 def _steers_to_other_side(fit: Fit, steering: Steering) -> str | None:
@@ -172,15 +185,6 @@ def simpler_structures(
     return list(simpler)[:2]
 
 
-def lost_control(terminated: Flags, most_lost: float = MOST_LOST) -> str | None:
-    """Reason to refuse an autopilot that loses control of too many models, or None."""
-    lost = int(np.sum(terminated))
-    n_models = len(terminated)
-    if np.mean(terminated) <= most_lost:
-        return None
-    return f"it loses control of {lost} of {n_models} models drawn"
-
-
 class Refusals(NamedTuple):
     """Which designs are refused, and whether none is given."""
 
@@ -195,15 +199,19 @@ def refused_designs(
     designed = [pilot for pilot in found.pilots if pilot.design is not None]
     lost = {}
     for pilot in designed:
-        terminated = pilot.episodes.terminated
-        why = lost_control(terminated, most_lost)
+        why = lost_control(found, pilot.episodes, most_lost)
         if why is not None:
             lost[pilot.key] = why
-    if not lost:
+    tracks = {}
+    for track in found.tracks:
+        why = lost_track(track, most_lost)
+        if why is not None:
+            tracks[track.key] = why
+    if not lost and not tracks:
         return Refusals({}, None)
 
     remedy = helpful_trial(fit)
-    refused = {key: f"{why}; run {remedy}" for key, why in lost.items()}
+    refused = {key: f"{why}; run {remedy}" for key, why in {**lost, **tracks}.items()}
     if len(lost) < len(designed):
         return Refusals(refused, None)
 
@@ -212,3 +220,58 @@ def refused_designs(
     names = ", ".join([key.upper() for key in lost])
     of_first = refused[designed[0].key]
     return Refusals(refused, f"{names}: {of_first}")
+
+
+def lost_control(
+    found: Verification, episodes: Episodes, most_lost: float = MOST_LOST
+) -> str | None:
+    """Reason to refuse a design that loses too many models drawn, or None.
+
+    It says how many, which, when, and what is special about them.
+    """
+    terminated = episodes.terminated
+    counted = found.counted
+    if counted is None:
+        counted = np.ones(len(terminated), dtype=np.bool_)
+    if not loses_too_many(terminated, counted, most_lost):
+        return None
+
+    lost = np.flatnonzero(terminated & counted)
+    n_counted = int(np.sum(counted))
+    why = f"it loses control of {len(lost)} of {n_counted} models drawn"
+    if len(lost):
+        median_s = float(np.median(episodes.duration_s[lost]))
+        why += (
+            f" in course keeping (numbers {_shortened(lost.tolist())}, after"
+            f" {median_s:.0f} s in the median"
+            f"{_off_course(found.course_unstable[lost])})"
+        )
+    if found.left_out:
+        why += f"; {found.left_out} more run away whatever steers them"
+    return f"{why}; nor does it hold them with another bandwidth"
+
+
+def _off_course(unstable: Flags) -> str:
+    """How many of some models keep no straight course by themselves."""
+    return f", {int(unstable.sum())} of them unstable on course"
+
+
+def _shortened(numbers: list[int]) -> str:
+    """The first few of some numbers."""
+    most = 8
+    words = ", ".join([str(number) for number in numbers[:most]])
+    return f"{words}, ..." if len(numbers) > most else words
+
+
+def lost_track(track: Track, most_lost: float = MOST_LOST) -> str | None:
+    """Reason to refuse a guide that does not reach the end of the track, or None."""
+    if not track.arrived[0]:
+        return "it does not reach the end of the track on the identified model"
+    arrived = track.arrived[1:]
+    lost = int(np.sum(~arrived))
+    if not len(arrived) or lost <= most_lost * len(arrived):
+        return None
+    return (
+        f"it does not reach the end of the track with {lost} of {len(arrived)} models"
+        " drawn; nor does it with another bandwidth"
+    )

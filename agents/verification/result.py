@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -68,6 +68,20 @@ class Verification:
     tracks: tuple[Track, ...] = ()  # of autopilots that keep to a track
     #: what the standards of heading and track control ask for
     standards: tuple[Requirement, ...] = ()
+    #: draws that count against a design: the others run away whatever steers them,
+    #: shape (n_draws,); None for all
+    counted: Flags | None = None
+    #: how designs were changed to hold the models drawn, by their kind
+    retuned: dict[str, str] = field(default_factory=dict)
+
+    def of_counted(self, values: Flags) -> Flags:
+        """Those of the draws that count."""
+        return values if self.counted is None else values[self.counted]
+
+    @property
+    def left_out(self) -> int:
+        """Number of draws that do not count."""
+        return 0 if self.counted is None else int(np.sum(~self.counted))
 
     @property
     def by_name(self) -> list[Pilot]:
@@ -128,12 +142,14 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
             "seed": found.seed,
             "unstable": int(found.manoeuvres.unstable.sum()),
             "course_unstable": int(found.course_unstable.sum()),
+            "left_out": found.left_out,
         },
         "nomoto": _finite(asdict(found.nomoto)),
         "imo": {name: criterion.to_dict() for name, criterion in criteria.items()},
         "controllers": {pilot.key: pilot_metrics(pilot) for pilot in found.pilots},
         "ranking": [pilot.key for pilot in found.pilots],
         "refused": found.refused,
+        "retuned": found.retuned,
         "tracks": {track.key: track_metrics(track) for track in found.tracks},
         "standards": _standards_metrics(found.standards),
     }

@@ -17,8 +17,10 @@ from shipgym.envs.engine import Engine
 from shipgym.sea.conditions import Weather
 from shipgym.sea.current_wind_waves import Current
 from shipgym.ships import ShipModel
-from shipgym.tasks.task import Task
+from shipgym.tasks.task import Task, course_keeping_task
 
+#: Distance from the data of a model that no ship reaches before she is lost.
+ANYWHERE = 1e6
 RECORDED = (
     "x",
     "y",
@@ -64,7 +66,13 @@ def track_task(model: ShipModel) -> Task:
         waypoints=waypoints,
         sea=Weather(current=current),
         episode_steps=3000,  # about twice what it takes
+        max_envelope_distance=ANYWHERE,
     )
+
+
+def judged_task() -> Task:
+    """Course keeping that ends when control is lost, not where a model extrapolates."""
+    return course_keeping_task(max_envelope_distance=ANYWHERE)
 
 
 def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,14 +13,16 @@ from agents.controllers.controller import Controller
 from agents.controllers.registry import controller_class
 from agents.jobs import HERE, JobEngine
 from agents.rollouts.course_keeping import Episodes, sail, step_response
-from agents.verification.monte_carlo import monte_carlo
+from agents.verification.closed_loop import ClosedLoop, Held
+from agents.verification.monte_carlo import MonteCarlo, monte_carlo
 from agents.verification.result import STEP_DEG, Pilot, Verification
-from agents.verification.tracks import Track, keep_track, track_task
+from agents.verification.tracks import Track, judged_task, track_task
 from identification.progress import Progress
 from shipgym.checks import quoted
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import nomoto
+from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from agents.agent_file import Agent
@@ -36,13 +38,15 @@ def verify(
     where: JobEngine = HERE,
     guests: Sequence[Agent] = (),
     designs: Sequence[str] = DESIGNS,
+    trials: Sequence[Trial] = (),
 ) -> Verification:
     """Design autopilots on a model and run them over models drawn from its covariance.
 
-    `model`: with a covariance; `draws`, `seed`, `where`, `designs`: see
-    `build_autopilot`; `tell`: called with the progress; `guests`: further autopilots.
-    Raises UnstableModelError if the model itself runs away; InputError if no autopilot
-    can be designed on it.
+    A design that loses too many of them is retuned on them. `model`: with a covariance;
+    `draws`, `seed`, `where`, `designs`: see `build_autopilot`; `tell`: called with the
+    progress; `guests`: further autopilots; `trials`: that the ship was put through: a
+    model drawn that runs away in one of them does not count. Raises UnstableModelError
+    if the model itself runs away; InputError if no autopilot can be designed on it.
     """
     tell("models drawn", 0, draws)
     designed = design_autopilots(model, designs)
@@ -54,15 +58,21 @@ def verify(
         where=where,
         progress=lambda done: tell("models drawn", done, draws),
     )
-    episodes = list(found.episodes)
+    loop = ClosedLoop(
+        model=model,
+        draws=found.draws,
+        seeds=seed + np.arange(draws),
+        trials=trials,
+    )
+    judged = judged_designs(loop, designed, found)
+    autopilots: list[Agent] = [held.controller for held in judged.courses]
+    episodes = [held.outcome for held in judged.courses]
     for guest in guests:
-        episodes.append(sail(guest, found.draws, seeds=seed + np.arange(draws)))
+        autopilots.append(guest)
+        episodes.append(sail(guest, loop.draws, judged_task(), loop.seeds))
 
-    stable = np.flatnonzero(~found.manoeuvres.unstable)
-    ships = [model, *[found.draws[i] for i in stable]]
-    autopilots = [*designed.controllers, *guests]
+    ships = [model, *stable_draws(found)]
     pilots = run_pilots(autopilots, episodes, ships, tell)
-    tracks, late = kept_tracks(designed.guides, ships)
     return Verification(
         draws=draws,
         seed=seed,
@@ -70,9 +80,48 @@ def verify(
         course_unstable=found.course_unstable,
         nomoto=nomoto(model),
         pilots=tuple(sorted(pilots, key=_mean_cost)),
-        refused={**designed.refused, **late},
-        tracks=tracks,
+        refused=designed.refused,
+        tracks=judged.kept_tracks,
+        counted=loop.counted,
+        retuned=judged.retuned,
     )
+
+
+class Judged(NamedTuple):
+    """Designs as they are given or refused, after they were judged."""
+
+    courses: list[Held]  # that keep a heading
+    tracks: list[Held]  # that keep a track
+
+    @property
+    def kept_tracks(self) -> tuple[Track, ...]:
+        """The tracks themselves."""
+        return tuple(held.outcome for held in self.tracks)
+
+    @property
+    def retuned(self) -> dict[str, str]:
+        """How designs were changed, by their kind."""
+        words = {}
+        for held in (*self.courses, *self.tracks):
+            if held.share != 1.0:
+                words[str(held.controller.kind)] = held.in_words
+        return words
+
+
+def stable_draws(found: MonteCarlo) -> list[ShipModel]:
+    """Models drawn that run away in no manoeuvre."""
+    stable = np.flatnonzero(~found.manoeuvres.unstable)
+    return [found.draws[number] for number in stable.tolist()]
+
+
+def judged_designs(loop: ClosedLoop, designed: Designed, found: MonteCarlo) -> Judged:
+    """Designs after the closed loop with the models drawn, some of them retuned."""
+    courses = []
+    for controller, first in zip(designed.controllers, found.episodes, strict=True):
+        held = loop.keep_course(controller, first)
+        courses.append(held)
+    tracks = [loop.keep_track(guide) for guide in designed.guides]
+    return Judged(courses, tracks)
 
 
 def run_pilots(
@@ -133,25 +182,6 @@ def design_autopilots(model: ShipModel, designs: Sequence[str]) -> Designed:
             f"no autopilot that keeps a heading could be designed on it: {why}"
         )
     return found
-
-
-def kept_tracks(
-    guides: Sequence[Controller], ships: Sequence[ShipModel]
-) -> tuple[tuple[Track, ...], dict[str, str]]:
-    """The track of each path autopilot, and reasons to refuse those that fail.
-
-    One fails that does not arrive on the first ship.
-    """
-    tracks = []
-    late = {}
-    for guide in guides:
-        track = keep_track(guide, ships)
-        tracks.append(track)
-        if not track.arrived[0]:
-            late[track.key] = (
-                "it does not reach the end of the track on the identified model"
-            )
-    return tuple(tracks), late
 
 
 def unique_keys(names: Sequence[str]) -> list[str]:

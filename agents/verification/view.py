@@ -53,6 +53,7 @@ class CriterionRow:
     notes: str  # paragraph, and remarks
     passed: bool | None  # None where it is not decided
     measured: float | None
+    measured_error: str  # with the side, in words
     value: float | None
     interval: str
     lost: str  # draws without a value, in words
@@ -86,6 +87,7 @@ class VerificationView:
     pilots: dict[str, dict[str, Any]]  # metrics by name, the best first
     cheaper: dict[str, float]  # share of the models on which the best costs less
     refused: dict[str, str]
+    retuned: dict[str, str]
     tracks: dict[str, dict[str, Any]]
     standards: Sequence[Requirement]
 
@@ -122,6 +124,7 @@ def verification_view(found: Verification, length: float) -> VerificationView:
         pilots=pilots,
         cheaper=_cheaper(found),
         refused=found.refused,
+        retuned=found.retuned,
         tracks={track.key.upper(): track_metrics(track) for track in found.tracks},
         standards=found.standards,
     )
@@ -155,6 +158,11 @@ def headline(found: Verification) -> str:
     sentences.append(
         f"{best.name} steers best and {control} {found.draws} models drawn."
     )
+    if found.left_out:
+        sentences.append(
+            f"{found.left_out} of the models run away whatever steers them, in the"
+            " trials themselves or straight ahead, and do not count."
+        )
     return " ".join(sentences)
 
 
@@ -237,6 +245,7 @@ def _criterion_row(name: str, criterion: Criterion) -> CriterionRow:
         notes=notes,
         passed=criterion.passed,
         measured=criterion.measured,
+        measured_error=_measured_error(criterion),
         value=criterion.value,
         interval=interval,
         lost="" if drawn is None else drawn.lost_in_words,
@@ -244,6 +253,13 @@ def _criterion_row(name: str, criterion: Criterion) -> CriterionRow:
         unit=criterion.unit,
         probability=criterion.probability,
     )
+
+
+def _measured_error(criterion: Criterion) -> str:
+    """Standard error of the measured index and its side; empty without one."""
+    if criterion.measured_error is None:
+        return ""
+    return f"± {fixed(criterion.measured_error)}, {criterion.side}"
 
 
 def _introduction(found: Verification, designed: Mapping[str, Controller]) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from shipgym.checks import check_number
+from shipgym.manoeuvres.evidence import Side
 from shipgym.manoeuvres.imo_rules import (
     STOPPING,
     imo_manoeuvres,
@@ -15,7 +16,6 @@ from shipgym.manoeuvres.intervals import IndexInterval, intervals_of, own_indice
 from shipgym.manoeuvres.verdicts import (
     Criterion,
     criterion_of,
-    decided_by_model,
     outside_envelope,
 )
 from shipgym.ships.by_name import takes_name
@@ -79,13 +79,18 @@ def imo_criteria(
 
     criteria = {}
     for criterion, rule in ship_rules(model).items():
-        names = [name for name in outside if name.startswith(rule.manoeuvre)]
-        runs = [found[name] for name in names]
-        criteria[criterion] = decided_by_model(
-            criterion_of(rule, runs),
-            trial_in_words(model, rule.manoeuvre),
-            outside=any(outside[name] for name in names),
-        )
+        sides = []
+        for name in outside:
+            if name.startswith(rule.manoeuvre):
+                side = "port" if "port" in name else "starboard"
+                known = Side(
+                    name=side,
+                    drawn=found[name][rule.index],
+                    outside=outside[name],
+                )
+                sides.append(known)
+        trial = trial_in_words(model, rule.manoeuvre)
+        criteria[criterion] = criterion_of(rule, sides, trial)
     stop = found.get(STOPPING.manoeuvre)
     criteria["stopping"] = stopping_criterion(model, stop)
     return criteria
@@ -100,7 +105,13 @@ def stopping_criterion(
             "where large displacement makes 15 lengths impracticable, the"
             " Administration may allow up to 20"
         )
-        return criterion_of(STOPPING, [stop], note)
+        side = Side(name="", drawn=stop[STOPPING.index])
+        return criterion_of(
+            STOPPING,
+            [side],
+            manoeuvre=STOPPING.manoeuvre,
+            note=note,
+        )
     why = "its equations hold for a shaft turning ahead only"
     if "n" not in model.command_names:
         why = (

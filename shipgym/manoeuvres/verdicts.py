@@ -6,18 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
-from shipgym.manoeuvres.execution import usual_rudder
-from shipgym.manoeuvres.imo_rules import RULES, Rule
+from shipgym.errors import ManoeuvreError, UnstableModelError
+from shipgym.manoeuvres.deciding import Remedy, remedy_for
+from shipgym.manoeuvres.evidence import Side, chances_of, worse_measured, worse_side
+from shipgym.manoeuvres.imo_rules import Rule
 from shipgym.manoeuvres.intervals import IndexInterval, worst
+from shipgym.manoeuvres.measured import MeasuredIndex, measured_indices
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.stopping import StoppingIndices
-from shipgym.manoeuvres.turning import full_rudder_deg, turning_indices
-from shipgym.manoeuvres.zigzags import (
-    STANDARD_DEG,
-    switch_heading_deg,
-    zigzag_indices,
-)
 from shipgym.ships.envelope import ENVELOPE_CHANNELS
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
@@ -37,13 +33,21 @@ class Criterion:
     # the value over models drawn from the covariance of an identified ship
     drawn: IndexInterval | None = None
     note: str = ""  # remarks
-    #: whether there is a verdict: by a measured trial, or by a model within the
-    #: envelope of its trials, with the interval on one side of the limit
+    #: whether there is a verdict: by measured trials, or by a model within the
+    #: envelope of its trials, with 97.5 % certainty
     decided: bool = True
-    #: of a trial that is the manoeuvre; it goes before the model's
+    #: the worse of the trials that are the manoeuvre; it goes before the model's
     measured: float | None = None
     #: such as "35 deg turn", with the rudder's limit where that is less
     manoeuvre: str = ""
+    measured_error: float | None = None  # standard error of what was measured
+    side: str = ""  # the worse side: of the trials, without any of the model
+    decided_by: str | None = None  # "trials", "model" or "trials and model"
+    certainty: float | None = None  # of the verdict
+    #: where it is not decided: one trial that would decide it, two of which both are
+    #: needed, or none
+    deciding_trials: tuple[str, ...] = ()
+    sides: tuple[Side, ...] = ()  # what is known on each
 
     @property
     def interval(self) -> tuple[float, float | None] | None:
@@ -59,12 +63,13 @@ class Criterion:
 
     @property
     def probability(self) -> float | None:
-        """Probability to pass: 1 or 0 if measured; None if undecided."""
+        """Probability to pass, by trials and models drawn; None if undecided."""
         if not self.decided:
             return None
-        if self.measured is not None:
-            return float(bool(self.passed))
-        return self.share_passed
+        by_value = self.measured is None and self.share_passed is None
+        if by_value or self.certainty is None:
+            return self.share_passed
+        return self.certainty if self.passed else 1.0 - self.certainty
 
     def to_dict(self) -> dict[str, Any]:
         """Dictionary ready for JSON."""
@@ -72,8 +77,14 @@ class Criterion:
             "manoeuvre": self.manoeuvre,
             "value": self.value,
             "measured": self.measured,
+            "measured_error": self.measured_error,
+            "side": self.side,
             "limit": self.limit,
+            "interval_95": self.interval,
+            "probability": self.probability,
             "decided": self.decided,
+            "decided_by": self.decided_by,
+            "deciding_trials": list(self.deciding_trials),
             "passed": self.passed,
             "unit": self.unit,
             "source": self.source,
@@ -84,8 +95,6 @@ class Criterion:
         if drawn is not None and len(drawn.values):
             (median,) = drawn.quantiles(0.5)
             fields |= {
-                "probability": self.probability,
-                "interval_95": self.interval,
                 "median": median,
                 "draws": len(drawn.values),
                 "ran_away": drawn.n_ran_away,
@@ -95,52 +104,124 @@ class Criterion:
 
 
 def criterion_of(
-    rule: Rule, runs: Sequence[Mapping[str, IndexInterval]], note: str = ""
+    rule: Rule, sides: Sequence[Side], manoeuvre: str = "", note: str = ""
 ) -> Criterion:
-    """The worst value of some runs against its limit; an incomplete run fails it."""
-    drawn = worst([run[rule.index] for run in runs])
-    value = drawn.value
-    return Criterion(
-        value=value,
+    """A rule judged on the worse side; an incomplete run fails it.
+
+    `sides`: what is known of the index on each; `manoeuvre`: the trial in words.
+    """
+    drawn = worst([side.drawn for side in sides])
+    criterion = Criterion(
+        value=drawn.value,
         limit=rule.limit,
-        passed=value is not None and value <= rule.limit,
+        passed=None,
         unit=rule.unit,
         source=rule.source,
         drawn=drawn,
         note=note,
+        manoeuvre=manoeuvre,
+        sides=tuple(sides),
+    )
+    return judged(criterion)
+
+
+def judged(criterion: Criterion) -> Criterion:
+    """The criterion with its verdict, or with the trial that would decide it."""
+    sides = criterion.sides
+    measured = worse_measured(sides)
+    chances = chances_of(sides, criterion.limit)
+    criterion = replace(
+        criterion,
+        side=worse_side(sides),
+        measured=None if measured is None else measured.value,
+        measured_error=None if measured is None else measured.error,
+    )
+    if not chances.is_sure:
+        return _undecided(criterion)
+    passed = chances.passes > chances.fails
+    return replace(
+        criterion,
+        passed=passed,
+        decided=True,
+        decided_by=_source_of(criterion, passed),
+        certainty=max(chances),
+        deciding_trials=(),
+        note="" if measured is not None else criterion.note,
     )
 
 
-def decided_by_model(criterion: Criterion, manoeuvre: str, outside: bool) -> Criterion:
-    """The criterion without verdict where a model does not decide it.
+def _source_of(criterion: Criterion, passed: bool) -> str:
+    """Evidence that decides a criterion: "trials", "model", or both."""
+    measured = [side for side in criterion.sides if side.measured is not None]
+    if not measured:
+        return "model"
+    by_trials = chances_of(measured, criterion.limit)
+    all_measured = len(measured) == len(criterion.sides)
+    if all_measured or (by_trials.is_sure and not passed):
+        return "trials"
+    return "trials and model"
 
-    It names the trial that would decide it.
 
-    `manoeuvre`: the trial in words; `outside`: whether it is outside the envelope of
-    the trials that the model was identified from.
-    """
-    criterion = replace(criterion, manoeuvre=manoeuvre)
-    if outside:
+def _undecided(criterion: Criterion) -> Criterion:
+    """The criterion without verdict, with the trials that would decide it."""
+    sides = criterion.sides
+    error = criterion.measured_error
+    if error is None:
+        error = 0.2 if criterion.unit == "deg" else 0.03  # usual ones
+    remedy = remedy_for(sides, criterion.limit, error)
+    trials = [side_in_words(criterion.manoeuvre, name) for name in remedy.run]
+    return replace(
+        criterion,
+        passed=None,
+        decided=False,
+        decided_by=None,
+        certainty=None,
+        deciding_trials=tuple(trials),
+        note=(
+            f"not decided by these trials: {_why_undecided(criterion)};"
+            f" {_in_words(remedy, criterion.manoeuvre)}"
+        ),
+    )
+
+
+def _in_words(remedy: Remedy, manoeuvre: str) -> str:
+    """The trials that would decide, or that no single one does."""
+    likeliest = side_in_words(manoeuvre, remedy.likeliest)
+    if len(remedy.run) == 1:
+        return f"run a {likeliest}"
+    words = "no single trial decides it"
+    if remedy.run:
+        return f"{words}, run a {manoeuvre} to both sides"
+    if remedy.share > 0.0:
+        per_cent = 100.0 * remedy.share
+        words += f" in four of five cases, a {likeliest} in {per_cent:.0f} %"
+    return words
+
+
+def side_in_words(manoeuvre: str, side: str) -> str:
+    """Trial of a manoeuvre to one side: "35 deg turn to port"."""
+    if manoeuvre.endswith("turn"):
+        return f"{manoeuvre} to {side}"
+    if not side:
+        return manoeuvre
+    return f"{manoeuvre}, {side} first"
+
+
+def _why_undecided(criterion: Criterion) -> str:
+    """Reason why there is no verdict."""
+    measured = [side for side in criterion.sides if side.measured is not None]
+    unmeasured = [side for side in criterion.sides if side.measured is None]
+    why = "the models drawn lie on both sides of the limit"
+    if any(side.outside for side in unmeasured):
         why = "it is outside the envelope of the trials"
-    elif _on_both_sides(criterion):
-        why = "the models drawn lie on both sides of the limit"
-    else:
-        return criterion
-    note = f"not decided by these trials: {why}; run a {manoeuvre} to both sides"
-    return replace(criterion, passed=None, decided=False, note=note)
-
-
-def _on_both_sides(criterion: Criterion) -> bool:
-    """Return whether the draws lie on both sides of the limit; runaways on none."""
-    drawn = criterion.drawn
-    if drawn is None or not len(drawn.values):
-        return False
-    passes = drawn.values <= criterion.limit
-    fails = ~passes & ~drawn.ran_away
-    larger_share = max(passes.mean(), fails.mean())
-    # Share of the draws on one side of a limit, from which on a criterion is decided.
-    sure = 0.975
-    return bool(larger_share < sure)
+    if not unmeasured:
+        return (
+            f"{criterion.measured:.2f} was measured with a standard error of"
+            f" {criterion.measured_error:.2g}, too near the limit"
+        )
+    if measured:
+        return f"it was measured to {measured[0].name} alone, and otherwise {why}"
+    return why
 
 
 def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:
@@ -169,73 +250,31 @@ def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:
 def with_measured(
     criteria: Mapping[str, Criterion], model: ShipModel, trials: Sequence[Trial]
 ) -> dict[str, Criterion]:
-    """Criteria of a ship, by her trials where they measure them; the worst counts.
+    """Criteria of a ship, by her trials where they measure them.
 
-    `trials`: as recorded; those of another rudder angle, heading or approach speed
-    count for nothing.
+    Of several trials to one side the worst counts. `trials`: as recorded; those of
+    another rudder angle, heading or approach speed count for nothing.
     """
-    decided = dict(criteria)
+    found = dict(criteria)
     for trial in trials:
-        for name, value in measured_indices(model, trial).items():
-            criterion = decided.get(name)
-            if criterion is None:
-                continue
-            worse = criterion.measured is None or value > criterion.measured
-            if worse:
-                decided[name] = replace(
-                    criterion,
-                    measured=value,
-                    decided=True,
-                    passed=value <= criterion.limit,
-                    note="",
-                )
-    return decided
+        for name, measured in measured_indices(model, trial).items():
+            if name in found:
+                sides = _with_trial(found[name].sides, measured)
+                found[name] = replace(found[name], sides=sides)
+    for name, criterion in found.items():
+        if worse_measured(criterion.sides) is not None:
+            found[name] = judged(criterion)
+    return found
 
 
-def measured_indices(model: ShipModel, trial: Trial) -> dict[str, float]:
-    """Criteria that a trial measures, by name; none for another manoeuvre."""
-    if trial.kind not in ("zigzag", "turning-circle") or not _at_speed(model, trial):
-        return {}
-    length = model.particulars["length"]
-    indices: Any
-    try:
-        manoeuvre = _manoeuvre_of(model, trial)
-        if trial.kind == "zigzag":
-            indices = zigzag_indices(trial, length)
+def _with_trial(sides: Sequence[Side], measured: MeasuredIndex) -> tuple[Side, ...]:
+    """The sides with a trial on its own, if it is the worst there."""
+    after = []
+    for side in sides:
+        known = side.measured
+        is_worst = known is None or measured.value > known.value
+        if side.name == measured.side and is_worst:
+            after.append(side._replace(measured=measured))
         else:
-            indices = turning_indices(trial, length)
-    except InputError:  # a channel such as the position is missing
-        return {}
-
-    values = {}
-    for name, rule in RULES.items():
-        if rule.manoeuvre == manoeuvre:
-            value = getattr(indices, rule.index)
-            if value is not None:
-                values[name] = value
-    return values
-
-
-def _at_speed(model: ShipModel, trial: Trial) -> bool:
-    """Return whether a trial begins at service speed, to a tenth."""
-    if "u" not in trial or "v" not in trial:
-        return False
-    service = model.particulars["speed"]
-    first = np.hypot(trial["u"][0], trial["v"][0])
-    off = abs(first - service)
-    return bool(off <= 0.1 * service)
-
-
-def _manoeuvre_of(model: ShipModel, trial: Trial) -> str | None:
-    """Manoeuvre of the rules that a trial is, to a degree; None for another."""
-    rudder_deg = float(np.degrees(usual_rudder(trial)))
-    if trial.kind == "turning-circle":
-        off = abs(rudder_deg - full_rudder_deg(model))
-        return "turning circle" if off <= 1.0 else None
-    heading_deg = switch_heading_deg(trial) or 0.0
-    for angle in STANDARD_DEG:
-        rudder_off = abs(rudder_deg - angle)
-        heading_off = abs(heading_deg - angle)
-        if rudder_off <= 1.0 and heading_off <= 1.0:
-            return f"zigzag {angle:.0f}/{angle:.0f}"
-    return None
+            after.append(side)
+    return tuple(after)

@@ -163,11 +163,16 @@ def test_limits_that_are_not_kept_and_designs_that_are_refused_are_warned_of(
         remark=None,
         identification=chain[1].identification,
         verification=SimpleNamespace(
-            manoeuvres=found, standards=rows, refused={"lqg": "no such sensor"}
+            manoeuvres=found,
+            standards=rows,
+            refused={"lqg": "no such sensor"},
+            retuned={"pid": "slower"},
         ),
     )
     print_autopilot(result, Path("report.html"), DRAWS)
-    first, *_, last = capsys.readouterr().err.splitlines()
+    shown = capsys.readouterr()
+    assert "PID was retuned to hold the models drawn: slower" in shown.out
+    first, *_, last = shown.err.splitlines()
     assert first == "warning: ISO 11674, course change: 3.2 deg, limit 2.5"
     assert last == "warning: no LQG autopilot: no such sensor"
 

@@ -8,10 +8,11 @@ import pytest
 
 from agents import PID, WheelOver
 from agents.verification.chain import build_autopilot, stage, with_standards
+from agents.verification.refusal import lost_track
 from agents.verification.result import pilot_metrics, track_metrics
 from agents.verification.standards import heading_control
-from agents.verification.tracks import track_task
-from agents.verification.verify import kept_tracks, unique_keys
+from agents.verification.tracks import keep_track, track_task
+from agents.verification.verify import unique_keys
 from agents.verification.view import headline, is_certain
 from identification.progress import PROGRESS
 from shipgym import InputError, load_model
@@ -152,7 +153,8 @@ def test_the_verdict_says_what_is_met_missed_and_not_decided(
         name: criterion(passed, passed is not None) for name, passed in criteria.items()
     }
     manoeuvres = SimpleNamespace(criteria=made, unstable=np.arange(9) < runaway)
-    told = headline(SimpleNamespace(draws=9, pilots=[best], manoeuvres=manoeuvres))
+    found = SimpleNamespace(draws=9, pilots=[best], manoeuvres=manoeuvres, left_out=0)
+    told = headline(found)
     assert told.startswith("The model ")
     assert said in told
 
@@ -185,7 +187,7 @@ def test_a_verdict_is_certain_if_all_is_met_and_no_model_drawn_is_lost(
     best = SimpleNamespace(episodes=SimpleNamespace(terminated=np.arange(9) < lost))
     criteria = dict(enumerate(map(criterion, passed)))
     manoeuvres = SimpleNamespace(criteria=criteria, unstable=np.arange(9) < runaway)
-    found = SimpleNamespace(pilots=[best], manoeuvres=manoeuvres)
+    found = SimpleNamespace(pilots=[best], manoeuvres=manoeuvres, left_out=0)
     assert is_certain(found) == certain
 
 
@@ -195,13 +197,17 @@ def test_a_path_autopilot_that_does_not_arrive_on_the_identified_model_is_refuse
     guide = WheelOver.from_model(ship, task=track_task(ship))
     gains = guide.gains | {"turn_reach": 1.0, "path_radius": 1.0}
     stuck = replace(ship, steering=replace(ship.steering, rudder_limit_deg=0.5))
-    (good,), none = kept_tracks([guide], [ship])
-    assert (bool(good.arrived[0]), none) == (True, {})
-    (lost,), late = kept_tracks([replace(guide, gains=gains)], [stuck])
+    good = keep_track(guide, [ship])
+    assert lost_track(good) is None
+    lost = keep_track(replace(guide, gains=gains), [stuck])
     assert not lost.arrived[0]
-    assert late == {
-        "wheel-over": "it does not reach the end of the track on the identified model"
-    }
+    assert lost_track(lost) == (
+        "it does not reach the end of the track on the identified model"
+    )
+    drawn = replace(good, arrived=np.arange(41) < 38)
+    assert lost_track(drawn).startswith(
+        "it does not reach the end of the track with 3 of 40 models drawn"
+    )
 
 
 def test_a_stage_is_told_at_its_beginning_and_end_and_its_parts_in_between():

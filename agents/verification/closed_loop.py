@@ -1,0 +1,154 @@
+"""Designs in closed loop with the models drawn: judged there, and retuned there.
+
+A design that loses too many of them is given another bandwidth, the first in a row of
+shares that holds them, before it is refused.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from agents.controllers.controller import Controller
+from agents.controllers.designs import with_bandwidth
+from agents.rollouts.course_keeping import Episodes, sail
+from agents.verification.possible_draws import is_possible
+from agents.verification.tracks import Track, judged_task, keep_track, track_task
+from shipgym.arrays import Flags, Integers
+from shipgym.errors import InputError
+from shipgym.ships import ShipModel
+from shipgym.trials.trial import Trial
+
+#: Share of the models drawn that an autopilot may lose control of.
+MOST_LOST = 0.05
+#: Shares of its bandwidth that a design is tried with, in this order.
+SHARES = (0.7, 0.5, 0.35, 0.25, 1.4)
+
+
+class Held(NamedTuple):
+    """A design as it is given, and what came of it."""
+
+    controller: Controller
+    outcome: Any  # its episodes, or its track
+    share: float = 1.0  # of the bandwidth of the first design
+
+    @property
+    def in_words(self) -> str:
+        """How it was retuned."""
+        per_cent = 100.0 * self.share
+        pace = "slower" if self.share < 1.0 else "faster"
+        return f"{pace}, {per_cent:.0f} % of the first design's bandwidth"
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedLoop:
+    """The models drawn that designs are judged on.
+
+    Of those that a design loses, the ones that the ship cannot be do not count.
+    """
+
+    model: ShipModel  # the identified one
+    draws: Sequence[ShipModel]
+    seeds: Integers  # of the episode of each
+    trials: Sequence[Trial] = ()  # that the ship was put through
+    #: whether models that a design lost are possible, by number
+    possible: dict[int, bool] = field(default_factory=dict)
+
+    @property
+    def counted(self) -> Flags:
+        """Models that count, shape (n_draws,)."""
+        counted = np.ones(len(self.draws), dtype=np.bool_)
+        for number, possible in self.possible.items():
+            counted[number] = possible
+        return counted
+
+    def keep_course(self, controller: Controller, episodes: Episodes) -> Held:
+        """A heading autopilot with its episodes, retuned if it loses too many."""
+        return self._held(
+            Held(controller, episodes),
+            run=lambda other: sail(other, self.draws, judged_task(), self.seeds),
+            lost=lambda outcome: outcome.terminated,
+        )
+
+    def keep_track(self, guide: Controller) -> Held:
+        """A path autopilot with its track on the models that count, likewise."""
+        ships = [self.model, *self.draws]
+
+        def run(other: Controller) -> Track:
+            return keep_track(other, ships)
+
+        held = self._held(
+            Held(guide, run(guide)),
+            run=run,
+            lost=lost_tracks,
+        )
+        return held._replace(outcome=self._of_counted(held.outcome))
+
+    def loses_too_many(self, lost: Flags) -> bool:
+        """Return True for a design that is not given; `lost`: shape (n_draws,)."""
+        for number in np.flatnonzero(lost).tolist():
+            if number not in self.possible:
+                draw = self.draws[number]
+                self.possible[number] = is_possible(draw, self.trials)
+        return loses_too_many(lost, self.counted)
+
+    def _held(
+        self,
+        first: Held,
+        run: Callable[[Controller], Any],
+        lost: Callable[[Any], Flags],
+    ) -> Held:
+        """The first design that holds enough models, or the first of all.
+
+        `run`: puts a design on the models; `lost`: which of them it lost.
+        """
+        if not self.loses_too_many(lost(first.outcome)):
+            return first
+        for share, other in self._variants(first.controller):
+            outcome = run(other)
+            if not self.loses_too_many(lost(outcome)):
+                return Held(other, outcome, share)
+        return first
+
+    def _variants(self, controller: Controller) -> Iterator[tuple[float, Controller]]:
+        """Designs of other bandwidths that are stable on the identified model."""
+        task = track_task(self.model) if controller.has_autopilot else None
+        for share in SHARES:
+            try:
+                other = with_bandwidth(controller, self.model, share, task)
+            except InputError:
+                continue
+            if other is not None:
+                yield share, other
+
+    def _of_counted(self, track: Track) -> Track:
+        """Track of the identified model and of the models that count."""
+        counted = np.concatenate([[True], self.counted])
+        return replace(
+            track,
+            largest=track.largest[counted],
+            rms=track.rms[counted],
+            arrived=track.arrived[counted],
+        )
+
+
+def loses_too_many(lost: Flags, counted: Flags, most_lost: float = MOST_LOST) -> bool:
+    """Return True if a design loses too many of the models that count.
+
+    Where less than a quarter of the models counts, nothing is known.
+    """
+    fewest = 0.25
+    if np.mean(counted) < fewest:
+        return True
+    return bool(np.mean(lost[counted]) > most_lost)
+
+
+def lost_tracks(track: Track) -> Flags:
+    """Models drawn that a guide did not lead to the end of the track.
+
+    All of them, if it did not lead the identified one there.
+    """
+    if not track.arrived[0]:
+        return np.ones(len(track.arrived) - 1, dtype=np.bool_)
+    return ~track.arrived[1:]

@@ -1,0 +1,235 @@
+"""Indices of the criteria that a trial measures, each with its standard error.
+
+They are read from a smoothed heading and track: the largest of noisy samples reads
+high. Source of the smoothing: Reinsch 1967, Smoothing by spline functions.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import make_smoothing_spline
+from scipy.special import ndtr
+
+from shipgym.arrays import Floats
+from shipgym.errors import InputError
+from shipgym.manoeuvres.execution import rudder, usual_rudder
+from shipgym.manoeuvres.imo_rules import RULES, Rule
+from shipgym.manoeuvres.turning import full_rudder_deg, turning_indices
+from shipgym.manoeuvres.zigzags import (
+    STANDARD_DEG,
+    switch_heading_deg,
+    zigzag_indices,
+)
+from shipgym.ships.ship_model import ShipModel
+from shipgym.trials.trial import Trial
+
+
+@dataclass(frozen=True)
+class MeasuredIndex:
+    """An index that a trial measures."""
+
+    value: float  # ship lengths or degrees
+    error: float  # its standard error
+    side: str  # to which the rudder was ordered first, "starboard" or "port"
+
+    def share_below(self, limit: float) -> float:
+        """Probability that the ship's own index is within a limit."""
+        if self.error == 0.0:
+            return float(self.value <= limit)
+        return float(ndtr((limit - self.value) / self.error))
+
+
+def measured_indices(model: ShipModel, trial: Trial) -> dict[str, MeasuredIndex]:
+    """Criteria that a trial measures, by name; none for another manoeuvre."""
+    if trial.kind not in ("zigzag", "turning-circle") or not _at_speed(model, trial):
+        return {}
+    try:
+        manoeuvre = _manoeuvre_of(model, trial)
+        rules = {
+            name: rule for name, rule in RULES.items() if rule.manoeuvre == manoeuvre
+        }
+        return _with_errors(model, trial, rules)
+    except InputError:  # a channel such as the position is missing
+        return {}
+
+
+def _with_errors(
+    model: ShipModel, trial: Trial, rules: dict[str, Rule]
+) -> dict[str, MeasuredIndex]:
+    """Indices of the smoothed trial, and errors by repeating its noise."""
+    fewest_samples = 5  # for a smoothing spline
+    if not rules or len(trial) < fewest_samples:
+        return {}
+    # Motions that last so long are halved, those of ten ship lengths kept to 3e-5.
+    period = 0.7 * model.travel_time
+    smooth, noise = smoothed(trial, period)
+    values = _values(model, smooth, rules)
+    repeated = []
+    for again in _repetitions(smooth, noise, period):
+        found_again = _values(model, again, rules)
+        repeated.append(found_again)
+
+    found = {}
+    side = first_side(trial)
+    for name, value in values.items():
+        others = [again.get(name, value) for again in repeated]
+        scatter = float(np.std(others))
+        unseen = _unseen_error(model, trial, noise, rules[name])
+        error = float(np.hypot(scatter, unseen))
+        found[name] = MeasuredIndex(
+            value=value,
+            error=error,
+            side=side,
+        )
+    return found
+
+
+def _values(model: ShipModel, trial: Trial, rules: dict[str, Rule]) -> dict[str, float]:
+    """Values of the rules that the trial reached."""
+    length = model.particulars["length"]
+    indices: Any
+    if trial.kind == "zigzag":
+        heading_deg = _standard_heading(trial)
+        indices = zigzag_indices(trial, length, heading_deg)
+    else:
+        indices = turning_indices(trial, length)
+    values = {}
+    for name, rule in rules.items():
+        value = getattr(indices, rule.index)
+        if value is not None:
+            values[name] = value
+    return values
+
+
+def _standard_heading(trial: Trial) -> float:
+    """Standard heading of a zigzag that is nearest to that of its first reversal."""
+    found = switch_heading_deg(trial) or 0.0
+    return min(STANDARD_DEG, key=lambda angle: abs(angle - found))
+
+
+def smoothed(trial: Trial, period: float) -> tuple[Trial, dict[str, float]]:
+    """Trial with a smooth heading and track, and the noise of each channel.
+
+    `period`: of motions that are halved, s.
+    """
+    t = trial.t
+    # degrees of freedom of the spline, of each sample: the mean of its low pass
+    freedom = np.pi * _step(t) / (np.sqrt(2.0) * period)
+    kept = 1.0 - min(freedom, 0.9)
+    unbiased = 1.0 / np.sqrt(kept)
+
+    smooth = {}
+    noise = {}
+    for name in ("psi", "x", "y"):
+        if name not in trial:
+            continue
+        channel = trial[name]
+        smooth[name] = _low_pass(name, t, channel, period)
+        residuals = channel - smooth[name]
+        noise[name] = float(np.std(residuals)) * unbiased
+    return trial.with_channels(smooth), noise
+
+
+def _low_pass(name: str, t: Floats, values: Floats, period: float) -> Floats:
+    """Smoothing spline along the first axis that halves motions of a period, s.
+
+    The heading is continued before the start by its mirror image: a spline is straight
+    at its ends, a heading is not where a trial begins with the order.
+    """
+    frequency = 2.0 * np.pi / period  # rad/s
+    penalty = 1.0 / (_step(t) * frequency**4)
+    times = t
+    if name == "psi":
+        start = t[0]
+        end = np.searchsorted(t, start + period)
+        mirrored = slice(int(end), 0, -1)
+        before = 2.0 * start - t[mirrored]
+        times = np.concatenate([before, t])
+        values = np.concatenate([values[mirrored], values])
+
+    spline = make_smoothing_spline(
+        times,
+        values,
+        lam=penalty,
+    )
+    return np.asarray(spline(t))
+
+
+def _repetitions(smooth: Trial, noise: dict[str, float], period: float) -> list[Trial]:
+    """A smooth trial as it would have been with other noise, smoothed likewise."""
+    rng = np.random.default_rng(0)
+    repetitions = 30
+    shape = (len(smooth), repetitions)
+    left = {}
+    for name, size in noise.items():
+        white = size * rng.standard_normal(shape)
+        left[name] = _low_pass(name, smooth.t, white, period)
+
+    trials = []
+    for k in range(repetitions):
+        channels = {}
+        for name, columns in left.items():
+            channels[name] = smooth[name] + columns[:, k]
+        again = smooth.with_channels(channels)
+        trials.append(again)
+    return trials
+
+
+def _unseen_error(
+    model: ShipModel, trial: Trial, noise: dict[str, float], rule: Rule
+) -> float:
+    """Error of an index that repeated noise does not show.
+
+    Of lengths: the order is known to one sample, and satellite positions wander slowly,
+    by about twice their noise.
+    """
+    if rule.unit == "deg":
+        return 0.0
+    length = model.particulars["length"]
+    step = _step(trial.t)
+    speed = model.particulars["speed"]
+    of_order = step * speed / np.sqrt(12.0)
+    wander = 0.0
+    if rule.manoeuvre == "turning circle":
+        wander = 2.0 * noise.get("x", 0.0)
+    return float(np.hypot(of_order, wander) / length)
+
+
+def _step(t: Floats) -> float:
+    """Usual sampling step, s."""
+    return float(np.median(np.diff(t)))
+
+
+def first_side(trial: Trial) -> str:
+    """Side to which the rudder was first held, "starboard" or "port"."""
+    delta = rudder(trial)
+    half = 0.5 * usual_rudder(trial)
+    is_held = np.abs(delta) > half
+    first = int(np.argmax(is_held))
+    return "starboard" if delta[first] > 0.0 else "port"
+
+
+def _at_speed(model: ShipModel, trial: Trial) -> bool:
+    """Return whether a trial begins at service speed, to a tenth."""
+    if "u" not in trial or "v" not in trial:
+        return False
+    service = model.particulars["speed"]
+    first = np.hypot(trial["u"][0], trial["v"][0])
+    off = abs(first - service)
+    return bool(off <= 0.1 * service)
+
+
+def _manoeuvre_of(model: ShipModel, trial: Trial) -> str | None:
+    """Manoeuvre of the rules that a trial is, to a degree; None for another."""
+    rudder_deg = float(np.degrees(usual_rudder(trial)))
+    if trial.kind == "turning-circle":
+        off = abs(rudder_deg - full_rudder_deg(model))
+        return "turning circle" if off <= 1.0 else None
+    heading_deg = switch_heading_deg(trial) or 0.0
+    for angle in STANDARD_DEG:
+        rudder_off = abs(rudder_deg - angle)
+        heading_off = abs(heading_deg - angle)
+        if rudder_off <= 1.0 and heading_off <= 1.0:
+            return f"zigzag {angle:.0f}/{angle:.0f}"
+    return None
