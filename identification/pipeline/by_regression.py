@@ -96,6 +96,7 @@ class RegressionFit:
             problem,
             provenance,
             options,
+            self.without,
         )
 
 

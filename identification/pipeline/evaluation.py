@@ -27,6 +27,7 @@ from identification.uncertainty.covariance import (
     coefficient_covariance,
     joint_covariance,
 )
+from identification.uncertainty.extrapolation import Without, beyond_trials
 from identification.uncertainty.model_error import (
     FEWEST_TRIALS,
     model_error,
@@ -118,12 +119,19 @@ def with_uncertainty(
     problem: Problem,
     provenance: dict[str, Any],
     options: Options,
+    without: Without | None = None,
 ) -> IdentificationResult:
-    """The result of a fit, its covariance scaled by the model error."""
+    """The result of a fit, its covariance scaled by the model error.
+
+    `without`: the model of the other trials, where it is known.
+    """
     covariance, error = scaled_covariance(options.uncertainty, fit, refined, problem)
+    model = replace(fit.model, covariance=covariance)
+    if error and without is not None and fit.stable:
+        model, beyond = beyond_trials(model, without, problem.used)
+        error = error | {"hard_turn": beyond}
     if error:
         provenance = provenance | {"model_error": error}
-    model = replace(fit.model, covariance=covariance)
     return evaluated(model, fit, problem, provenance, options)
 
 

@@ -38,6 +38,7 @@ from identification.simulation_error.maximum_a_posteriori import (
     checked_mmg,
     fit_mmg,
 )
+from identification.uncertainty.extrapolation import beyond_trials
 from identification.validation.guard import GuardedFit, reasons_unstable
 from identification.validation.selection import select
 from shipgym import InputError, ShipModel, Trial
@@ -227,7 +228,11 @@ class SimulationFit:
         problem = replace(problem, sea={**problem.sea, **(sea or {})})
         fit = _guard_report(model, estimators, self.reasons)
         provenance = provenance_of(options, MAP, fit, problem)
-        provenance |= self.fit.report
+        report = dict(self.fit.report)
+        if options.uncertainty.model_error and self.stable:
+            model, beyond = beyond_trials(model, self.without, self.problem.used)
+            report["model_error"] = report["model_error"] | {"hard_turn": beyond}
+        provenance |= report
         return evaluated(model, fit, problem, provenance, options)
 
 
