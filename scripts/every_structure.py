@@ -63,6 +63,8 @@ NORRBIN = "norrbin"
 IN_RANGE, BEYOND = "in range", "beyond"
 PARTS = (IN_RANGE, BEYOND)
 KINDS = ("indices", "motion")
+#: The ships that the error of hard turns was worked out on.
+WORKED_ON = [name for name in KNOWN if name not in ("stable-heavy", "lively-light")]
 QUICK = ("naval-vessel", "ferry", "kcs")
 Row = dict[str, Any]
 
@@ -301,7 +303,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("every_structure.jsonl"))
     parser.add_argument("--seeds", type=int, default=1, help="of the noise")
     parser.add_argument("--draws", type=int, default=60, help="models drawn")
-    parser.add_argument("--ships", default=",".join(KNOWN), help="with commas between")
+    parser.add_argument("--ships", default=",".join(WORKED_ON))
     parser.add_argument("--new", action="store_true", help="the five that came second")
     parser.add_argument("--structures", default=",".join((*STRUCTURES, AUTO)))
     parser.add_argument("--quick", action="store_true", help="three ships, 30 draws")
