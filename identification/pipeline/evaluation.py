@@ -129,7 +129,7 @@ def with_uncertainty(
     model = replace(fit.model, covariance=covariance)
     if error and without is not None and fit.stable:
         model, beyond = beyond_trials(model, without, problem.used)
-        error = error | {"hard_turn": beyond}
+        error = error | beyond
     if error:
         provenance = provenance | {"model_error": error}
     return evaluated(model, fit, problem, provenance, options)

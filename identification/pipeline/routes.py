@@ -231,7 +231,7 @@ class SimulationFit:
         report = dict(self.fit.report)
         if options.uncertainty.model_error and self.stable:
             model, beyond = beyond_trials(model, self.without, self.problem.used)
-            report["model_error"] = report["model_error"] | {"hard_turn": beyond}
+            report["model_error"] = report["model_error"] | beyond
         provenance |= report
         return evaluated(model, fit, problem, provenance, options)
 

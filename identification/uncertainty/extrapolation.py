@@ -6,8 +6,8 @@ those that it lacks, go apart. How far, the trials show themselves: those of the
 rudder are predicted by a fit to the others, and their error is taken for that of the
 turn. The form of the MMG gets it in terms that grow beyond the trials, the moment
 N'vvr of the hull and its resistance X'rr in a turn, which zigzags hardly show. A table
-gets it along the one direction in which its covariance lets the turn change most; what
-does not move with the turn stays as certain as it was.
+of few terms gets it along the one direction in which its covariance lets the turn
+change most; what does not move with the turn stays as certain as it was.
 """
 
 import math
@@ -54,9 +54,11 @@ def _turned(trial: Trial) -> float:
 def largest_rudders(trials: Sequence[Trial]) -> Integers:
     """Places of the trials of the largest rudder; none where few would be left."""
     reached = np.array([np.abs(trial["delta"]).max() for trial in trials])
-    largest = np.flatnonzero(reached > 0.9 * reached.max())
-    n_left = len(trials) - len(largest)
-    return largest if n_left > 1 else largest[:0]
+    is_largest = reached > 0.9 * reached.max()
+    n_left = np.sum(~is_largest)
+    if n_left < 2:
+        is_largest[:] = False
+    return np.flatnonzero(is_largest)
 
 
 def extrapolation_error(without: Without, trials: Sequence[Trial]) -> float | None:
@@ -71,14 +73,23 @@ def extrapolation_error(without: Without, trials: Sequence[Trial]) -> float | No
     model = without(largest.tolist())
     errors = []
     for place in largest:
-        trial = trials[place]
-        run = predict(model, trial)
-        if run is None:
+        error = _relative_error(model, trials[place])
+        if error is None:
             return None
-        name = "psi" if "psi" in trial else "r"
-        error = root_mean_square(run[name] - trial[name])
-        errors.append(error / max(float(np.std(trial[name])), 1e-12))
+        errors.append(error)
     return root_mean_square(np.array(errors))
+
+
+def _relative_error(model: ShipModel, trial: Trial) -> float | None:
+    """Error of a prediction by the scatter of what was measured."""
+    run = predict(model, trial)
+    if run is None:
+        return None
+    name = "psi" if "psi" in trial else "r"
+    measured = trial[name]
+    error = root_mean_square(run[name] - measured)
+    scatter = float(np.std(measured))
+    return error / max(scatter, 1e-12)
 
 
 def beyond_trials(
@@ -86,9 +97,14 @@ def beyond_trials(
 ) -> tuple[ShipModel, dict[str, Any]]:
     """The model with its covariance widened by the error of a hard turn, and a report.
 
-    As it is where a trial turns, or where it has no hard turn itself.
+    As it is where a trial turns, or where it has no hard turn itself. So are tables of
+    many terms: the trials of less rudder do not fix these, so that the error of such a
+    fit says nothing, and the covariance lets their turns go far.
     """
-    if holds_turn(trials):
+    is_mmg = model.structure == MMG
+    most_terms = 20  # of a table that a fit to the lesser rudders still determines
+    has_many = len(model.coefficients) > most_terms and not is_mmg
+    if has_many or holds_turn(trials) or _log_angle(model) is None:
         return model, {}
     error = extrapolation_error(without, trials)
     how = "trials of the largest rudder by a fit to the others"
@@ -97,9 +113,10 @@ def beyond_trials(
         how = "assumed"
     smallest, largest = 0.04, 0.15
     error = min(max(error, smallest), largest)
-    is_mmg = model.structure == MMG
-    wider = with_growing_terms(model, error) if is_mmg else widened(model, error)
-    return wider, {"size": error, "how": how}
+    report = {"hard_turn": {"size": error, "how": how}}
+    if is_mmg:
+        return with_growing_terms(model, error), report
+    return widened(model, error), report
 
 
 def with_growing_terms(model: ShipModel, error: float) -> ShipModel:
@@ -145,30 +162,49 @@ def widened(model: ShipModel, deviation: float) -> ShipModel:
     if turn is None or turn.deviation >= deviation:
         return model
     ratio = deviation / turn.deviation
-    more = (ratio**2 - 1.0) * np.outer(turn.direction, turn.direction)
-    return replace(model, covariance=np.asarray(model.covariance) + more)
+    added = ratio**2 - 1.0
+    along = np.outer(turn.direction, turn.direction)
+    covariance = np.asarray(model.covariance) + added * along
+    return replace(model, covariance=covariance)
 
 
 def hard_turn(model: ShipModel) -> HardTurn | None:
     """How far its covariance lets a model's hard turn change; None without a turn."""
-    variances, axes = np.linalg.eigh(np.asarray(model.covariance))
-    known = variances > 1e-12 * variances.max()
-    moves = axes[:, known] * np.sqrt(variances[known])
     own = _log_angle(model)
     if own is None:
         return None
+    moves = _principal_moves(model)
+    slopes = np.zeros(len(moves))
+    for k, move in enumerate(moves):
+        slopes[k] = _slope_along(model, move, own)
 
-    values = np.array(list(model.coefficients.values()))
-    step = 0.1
-    slopes = np.zeros(moves.shape[1])
-    for k, move in enumerate(moves.T):
-        moved = _log_angle(model.with_coefficients(values + step * move))
-        if moved is not None:
-            slopes[k] = (moved - own) / step
     deviation = float(np.linalg.norm(slopes))
     if deviation == 0.0:
         return None
-    return HardTurn(deviation, moves @ slopes / deviation)
+    direction = slopes @ moves / deviation
+    return HardTurn(deviation, direction)
+
+
+def _principal_moves(model: ShipModel) -> Floats:
+    """Moves of the coefficients by one standard deviation along each principal axis.
+
+    Shape (n_moves, n_coefficients).
+    """
+    covariance = np.asarray(model.covariance)
+    variances, axes = np.linalg.eigh(covariance)
+    known = variances > 1e-12 * variances.max()
+    deviations = np.sqrt(variances[known])
+    return np.asarray((axes[:, known] * deviations).T)
+
+
+def _slope_along(model: ShipModel, move: Floats, own: float) -> float:
+    """Change of the logarithm of the angle by a move; 0 where there is no turn."""
+    step = 0.1
+    values = np.array(list(model.coefficients.values()))
+    moved = _log_angle(model.with_coefficients(values + step * move))
+    if moved is None:
+        return 0.0
+    return (moved - own) / step
 
 
 def _log_angle(model: ShipModel) -> float | None:

@@ -133,10 +133,13 @@ def shown_to_turn(ranked: Sequence[RankedFit], options: Options) -> list[RankedF
     Those of few parameters, and those that a prior, formulas or a reference ship hold
     in a hard turn. The terms of a table that zigzags fix are not known beyond them.
     """
-    held = [*RESPONSES, GREY_BOX, MMG]
+    held = {*RESPONSES, GREY_BOX, MMG}
     if options.prior is not None:
-        held += TABLES
-    known = [fit for fit in ranked if fit.structure in held and not fit.ran_away]
+        held.update(TABLES)
+    known = []
+    for fit in ranked:
+        if fit.structure in held and not fit.ran_away:
+            known.append(fit)
     return known or list(ranked)
 
 

@@ -62,7 +62,7 @@ def test_draws_turn_by_the_error_that_the_trials_show(zigzags: list[Trial]) -> N
     model = load_model("kvlcc2-mmg")
     other = load_model("kvlcc2-nomoto")
     wider, told = beyond_trials(model, lambda places: other, zigzags)
-    assert 0.04 <= told["size"] <= 0.15
+    assert 0.04 <= told["hard_turn"]["size"] <= 0.15
 
     def scatter(some: ShipModel) -> float:
         angles = []
@@ -72,7 +72,7 @@ def test_draws_turn_by_the_error_that_the_trials_show(zigzags: list[Trial]) -> N
         return float(np.std(angles))
 
     assert scatter(wider) >= 0.99 * scatter(model)
-    assert scatter(wider) > 0.6 * told["size"]
+    assert scatter(wider) > 0.6 * told["hard_turn"]["size"]
     turned = [*zigzags, turning_circle(model, 35.0, 2000.0, 5.0)]
     assert beyond_trials(model, lambda places: other, turned) == (model, {})
 
