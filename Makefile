@@ -73,6 +73,8 @@ evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/transfer.py --out build/transfer
 	$(BIN)/python scripts/certainty.py
 	$(BIN)/python scripts/opened_once.py
+	$(BIN)/python scripts/every_structure.py --draws 40 --out build/every_structure.jsonl
+	$(BIN)/python scripts/every_structure.py --draws 40 --out build/every_structure.jsonl --new
 	$(BIN)/python scripts/bridge_logs.py
 	$(BIN)/python scripts/standards.py
 	$(BIN)/python scripts/run_notebooks.py

@@ -107,7 +107,7 @@ class RegressionFit:
             problem,
             provenance,
             options,
-            self.without if is_yaw_alone(self.model) else None,
+            self.without,
             self._by_clock(),
         )
 

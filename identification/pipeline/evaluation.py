@@ -26,6 +26,7 @@ from identification.uncertainty.covariance import (
     coefficient_covariance,
     joint_covariance,
 )
+from identification.uncertainty.extrapolation import Without, beyond_trials
 from identification.uncertainty.model_error import (
     FEWEST_TRIALS,
     model_error,
@@ -34,6 +35,7 @@ from identification.uncertainty.model_error import (
 from identification.uncertainty.uncertainty import Uncertainty
 from identification.validation.diagnostics import diagnose
 from identification.validation.guard import GuardedFit, with_coefficients
+from identification.validation.predicted import is_yaw_alone
 from identification.validation.prediction import predict, trial_metrics
 from identification.validation.rudder_bias import rudder_bias
 from shipgym import ShipModel, Trial
@@ -117,26 +119,32 @@ def with_uncertainty(
     problem: Problem,
     provenance: dict[str, Any],
     options: Options,
-    without: Callable[[Sequence[int]], ShipModel] | None = None,
+    without: Without | None = None,
     by_clock: Floats | float = 0.0,
 ) -> IdentificationResult:
     """The result of a fit, its covariance scaled by the model error.
 
-    `without`: fits again without some trials, where that is quick; `by_clock`: change
-    of the coefficients by a standard deviation of the time of the rudder.
+    `without`: the model of the other trials, where it is known; `by_clock`: change of
+    the coefficients by a standard deviation of the time of the rudder.
     """
     covariance, error = scaled_covariance(
         options.uncertainty,
         fit,
         refined,
         problem,
-        without,
+        without if is_yaw_alone(fit.model) else None,
     )
     if error:
-        provenance = provenance | {"model_error": error}
         covariance = covariance + np.outer(by_clock, by_clock)
     model = replace(fit.model, covariance=covariance)
-    if options.uncertainty.by_sampling:
+
+    by_sampling = options.uncertainty.by_sampling
+    if error and without is not None and fit.stable and not by_sampling:
+        model, beyond = beyond_trials(model, without, problem.used)
+        error = error | beyond
+    if error:
+        provenance = provenance | {"model_error": error}
+    if by_sampling:
         from identification.uncertainty.posterior import table_prior, with_posterior
 
         prior = table_prior(model)

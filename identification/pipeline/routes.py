@@ -38,6 +38,7 @@ from identification.simulation_error.maximum_a_posteriori import (
     checked_mmg,
     fit_mmg,
 )
+from identification.uncertainty.extrapolation import beyond_trials
 from identification.validation.guard import GuardedFit, reasons_unstable
 from identification.validation.selection import select
 from shipgym import InputError, ShipModel, Trial
@@ -238,14 +239,18 @@ class SimulationFit:
         problem = replace(problem, sea={**problem.sea, **(sea or {})})
         fit = _guard_report(model, estimators, self.reasons)
         provenance = provenance_of(options, MAP, fit, problem)
-        provenance |= self.fit.report
-        if options.uncertainty.by_sampling:
+        report = dict(self.fit.report)
+        asked = options.uncertainty
+        if asked.by_sampling:
             from identification.uncertainty.posterior import with_posterior
 
             prior = self.fit.posterior.coefficient_prior
-            asked = options.uncertainty
-            model, report = with_posterior(model, problem.used, prior, asked)
-            provenance |= {"uncertainty": "posterior", "posterior": report}
+            model, posterior = with_posterior(model, problem.used, prior, asked)
+            report |= {"uncertainty": "posterior", "posterior": posterior}
+        elif asked.model_error and self.stable:
+            model, beyond = beyond_trials(model, self.without, self.problem.used)
+            report["model_error"] = report["model_error"] | beyond
+        provenance |= report
         return evaluated(model, fit, problem, provenance, options)
 
 

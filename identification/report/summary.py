@@ -8,6 +8,7 @@ from rich.table import Table
 
 from identification.fit import Fit
 from identification.report.sea import sea_sentences
+from identification.report.turns import turn_sentences
 from identification.text import as_text, lined_table
 from identification.validation.rudder_bias import bias_sentences
 from identification.validation.warnings import (
@@ -41,6 +42,7 @@ def summary_table(fit: Fit) -> str:
             f"Standard errors are scaled by {error['factor']:.2g} for model error"
             f" ({error['how']})."
         )
+    shown += turn_sentences(provenance)
     shown += bias_sentences(provenance.get("rudder_bias"))
     shown += sea_sentences(provenance)
     shown += undetermined(fit)

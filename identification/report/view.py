@@ -29,6 +29,7 @@ from identification.report.tables import (
     steering_gear,
     trial_row,
 )
+from identification.report.turns import turn_sentences
 from identification.validation.diagnostics import EquationDiagnostics
 from identification.validation.rudder_bias import bias_sentences
 from identification.validation.warnings import (
@@ -108,6 +109,7 @@ def fit_view(fit: Fit) -> FitView:
         guarded="rejected" in provenance.get("guard", {}),
         warnings=model_warnings(fit),
         sea=[
+            *turn_sentences(provenance),
             *bias_sentences(provenance.get("rudder_bias")),
             *sea_sentences(provenance),
         ],

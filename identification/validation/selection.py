@@ -12,6 +12,7 @@ from identification.progress import counted
 from identification.result import IdentificationResult
 from identification.simulation_error.refinement import whole_trials
 from identification.simulation_error.similarity import AUTO
+from identification.uncertainty.extrapolation import holds_turn, largest_rudders
 from identification.validation.folds import pieces
 from identification.validation.predicted import predicts_track
 from identification.validation.prediction import predict
@@ -110,12 +111,19 @@ def select(
     attempts.add_all(structures)
 
     ranked = attempts.by_rank()
-    best = simplest(ranked, in_wind(parts))
+    windy = in_wind(parts)
+    best = simplest(ranked, windy)
+    turns: dict[str, Any] = {"shown_by": "a trial that turns"}
+    if not holds_turn(to_fit):
+        by_error = best
+        best = simplest(shown_to_turn(ranked, options), windy)
+        turns = _turns(best, by_error)
     others = [other for other in ranked if other is not best]
     report = {
         "held_out": held_out,
         "ranking": [asdict(one) for one in (best, *others)],
         "refused": attempts.refused,
+        "turns": turns,
     }
     own, whole = attempts.fits[fit_name(best.structure, best.method)]
     if single:
@@ -137,6 +145,38 @@ def _with_bias(choice: Choice, fit: Fit, trials: Sequence[Trial]) -> Choice:
     options = replace(choice.options, structure=table)
     other = fit(trials, options)
     return Choice(options, other, choice.report) if other.stable else choice
+
+
+def shown_to_turn(ranked: Sequence[RankedFit], options: Options) -> list[RankedFit]:
+    """The fits that are known to turn where no trial does; all where none is.
+
+    Those of few parameters, and those that a prior, formulas or a reference ship hold
+    in a hard turn. The terms of a table that zigzags fix are not known beyond them.
+    """
+    held = {*RESPONSES, GREY_BOX, MMG}
+    if options.prior is not None:
+        held.update(TABLES)
+    known = []
+    for fit in ranked:
+        if fit.structure in held and not fit.ran_away:
+            known.append(fit)
+    return known or list(ranked)
+
+
+def _turns(taken: RankedFit, by_error: RankedFit) -> dict[str, Any]:
+    """What holds a hard turn of the fit that is taken, where no trial turns.
+
+    `by_error`: the fit that would be taken by its error alone.
+    """
+    shown_by = "nothing"
+    if taken.structure in RESPONSES:
+        shown_by = "its few parameters"
+    elif taken.structure in (GREY_BOX, MMG):
+        shown_by = "its prior"
+    passed_over = None
+    if by_error is not taken:
+        passed_over = fit_name(by_error.structure, by_error.method)
+    return {"shown_by": shown_by, "predicts_better": passed_over}
 
 
 def _response_with_bias(
@@ -284,10 +324,8 @@ def _groups(trials: Sequence[Trial]) -> list[Integers]:
     These are what a hard turn is to trials of less rudder.
     """
     groups = [np.array([place]) for place in range(len(trials))]
-    reached = np.array([np.abs(trial["delta"]).max() for trial in trials])
-    largest = np.flatnonzero(reached > 0.9 * reached.max())
-    n_left = len(trials) - len(largest)
-    if n_left > 1:
+    largest = largest_rudders(trials)
+    if largest.size:
         groups.append(largest)
     return groups
 

@@ -1,0 +1,99 @@
+"""A hard turn that no trial shows: its error in the covariance, and what is taken."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification import Options
+from identification.report.turns import turn_sentences
+from identification.simulation_error.prior_knowledge import PriorKnowledge
+from identification.uncertainty.extrapolation import (
+    beyond_trials,
+    extrapolation_error,
+    holds_turn,
+    largest_rudders,
+)
+from identification.validation.ranking import RankedFit
+from identification.validation.selection import shown_to_turn
+from shipgym import ShipModel, Trial, load_model
+from shipgym.manoeuvres import turning_circle, zigzag
+
+
+@pytest.fixture(scope="module")
+def ship() -> ShipModel:
+    return load_model("kvlcc2")
+
+
+@pytest.fixture(scope="module")
+def zigzags(ship: ShipModel) -> list[Trial]:
+    plan = [(10.0, False), (10.0, True), (20.0, False)]
+    return [zigzag(ship, a, a, port, 900.0, 2.0) for a, port in plan]
+
+
+def test_a_turn_is_told_from_zigzags(ship: ShipModel, zigzags: list[Trial]) -> None:
+    assert not holds_turn(zigzags)
+    quarter = turning_circle(ship, 35.0, 200.0, 2.0)
+    assert np.degrees(quarter["psi"][-1]) > 90.0
+    assert not holds_turn([quarter])
+    assert holds_turn([*zigzags, turning_circle(ship, -20.0, 1500.0, 2.0)])
+
+
+def test_the_largest_rudder_is_left_out_where_two_trials_remain(
+    ship: ShipModel, zigzags: list[Trial]
+) -> None:
+    assert largest_rudders(zigzags).tolist() == [2]
+    assert not largest_rudders(zigzags[1:]).size
+    exact = extrapolation_error(lambda places: ship, zigzags)
+    assert exact == pytest.approx(0.0, abs=0.005)
+    other = load_model("kvlcc2-nomoto")
+    assert extrapolation_error(lambda places: other, zigzags) > 0.05
+
+
+def test_a_table_is_widened_in_one_direction(zigzags: list[Trial]) -> None:
+    model = load_model("kvlcc2-nomoto")
+    narrow = replace(model, covariance=0.01 * np.asarray(model.covariance))
+    wider, _ = beyond_trials(narrow, lambda places: model, zigzags)
+    more = np.linalg.eigvalsh(wider.covariance - narrow.covariance)
+    assert (more > 1e-6 * more.max()).sum() == 1
+
+
+def test_draws_turn_by_the_error_that_the_trials_show(zigzags: list[Trial]) -> None:
+    model = load_model("kvlcc2-mmg")
+    other = load_model("kvlcc2-nomoto")
+    wider, told = beyond_trials(model, lambda places: other, zigzags)
+    assert 0.04 <= told["hard_turn"]["size"] <= 0.15
+
+    def scatter(some: ShipModel) -> float:
+        angles = []
+        for draw in some.sample(25, 0):
+            turn = turning_circle(draw, 35.0, 10.0 * draw.travel_time, 5.0)
+            angles.append(np.log(turn["psi"][-1]))
+        return float(np.std(angles))
+
+    assert scatter(wider) >= 0.99 * scatter(model)
+    assert scatter(wider) > 0.6 * told["hard_turn"]["size"]
+    turned = [*zigzags, turning_circle(model, 35.0, 2000.0, 5.0)]
+    assert beyond_trials(model, lambda places: other, turned) == (model, {})
+
+
+def test_few_parameters_and_priors_are_known_to_turn() -> None:
+    def fit(structure: str, ran_away: int = 0) -> RankedFit:
+        return RankedFit(structure, "ls", 3, True, ran_away, 0.1, None, None, {})
+
+    table, few, mmg = fit("cubic"), fit("norrbin"), fit("mmg")
+    ranked = [table, few, mmg, fit("grey-box", ran_away=1)]
+    assert shown_to_turn(ranked, Options()) == [few, mmg]
+    assert shown_to_turn([table], Options()) == [table]
+    pulled = Options(prior=PriorKnowledge("mariner"))
+    assert shown_to_turn(ranked, pulled) == [table, few, mmg]
+
+
+def test_the_page_says_what_holds_the_turn_and_by_how_much() -> None:
+    choice = {"shown_by": "its prior", "predicts_better": "cubic by tls-svm"}
+    error = {"hard_turn": {"size": 0.1, "how": "assumed"}}
+    told = turn_sentences({"model_error": error, "selection": {"turns": choice}})
+    assert "known to 10 %" in told[0]
+    assert "its prior" in told[1]
+    assert "cubic by tls-svm predicts" in told[1]
+    assert turn_sentences({}) == []
