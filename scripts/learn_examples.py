@@ -1,6 +1,6 @@
 """Learning curves of the example tasks with stable-baselines3's defaults.
 
-    python scripts/learn_examples.py                    # all; docs/environments/examples.md
+    python scripts/learn_examples.py            # all of docs/environments/examples.md
     python scripts/learn_examples.py berth --steps 50000
 
 PPO with its defaults but 256 steps of 32 ships a rollout; after each quarter of the
@@ -51,7 +51,7 @@ def main() -> None:
 def learn(name: str, steps: int, seed: int) -> None:
     """Learn an example, and print a row before and after each quarter."""
     path = ROOT / "examples" / f"{name}.py"
-    options = runpy.run_path(str(path))["OPTIONS"]
+    options = runpy.run_path(str(path)).get("OPTIONS", {"dt": 5.0})
     env_id = f"examples/{name}-v0"
     shipgym.register_task(env_id, str(path), **options)
     ships = shipgym.ShipVecEnv(env_id, num_envs=N_SHIPS)
