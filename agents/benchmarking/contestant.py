@@ -19,8 +19,7 @@ import numpy as np
 from agents.benchmarking.entries import design_hashes
 from agents.benchmarking.frames import Frame, read_frame, write_frame
 from agents.benchmarking.sources import import_code, make_policy, policy_hash
-from agents.controllers.interface import model_hash
-from agents.rollouts.rollout import check_fits
+from agents.controllers.interface import check_fits, model_hash
 from agents.suites.suite import BenchmarkTask
 from shipgym import InputError, ShipModel
 from shipgym.python_files import working_folder

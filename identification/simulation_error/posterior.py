@@ -60,6 +60,16 @@ class _GroupErrors(NamedTuple):
     expected: float  # of that, by the covariance of the fit
 
 
+def least_scales(ship: ShipModel, channels: Sequence[str]) -> Floats:
+    """Least scales of errors by channel, SI units; of others that of the yaw rate.
+
+    Velocities by service speed U0, yaw rate by U0 / L, heading in rad.
+    """
+    least = {"u": 0.0017, "v": 0.0017, "r": 0.0021, "psi": np.radians(0.1)}
+    parts = np.array([least.get(name, least["r"]) for name in channels])
+    return np.asarray(parts * channel_units(ship, channels))
+
+
 class Posterior:
     """Segments of trials and a prior, and the errors of ships of given coefficients.
 
@@ -74,11 +84,7 @@ class Posterior:
         self.prior = prior
         self.mean = np.array([prior.mean[name] for name in IDENTIFIED])
         self.channels = compared_channels(blank, trials)
-        # Least scales of the errors: velocities by service speed U0, yaw rate by U0 /
-        # L, heading in rad.
-        least = {"u": 0.0017, "v": 0.0017, "r": 0.0021, "psi": np.radians(0.1)}
-        floors = np.array([least[name] for name in self.channels])
-        self.floors = floors * channel_units(blank, self.channels)
+        self.floors = least_scales(blank, self.channels)
         segment_lengths = 1.7  # of a segment, ship lengths at service speed
         sample_lengths = 0.067  # between the samples that are compared
         self.segments = cut(

@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.simulation_error.coefficient_prior import CoefficientPrior
-from identification.simulation_error.posterior import FLOORS
+from identification.simulation_error.posterior import least_scales
 from identification.simulation_error.segments import Segment, compared_channels, cut
 from identification.simulation_error.shooting import (
-    channel_units,
     in_all_lanes,
     sail_lanes,
 )
@@ -41,8 +40,7 @@ class WholeTrials:
         self.prior = prior
         self.channels = compared_channels(blank, trials)
         self.columns = [blank.state_names.index(name) for name in self.channels]
-        floors = np.array([FLOORS.get(name, FLOORS["r"]) for name in self.channels])
-        self.floors = floors * channel_units(blank, self.channels)
+        self.floors = least_scales(blank, self.channels)
         self.parts = _parts(blank, trials, self.channels)
         self.numbers = blank.ship_numbers()
         self.rows, self.matrix = _number_map(blank)
