@@ -48,7 +48,7 @@ def autopilot_command(
             metavar="NAMES",
             help=(
                 "Autopilots to design; default: pid,lq,turn-rate,wheel-over. "
-                "Others: lqg, mpc."
+                "Others: lqg, preview-lq, mpc."
             ),
         ),
     ] = None,
@@ -59,6 +59,14 @@ def autopilot_command(
             help="Simulate topics of ISO 11674 and IEC 62065, with our own limits.",
         ),
     ] = False,
+    tune: Annotated[
+        float,
+        Option(
+            min=0.0,
+            metavar="SECONDS",
+            help="Search the settings of each design, so long; adds preview-lq.",
+        ),
+    ] = 0.0,
     engine: EngineName = "local",
     workers: Workers = 1,
     address: Address = None,
@@ -78,6 +86,8 @@ def autopilot_command(
     from agents.verification.verify import DESIGNS
 
     designs = list(DESIGNS)
+    if tune > 0.0:
+        designs.append("preview-lq")
     if autopilots is not None:
         designs = [name.strip() for name in autopilots.split(",")]
     with progress_bars() as on_progress:
@@ -90,6 +100,7 @@ def autopilot_command(
             agents=agents or (),
             designs=designs,
             standards=standards,
+            tune_seconds=tune,
             progress=on_progress,
             where=JobEngine(engine, workers, address),
         )
@@ -117,6 +128,8 @@ def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
     for warning in model_warnings(result.identification):
         warn(warning)
     if result.verification is not None:
+        for name, how in result.verification.tuned.items():
+            say(f"settings of {name.upper()} were searched: {how}")
         for name, how in result.verification.retuned.items():
             say(f"{name.upper()} was retuned to hold the models drawn: {how}")
         for name, reason in result.verification.refused.items():

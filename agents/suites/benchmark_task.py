@@ -226,3 +226,42 @@ class BenchmarkTask:
                 options["sea"] = Weather.from_dict(sea, "sea")
             values[name] = options
         return cls(**values)
+
+
+@dataclass(frozen=True)
+class ModelTask(BenchmarkTask):
+    """A task of a model that is at hand, in no file and no suite.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        Model, task and domain randomisation.
+    """
+
+    scenario: Any = None
+
+    @classmethod
+    def of(cls, name: str, environment: str, scenario: Scenario) -> Self:
+        """Make the task of a scenario."""
+        return cls(name, environment, model=scenario.ship.name, scenario=scenario)
+
+    @property
+    def design(self) -> Scenario:
+        """Scenario that controllers are made for."""
+        found: Scenario = self.scenario
+        return found
+
+    @property
+    def evaluation(self) -> Scenario:
+        """Scenario that controllers are evaluated in, the same."""
+        return self.design
+
+    @property
+    def design_task(self) -> Self:
+        """The task itself."""
+        return self
+
+    @property
+    def ship(self) -> ShipModel:
+        """Model of the scenario."""
+        return self.design.ship

@@ -1,11 +1,13 @@
 """Settings of controllers that are searched: where each begins, and how far it goes."""
 
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from agents.controllers.designs import INNER, design, no_path
 from agents.controllers.los_autopilot import CRITICAL
+from agents.controllers.registry import controller_class
 from agents.controllers.wheel_over import own_lead
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_choice
@@ -62,27 +64,17 @@ def search_space(kind: str, task: BenchmarkTask) -> list[Setting]:
 
     Raises InputError for a kind that has none, and for guidance without a path.
     """
-    spaces = {
-        "pid": pid_space,
-        "lq": lq_space,
-        "lqg": lqg_space,
-        "los": los_space,
-        "ilos": ilos_space,
-        "alos": ilos_space,
-        "wheel-over": wheel_over_space,
-        "preview-lq": preview_space,
-        "mpc": mpc_space,
-    }
-    check_choice(kind, spaces, "controller")
-    guides = ("los", "ilos", "alos", "wheel-over", "preview-lq", "mpc")
-    if kind not in guides:
-        return spaces[kind](task)
-    if not task.task.follows_path:
+    check_choice(kind, SEARCHED, "controller")
+    leads = controller_class(kind).has_autopilot
+    if leads and not task.task.follows_path:
         raise no_path(kind, task)
+    space = SEARCHED[kind](task)
+    if not leads:
+        return space
     of_autopilot = []
     for setting in lq_space(task):
         of_autopilot.append(setting._replace(name=INNER + setting.name))
-    return [*spaces[kind](task), *of_autopilot]
+    return [*space, *of_autopilot]
 
 
 def pid_space(task: BenchmarkTask) -> list[Setting]:
@@ -157,3 +149,17 @@ def preview_space(task: BenchmarkTask) -> list[Setting]:
         factor("dead_band_deg", 0.05, 1.2),
         Setting("speed_power", 0.0, 0.5, low=-2.0, high=4.0),
     ]
+
+
+#: Settings that are searched, by kind of controller.
+SEARCHED: Mapping[str, Callable[[BenchmarkTask], list[Setting]]] = {
+    "pid": pid_space,
+    "lq": lq_space,
+    "lqg": lqg_space,
+    "los": los_space,
+    "ilos": ilos_space,
+    "alos": ilos_space,
+    "wheel-over": wheel_over_space,
+    "preview-lq": preview_space,
+    "mpc": mpc_space,
+}

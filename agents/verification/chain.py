@@ -31,6 +31,7 @@ from identification.validation.selection import RESPONSES
 from identification.validation.warnings import why_unstable
 from shipgym.checks import check_number, placed, quoted
 from shipgym.errors import InputError, UnstableModelError
+from shipgym.extras import library
 from shipgym.files import write_json
 from shipgym.manoeuvres.verdicts import with_measured
 from shipgym.plots import graph_objects
@@ -55,6 +56,7 @@ def build_autopilot(
     agents: Sequence[str | Path] = (),
     designs: Sequence[str] = DESIGNS,
     standards: bool = False,
+    tune_seconds: float = 0.0,
     progress: Progress | None = None,
     where: JobEngine = HERE,
 ) -> AutopilotResult:
@@ -70,13 +72,18 @@ def build_autopilot(
     are the ship file's; `agents`: files of autopilots to verify beside those designed,
     or names of pretrained ones (`load_agent`); `designs`: kinds of controller to
     design, of which those that lead another one keep to a track; `standards`: whether
-    to simulate what the standards of heading and track control ask for; `progress`:
+    to simulate what the standards of heading and track control ask for;
+    `tune_seconds`: of processor for a search of each design's settings, 0 for none;
+    `progress`:
     called as the work goes on; `where`: where the models drawn are worked on; the
     results are the same. Raises InputError for anything wrong with the files or
     arguments; nothing is written then.
     """
     check_number(draws, "draws", at_least=2)
     largest_seed = 2**32
+    check_number(tune_seconds, "tune", at_least=0.0)
+    if tune_seconds > 0.0:
+        library("cma", "tune", "searching settings needs it")
     check_number(seed, "seed", at_least=0, at_most=largest_seed)
     for kind in designs:
         controller_class(kind, "autopilots")
@@ -96,9 +103,13 @@ def build_autopilot(
         def examined_fit(fit: IdentificationResult) -> AutopilotResult:
             others = [guest for _, guest in guests]
             work = int(draws), int(seed), tell, where, others, designs
-            return examined(
-                ship, fit, guests, lambda: verify(fit.model, *work, trials=fit.trials)
-            )
+
+            def verified() -> Verification:
+                return verify(
+                    fit.model, *work, trials=fit.trials, tune_seconds=tune_seconds
+                )
+
+            return examined(ship, fit, guests, verified)
 
         def of_structure(structure: str) -> AutopilotResult:
             named = arguments | {"structure": structure}

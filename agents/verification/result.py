@@ -73,6 +73,8 @@ class Verification:
     counted: Flags | None = None
     #: how designs were changed to hold the models drawn, by their kind
     retuned: dict[str, str] = field(default_factory=dict)
+    #: what a search of settings found, by their kind
+    tuned: dict[str, str] = field(default_factory=dict)
 
     def of_counted(self, values: Flags) -> Flags:
         """Those of the draws that count."""
@@ -150,6 +152,7 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
         "ranking": [pilot.key for pilot in found.pilots],
         "refused": found.refused,
         "retuned": found.retuned,
+        "tuned": found.tuned,
         "tracks": {track.key: track_metrics(track) for track in found.tracks},
         "standards": _standards_metrics(found.standards),
     }

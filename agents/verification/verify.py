@@ -13,10 +13,12 @@ from agents.controllers.controller import Controller
 from agents.controllers.registry import controller_class
 from agents.jobs import HERE, JobEngine
 from agents.rollouts.course_keeping import Episodes, sail, step_response
+from agents.training.controller_space import SEARCHED
 from agents.verification.closed_loop import ClosedLoop, Held
 from agents.verification.monte_carlo import MonteCarlo, monte_carlo
 from agents.verification.result import STEP_DEG, Pilot, Verification
 from agents.verification.tracks import Track, judged_task, track_task
+from agents.verification.tuned import tuned_design
 from identification.progress import Progress
 from shipgym.checks import quoted
 from shipgym.errors import InputError
@@ -39,17 +41,19 @@ def verify(
     guests: Sequence[Agent] = (),
     designs: Sequence[str] = DESIGNS,
     trials: Sequence[Trial] = (),
+    tune_seconds: float = 0.0,
 ) -> Verification:
     """Design autopilots on a model and run them over models drawn from its covariance.
 
     A design that loses too many of them is retuned on them. `model`: with a covariance;
     `draws`, `seed`, `where`, `designs`: see `build_autopilot`; `tell`: called with the
     progress; `guests`: further autopilots; `trials`: that the ship was put through: a
-    model drawn that runs away in one of them does not count. Raises UnstableModelError
-    if the model itself runs away; InputError if no autopilot can be designed on it.
+    model drawn that runs away in one of them does not count; `tune_seconds`: of
+    processor for the settings of each design, 0 for none. Raises UnstableModelError if
+    the model itself runs away; InputError if no autopilot can be designed on it.
     """
     tell("models drawn", 0, draws)
-    designed = design_autopilots(model, designs)
+    designed = design_autopilots(model, designs, tune_seconds, tell)
     found = monte_carlo(
         designed.controllers,
         model,
@@ -84,6 +88,7 @@ def verify(
         tracks=judged.kept_tracks,
         counted=loop.counted,
         retuned=judged.retuned,
+        tuned=designed.tuned,
     )
 
 
@@ -159,19 +164,34 @@ class Designed:
     guides: list[Controller] = field(default_factory=list)  # keep a track
     #: why others could not be designed, by their kind
     refused: dict[str, str] = field(default_factory=dict)
+    #: what a search of settings found, by their kind
+    tuned: dict[str, str] = field(default_factory=dict)
 
 
-def design_autopilots(model: ShipModel, designs: Sequence[str]) -> Designed:
-    """Autopilots of some kinds; InputError if none of them keeps a heading."""
+def design_autopilots(
+    model: ShipModel,
+    designs: Sequence[str],
+    tune_seconds: float = 0.0,
+    tell: Progress = lambda *_: None,
+) -> Designed:
+    """Autopilots of some kinds; InputError if none of them keeps a heading.
+
+    `tune_seconds`: of processor for the settings of each, 0 for none.
+    """
     found = Designed()
     for kind in dict.fromkeys(designs):
         made: Any = controller_class(kind)
         try:
-            if made.has_autopilot:
-                guide = made.from_model(model, task=track_task(model))
-                found.guides.append(guide)
+            if tune_seconds > 0.0 and kind in SEARCHED:
+                tuned = tuned_design(kind, model, tune_seconds, tell)
+                found.tuned[kind] = tuned.in_words
+                controller = tuned.controller
+            elif made.has_autopilot:
+                controller = made.from_model(model, task=track_task(model))
             else:
-                found.controllers.append(made.from_model(model))
+                controller = made.from_model(model)
+            group = found.guides if made.has_autopilot else found.controllers
+            group.append(controller)
         except InputError as error:  # this design does not suit the ship; another may
             found.refused[kind] = str(error)
     if not found.controllers:

@@ -88,6 +88,7 @@ class VerificationView:
     cheaper: dict[str, float]  # share of the models on which the best costs less
     refused: dict[str, str]
     retuned: dict[str, str]
+    tuned: dict[str, str]
     tracks: dict[str, dict[str, Any]]
     standards: Sequence[Requirement]
 
@@ -125,6 +126,7 @@ def verification_view(found: Verification, length: float) -> VerificationView:
         cheaper=_cheaper(found),
         refused=found.refused,
         retuned=found.retuned,
+        tuned=found.tuned,
         tracks={track.key.upper(): track_metrics(track) for track in found.tracks},
         standards=found.standards,
     )

@@ -65,6 +65,11 @@ LINES = (
         " lq,turn-rate --standards --engine local --workers 1 --out report",
         0,
     ),
+    (
+        f"autopilot ship.toml {LINEAR} --draws 2 --tune 0.2 --autopilots"
+        " lq,turn-rate,preview-lq --out tuned-report",
+        0,
+    ),
     (f"autopilot ship.toml {WRONG} --out report2", 2),
     ("autopilot ship.toml --address 127.0.0.1:9 --out report2", 2),
     ("export report/lq.json --c c --fmu lq.fmu --fmi 2.0 --name lq --float", 0),

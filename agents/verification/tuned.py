@@ -1,0 +1,74 @@
+"""Designs whose settings are searched on the models drawn, by CMA-ES."""
+
+from functools import partial
+from typing import NamedTuple
+
+from agents.controllers.controller import Controller
+from agents.controllers.designs import design
+from agents.controllers.registry import controller_class
+from agents.suites.benchmark_task import ModelTask, Scenario
+from agents.training.controller_search import (
+    FoundSettings,
+    SearchBudget,
+    tune_controller,
+)
+from agents.verification.tracks import track_task
+from identification.progress import Progress
+from shipgym import Current, ShipModel, Weather
+from shipgym.envs.randomisation import Randomisation
+from shipgym.tasks.task import Task, course_keeping_task, path_following_task
+
+
+class Tuned(NamedTuple):
+    """A design with settings that were found, and what they cost."""
+
+    controller: Controller
+    found: FoundSettings
+
+    @property
+    def in_words(self) -> str:
+        """Sentence for the report."""
+        found = self.found
+        return (
+            f"{found.evaluations} candidates in {found.seconds:.0f} s of processor;"
+            f" cost {found.start_cost:.3g} as designed, {found.cost:.3g} tuned, on models"
+            " drawn that the search has not seen"
+        )
+
+
+def tuned_design(kind: str, model: ShipModel, seconds: float, tell: Progress) -> Tuned:
+    """Design of a kind with settings searched on models drawn from the covariance.
+
+    A heading autopilot is tried in course keeping, a path autopilot on drawn paths in a
+    current of a tenth of the ship's speed. Raises InputError if there is no design with
+    enough margin.
+    """
+    follows_path = controller_class(kind).has_autopilot
+    task = path_task(model) if follows_path else course_keeping_task()
+    environment = "path-following" if follows_path else "course-keeping"
+    found = tune_controller(
+        kind,
+        model_task(environment, model, task),
+        SearchBudget(seconds=seconds),
+        on_progress=partial(_told, tell, kind),
+    )
+    given_task = track_task(model) if follows_path else task
+    given = model_task(environment, model, given_task)
+    return Tuned(design(kind, given, found.settings), found)
+
+
+def _told(tell: Progress, kind: str, spent: float, seconds: float, _: float) -> None:
+    tell(f"tuning {kind}", min(round(spent), round(seconds)), round(seconds))
+
+
+def model_task(environment: str, model: ShipModel, task: Task) -> ModelTask:
+    """Task of models drawn from the covariance of one, where it has one."""
+    drawn = None if model.covariance is None else "covariance"
+    scenario = Scenario(model, task, Randomisation(model_uncertainty=drawn))
+    return ModelTask.of(environment, environment, scenario)
+
+
+def path_task(model: ShipModel) -> Task:
+    """Drawn paths in a current of a tenth of the ship's speed."""
+    current = Current(0.1 * model.particulars["speed"], towards_deg=90.0)
+    return path_following_task(sea=Weather(current=current))
