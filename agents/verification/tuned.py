@@ -31,8 +31,8 @@ class Tuned(NamedTuple):
         found = self.found
         return (
             f"{found.evaluations} candidates in {found.seconds:.0f} s of processor;"
-            f" cost {found.start_cost:.3g} as designed, {found.cost:.3g} tuned, on models"
-            " drawn that the search has not seen"
+            f" cost {found.start_cost:.3g} as designed, {found.cost:.3g} tuned, on"
+            " models drawn that the search has not seen"
         )
 
 
