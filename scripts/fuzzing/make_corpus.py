@@ -129,7 +129,8 @@ def controllers(folder: Path) -> None:
     folder.joinpath("controller").mkdir()
     for kind in BUILT_IN:
         made: Any = controller_class(kind)
-        led = agents.LQ if made.has_ship else agents.PID
+        leads_lq = made.has_ship or kind == "preview-lq"
+        led = agents.LQ if leads_lq else agents.PID
         given = {"autopilot": led.from_model(SHIP)} if made.has_autopilot else {}
         made.from_model(SHIP, **given).save(folder / "controller" / f"{kind}.json")
 

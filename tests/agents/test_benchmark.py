@@ -272,7 +272,12 @@ def test_a_summary_of_a_hundred_episodes_by_hand(tmp_path):
     }
     source = str(write_suite(tmp_path, best=best))
     tasks = [
-        SimpleNamespace(name=name, on="far" if "far" in name else "ship", suite=source)
+        SimpleNamespace(
+            name=name,
+            on="far" if "far" in name else "ship",
+            suite=source,
+            limits={},
+        )
         for name in known
     ]
 
@@ -319,7 +324,10 @@ def test_controllers_that_could_run_more_tasks_come_first(tmp_path):
     }
     tasks = [
         SimpleNamespace(
-            name=name, on="ship", suite=str(write_suite(tmp_path, best=best))
+            name=name,
+            on="ship",
+            suite=str(write_suite(tmp_path, best=best)),
+            limits={},
         )
         for name in best
     ]
@@ -852,7 +860,7 @@ def test_the_command_goes_on_where_it_was_interrupted(suite, tmp_path, monkeypat
     words = ["--controllers", "lq,pid", "--suite", suite]
     words += ["--tasks", "calm", "--episodes", 2, "--workers", 1, "--out", "r"]
     with monkeypatch.context() as patched:
-        patched.setattr(PID, "from_model", interrupted)
+        patched.setattr(PID, "predict", interrupted)
         answer = shipgym(*words)
     assert answer.exit_code == 130
     assert "what was done is kept in r: continue with --resume" in answer.stderr

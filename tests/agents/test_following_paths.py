@@ -14,7 +14,7 @@ def sailed(controller, model, n=64, **options):
         "shipgym/PathFollowing-v0",
         num_envs=n,
         model=model,
-        autoreset_mode="Disabled",
+        autoreset_mode="NextStep",
         **options,
     )
     controller.check_fits(env.observation_names, env.observation_scales)

@@ -76,7 +76,7 @@ def test_the_commands_are_those_of_torch(name, tmp_path):
     strong(agent.learn(32))
     observations = seen(agent)
     expected, _ = agent.predict(observations, deterministic=True)
-    assert expected.std() > 0.3
+    assert expected.std() > 0.2
 
     policy = LearnedPolicy.from_sb3(agent, training={"algorithm": name.lower()})
     same_commands(policy, observations, expected)

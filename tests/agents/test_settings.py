@@ -341,7 +341,7 @@ def test_domain_randomisation_draws_ships_seas_and_speeds_and_leaves_what_was_as
         "model_uncertainty": "covariance",  # neither seas nor speeds
         "bounded": True,
     }
-    assert options("mariner", settings=alone) == {}
+    assert options("mariner", settings=alone) == {"bounded": True}
     bare = nomoto1_ship(0.1, 20.0, {"length": 160.0, "speed": 7.0})
     bare.save(tmp_path / "ship.json")
     found = options(tmp_path / "ship.json", randomise=True)
