@@ -226,7 +226,7 @@ def test_agents_of_a_suite_learn_over_drawn_models_and_never_see_the_true_ship()
         "model_uncertainty": "covariance",
         "bounded": False,
     }
-    assert design_base(plan.settings.base, plan.task).kind == "wheel-over"
+    assert design_base(plan.settings.base, plan.task).kind == "preview-lq"
     assert plan.settings.rate_limit == 0.1
 
 

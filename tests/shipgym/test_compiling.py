@@ -99,7 +99,7 @@ def test_every_hook_is_filled_with_a_function_of_its_arguments(ship):
     stages = {"point", "sums", "slope", "slopes"}
     for name, function in asked.items():
         with pytest.raises(
-            NotImplementedError, match="when a loop is compiled|given by a task"
+            NotImplementedError, match=r"when a loop is compiled|given by a task"
         ):
             function(*[None] * function.__code__.co_argcount)
         if name in elsewhere or name.partition("_")[2] in stages:
