@@ -139,6 +139,8 @@ def indices(model: ShipModel, ship: ShipModel, draws: int) -> dict[str, Row]:
         part = part_of(manoeuvre, name)
         if part is None or (part == BEYOND and not predicts_track(model)):
             continue
+        if truth.get(key) is None:  # she reaches no such state
+            continue
         row = found[part]
         if one.interval is None:
             row["held"].append(False)
