@@ -215,9 +215,11 @@ def _principal_moves(model: ShipModel) -> Floats:
     """
     covariance = np.asarray(model.covariance)
     variances, axes = np.linalg.eigh(covariance)
-    known = variances > 1e-12 * variances.max()
+    least = 1e-12 * variances.max()
+    known = variances > least
     deviations = np.sqrt(variances[known])
-    return np.asarray((axes[:, known] * deviations).T)
+    moves = axes[:, known] * deviations
+    return np.asarray(moves.T)
 
 
 def _slope_along(model: ShipModel, move: Floats, own: float) -> float:
