@@ -145,9 +145,12 @@ def indices(model: ShipModel, ship: ShipModel, draws: int) -> dict[str, Row]:
             row["missed"].append(f"{manoeuvre} {name}: no interval")
             continue
         low, high = one.interval
+        if high is None:  # too many draws run away for an upper bound
+            high = np.inf
         held = low <= truth[key] <= high
         row["held"].append(held)
-        row["width"].append((high - low) / 2.0 / truth[key])
+        if np.isfinite(high):
+            row["width"].append((high - low) / 2.0 / truth[key])
         if not held:
             text = (
                 f"{manoeuvre} {name}: {truth[key]:.2f} not in {low:.2f} to {high:.2f}"

@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from shipgym.errors import InputError
 
 #: Most characters of a name, a source or a path.
-LONGEST_TEXT = 4096
-
 #: Types of a JSON value; a list of what all entries are, or of what each of several is;
 #: a table by key, or by `ANY_KEY` what all values are.
 Shape: TypeAlias = "tuple[type, ...] | list[Shape] | dict[str, Shape]"
@@ -134,12 +132,13 @@ def check_table(
 
 
 def check_text(value: Any, where: str) -> str:
-    """Return `value`, which must be a non-empty string of `LONGEST_TEXT` at most."""
+    """Return `value`, which must be a non-empty string of no great length."""
+    longest = 4096
     if not isinstance(value, str) or not value.strip():
         raise unexpected(where, "a non-empty string", value)
-    if len(value) > LONGEST_TEXT:
+    if len(value) > longest:
         raise InputError(
-            f"{where}: expected at most {LONGEST_TEXT} characters, got {len(value)}"
+            f"{where}: expected at most {longest} characters, got {len(value)}"
         )
     return value
 

@@ -10,8 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 LENGTHS = struct.Struct("<II")  # of the header and of the numbers, bytes
-LARGEST = 1 << 28  # bytes of a frame
-
 NO_NUMBERS = np.zeros(0, dtype=np.float32)
 
 
@@ -38,7 +36,8 @@ def write_frame(stream: BinaryIO | Any, frame: Frame) -> None:
 def read_frame(stream: BinaryIO | Any) -> Frame:
     """Read a frame; EOFError at the end, ValueError for anything else."""
     n_text, n_content = LENGTHS.unpack(_read(stream, LENGTHS.size))
-    if max(n_text, n_content) > LARGEST:
+    largest = 1 << 28  # bytes
+    if max(n_text, n_content) > largest:
         raise ValueError("expected a frame, got something else")
     header = json.loads(_read(stream, n_text))
     content = np.frombuffer(_read(stream, n_content), dtype=np.float32)

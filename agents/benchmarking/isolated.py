@@ -24,9 +24,6 @@ from agents.benchmarking.frames import Frame, read_frame, write_frame
 from agents.suites.suite import BenchmarkTask
 from shipgym.errors import InputError
 
-MAKING_S = 300.0  # for a contestant to be made: it may compile, or train
-COMMAND_S = 60.0  # for a command
-
 
 class ContestantError(Exception):
     """A contestant that died, hung, or did what none may."""
@@ -63,8 +60,8 @@ class IsolatedPolicy:
         task: BenchmarkTask,
         forbidden: Sequence[str] = (),
         *,
-        making_s: float = MAKING_S,
-        command_s: float = COMMAND_S,
+        making_s: float = 300.0,  # it may compile, or train
+        command_s: float = 60.0,
     ) -> None:
         self.source = source
         self.command_s = command_s

@@ -22,7 +22,6 @@ from shipgym.wrong_types import typed
 Observations = NDArray[np.float32]
 
 N_SHIPS = 3
-SIGNATURE = "predict(observation, state=None, episode_start=None, deterministic=True)"
 
 
 @typed
@@ -70,16 +69,18 @@ def check_controller(
 
 def check_signature(controller: Any, name: str) -> None:
     """Refuse a controller without a method of the signature of `Policy.predict`."""
+    arguments = "observation, state=None, episode_start=None, deterministic=True"
+    expected = f"predict({arguments})"
     predict = getattr(controller, "predict", None)
     if not callable(predict):
-        raise InputError(f"{name}: expected a method {SIGNATURE}, got none")
+        raise InputError(f"{name}: expected a method {expected}, got none")
     signature = inspect.signature(predict)
     try:
         signature.bind(None, state=None, episode_start=None, deterministic=True)
         signature.bind(None, None, None, True)
     except TypeError as error:
         raise InputError(
-            f"{name}.predict: expected {SIGNATURE}, got {signature}: {error}"
+            f"{name}.predict: expected {expected}, got {signature}: {error}"
         ) from None
 
 

@@ -34,9 +34,6 @@ from shipgym.ships.linear import linearise, straight_running
 from shipgym.tasks.task import Task, path_following_task
 from shipgym.wrong_types import typed
 
-# what a ship is slow to begin a turn with, as measured on the reference ships, ship
-# lengths
-LATE = 0.25
 SHORTEST_LEAD, LONGEST_LEAD = 0.1, 10.0  # ship lengths
 
 
@@ -157,8 +154,9 @@ def own_lead(model: ShipModel, autopilot: Policy | None) -> float:
 
     In a steady turn the heading lags by what makes the rudder for it, and the way over
     ground by the drift angle; both in proportion to the yaw rate as long as the ship is
-    linear: 0 = A (v, r) + B delta. What she is slow to begin with comes to `LATE`
-    more. `autopilot`: by default, and in place of others, `LQ.from_model(model)`.
+    linear: 0 = A (v, r) + B delta. What she is slow to begin with comes to a
+    quarter of a length more. `autopilot`: by default, and in place of others,
+    `LQ.from_model(model)`.
     """
     if not isinstance(autopilot, LQ):
         autopilot = LQ.from_model(model)
@@ -171,7 +169,8 @@ def own_lead(model: ShipModel, autopilot: Policy | None) -> float:
     heading_lag = missing / gains["heading_error"]  # s
 
     lag_m = heading_lag * model.particulars["speed"] - turn.sway
-    lead = lag_m / model.particulars["length"] + LATE
+    late = 0.25  # measured on the reference ships as they begin to turn, ship lengths
+    lead = lag_m / model.particulars["length"] + late
     return float(np.clip(lead, SHORTEST_LEAD, LONGEST_LEAD))
 
 

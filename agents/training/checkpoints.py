@@ -19,15 +19,6 @@ from stable_baselines3.common.vec_env import VecEnvWrapper, VecNormalize
 from agents.training.likeness import check_like, list_of, optional_number
 
 State = dict[str, Any]
-#: Attributes of an agent that count its steps, and what it saw last.
-COUNTERS = (
-    "num_timesteps",
-    "_n_updates",
-    "_episode_num",
-    "_last_obs",
-    "_last_episode_starts",
-    "_last_original_obs",
-)
 #: Arrays of a replay buffer.
 STORED = (
     "observations",
@@ -55,6 +46,15 @@ def agent_state(agent: Any) -> State:
     `agent` is between a rollout and the next, its ships begun. Returns nested values
     for `nested_values.write_values`.
     """
+    # Attributes of an agent that count its steps, and what it saw last.
+    counters = (
+        "num_timesteps",
+        "_n_updates",
+        "_episode_num",
+        "_last_obs",
+        "_last_episode_starts",
+        "_last_original_obs",
+    )
     _, names = agent._get_torch_save_params()
     variables = {name: recursive_getattr(agent, name) for name in names}
     ships = [_layer_state(layer) for layer in _layers(agent.env)]
@@ -63,7 +63,7 @@ def agent_state(agent: Any) -> State:
     return {
         "parameters": agent.get_parameters(),
         "variables": variables,
-        "counters": {name: getattr(agent, name) for name in COUNTERS},
+        "counters": {name: getattr(agent, name) for name in counters},
         "episodes": list(agent.ep_info_buffer),
         "successes": [float(success) for success in agent.ep_success_buffer],
         "ships": ships,

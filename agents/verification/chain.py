@@ -80,13 +80,8 @@ def build_autopilot(
     arguments; nothing is written then.
     """
     check_number(draws, "draws", at_least=2)
-    largest_seed = 2**32
-    check_number(tune_seconds, "tune", at_least=0.0)
-    if tune_seconds > 0.0:
-        library("cma", "tune", "searching settings needs it")
-    check_number(seed, "seed", at_least=0, at_most=largest_seed)
-    for kind in designs:
-        controller_class(kind, "autopilots")
+    check_number(seed, "seed", at_least=0, at_most=2**32)
+    check_designs(designs, tune_seconds)
     graph_objects()  # a missing extra is reported now, not after the work
     tell = progress or (lambda *_: None)
     failure: Exception | None = None
@@ -131,6 +126,15 @@ def build_autopilot(
     if failure is not None:
         raise failure
     return result
+
+
+def check_designs(designs: Sequence[str], tune_seconds: float) -> None:
+    """Refuse kinds that no controller has, and a search that cannot be done."""
+    for kind in designs:
+        controller_class(kind, "autopilots")
+    check_number(tune_seconds, "tune", at_least=0.0)
+    if tune_seconds > 0.0:
+        library("cma", "tune", "searching settings needs it")
 
 
 @contextmanager

@@ -21,15 +21,6 @@ from shipgym.tasks.task import Task, course_keeping_task
 
 #: Distance from the data of a model that no ship reaches before she is lost.
 ANYWHERE = 1e6
-RECORDED = (
-    "x",
-    "y",
-    "cross_track",
-    "distance_made_good",
-    "success",
-    "in_corridor",
-    "grounded",
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +71,16 @@ def keep_track(guide: Controller, models: Sequence[ShipModel]) -> Track:
     task = track_task(models[0])
     engine = Engine(models, len(models), task, allow_unstable=True)
     seeds = np.zeros(len(models), dtype=np.int64)
-    run = rollout(guide, engine, seeds, record=RECORDED)
+    recorded = (
+        "x",
+        "y",
+        "cross_track",
+        "distance_made_good",
+        "success",
+        "in_corridor",
+        "grounded",
+    )
+    run = rollout(guide, engine, seeds, record=recorded)
     figures = path_following(run)
 
     x = _of_first(run, run.states["x"])

@@ -69,12 +69,7 @@ def verify(
         trials=trials,
     )
     judged = judged_designs(loop, designed, found)
-    autopilots: list[Agent] = [held.controller for held in judged.courses]
-    episodes = [held.outcome for held in judged.courses]
-    for guest in guests:
-        autopilots.append(guest)
-        episodes.append(sail(guest, loop.draws, judged_task(), loop.seeds))
-
+    autopilots, episodes = with_guests(judged.courses, guests, loop)
     ships = [model, *stable_draws(found)]
     pilots = run_pilots(autopilots, episodes, ships, tell)
     return Verification(
@@ -111,6 +106,18 @@ class Judged(NamedTuple):
             if held.share != 1.0:
                 words[str(held.controller.kind)] = held.in_words
         return words
+
+
+def with_guests(
+    courses: Sequence[Held], guests: Sequence[Agent], loop: ClosedLoop
+) -> tuple[list[Agent], list[Episodes]]:
+    """Designs and guests that keep a heading, and the episodes of each."""
+    autopilots: list[Agent] = [held.controller for held in courses]
+    episodes = [held.outcome for held in courses]
+    for guest in guests:
+        autopilots.append(guest)
+        episodes.append(sail(guest, loop.draws, judged_task(), loop.seeds))
+    return autopilots, episodes
 
 
 def stable_draws(found: MonteCarlo) -> list[ShipModel]:

@@ -21,8 +21,6 @@ from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.trials.resampling import usual_step
 
-WINDOW = 0.2  # over which velocities are integrated, of the time to sail a ship length
-
 
 @dataclass(frozen=True, eq=False)
 class TrialInformation:
@@ -41,7 +39,8 @@ class TrialInformation:
 
 def trial_regression(model: ShipModel, trial: Trial) -> Samples:
     """Regression of a trial over windows of the same time, whatever the sampling."""
-    sampling_steps = WINDOW * model.travel_time / usual_step(trial.t)
+    share = 0.2  # of the time to sail a ship length: velocities are integrated over it
+    sampling_steps = share * model.travel_time / usual_step(trial.t)
     window = max(round(sampling_steps), 1)
     tenth = max(len(trial) // 10, 1)
     return build_samples(

@@ -232,10 +232,11 @@ def _less_influences(model: ShipModel, influences: Sequence[Floats]) -> list[Shi
     n_trials = len(influences)
     inflation = n_trials / (n_trials - 1)
     covariance = inflation * np.asarray(model.covariance)
-    return [
-        replace(less_influence(model, influences, trial), covariance=covariance)
-        for trial in range(n_trials)
-    ]
+    found = []
+    for trial in range(n_trials):
+        less = less_influence(model, influences, trial)
+        found.append(replace(less, covariance=covariance))
+    return found
 
 
 def less_influence(

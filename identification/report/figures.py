@@ -35,7 +35,6 @@ from shipgym.plots import (
 from shipgym.plots.style import LIMIT, MEASURED, MODEL, MUTED, Figure
 
 UNITS = {"u": "m/s²", "v": "m/s²", "r": "deg/s²", "p": "deg/s²"}
-LAGS = 24  # windows
 
 
 def all_figures(fit: Fit) -> dict[str, Figure]:
@@ -159,12 +158,13 @@ def residual_figure(fit: Fit) -> Figure:
     rows = without_overlap(fit.samples)
     rudder = rudder_at_windows(fit)
     bound = NORMAL_95 / np.sqrt(len(rows))
-    lags = np.arange(-LAGS, LAGS + 1)
+    most = 24  # windows
+    lags = np.arange(-most, most + 1)
 
     shown = []
     own_title, rudder_title = "with themselves", "with the rudder"
     for q, error in errors.items():
-        own = autocorrelation(error[rows], LAGS)
+        own = autocorrelation(error[rows], most)
         after = np.arange(1, len(own) + 1)
         panel = _bars_panel(after, own, bound, EQUATIONS[q], own_title)
         shown.append(panel)

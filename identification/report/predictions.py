@@ -90,21 +90,47 @@ def _channel_lines(
     """A channel over time, in the unit of its axis; none where it was not measured."""
     if channel not in measured.channels:
         return []
-    values = factor * measured[channel]
-    lines = [line(measured.t, values, "measured", MEASURED, 1.3)]
-    if predicted is not None:
-        values = factor * predicted[channel]
-        lines.append(line(predicted.t, values, "predicted", MODEL, 2.0))
-    return lines
+    own = line(
+        measured.t,
+        factor * measured[channel],
+        name="measured",
+        colour=MEASURED,
+        width=1.3,
+    )
+    if predicted is None:
+        return [own]
+    other = line(
+        predicted.t,
+        factor * predicted[channel],
+        name="predicted",
+        colour=MODEL,
+        width=2.0,
+    )
+    return [own, other]
 
 
 def _path_panel(measured: Trial, predicted: Trial | None) -> Panel:
     """The paths along and across the first course; a turning circle to one scale."""
     turning = measured.kind == "turning-circle"
-    lines = [_path_line(measured, measured, turning, "measured", MEASURED, 1.3)]
+    own = _path_line(
+        measured,
+        measured,
+        turning,
+        name="measured",
+        colour=MEASURED,
+        width=1.3,
+    )
+    lines = [own]
     if predicted is not None:
-        path = _path_line(predicted, measured, turning, "predicted", MODEL, 2.0)
-        lines.append(path)
+        other = _path_line(
+            predicted,
+            measured,
+            turning,
+            name="predicted",
+            colour=MODEL,
+            width=2.0,
+        )
+        lines.append(other)
 
     along = "along the first course, m"
     across = "to starboard, m"

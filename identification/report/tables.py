@@ -113,14 +113,17 @@ def trial_row(trial: Trial, name: str) -> TrialRow:
         fastest = fixed(knots.max(), 1)
         speeds = f"{slowest} to {fastest}"
 
+    kind = trial.kind and trial.kind.replace("-", " ")
+    derived = ", ".join(sorted(trial.derived))
+    steps = np.diff(trial.t)
     return TrialRow(
         name=name,
-        kind=trial.kind and trial.kind.replace("-", " "),
+        kind=kind,
         use=trial.use,
-        derived=", ".join(sorted(trial.derived)) or "none",
+        derived=derived or "none",
         samples=len(trial),
         duration=trial.duration,
-        interval=float(np.median(np.diff(trial.t))),
+        interval=float(np.median(steps)),
         rudder=rudder,
         speeds=speeds,
     )

@@ -61,35 +61,58 @@ def largest_rudders(trials: Sequence[Trial]) -> Integers:
     return np.flatnonzero(is_largest)
 
 
-def extrapolation_error(without: Without, trials: Sequence[Trial]) -> float | None:
+def extrapolation_error(
+    model: ShipModel, without: Without, trials: Sequence[Trial]
+) -> float | None:
     """Error of the trials of the largest rudder by a fit to the others.
 
-    That of the heading by its standard deviation, without a heading of the yaw rate;
-    None where no trials would be left, or the fit runs away.
+    By the scatter of what was measured, beyond the error that the model of all trials
+    has there: no rudder explains that. None where no trials would be left, or a fit
+    runs away.
     """
     largest = largest_rudders(trials)
     if not largest.size:
         return None
-    model = without(largest.tolist())
-    errors = []
-    for place in largest:
-        error = _relative_error(model, trials[place])
+    shown = [trials[place] for place in largest]
+    by_others = _mean_square(without(largest.tolist()), shown)
+    by_all = _mean_square(model, shown)
+    if by_others is None or by_all is None:
+        return None
+    return math.sqrt(max(by_others - by_all, 0.0))
+
+
+def _mean_square(model: ShipModel, trials: Sequence[Trial]) -> float | None:
+    """Mean square of the relative errors of some trials."""
+    squares = []
+    for trial in trials:
+        error = _relative_error(model, trial)
         if error is None:
             return None
-        errors.append(error)
-    return root_mean_square(np.array(errors))
+        squares.append(error**2)
+    return float(np.mean(squares))
 
 
 def _relative_error(model: ShipModel, trial: Trial) -> float | None:
-    """Error of a prediction by the scatter of what was measured."""
+    """Error of a prediction by the scatter of what was measured.
+
+    Of the heading, or of the yaw rate where none was logged, after a steady drift was
+    taken out: it makes turns to one side wider and to the other tighter.
+    """
     run = predict(model, trial)
     if run is None:
         return None
-    name = "psi" if "psi" in trial else "r"
+    name, drift = ("psi", 1) if "psi" in trial else ("r", 0)
     measured = trial[name]
-    error = root_mean_square(run[name] - measured)
-    scatter = float(np.std(measured))
-    return error / max(scatter, 1e-12)
+    error = _without_drift(trial.t, run[name] - measured, drift)
+    scatter = _without_drift(trial.t, measured, drift)
+    return root_mean_square(error) / max(root_mean_square(scatter), 1e-12)
+
+
+def _without_drift(t: Floats, values: Floats, degree: int) -> Floats:
+    """Values without the polynomial of time that fits them best."""
+    since_start = t - t[0]
+    drift = np.polyfit(since_start, values, degree)
+    return np.asarray(values - np.polyval(drift, since_start))
 
 
 def beyond_trials(
@@ -106,7 +129,7 @@ def beyond_trials(
     has_many = len(model.coefficients) > most_terms and not is_mmg
     if has_many or holds_turn(trials) or _log_angle(model) is None:
         return model, {}
-    error = extrapolation_error(without, trials)
+    error = extrapolation_error(model, without, trials)
     how = "trials of the largest rudder by a fit to the others"
     if error is None:
         error = 0.12  # found were 0.06 to 0.2 on ships of other equations
@@ -192,9 +215,11 @@ def _principal_moves(model: ShipModel) -> Floats:
     """
     covariance = np.asarray(model.covariance)
     variances, axes = np.linalg.eigh(covariance)
-    known = variances > 1e-12 * variances.max()
+    least = 1e-12 * variances.max()
+    known = variances > least
     deviations = np.sqrt(variances[known])
-    return np.asarray((axes[:, known] * deviations).T)
+    moves = axes[:, known] * deviations
+    return np.asarray(moves.T)
 
 
 def _slope_along(model: ShipModel, move: Floats, own: float) -> float:

@@ -106,9 +106,12 @@ def _without_rows(
     XW = X.T * counts[out]
     change = np.linalg.pinv(np.eye(len(M)) - M @ XW @ X)
 
+    inverse = change @ M
+    moved = XW @ errors[out]
+
     found = copy.copy(estimator)
-    found.coef_ = estimator.coef_ - change @ M @ (XW @ errors[out])
-    found.inverse_moment_ = change @ M
+    found.coef_ = estimator.coef_ - inverse @ moved
+    found.inverse_moment_ = inverse
     if hasattr(estimator, "weights_"):
         found.weights_ = counts[~out]  # type: ignore[attr-defined]
     return found

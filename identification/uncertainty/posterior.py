@@ -222,8 +222,8 @@ def _walkers(
     best = order[-n_walkers:]
     chosen = points[best]
     values = log_density(chosen)
-    lost = ~np.isfinite(values)
-    chosen[lost] *= 0.01
+    finite = np.isfinite(values)
+    chosen[~finite] *= 0.01
     return np.asarray(chosen)
 
 
@@ -259,11 +259,14 @@ def _not_mixed(mixing: Mixing) -> str:
     needed = 2.0 * fewest * time
     hundreds = math.ceil(needed / 100.0)
     more = max(100 * hundreds, 2 * steps)
+    wanted = (
+        f"{fewest:g} autocorrelation times and a split R-hat up to"
+        f" {mixing.largest_r_hat:g}"
+    )
+    found = f"{steps} steps of {time:.0f} each and {mixing.r_hat:.2f}"
     return (
-        f"posterior: expected walkers that mix, {fewest:g} autocorrelation times and"
-        f" a split R-hat up to {mixing.largest_r_hat:g}, got {steps} steps of"
-        f" {time:.0f} each and {mixing.r_hat:.2f}; the"
-        f" covariance is kept: try uncertainty.steps = {more}"
+        f"posterior: expected walkers that mix, {wanted}, got {found}; the covariance"
+        f" is kept: try uncertainty.steps = {more}"
     )
 
 

@@ -188,7 +188,8 @@ def bias_sentences(bias: dict[str, Any] | None) -> list[str]:
         return [f"{found}, which does not differ from zero."]
     if bias["in_model"]:
         return [f"{found}; the model has it."]
+    structure = bias["structure"]
     return [
-        f"{found}, by {bias['structure']}; the structure has no constant for it: it"
-        f" belongs to the rudder's zero, or take structure {bias['structure']!r}."
+        f"{found}, by {structure}; the structure has no constant for it: it belongs to"
+        f" the rudder's zero, or take structure {structure!r}."
     ]

@@ -9,8 +9,6 @@ from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.ships.simulate import open_loop
 
-WINDOW = 1.5  # time over which the start is estimated, of that to sail one ship length
-
 
 def with_start(model: ShipModel, trial: Trial) -> Trial:
     """The trial with the first velocities estimated, as far as they were derived.
@@ -32,7 +30,8 @@ def with_start(model: ShipModel, trial: Trial) -> Trial:
 
     length = model.particulars["length"]
     speed = model.particulars["speed"]
-    end = trial.t[0] + WINDOW * length / speed
+    lengths = 1.5  # sailed while the start is estimated
+    end = trial.t[0] + lengths * length / speed
     window = trial.t <= end
     if np.sum(window) < 3:
         return trial

@@ -23,10 +23,8 @@ PLAINLY = {
         "expected global arrays to be only read, got one that is written"
     ),
 }
-COLOUR = re.compile(r"\x1b\[[\d;]*m")
 # a function that loops call, as `shipgym.engine.compiling` names it
 CALLEE = re.compile(r"<function \w+_[0-9a-f]{32} at 0x[0-9a-f]+>")
-PLACE = re.compile(r'(?:at|from) (\S+) \((\d+)\)|File "([^"]+)", line (\d+)')
 
 
 def explanation(error: Exception, what: str, functions: Iterable[Any] = ()) -> str:
@@ -35,7 +33,8 @@ def explanation(error: Exception, what: str, functions: Iterable[Any] = ()) -> s
     It names the function and the line of the innermost call. `functions` are those that
     were compiled, of which Numba's text may name one.
     """
-    text = COLOUR.sub("", str(error))
+    colour = r"\x1b\[[\d;]*m"
+    text = re.sub(colour, "", str(error))
     reason = _reason(text)
     own = text
     code = None
@@ -100,8 +99,9 @@ def _reason(text: str) -> str:
 
 def _place(text: str) -> tuple[str, int]:
     """First user's file and line that a text names, or the first of all."""
+    place = r'(?:at|from) (\S+) \((\d+)\)|File "([^"]+)", line (\d+)'
     places = []
-    for at, at_line, within, within_line in PLACE.findall(text):
+    for at, at_line, within, within_line in re.findall(place, text):
         file = at or within
         line = int(at_line or within_line)
         places.append((file, line))

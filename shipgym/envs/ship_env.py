@@ -26,7 +26,6 @@ from shipgym.tasks.task import ENV_OPTIONS
 
 Observation = NDArray[np.float32]
 FLOAT32 = np.dtype(np.float32)
-NOT_OVER = (0.0, 0.0)  # neither terminated nor truncated
 
 
 class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
@@ -203,8 +202,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             observation = self._goals.split(observation)
         return observation, reward, terminated > 0.0, truncated > 0.0, info
 
-    def _note_end(self, end: Any = NOT_OVER) -> None:
-        """Note how an episode ended, or that it goes on."""
+    def _note_end(self, end: Any = (0.0, 0.0)) -> None:
+        """Note how an episode ended, terminated or truncated; neither: it goes on."""
         self._end = tuple(end)
         self._over = any(end)
         self._warned = False

@@ -23,11 +23,8 @@ from shipgym.tasks.task import Task
 from shipgym.wrong_types import typed
 
 STEPS = 400
-LANES = 70  # more than a tile
 PLAIN_STEPS = 40  # in plain Python
 PLAIN_LANES = 3
-AGREEMENT = 1e-5  # of compiled and plain results, whose last digits differ
-BEYOND = 1e-6  # beyond a bound, by rounding
 RARE = 20.0  # times the median of its magnitude that a rare reward is at least
 
 
@@ -50,13 +47,14 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
     among them.
     """
     ship = options.pop("model", DEFAULT_MODEL)
+    more_than_a_tile = 70
     try:
         model, given, randomisation = read_options(task, ship, options)
         plain, seen = _plain_engine(model, given, randomisation)
         _sail_in_python(plain)
         plain.shapes(0)
         few = Engine(model, PLAIN_LANES, given, randomisation)
-        many = Engine(model, LANES, given, randomisation)
+        many = Engine(model, more_than_a_tile, given, randomisation)
         one = Engine(model, 1, given, randomisation)
     except InputError as error:
         return TaskCheck(str(task), (str(error),))
@@ -66,7 +64,7 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
         plain,
         lanes=slice(None),
         steps=PLAIN_STEPS,
-        agreement=AGREEMENT,
+        agreement=1e-5,  # their last digits differ
         ways=("compiled", "in plain Python"),
     )
     many_and_one = _differ(
@@ -240,10 +238,12 @@ def _differ(
 def _often_clipped(task: Task, seen: dict[str, list[float]]) -> Iterator[str]:
     """Observations that are often beyond their bounds."""
     often = 0.05  # share of the observations beyond their bounds that is worth a remark
+    rounding = 1e-6
     for path, observed in seen.items():
         spec = task.definition.observations[path]
         values = np.array(observed)
-        is_beyond = (values < spec.low - BEYOND) | (values > spec.high + BEYOND)
+        too_low = values < spec.low - rounding
+        is_beyond = too_low | (values > spec.high + rounding)
         part = np.mean(is_beyond)
         if part > often:
             beyond = values[is_beyond]

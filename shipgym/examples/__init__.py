@@ -5,8 +5,6 @@ from pathlib import Path
 from shipgym.checks import check_choice
 from shipgym.wrong_types import typed
 
-FOLDER = Path(__file__).parent
-
 
 @typed
 def example_ship(name: str = "mariner") -> Path:
@@ -21,5 +19,6 @@ def example_ship(name: str = "mariner") -> Path:
         The ship: "mariner" is a cargo ship of the Mariner class with three simulated
         zigzags as a sea trial would log them, two to fit and one to validate.
     """
-    known = sorted(path.parent.name for path in FOLDER.glob("*/ship.toml"))
-    return FOLDER / check_choice(name, known, "example ship") / "ship.toml"
+    folder = Path(__file__).parent
+    known = sorted(path.parent.name for path in folder.glob("*/ship.toml"))
+    return folder / check_choice(name, known, "example ship") / "ship.toml"

@@ -63,8 +63,6 @@ FUNCTIONS = {
     "check": ("settings", "model"),
     "listed": ("value",),
 }
-#: Options of an environment that observations are made for.
-OPTIONS = ("", "roll", "shaft", "shaft speed")
 #: Names in `info` that are the engine's.
 TAKEN = (
     "reward",
@@ -360,7 +358,9 @@ def _check_observation(spec: ObservationSpec | None, where: str) -> None:
         )
     check_number(spec.low, f"{where}: lower bound")
     check_number(spec.high, f"{where}: upper bound", above=spec.low)
-    check_choice(spec.option, OPTIONS, f"{where}: option")
+    # options of an environment that observations are made for
+    known = ("", "roll", "shaft", "shaft speed")
+    check_choice(spec.option, known, f"{where}: option")
     check_text(spec.unit, f"{where}: unit")
     where = f"{where}: scale"
     if callable(spec.scale):

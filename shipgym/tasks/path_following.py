@@ -65,7 +65,6 @@ REPORTED = (
 )
 EPISODE_STEPS = 1500
 
-PREVIEW = 20.0  # ship lengths along the path within which turns are observed
 WORST_PROGRESS = 2.0  # cost of a step against the path
 
 
@@ -171,7 +170,8 @@ def half_corridor(ship: Ship, settings: Settings) -> float:
 
 def preview(ship: Ship, settings: Settings) -> float:
     """Distance along the path within which turns are observed, m."""
-    return PREVIEW * ship.length
+    ship_lengths = 20.0
+    return ship_lengths * ship.length
 
 
 class Observation(NamedTuple):

@@ -13,16 +13,6 @@ from shipgym.arrays import Floats
 
 HEADING = ("psi", "r")
 PLANE = ("x", "y", "u", "v")
-#: Covariance of position, velocity and acceleration after a step h of a twice
-#: integrated random walk: factors times powers of h.
-WALK_FACTORS = np.array(
-    [
-        [1 / 20, 1 / 8, 1 / 6],
-        [1 / 8, 1 / 3, 1 / 2],
-        [1 / 6, 1 / 2, 1.0],
-    ]
-)
-WALK_POWERS = np.array([[5, 4, 3], [4, 3, 2], [3, 2, 1]])
 
 
 def smooth_kinematics(trial: Trial) -> Trial:
@@ -94,12 +84,22 @@ def heading_motion(t: Floats) -> RandomWalkMotion:
     transitions[:, r, rdot] = h
     transitions[:, psi, rdot] = 0.5 * h**2
 
+    # covariance of position, velocity and acceleration after a step h of a twice
+    # integrated random walk: factors times powers of h
+    factors = np.array(
+        [
+            [1 / 20, 1 / 8, 1 / 6],
+            [1 / 8, 1 / 3, 1 / 2],
+            [1 / 6, 1 / 2, 1.0],
+        ]
+    )
+    powers = np.array([[5, 4, 3], [4, 3, 2], [3, 2, 1]])
     steps = h[:, None, None]
     return RandomWalkMotion(
         states=(*HEADING, "rdot"),
         guessed_by=("r", "psi"),
         transitions=transitions,
-        process=WALK_FACTORS * steps**WALK_POWERS,
+        process=factors * steps**powers,
         start_variances=np.array([1.0, 1e-2, 1.0]),
     )
 
