@@ -10,7 +10,6 @@ from shipgym.tasks.shapes import ChartWidth, Line, ShipOutline
 
 EPISODE_STEPS = 300
 REPORTED = ("distance", "speed")
-QUAY = 0.6  # ship lengths to starboard
 
 
 class Settings(NamedTuple):
@@ -81,9 +80,10 @@ def step(motion, state, interval, ship, settings):
         off_line=-off_line * off_line,
         heading=-4.0 * motion.psi * motion.psi,
     )
-    failed = (off_line > QUAY) | (off_line < -2.0) | (motion.x > ship.length)
+    aground = (off_line > settings.quay) | (off_line < -2.0)
+    failed = aground | (motion.x > ship.length)
     stopped = speed < settings.slow * ship.speed
-    arrived = stopped & (distance < 0.4 * ship.length)
+    arrived = stopped & (distance < settings.near * ship.length)
     return State(0.0, distance, speed), reward, failed, arrived
 
 
@@ -100,7 +100,7 @@ def observe(readings, state, interval, ship, settings):
 
 def draw(motion, state, ship, settings):
     run = settings.distance * ship.length
-    quay = (QUAY + 0.1) * ship.length
+    quay = (settings.quay + 0.1) * ship.length
     berth = ShipOutline(0.0, 0.0, 0.0, ship.length, None, "safe")
     return [ChartWidth(2.5 * run), Line([(-run, quay), (run, quay)], "land"), berth]
 

@@ -8,7 +8,7 @@ from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
 from shipgym.tasks.contract import ObservationSpec, Setting, at_service_speed, drawn
 from shipgym.tasks.shapes import ChartWidth, Line
 
-EPISODE_STEPS = 400
+EPISODE_STEPS = 600
 REPORTED = ("off", "over")
 
 
@@ -81,7 +81,7 @@ def step(motion, state, interval, ship, settings):
     limit = limit_at(motion.x, ship, settings)
     over = max(speed - limit, 0.0)
     delay = clip(1.0 - speed / min(limit, ship.speed - settings.stream), 0.0, 1.0)
-    reward = Reward(-delay, -off * off, -4.0 * over * over)
+    reward = Reward(-delay, -off * off, -over * over)
     return State(along, off, over), reward, fabs(off) > 1.0, motion.x > settings.end
 
 

@@ -50,7 +50,8 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
     except BaseException as error:
         del sys.modules[name]
         if isinstance(error, InputError):
-            raise InputError(f"{path}: {error}") from None
+            place = _place_in(path, str(resolved), error)
+            raise InputError(f"{place}: {error}") from None
         if not isinstance(error, Exception | SystemExit):  # Ctrl-C
             raise
         raise _not_executed(path, str(resolved), error) from error
@@ -68,16 +69,22 @@ def working_folder() -> Iterator[None]:
         sys.path[:] = before
 
 
-def _not_executed(path: Path, resolved: str, error: BaseException) -> InputError:
-    """Error of a file that failed: its last line, and that of what it imports."""
-    line = getattr(error, "lineno", None)  # of a SyntaxError
-    imported = ""
+def _place_in(path: Path, resolved: str, error: BaseException) -> str:
+    """Path, and line if known, at which a file failed."""
+    lines = [getattr(error, "lineno", None)]  # of a SyntaxError
     for frame in extract_tb(error.__traceback__):
         if frame.filename == resolved:
-            line = frame.lineno
-        elif not frame.filename.startswith(("<", resolved, *LIBRARIES)):
+            lines.append(frame.lineno)
+    return f"{path}, line {lines[-1]}" if lines[-1] else str(path)
+
+
+def _not_executed(path: Path, resolved: str, error: BaseException) -> InputError:
+    """Error of a file that failed: its last line, and that of what it imports."""
+    imported = ""
+    for frame in extract_tb(error.__traceback__):
+        if not frame.filename.startswith(("<", resolved, *LIBRARIES)):
             imported = f" ({frame.filename}, line {frame.lineno})"
-    place = f"{path}, line {line}" if line else str(path)
+    place = _place_in(path, resolved, error)
     why = f"{type(error).__name__}: {error}{imported}"
     return InputError(f"{place}: cannot be executed: {why}")
 

@@ -19,6 +19,8 @@ from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from shipgym.checks import check_whole
+
 LANES = 64
 
 Record = type[tuple[Any, ...]]
@@ -37,6 +39,9 @@ class Size:
     """Number of entries of an array, `Annotated[tuple[float, ...], Size(8)]`."""
 
     entries: int
+
+    def __post_init__(self) -> None:
+        check_whole(self.entries, "Size", at_least=1)
 
 
 class TableField:

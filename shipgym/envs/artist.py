@@ -95,8 +95,11 @@ def _readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, s
         lines["heading error"] = f"{degrees(error):+.1f} deg"
     rudder_deg = degrees(state["delta"])
     lines["rudder"] = f"{rudder_deg:+.1f} deg"
+    is_ordered = len(engine.command) > 1
     if "n" in state:
         lines["shaft"] = _shaft(engine, lane, state["n"])
+    elif is_ordered:  # a shaft without lag turns as ordered
+        lines["shaft"] = _shaft(engine, lane, state["n_command"])
     if "cross_track" in engine.task.info_names:
         cross_track = engine.info("cross_track")[lane]
         lines["cross-track"] = f"{cross_track:+.0f} m"

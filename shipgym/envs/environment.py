@@ -219,6 +219,16 @@ class ShipsEnv:
             self.compute_reward = self._goals.compute_reward
         return spaces(self.task, self.model, self._goals)
 
+    @property
+    def corridor(self) -> float | None:
+        """Half the width of the corridor along the path, m; None in course keeping."""
+        return self._engine.path_metres("corridor")
+
+    @property
+    def turn_radius(self) -> float | None:
+        """Radius of the turns of the path, m; None where it has none."""
+        return self._engine.path_metres("turn_radius")
+
     def _shown(self, rows: NDArray[np.float32]) -> Any:
         """Observations as they are returned: an array, or a dictionary with goals."""
         return rows if self._goals is None else self._goals.split(rows)

@@ -1,11 +1,12 @@
 """Settings of a task for a reset, the same for all rows or one for each."""
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
-from shipgym.checks import placed
+from shipgym.checks import placed, quoted
 from shipgym.engine.records import is_list, members
 from shipgym.errors import InputError
 from shipgym.python_files import asked
@@ -54,6 +55,52 @@ def _axes_of(value: Any) -> int:
         return int(np.ndim(value))
     except ValueError:  # ragged
         return 0
+
+
+def options_of_rows(
+    task: Task,
+    given: Sequence[Options],
+    n_rows: int,
+) -> Options:
+    """Options of a reset of all rows, given those of each.
+
+    A row that does not name a setting has that of the task. InputError for options of
+    another number than rows, and for those that rows cannot have on their own.
+    """
+    if len(given) != n_rows:
+        raise InputError(
+            f"options: expected one dictionary for each of {n_rows} rows, got"
+            f" {len(given)}"
+        )
+    first = given[0]
+    if all(options is first for options in given):
+        return dict(first)
+
+    own = {}
+    for name, kind, _, default in keywords(task.definition.Settings):
+        if not is_list(kind):
+            own[name] = task.options.get(name, default)
+
+    combined = {}
+    for name in dict.fromkeys(chain.from_iterable(given)):
+        values = [options.get(name, own.get(name)) for options in given]
+        if all(_are_equal(value, values[0]) for value in values):
+            combined[name] = values[0]
+        elif name in own:
+            combined[name] = values
+        else:
+            raise InputError(
+                f"options: {name}: expected the same for all rows, got several; only"
+                f" settings may differ: {quoted(own)}"
+            )
+    return combined
+
+
+def _are_equal(value: Any, other: Any) -> bool:
+    try:
+        return bool(value == other)
+    except ValueError:  # arrays
+        return np.array_equal(value, other)
 
 
 def row_settings(

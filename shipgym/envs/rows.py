@@ -7,6 +7,7 @@ from shipgym.arrays import Floats
 #: Attributes that all rows share, by the names of the single environment.
 SHARED = (
     "compute_reward",
+    "corridor",
     "dt",
     "metadata",
     "model",
@@ -15,6 +16,7 @@ SHARED = (
     "render_mode",
     "spec",
     "task",
+    "turn_radius",
 )
 SPACES = ("observation_space", "action_space")  # of one ship
 

@@ -13,7 +13,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
 from shipgym.arrays import Flags
-from shipgym.checks import check_choice, unexpected
+from shipgym.checks import check_choice
+from shipgym.envs.row_settings import options_of_rows
 from shipgym.envs.rows import FIXED, Row
 from shipgym.envs.ship_vector_env import Infos, ShipVectorEnv
 from shipgym.errors import InputError
@@ -99,19 +100,18 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # not type-checked here
     def reset(self) -> Observations:
         """Begin an episode in each row: the next, or by the seeds of `seed`, once.
 
-        Raises InputError if there are options: as the single environments, these know
-        none.
+        Options of `set_options` are those of the native environment's `reset`, the same
+        in all rows or settings of the task by row. Episodes that begin by themselves
+        keep them, until the next `reset`. Raises InputError as that does.
         """
-        options = [given for given in self._options if given]
+        given = self._options
         self._reset_options()
-        if options:
-            remedy = "name them when the ships are made"
-            raise unexpected("options", "none", options[0], remedy)
+        options = options_of_rows(self._ships.task, given, self.num_envs)
 
         # `seed` sets those of all rows, or there are none
         seeds = None if None in self._seeds else self._seeds
         observations: Observations
-        observations, infos = self.vector_env.reset(seed=seeds)
+        observations, infos = self.vector_env.reset(seed=seeds, options=options)
         self._reset_seeds()
         self.reset_infos = [_info_of(infos, row) for row in range(self.num_envs)]
         self._returns[:] = 0.0

@@ -101,16 +101,6 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         """North and east of this episode's path, m, shape (n, 2); None without one."""
         return self._engine.waypoints()
 
-    @property
-    def corridor(self) -> float | None:
-        """Half the width of the corridor along the path, m; None in course keeping."""
-        return self._engine.path_metres("corridor")
-
-    @property
-    def turn_radius(self) -> float | None:
-        """Radius of the turns of the path, m; None where it has none."""
-        return self._engine.path_metres("turn_radius")
-
     def reset(
         self,
         *,

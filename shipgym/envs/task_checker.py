@@ -315,11 +315,14 @@ def _hard_to_learn(engine: Engine) -> Iterator[str]:
     if rare_share > most:
         expected = f"{100.0 * most:.0f} %"
         found = f"{100.0 * rare_share:.0f} %"
+        remedy = "lower loss_horizon, or give a larger scale as bounded"
+        if engine.task.half_reward_cost == 0.0:
+            remedy = "leave bounded=True, or lower loss_horizon"
         yield (
             f"reward: expected at most {expected} of all reward in steps of more than"
             f" {RARE:g} times the median, {median:.3g}, got {found} under random"
-            f" orders, in one step {largest:.4g}: one event drowns the rest; leave"
-            " bounded=True, or lower loss_horizon"
+            f" orders, in one step {largest:.4g}: one event drowns the rest;"
+            f" {remedy}"
         )
 
     scale = engine.task.half_reward_cost

@@ -6,9 +6,11 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
+import numpy as np
+
 from shipgym.checks import check_text
 from shipgym.errors import InputError
-from shipgym.python_files import check_function, load_file, refuse_closure
+from shipgym.python_files import check_function, load_file, place_of, refuse_closure
 from shipgym.tasks.refused_code import refuse_foreign_random
 
 
@@ -41,6 +43,24 @@ class CurrentField:
         check_function(found, 2, f"{path}: current", what)
         refuse_closure(found)
         refuse_foreign_random(found)
+        self._refuse_infinite(found)
+
+    def _refuse_infinite(self, current: Any) -> None:
+        """Refuse a current that is no number at the origin, where ships begin."""
+        try:
+            at_origin = current(0.0, 0.0)
+            flow = np.asarray(at_origin, dtype=np.float64)
+        except ArithmeticError as error:
+            why = f"{type(error).__name__}: {error} at x = 0 and y = 0"
+            raise InputError(f"{place_of(current, error)}: {why}") from None
+        except (TypeError, ValueError):
+            return  # refused with line and reason where it is compiled
+        if flow.shape == () or (flow.shape == (2,) and np.isfinite(flow).all()):
+            return
+        raise InputError(
+            f"{place_of(current)}: expected two finite numbers, m/s, at x = 0 and"
+            f" y = 0, got {at_origin}"
+        )
 
     @cached_property
     def function(self) -> Any:

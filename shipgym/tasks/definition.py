@@ -295,7 +295,8 @@ def _definition(source: Any) -> TaskDefinition:
     _check_task(namespace, where)
     definition = _definition_of(namespace, where)
     for path, spec in definition.observations.items():
-        _check_observation(spec, f"{where}: Observation.{path}")
+        place = field_place(definition.Observation, path.partition(".")[0], where)
+        _check_observation(spec, f"{place}: Observation.{path}")
     for path, spec in definition.goals.items():
         field = path.removeprefix("achieved.").removeprefix("desired.")
         place = field_place(definition.Goal, field.partition(".")[0], where)

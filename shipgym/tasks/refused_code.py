@@ -29,8 +29,8 @@ def refuse_foreign_random(function: FunctionType) -> None:
     for place, found in _foreign_random(function, {function}):
         raise InputError(
             f"{place}: expected random numbers of the episode, got those of {found};"
-            " take the argument `random` and draw them with drawn(random, number, low,"
-            " high)"
+            " in a function with the argument `random` draw them with drawn(random,"
+            " number, low, high)"
         )
 
 

@@ -242,6 +242,8 @@ def vessel(source: Any, steps: int = 2) -> Callable[..., Motion]:
     }
     made: Any = _OfTarget(hooks).copy(sail_steps)
     made.equations = place_of(hooks["accelerations"])
+    if made.equations.startswith("<"):  # code made of a table of terms
+        made.equations = model.name
     made.ship = ship
     made.start = at_service_speed(0.0, 0.0, 0.0, ship)
     return made  # type: ignore[no-any-return]

@@ -94,7 +94,8 @@ def test_a_task_has_one_by_its_settings(tmp_path):
         ("def current(x):\n    return 0.0, 0.0\n", "river.py: current: expected"),
         ("def current(x, y):\n    return 1.0\n", "line 1, in current: .*number"),
         ("def current(x, y):\n    return y / 0.0, 0.0\n", "line 2, in current: Zero"),
-        ("def current(x, y):\n    return 0.0, float('nan')\n", "line 1, in current: "),
+        ("def current(x, y):\n    return 0.0, float('nan')\n", "expected two finite"),
+        ("def current(x, y):\n    return 0.0, 1.0, 2.0\n", "line 1, .* two finite"),
     ],
 )
 def test_files_that_do_not_fit_are_refused(tmp_path, text, message):

@@ -12,10 +12,12 @@ from gymnasium.wrappers import TimeAwareObservation
 
 from shipgym import InputError, load_model
 from shipgym.envs.engine import Engine, episode_keys
-from shipgym.envs.environment import rudder_orders
+from shipgym.envs.environment import given_orders
 from shipgym.tasks import course_keeping_task, path_following_task
+from shipgym.tasks.task import RUDDER_ORDERS
 
 PATH, COURSE = "shipgym/PathFollowing-v0", "shipgym/CourseKeeping-v0"
+NINE = [np.array(RUDDER_ORDERS, dtype=np.float32)]
 HOOK = [[0.0, 0.0], [1500.0, 0.0], [2900.0, 1400.0]]
 SEA = {
     "model": "mariner",
@@ -376,13 +378,13 @@ def test_episodes_of_a_checkpoint_go_on_for_every_row():
     [(4, [[0.0]]), (np.int64(0), [[-1.0]]), (8, [[1.0]]), (np.uint8(5), [[0.1]])],
 )
 def test_an_order_is_one_of_nine(given, expected):
-    np.testing.assert_allclose(rudder_orders(given, (), "action"), expected)
+    np.testing.assert_allclose(given_orders(NINE, given, (), "action"), expected)
 
 
 @pytest.mark.parametrize("wrong", [-1, 9, 4.0, [4], True])
 def test_what_is_no_order_is_refused(wrong):
     with pytest.raises(InputError) as caught:
-        rudder_orders(wrong, (), "action")
+        given_orders(NINE, wrong, (), "action")
     assert (
         str(caught.value)
         == f"action: expected an integer from 0 to 8: a rudder order, got {wrong!r}"
@@ -390,7 +392,7 @@ def test_what_is_no_order_is_refused(wrong):
 
 
 def test_orders_of_several_ships_are_a_column():
-    found = rudder_orders([0, 8, 2], (3,), "actions")
+    found = given_orders(NINE, [0, 8, 2], (3,), "actions")
     np.testing.assert_allclose(found, [[-1.0], [1.0], [-0.25]])
     assert found.dtype == np.float32
     for wrong in ([0, 8], [0, 8, 9], [-1, 0, 0], [0.0, 1.0, 2.0], 3):
@@ -398,7 +400,7 @@ def test_orders_of_several_ships_are_a_column():
             InputError,
             match=r"expected integers of shape \(3,\) from 0 to 8: rudder orders",
         ):
-            rudder_orders(wrong, (3,), "actions")
+            given_orders(NINE, wrong, (3,), "actions")
 
 
 def test_seeds_are_those_of_gymnasiums_generators():

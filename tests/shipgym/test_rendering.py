@@ -251,6 +251,7 @@ class Voyage:
         SimpleNamespace(outcomes=np.array([[-9.0, -0.1234]])),
     )
     task = SimpleNamespace(info_names=("cross_track",))
+    command = np.zeros((1, 2))
     state = {  # noqa: RUF012
         "x": 10.0,
         "y": -20.0,
@@ -306,6 +307,10 @@ def test_readouts_are_those_of_the_lane_in_usual_units():
         "+4.8 deg",
     )
     assert shown.course_order == -3.1
+    voyage.command = np.array([[0.0, 0.1], [0.0, 0.75]])
+    voyage.state = {**voyage.state, "n_command": 1.5}  # a shaft without lag
+    shown = scene(voyage, 1, np.zeros((0, 2)))
+    assert shown.readouts["shaft"] == "90 rpm, ordered +0.75"
 
 
 @pytest.mark.parametrize(

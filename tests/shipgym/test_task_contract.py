@@ -174,7 +174,7 @@ def test_settings_apply_until_the_next_reset(task):
     one.reset(seed=2)
     many.reset(seed=2)
     np.testing.assert_array_equal(sailed(many, 3)[1][:, 0], sailed(one, 3)[1])
-    assert one.step(one.action_space.sample())[1] < 0.5
+    assert one.step(one.action_space.sample())[4]["cost"] > -0.5  # of the bonus
 
 
 @pytest.mark.parametrize(
@@ -197,6 +197,10 @@ WRONG = {
     "headings: Annotated[tuple[float, ...], Size(4)]": [
         ("headings: tuple[float, ...]", "State.headings: expected an array of a fixed"),
         ("headings: list[float]", "State.headings: expected an array of a fixed size"),
+        (
+            "headings: Annotated[tuple[float, ...], Size(0)]",
+            "Size: expected an integer of at least 1",
+        ),
         ("headings: tuple[float, str]", "State.headings: expected a float, got"),
     ],
     "    luck: float": [

@@ -1,5 +1,8 @@
 """Goals of a task: Gymnasium's dictionary form, and rewards for HER."""
 
+import re
+from pathlib import Path
+
 import gymnasium
 import numpy as np
 import pytest
@@ -9,6 +12,7 @@ from stable_baselines3.common.env_checker import check_env as check_sb3_env
 
 from shipgym import InputError, ShipVecEnv, check_task, check_vector_env
 
+ROOT = Path(__file__).parents[2]
 COURSE = "shipgym/CourseKeeping-v0"
 TASK = '''"""Reach a place."""
 
@@ -122,6 +126,17 @@ def test_hindsight_replay_learns_from_them(task):
     rewards = samples.rewards.flatten().tolist()
     assert min(rewards) < -1.0  # as it happened: the rudder costs, too
     assert max(rewards) == 0.0  # for a goal that was reached
+
+
+def test_the_page_on_her_runs(tmp_path, monkeypatch):
+    page = (ROOT / "docs" / "stable_baselines3.md").read_text(encoding="utf-8")
+    section = page.split("\n## HER\n")[1].split("\n## ")[0]
+    task, training = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
+    (tmp_path / "reach.py").write_text(task)
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec(training.replace("20_000", "8").replace('"harbour', '"page'), names)
+    assert names["agent"].num_timesteps >= 8
 
 
 @pytest.mark.parametrize(
