@@ -94,6 +94,7 @@ class Recipe:
             particulars=known.particulars,
             steering=known.steering,
             name=name,
+            rudder_bias="none",
             **shaft,
             **self.options,
         )

@@ -14,10 +14,11 @@ from identification.design.sensitivity import zigzag_sensitivity
 from identification.pipeline import identify
 from identification.regression.samples import Samples
 from identification.result import IdentificationResult
-from shipgym import InputError, Trial, register_structure
+from shipgym import InputError, Trial, list_structures, register_structure
 from shipgym.arrays import finite
 from shipgym.checks import check_choice
-from shipgym.ships import GreyBox, Structure
+from shipgym.ships import GreyBox, Structure, get_structure
+from shipgym.ships.structures import GREY_BOX
 from shipgym.wrong_types import typed
 
 
@@ -98,6 +99,9 @@ def identify_reduced(
     **arguments
         Of `identify`.
     """
+    asked = arguments.get("structure")
+    if isinstance(asked, str) and asked in list_structures() and asked != GREY_BOX:
+        _check_reducible(get_structure(asked))
     full = identify(trials, **arguments)
     table = full.model.table
     _check_reducible(table)

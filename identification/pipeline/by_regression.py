@@ -30,6 +30,7 @@ from identification.validation.rudder_bias import with_bias
 from shipgym import ShipModel, Trial, list_structures
 from shipgym.arrays import Floats
 from shipgym.ships import Structure, get_structure
+from shipgym.ships.structures import GREY_BOX
 from shipgym.trials.resampling import usual_step
 
 if TYPE_CHECKING:
@@ -159,6 +160,8 @@ def differentiates_heading(trials: Sequence[Trial], options: Options) -> bool:
     Differentiation biases a regression on them, but not what is fitted to the heading.
     """
     table = options.structure
+    if table == GREY_BOX:
+        return False
     if isinstance(table, str) and table in list_structures():
         table = get_structure(table)
     is_response = isinstance(table, Structure) and set(table.equations) == {"r"}

@@ -4,10 +4,11 @@ The covariance of coefficients says how well the trials fix the motion that they
 A turn at full rudder lies beyond zigzags, and there the terms that a structure has, and
 those that it lacks, go apart. How far, the trials show themselves: those of the largest
 rudder are predicted by a fit to the others, and their error is taken for that of the
-turn. The form of the MMG gets it in terms that grow beyond the trials, the moment
-N'vvr of the hull and its resistance X'rr in a turn, which zigzags hardly show. A table
-of few terms gets it along the one direction in which its covariance lets the turn
-change most; what does not move with the turn stays as certain as it was.
+turn. The form of the MMG gets it, less what is a drift or is missed anyway, in terms
+that grow beyond the trials, the moment N'vvr of the hull and its resistance X'rr in a
+turn, which zigzags hardly show. A table of few terms gets it along the one direction in
+which its covariance lets the turn change most; what does not move with the turn stays
+as certain as it was.
 """
 
 import math
@@ -61,14 +62,34 @@ def largest_rudders(trials: Sequence[Trial]) -> Integers:
     return np.flatnonzero(is_largest)
 
 
-def extrapolation_error(
-    model: ShipModel, without: Without, trials: Sequence[Trial]
-) -> float | None:
+def extrapolation_error(without: Without, trials: Sequence[Trial]) -> float | None:
     """Error of the trials of the largest rudder by a fit to the others.
 
-    By the scatter of what was measured, beyond the error that the model of all trials
-    has there: no rudder explains that. None where no trials would be left, or a fit
-    runs away.
+    That of the heading by its standard deviation, without a heading of the yaw rate;
+    None where no trials would be left, or the fit runs away.
+    """
+    largest = largest_rudders(trials)
+    if not largest.size:
+        return None
+    model = without(largest.tolist())
+    errors = []
+    for place in largest:
+        trial = trials[place]
+        error = _error(model, trial)
+        if error is None:
+            return None
+        name = _compared(trial)
+        errors.append(root_mean_square(error) / _size(np.std(trial[name])))
+    return root_mean_square(np.array(errors))
+
+
+def growing_error(
+    model: ShipModel, without: Without, trials: Sequence[Trial]
+) -> float | None:
+    """The same beyond a steady drift, and beyond what the fit to all trials misses.
+
+    A drift makes turns to one side wider and to the other tighter, and what all trials
+    miss no rudder explains: terms that grow with the turn are due to the rest.
     """
     largest = largest_rudders(trials)
     if not largest.size:
@@ -82,30 +103,37 @@ def extrapolation_error(
 
 
 def _mean_square(model: ShipModel, trials: Sequence[Trial]) -> float | None:
-    """Mean square of the relative errors of some trials."""
+    """Mean square of the relative errors of some trials, without their drift."""
     squares = []
     for trial in trials:
-        error = _relative_error(model, trial)
+        error = _error(model, trial)
         if error is None:
             return None
-        squares.append(error**2)
+        name = _compared(trial)
+        degree = 1 if name == "psi" else 0
+        left = root_mean_square(_without_drift(trial.t, error, degree))
+        scatter = root_mean_square(_without_drift(trial.t, trial[name], degree))
+        squares.append((left / _size(scatter)) ** 2)
     return float(np.mean(squares))
 
 
-def _relative_error(model: ShipModel, trial: Trial) -> float | None:
-    """Error of a prediction by the scatter of what was measured.
+def _compared(trial: Trial) -> str:
+    """The channel that is compared: the heading, or the yaw rate where none is."""
+    return "psi" if "psi" in trial else "r"
 
-    Of the heading, or of the yaw rate where none was logged, after a steady drift was
-    taken out: it makes turns to one side wider and to the other tighter.
-    """
+
+def _error(model: ShipModel, trial: Trial) -> Floats | None:
+    """Error of a prediction of that channel; None if the model runs away."""
     run = predict(model, trial)
     if run is None:
         return None
-    name, drift = ("psi", 1) if "psi" in trial else ("r", 0)
-    measured = trial[name]
-    error = _without_drift(trial.t, run[name] - measured, drift)
-    scatter = _without_drift(trial.t, measured, drift)
-    return root_mean_square(error) / max(root_mean_square(scatter), 1e-12)
+    name = _compared(trial)
+    return np.asarray(run[name] - trial[name])
+
+
+def _size(scatter: Any) -> float:
+    """Scatter of what was measured, not below what can be divided by."""
+    return max(float(scatter), 1e-12)
 
 
 def _without_drift(t: Floats, values: Floats, degree: int) -> Floats:
@@ -129,7 +157,10 @@ def beyond_trials(
     has_many = len(model.coefficients) > most_terms and not is_mmg
     if has_many or holds_turn(trials) or _log_angle(model) is None:
         return model, {}
-    error = extrapolation_error(model, without, trials)
+    if is_mmg:
+        error = growing_error(model, without, trials)
+    else:
+        error = extrapolation_error(without, trials)
     how = "trials of the largest rudder by a fit to the others"
     if error is None:
         error = 0.12  # found were 0.06 to 0.2 on ships of other equations

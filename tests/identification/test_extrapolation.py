@@ -11,6 +11,7 @@ from identification.simulation_error.prior_knowledge import PriorKnowledge
 from identification.uncertainty.extrapolation import (
     beyond_trials,
     extrapolation_error,
+    growing_error,
     holds_turn,
     largest_rudders,
 )
@@ -44,19 +45,27 @@ def test_the_largest_rudder_is_left_out_where_two_trials_remain(
 ) -> None:
     assert largest_rudders(zigzags).tolist() == [2]
     assert not largest_rudders(zigzags[1:]).size
-    exact = extrapolation_error(ship, lambda places: ship, zigzags)
+    exact = extrapolation_error(lambda places: ship, zigzags)
     assert exact == pytest.approx(0.0, abs=0.005)
     other = load_model("kvlcc2-nomoto")
-    error = extrapolation_error(ship, lambda places: other, zigzags)
+    assert extrapolation_error(lambda places: other, zigzags) > 0.05
+
+
+def test_what_grows_is_beyond_a_drift_and_what_is_missed_anyway(
+    ship: ShipModel, zigzags: list[Trial]
+) -> None:
+    other = load_model("kvlcc2-nomoto")
+    error = growing_error(ship, lambda places: other, zigzags)
+    assert error is not None
     assert error > 0.05
-    assert extrapolation_error(other, lambda places: other, zigzags) == 0.0
+    assert growing_error(other, lambda places: other, zigzags) == 0.0
 
     drift = [trial["psi"] + 1e-3 * trial.t for trial in zigzags]
     drifting = [
         trial.with_channels({"psi": psi})
         for trial, psi in zip(zigzags, drift, strict=True)
     ]
-    again = extrapolation_error(ship, lambda places: other, drifting)
+    again = growing_error(ship, lambda places: other, drifting)
     assert again == pytest.approx(error, rel=0.05)
 
 
