@@ -167,11 +167,13 @@ def test_limits_that_are_not_kept_and_designs_that_are_refused_are_warned_of(
             standards=rows,
             refused={"lqg": "no such sensor"},
             retuned={"pid": "slower"},
+            tuned={"lq": "9 candidates"},
         ),
     )
     print_autopilot(result, Path("report.html"), DRAWS)
     shown = capsys.readouterr()
     assert "PID was retuned to hold the models drawn: slower" in shown.out
+    assert "settings of LQ were searched: 9 candidates" in shown.out
     first, *_, last = shown.err.splitlines()
     assert first == "warning: ISO 11674, course change: 3.2 deg, limit 2.5"
     assert last == "warning: no LQG autopilot: no such sensor"

@@ -94,7 +94,7 @@ def test_every_hook_is_filled_with_a_function_of_its_arguments(ship):
         if isinstance(function, FunctionType) and function.__module__ == hooks.__name__
     }
     of_trials = {"store_sea_channels", "load_inputs", "load_wind"}
-    of_goals = {"load_goal", "goal_reward"}
+    of_goals = {"load_goal", "goal_reward", "current_at"}
     elsewhere = {"step_of_task", "reward_of_another", *of_trials, *of_goals}
     stages = {"point", "sums", "slope", "slopes"}
     for name, function in asked.items():

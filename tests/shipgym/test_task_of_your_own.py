@@ -800,7 +800,7 @@ def test_an_error_of_a_file_is_told_with_its_last_line_in_it_and_the_file_may_be
     assert refused("x = (\n").startswith(", line 1: cannot be executed: SyntaxError: ")
     assert (
         refused("from shipgym import InputError\nraise InputError('no such tide')\n")
-        == ": no such tide"
+        == ", line 2: no such tide"
     )
     assert refused("\0").startswith(": cannot be executed: ")
     own = load_file(written(tmp_path, "own.py", "x = 3\n"))
