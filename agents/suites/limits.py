@@ -45,7 +45,7 @@ LIMITED_FIGURES: Mapping[str, LimitedFigure] = {
     "speed_lost_percent": LimitedFigure(
         "speed lost, %",
         "mean",
-        "ISO 15016 and operators' practice: loss of speed by steering",
+        "operators' practice: loss of speed by steering",
     ),
 }
 

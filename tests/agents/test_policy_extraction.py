@@ -72,11 +72,12 @@ def same_commands(policy, observations, expected):
 @pytest.mark.parametrize("name", AGENTS)
 def test_the_commands_are_those_of_torch(name, tmp_path):
     algorithm, settings = AGENTS[name]
-    agent = algorithm("MlpPolicy", ships(), seed=0, **deepcopy(settings))
+    learned_from = ships(bounded=False)
+    agent = algorithm("MlpPolicy", learned_from, seed=0, **deepcopy(settings))
     strong(agent.learn(32))
     observations = seen(agent)
     expected, _ = agent.predict(observations, deterministic=True)
-    assert expected.std() > 0.2
+    assert expected.std() > 0.3
 
     policy = LearnedPolicy.from_sb3(agent, training={"algorithm": name.lower()})
     same_commands(policy, observations, expected)

@@ -135,6 +135,8 @@ def test_the_command_line_finds_a_class_by_its_module(mine, tmp_path):
     )
     assert done.exit_code == 0, done.output
     assert "PD" in done.output
+    # its code was run in a process of its own
+    assert "my-pd" not in registry.controller_kinds()
 
 
 def test_what_is_no_controller_is_refused():
