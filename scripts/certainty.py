@@ -55,9 +55,8 @@ from shipgym.manoeuvres.intervals import (  # noqa: E402
 )
 from shipgym.manoeuvres.registry import standard_time  # noqa: E402
 from shipgym.trials.sensors import Sensors  # noqa: E402
-from tests.ships.inoue import INOUE_SHIPS  # noqa: E402
-from tests.ships.mmg import MMG_SHIPS, mmg_ship  # noqa: E402
-from tests.ships.square_drag import SQUARE_DRAG  # noqa: E402
+from tests.ships.foreign import FOREIGN  # noqa: E402
+from tests.ships.mmg import MMG_SHIPS  # noqa: E402
 
 Value = TypeVar("Value")
 Key = dict[tuple[str, str], Value]  # by manoeuvre and name of the index
@@ -82,12 +81,7 @@ INDICES = (
 
 def ship_of(name: str) -> ShipModel:
     """A ship by name, the truth behind the trials."""
-    made = {
-        **SQUARE_DRAG,
-        **INOUE_SHIPS,
-        **{one: partial(mmg_ship, one) for one in MMG_SHIPS},
-    }
-    return made[name]() if name in made else shipgym.load_model(name)
+    return FOREIGN[name]() if name in FOREIGN else shipgym.load_model(name)
 
 
 def sea_trials(ship: ShipModel, kind: str, seed: int) -> list[Trial]:

@@ -24,7 +24,6 @@ not done again.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 import warnings
@@ -35,6 +34,7 @@ from typing import Any
 
 import numpy as np
 from certainty import index_intervals, sea_trials, true_indices
+from kept_rows import KeptRows
 
 ROOT = Path(__file__).parents[1]
 if str(ROOT) not in sys.path:
@@ -291,13 +291,6 @@ def error_of(row: Row) -> float:
     return float(np.mean(errors))
 
 
-def read_rows(path: Path) -> list[Row]:
-    """The cases that a file has."""
-    if not path.exists():
-        return []
-    return [json.loads(text) for text in path.read_text("utf-8").splitlines()]
-
-
 def main() -> None:
     """Run the cases that are missing and print the tables."""
     parser = argparse.ArgumentParser(
@@ -316,21 +309,18 @@ def main() -> None:
     draws = given.draws
     if given.quick:
         ships, draws = list(QUICK), 30
-    rows = read_rows(given.out)
-    done = {(row["ship"], row["structure"], row["seed"]) for row in rows}
+    kept = KeptRows(given.out, ("ship", "structure", "seed"))
     cases = [
         (ship, structure, seed)
         for ship in ships
         for structure in given.structures.split(",")
         for seed in range(given.seeds)
-        if (ship, structure, seed) not in done
+        if (ship, structure, seed) not in kept
     ]
     for k, (ship, structure, seed) in enumerate([] if given.table else cases):
         print(f"{k + 1} of {len(cases)}: {ship}, {structure}", file=sys.stderr)
-        row = case(ship, structure, seed, draws)
-        rows.append(row)
-        with given.out.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
+        kept.add(case(ship, structure, seed, draws))
+    rows = kept.rows
     print(table(rows, "structure"), table(rows, "ship"), turns(rows), sep="\n\n")
 
 

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import json
 import sys
 import time
 import warnings
@@ -30,7 +29,9 @@ from typing import Any
 
 import numpy as np
 from certainty import sea_trials, ship_of
+from kept_rows import KeptRows
 from opened_once import steered
+from verdicts import SHIPS as OF_VERDICTS
 
 from agents.verification.chain import examined
 from agents.verification.verify import DESIGNS, design_autopilots, verify
@@ -38,23 +39,11 @@ from identification import IdentificationResult, identify
 from identification.validation.selection import RESPONSES, whole_trials
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
-from tests.ships.opened_once import OPENED_ONCE
 
-SHIPS = (
-    "kcs",
-    "seiun-maru",
-    "ferry",
-    "product-tanker",
-    "training-vessel",
-    "stable-heavy",
-    "lively-light",
-    "tanker",
-    *OPENED_ONCE,
-)
+SHIPS = (*OF_VERDICTS, "tanker")
 STRUCTURES = ("nomoto", "abkowitz", "cubic", "mmg", "auto")
 KINDS = ("zigzags", "one poor zigzag")
 DRAWS = 60
-CASE = ("ship", "structure", "trials", "seed")
 
 
 def poor_zigzag(ship: ShipModel, seed: int) -> list[Trial]:
@@ -95,7 +84,7 @@ def identified(
 
 def examined_case(name: str, structure: str, kind: str, seed: int) -> dict[str, Any]:
     """Which designs are given for one ship, and which of all steer her."""
-    ship = OPENED_ONCE[name]() if name in OPENED_ONCE else ship_of(name)
+    ship = ship_of(name)
     row: dict[str, Any] = {"ship": name, "structure": structure}
     row |= {"trials": kind, "seed": seed}
     try:
@@ -189,10 +178,7 @@ def main() -> None:
     given = parser.parse_args()
     warnings.simplefilter("ignore")
 
-    rows = []
-    if given.rows.exists():
-        rows = [json.loads(line) for line in given.rows.read_text().splitlines()]
-    done = {tuple(row[name] for name in CASE) for row in rows}
+    kept = KeptRows(given.rows, ("ship", "structure", "trials", "seed"))
     cases = itertools.product(
         given.trials.split(","),
         given.structures.split(","),
@@ -200,14 +186,12 @@ def main() -> None:
         range(given.seeds),
     )
     for kind, structure, name, seed in cases:
-        if (name, structure, kind, seed) in done:
+        if (name, structure, kind, seed) in kept:
             continue
         row = examined_case(name, structure, kind, seed)
-        rows.append(row)
-        with given.rows.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row, default=np.ndarray.tolist) + "\n")
+        kept.add(row)
         print(row, file=sys.stderr, flush=True)
-    print(table(rows))
+    print(table(kept.rows))
 
 
 if __name__ == "__main__":

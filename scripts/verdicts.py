@@ -17,7 +17,7 @@ Rows are kept in a file; a second call does what is left.
 from __future__ import annotations
 
 import argparse
-import json
+import itertools
 import sys
 import warnings
 from collections import Counter
@@ -28,6 +28,7 @@ from typing import Any
 
 import numpy as np
 from certainty import fitted, ship_of
+from kept_rows import KeptRows
 
 from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import Criterion, turning_circle, zigzag
@@ -99,7 +100,7 @@ def named(criterion: Criterion) -> str | None:
 
 def case(name: str, kind: str, seed: int) -> dict[str, Any]:
     """Verdicts on one ship from one set of trials."""
-    ship = OPENED_ONCE[name]() if name in OPENED_ONCE else ship_of(name)
+    ship = ship_of(name)
     row: dict[str, Any] = {"ship": name, "trials": kind, "seed": seed}
     trials = [run_of(ship, trial, 100 * seed + k) for k, trial in enumerate(SETS[kind])]
     result = fitted(ship, STRUCTURE, trials)
@@ -187,20 +188,12 @@ def main() -> None:
     given = parser.parse_args()
     warnings.simplefilter("ignore")
 
-    rows = []
-    if given.rows.exists():
-        rows = [json.loads(line) for line in given.rows.read_text().splitlines()]
-    done = {(row["ship"], row["trials"], row["seed"]) for row in rows}
-    for seed in range(given.seeds):
-        for name in given.ships.split(","):
-            for kind in SETS:
-                if (name, kind, seed) in done:
-                    continue
-                row = case(name, kind, seed)
-                rows.append(row)
-                with given.rows.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(row, default=bool) + "\n")
-    print(table(rows))
+    kept = KeptRows(given.rows, ("ship", "trials", "seed"))
+    cases = itertools.product(range(given.seeds), given.ships.split(","), SETS)
+    for seed, name, kind in cases:
+        if (name, kind, seed) not in kept:
+            kept.add(case(name, kind, seed))
+    print(table(kept.rows))
 
 
 if __name__ == "__main__":

@@ -174,14 +174,20 @@ def beyond_trials(
 
 
 def with_growing_terms(model: ShipModel, error: float) -> ShipModel:
-    """The MMG form with an error of its terms that grow beyond the trials."""
-    share = 0.7  # of the error that each of the two has
+    """The MMG form whose draws' hard turn has at least this deviation.
+
+    What its covariance lacks of it goes to the terms that grow beyond the trials.
+    """
+    turn = hard_turn(model)
+    own = 0.0 if turn is None else turn.deviation
+    lacking = math.sqrt(max(error**2 - own**2, 0.0))
+    share = 0.7  # of that, which each of the two has
     names = list(model.coefficients)
     more = np.zeros(len(names))
     for name in ("N_vvr", "X_rr"):
         slope = _slope(model, name)
         if slope:
-            deviation = share * error / slope
+            deviation = share * lacking / slope
             more[names.index(name)] = deviation**2
 
     covariance = np.asarray(model.covariance) + np.diag(more)

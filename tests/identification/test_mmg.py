@@ -412,8 +412,7 @@ def test_models_drawn_hold_the_turn_that_no_trial_shows(
     )
     low, high = np.percentile(drawn, [2.5, 97.5], axis=0)
     assert np.all((low < truth) & (truth < high))
-    # the least error of a hard turn, 4 %, leaves her diameter to a quarter either way
-    assert np.all((high - low) / truth < [0.25, 0.5])
+    assert np.all((high - low) / truth < 0.25)  # and say something
 
 
 def turn_lengths(model: ShipModel) -> tuple[float, float]:
