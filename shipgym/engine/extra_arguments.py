@@ -83,7 +83,7 @@ def with_plan(
     return wrapped_function(moment, state, interval, ship, settings, plan)
 
 
-def with_random_and_plan(
+def with_both(
     moment: Any,
     state: Any,
     interval: Any,
@@ -92,33 +92,24 @@ def with_random_and_plan(
     tile: Tile,
     lane: int,
 ) -> Any:
-    """Call a function that names both, random numbers first."""
-    random = random_of(tile, lane, interval.steps)
-    plan = plan_to_read(tile, lane)
-    return wrapped_function(moment, state, interval, ship, settings, random, plan)
-
-
-def with_plan_and_random(
-    moment: Any,
-    state: Any,
-    interval: Any,
-    ship: Any,
-    settings: Any,
-    tile: Tile,
-    lane: int,
-) -> Any:
-    """Call a function that names both, the plan first."""
-    random = random_of(tile, lane, interval.steps)
-    plan = plan_to_read(tile, lane)
-    return wrapped_function(moment, state, interval, ship, settings, plan, random)
+    """Call a function that names both, in either order."""
+    return wrapped_function(
+        moment,
+        state,
+        interval,
+        ship,
+        settings,
+        random=random_of(tile, lane, interval.steps),
+        plan=plan_to_read(tile, lane),
+    )
 
 
 _WRAPPERS = {
     (): with_nothing,
     ("random",): with_random,
     ("plan",): with_plan,
-    ("random", "plan"): with_random_and_plan,
-    ("plan", "random"): with_plan_and_random,
+    ("random", "plan"): with_both,
+    ("plan", "random"): with_both,
 }
 
 
