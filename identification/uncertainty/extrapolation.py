@@ -174,13 +174,16 @@ def beyond_trials(
 
 
 def with_growing_terms(model: ShipModel, error: float) -> ShipModel:
-    """The MMG form whose draws' hard turn has at least this deviation.
+    """The MMG form whose draws' hard turn has this deviation at least, and more.
 
-    What its covariance lacks of it goes to the terms that grow beyond the trials.
+    What its covariance lacks goes to the terms that grow beyond the trials.
     """
+    # the error is that of two trials or so, whose mean square may well be half as large
+    few = 1.5
+    due = few * error
     turn = hard_turn(model)
     own = 0.0 if turn is None else turn.deviation
-    lacking = math.sqrt(max(error**2 - own**2, 0.0))
+    lacking = math.sqrt(max(due**2 - own**2, 0.0))
     share = 0.7  # of that, which each of the two has
     names = list(model.coefficients)
     more = np.zeros(len(names))
