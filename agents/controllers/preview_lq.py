@@ -117,7 +117,31 @@ def summed_arc(along_arc: Number, angle: Number, radius: float) -> Number:
 
 
 class PreviewSettings(NamedTuple):
-    """Settings of `PreviewLQ.from_model`."""
+    """Settings of `PreviewLQ.from_model`.
+
+    Attributes
+    ----------
+    lookahead_lengths : float
+        Lookahead of the way back to the track, ship lengths; by default the task's.
+    lead_lengths : float
+        How far ahead the path's course is read, ship lengths; by default `own_lead`.
+    window_lengths : float
+        Over which it is averaged, ship lengths: longer turns more gently.
+    inside_lengths : float
+        How far inside a turn the ship is to be, ship lengths per radian that the path
+        turns in the window.
+    feed_forward_lengths : float
+        Change of course per curvature of the path, ship lengths.
+    crab_share : float
+        Share of the angle of drift by the current that is countered.
+    crab_time, yaw_time : float
+        Time constants of the low-passes on that angle and on the yaw rate, in times to
+        travel one ship length.
+    dead_band_deg : float
+        Heading error that is left alone.
+    speed_power : float
+        Power of service speed over speed in the gain on the heading error.
+    """
 
     lookahead_lengths: float
     lead_lengths: float
@@ -231,26 +255,8 @@ class PreviewLQ(Guided):
         task : Task, optional
             Its lookahead, turns and control interval are used; by default the
             environment's own.
-        lookahead_lengths : float, optional
-            Lookahead of the way back to the track, ship lengths; by default the task's.
-        lead_lengths : float, optional
-            How far ahead the path's course is read, ship lengths.
-        window_lengths : float
-            Over which it is averaged, ship lengths: longer turns more gently.
-        inside_lengths : float
-            How far inside a turn the ship is to be, ship lengths per radian that the
-            path turns in the window.
-        feed_forward_lengths : float
-            Change of course per curvature of the path, ship lengths.
-        crab_share : float
-            Share of the angle of drift by the current that is countered.
-        crab_time, yaw_time : float
-            Time constants of the low-passes on that angle and on the yaw rate, in times
-            to travel one ship length.
-        dead_band_deg : float
-            Heading error that is left alone.
-        speed_power : float
-            Power of service speed over speed in the gain on the heading error.
+        lookahead_lengths, lead_lengths, ... : float, optional
+            See `PreviewSettings`.
         """
         asked = task or path_following_task()
         dt = asked.interval(model)
