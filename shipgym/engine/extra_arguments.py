@@ -37,7 +37,7 @@ def plan_to_read(tile: Tile, lane: int) -> Any:
     return plan_of(tile.state, lane)
 
 
-def wrapped_function(*arguments: Any) -> Any:
+def wrapped_function(*arguments: Any, **extras: Any) -> Any:
     """Hook: the function that is wrapped."""
     raise NotImplementedError("filled by `completed`")
 
