@@ -6,8 +6,8 @@ from typing import Annotated, NamedTuple
 
 from shipgym.engine.mathematics import clip, sin_cos
 from shipgym.engine.motion import Motion
-from shipgym.tasks.contract import ObservationSpec, Setting, at_service_speed
-from shipgym.tasks.encounters import Seen, imazu_case, imazu_target, seen_three
+from shipgym.tasks.contract import ObservationSpec, Setting, at_service_speed, drawn
+from shipgym.tasks.encounters import Seen, imazu_case, imazu_targets, seen_three
 from shipgym.tasks.shapes import ChartWidth, Circle, Line, ShipOutline
 from shipgym.tasks.traffic import (
     Target,
@@ -18,7 +18,7 @@ from shipgym.tasks.traffic import (
     vessel,
 )
 
-EPISODE_STEPS = 150
+EPISODE_STEPS = 200
 mariner = vessel("mariner")  # equations of the second, who gives way
 MARINER, AT_SPEED = mariner.ship, mariner.start
 
@@ -26,6 +26,7 @@ MARINER, AT_SPEED = mariner.ship, mariner.start
 class Settings(NamedTuple):
     case: Annotated[float, Setting("0: drawn.", at_least=0, at_most=22, whole=True)] = 0
     distance: Annotated[float, Setting("To the meeting, ship lengths.", above=0)] = 15.0
+    scatter: Annotated[float, Setting("About it, ship lengths.", at_least=0)] = 1.0
     safe: Annotated[float, Setting("Distance to keep, ship lengths.", above=0)] = 3.0
 
 
@@ -54,13 +55,13 @@ class Observation(NamedTuple):
 
 
 def begin(ship, settings, random, plan):
-    run = settings.distance * ship.length
+    run, scatter = settings.distance * ship.length, settings.scatter * ship.length
     case = imazu_case(settings.case, random)
-    second = imazu_target(case, 1, run, ship)
+    first, second, third = imazu_targets(case, run, scatter, random, ship)
     sailing = Motion(second.x, second.y, second.course, *AT_SPEED[3:])
-    first, third = imazu_target(case, 0, run, ship), imazu_target(case, 2, run, ship)
     state = State((first, second, third), sailing, second.course)
-    return at_service_speed(-run, 0.0, 0.0, ship), state
+    aside = drawn(random, 4, -scatter, scatter)
+    return at_service_speed(-run, aside, 0.0, ship), state
 
 
 def step(motion, state, interval, ship, settings):

@@ -46,9 +46,11 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=400_000)
     parser.add_argument("--parts", type=int, default=8)
     parser.add_argument("--bounded", type=float, default=0.1)
+    parser.add_argument("--scatter", type=float, default=0.0)
     given = parser.parse_args()
     bounded = given.bounded or False
-    shipgym.register_task("harbour/Encounter-v0", TASK, dt=5.0, bounded=bounded)
+    options = {"dt": 5.0, "episode_steps": 150, "scatter": given.scatter}
+    shipgym.register_task("harbour/Encounter-v0", TASK, bounded=bounded, **options)
     ships = shipgym.ShipVecEnv("harbour/Encounter-v0", num_envs=32, seed=0)
     agent = PPO("MlpPolicy", ships, n_steps=256, batch_size=256, seed=0)
     began = time.time()

@@ -89,6 +89,28 @@ def imazu_target(case: int, number: int, distance: float, ship: Ship) -> Target:
     return advance(at_origin, -meeting_time)
 
 
+def imazu_targets(
+    case: int,
+    distance: float,
+    scatter: float,
+    random: Random,
+    ship: Ship,
+) -> tuple[Target, Target, Target]:
+    """Three other ships of a case of Imazu, who are not all at one place at one time.
+
+    Each is up to `scatter`, m, early or late along her own course. Random numbers 1 to 3
+    of the episode say by how much; number 0 draws the case.
+    """
+    first = distance + drawn(random, 1, -scatter, scatter)
+    second = distance + drawn(random, 2, -scatter, scatter)
+    third = distance + drawn(random, 3, -scatter, scatter)
+    return (
+        imazu_target(case, 0, first, ship),
+        imazu_target(case, 1, second, ship),
+        imazu_target(case, 2, third, ship),
+    )
+
+
 def seen(readings: Any, other: Target, ship: Ship) -> Seen:
     """Observe another ship by the readings of the own ship, up to 50 lengths away."""
     near = approach(readings, other)

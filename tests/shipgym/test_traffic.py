@@ -77,7 +77,8 @@ def test_the_cases_of_imazu_are_collisions():
     ships = gymnasium.make_vec(
         COURSE, 22, task=task, dt=5.0, autoreset_mode="Disabled", model="mariner"
     )
-    seen, _ = ships.reset(seed=0, options={"case": np.arange(1, 23)})
+    cases = {"case": np.arange(1, 23), "scatter": np.zeros(22)}
+    seen, _ = ships.reset(seed=0, options=cases)
     collided = np.zeros(22, dtype=bool)
     for _ in range(70):
         rudder = -3.0 * seen[:, :1] - seen[:, 2:3]
@@ -86,6 +87,14 @@ def test_the_cases_of_imazu_are_collisions():
         if terminated.any():
             seen, _ = ships.reset(options={"reset_mask": terminated})
     assert collided.all()
+
+
+def test_an_encounter_differs_from_episode_to_episode_of_a_case():
+    task = ROOT / "examples" / "encounter.py"
+    for scatter, n_different in ((0.0, 1), (1.0, 8)):
+        ships = gymnasium.make_vec(COURSE, 8, task=task, dt=5.0, scatter=scatter)
+        seen, _ = ships.reset(seed=0, options={"case": np.full(8, 12)})
+        assert len(np.unique(seen, axis=0)) == n_different
 
 
 def test_the_example_is_a_task_of_one_screen_that_is_learned(tmp_path):
