@@ -98,8 +98,8 @@ def imazu_targets(
 ) -> tuple[Target, Target, Target]:
     """Three other ships of a case of Imazu, who are not all at one place at one time.
 
-    Each is up to `scatter`, m, early or late along her own course. Random numbers 1 to 3
-    of the episode say by how much; number 0 draws the case.
+    Each is up to `scatter`, m, early or late along her own course. Numbers 1 to 3 of
+    the episode say by how much; number 0 draws the case.
     """
     first = distance + drawn(random, 1, -scatter, scatter)
     second = distance + drawn(random, 2, -scatter, scatter)
