@@ -99,7 +99,8 @@ class Guided(Controller):
             margins = Margins(np.inf, np.inf, np.inf, np.inf)
         like.check_fits_model(model)
 
-        scales = _scales_of(task, model, cls.observes)
+        names = cls.observed_in(task, model)
+        scales = _scales_of(task, model, names)
         task_lookahead = task.lookahead * model.particulars["length"]
         design_model = {"ship": model} if cls.has_ship else {}
         return cls(
@@ -108,13 +109,18 @@ class Guided(Controller):
             neutral_sway=like.neutral_sway,
             margins=margins,
             observation_scales=scales,
-            observation_names=cls.observes,
+            observation_names=names,
             model_name=like.model_name,
             model_sha256=like.model_sha256,
             design={"dt": dt, **design},
             autopilot=autopilot,
             **design_model,
         )
+
+    @classmethod
+    def observed_in(cls, task: Task, model: ShipModel) -> tuple[str, ...]:
+        """Names of what it observes in a task."""
+        return cls.observes
 
     @property
     def path_radius(self) -> float:
@@ -224,6 +230,8 @@ class Guided(Controller):
             surge=known["surge"],
             yaw_rate=known["yaw_rate"],
             rudder=known["rudder"],
+            roll=known.get("roll", zero),
+            roll_rate=known.get("roll_rate", zero),
             turns=turns,
         )
         shown = shown_course(seen, self.gains["task_lookahead"], self.path_radius)

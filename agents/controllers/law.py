@@ -50,6 +50,8 @@ class PathSignals(NamedTuple):
     surge: Number  # m/s
     yaw_rate: Number  # rad/s
     rudder: Number  # rad
+    roll: Number  # rad
+    roll_rate: Number  # rad/s
     turns: Turns
 
 
