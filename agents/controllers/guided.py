@@ -16,7 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import ANY_NUMBER, Action, Bounds, Controller
 from agents.controllers.interface import Policy
-from agents.controllers.law import Number, PathSignals, Turns, gathered, wrapped
+from agents.controllers.law import (
+    Number,
+    PathSignals,
+    Turns,
+    clipped,
+    gathered,
+    wrapped,
+)
 from agents.controllers.lq import LQ
 from agents.controllers.margins import Compensator, Margins
 from agents.controllers.memory import (
@@ -300,5 +307,5 @@ def arc_turned(along_arc: Number, angle: Number, radius: float) -> Number:
 
     It is 0 before the arc, and the whole angle behind it.
     """
-    turned = np.clip(along_arc / radius, 0.0, np.abs(angle))
+    turned = clipped(along_arc / radius, 0.0, np.abs(angle))
     return np.sign(angle) * turned

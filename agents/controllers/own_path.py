@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.controllers.law import Number, Turns
+from agents.controllers.law import Number, Turns, clipped
 
 
 class TurnMemory(NamedTuple):
@@ -89,7 +89,7 @@ def tangent(angle: Number, radii: Radii) -> Number:
 
 
 def half_of(angle: Number) -> Number:
-    """Half of a turn, rad; of a sharper one than 150 degrees the tangents have no end."""
+    """Half of a turn, rad, at most 75 degrees: tangents of sharper ones have no end."""
     sharpest = 2.6  # rad
     return 0.5 * np.minimum(np.abs(angle), sharpest)
 
@@ -122,7 +122,7 @@ def left_behind(memory: TurnMemory, radii: Radii) -> OwnArc:
 
 def turned_along(along: Number, radii: Radii) -> Number:
     """Angle that the own arc turns over a distance along its tangent, rad."""
-    return np.arcsin(np.clip(along / radii.own, 0.0, 1.0))
+    return np.arcsin(clipped(along / radii.own, 0.0, 1.0))
 
 
 def passed(left: Number, whole: Number, radii: Radii) -> OwnArc:
@@ -137,7 +137,7 @@ def passed(left: Number, whole: Number, radii: Radii) -> OwnArc:
     across = apart * np.sin(past)
     reach = np.sqrt(np.maximum(radii.own * radii.own - across * across, 0.0))
     from_centre = reach - apart * np.cos(past)
-    own_past = np.arcsin(np.clip(from_centre * np.sin(past) / radii.own, -1.0, 1.0))
+    own_past = np.arcsin(clipped(from_centre * np.sin(past) / radii.own, -1.0, 1.0))
 
     side = np.sign(whole)
     return OwnArc(

@@ -21,7 +21,7 @@ import numpy as np
 from agents.controllers.controller import ANY_NUMBER, Bounds
 from agents.controllers.guided import COURSE_ERROR, TURNS, Guided, arc_turned
 from agents.controllers.interface import Policy
-from agents.controllers.law import Law, Number, PathSignals, wrapped
+from agents.controllers.law import Law, Number, PathSignals, clipped, wrapped
 from agents.controllers.lq import LQ
 from agents.controllers.own_path import (
     OwnPath,
@@ -98,7 +98,7 @@ def preview_law(
     course = along_path(seen, turns, slowness, p) - p.crab_share * crab
 
     error = wrapped(seen.heading_error + course)
-    quiet = error - np.clip(error, -p.dead_band, p.dead_band)
+    quiet = error - clipped(error, -p.dead_band, p.dead_band)
     by_heading = quiet * np.exp(p.speed_power * np.log(slowness))
     yaw_rate = memory.yaw_rate + p.yaw_update * (seen.yaw_rate - memory.yaw_rate)
     by_yaw_rate = p.yaw_gain * (yaw_rate - seen.yaw_rate)
@@ -159,7 +159,7 @@ def summed_turn(distance: Number, path: OwnPath, radius: float) -> Number:
 def summed_arc(along_arc: Number, angle: Number, radius: float) -> Number:
     """Integral of `arc_turned` to a distance along an arc of an angle, rad m."""
     size = np.abs(angle)
-    turned = np.clip(along_arc / radius, 0.0, size)
+    turned = clipped(along_arc / radius, 0.0, size)
     on_arc = 0.5 * radius * turned * turned
     behind = size * np.maximum(along_arc - radius * size, 0.0)
     return np.sign(angle) * (on_arc + behind)
