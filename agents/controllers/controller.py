@@ -96,6 +96,8 @@ class Controller:
     gain_names: ClassVar[tuple[str, ...]] = ()
     #: What it observes of the environment.
     observes: ClassVar[tuple[str, ...]] = OBSERVATION_NAMES
+    #: What it observes too where that is shown next.
+    may_observe: ClassVar[tuple[str, ...]] = ()
     #: Its law (`agents.controllers.law`), and the record of what that remembers of each
     #: ship.
     law: ClassVar[Law] = staticmethod(linear_law)

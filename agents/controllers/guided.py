@@ -127,7 +127,11 @@ class Guided(Controller):
     @classmethod
     def observed_in(cls, task: Task, model: ShipModel) -> tuple[str, ...]:
         """Names of what it observes in a task."""
-        return cls.observes
+        shown = [quantity.name for quantity in task.observed(model)]
+        n = len(cls.observes)
+        following = tuple(shown[n : n + len(cls.may_observe)])
+        has_more = following == cls.may_observe
+        return cls.observes + cls.may_observe if has_more else cls.observes
 
     @property
     def path_radius(self) -> float:

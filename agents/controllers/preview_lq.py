@@ -262,6 +262,7 @@ class PreviewLQ(Guided):
     law: ClassVar[Law] = staticmethod(preview_law)
     memory_record: ClassVar[Record] = PreviewMemory
     observes: ClassVar[tuple[str, ...]] = (*Guided.observes, *COURSE_ERROR, *TURNS)
+    may_observe: ClassVar[tuple[str, ...]] = ("roll", "roll_rate")
     reads: ClassVar[tuple[str, ...]] = (
         "cross_track",
         "drift",
@@ -374,13 +375,6 @@ class PreviewLQ(Guided):
             "service_speed": model.particulars["speed"],
         }
         return cls.leading(model, autopilot, asked, gains, {})
-
-    @classmethod
-    def observed_in(cls, task: Task, model: ShipModel) -> tuple[str, ...]:
-        """Names of what it observes in a task, heel where that is shown."""
-        shown = {quantity.name for quantity in task.observed(model)}
-        heel = ("roll", "roll_rate")
-        return (*cls.observes, *(name for name in heel if name in shown))
 
     @property
     def needed_signals(self) -> tuple[str, ...]:

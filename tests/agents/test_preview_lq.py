@@ -12,6 +12,7 @@ from agents.controllers.preview_lq import summed_turn, turned_by
 from agents.controllers.quiet_lq import QuietLQ
 from agents.controllers.side_by_side import side_by_side
 from agents.rollouts.rollout import episode_costs
+from shipgym import load_model
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.tasks.task import path_following_task
@@ -81,6 +82,20 @@ def test_it_is_a_controller_and_a_file(tmp_path):
     guide.save(tmp_path / "guide.json")
     again = load_agent(tmp_path / "guide.json", MARINER)
     assert (again.kind, again.gains) == ("preview-lq", guide.gains)
+
+
+def test_heel_turns_the_rudder_where_a_task_shows_it(tmp_path):
+    ship = load_model("container")
+    task = path_following_task(roll=True)
+    guide = PreviewLQ.from_model(ship, task=task, roll_gain=0.5, roll_time=0.1)
+    guide.save(tmp_path / "guide.json")
+    again = load_agent(tmp_path / "guide.json", ship)
+    level = np.zeros((1, len(again.observation_names)))
+    level[0, [1, 4]] = 1.0  # on course at service speed
+    heeled = level.copy()
+    heeled[0, again.observation_names.index("roll")] = 0.5
+    assert again.predict(heeled)[0] != again.predict(level)[0]
+    assert "roll" not in PreviewLQ.from_model(ship).observation_names
 
 
 @pytest.mark.parametrize(
