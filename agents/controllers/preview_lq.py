@@ -1,9 +1,10 @@
 """LQ path tracking with preview: the path's course is read ahead and averaged.
 
 LQ steers heading and yaw rate around a course that is read from the path one lead
-ahead, averaged over a window, with feed-forward of the path's curvature, a track to the
-inside of turns, and the angle of drift by a current countered. Waves are kept from the
-rudder by a low-pass on the yaw rate and by a dead-band on the heading error.
+ahead, averaged over a window, with feed-forward of the path's curvature and the angle
+of drift by a current countered. The path may be her own, on wider arcs inside the
+planned ones. Heel and its rate change the course where they are seen. Waves are kept
+from the rudder by low-passes and dead-bands on yaw rate, heading error and order.
 
 Sources: Tomizuka 1975, Optimal continuous finite preview problem, IEEE Transactions on
 Automatic Control 20 (preview in LQ tracking); Fossen 2011, Handbook of Marine Craft
@@ -255,7 +256,7 @@ class PreviewSettings(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PreviewLQ(Guided):
-    """LQ around the course of the path ahead: track keeping by 14 numbers."""
+    """LQ around the course of the path ahead: track keeping by 19 numbers."""
 
     kind: ClassVar[str] = "preview-lq"
     leads: ClassVar[str] = "quiet-lq"
