@@ -183,9 +183,9 @@ def test_a_value_comes_from_the_nearest_table():
         table = load_settings(algorithm).to_dict()
         assert type(make_settings(algorithm, table)) is kind
         assert make_settings(algorithm, table).to_dict() == table
-        del table["gamma"]
+        del table["net_arch"]
         with pytest.raises(
-            InputError, match=f"settings of {algorithm}: field 'gamma' is missing"
+            InputError, match=f"settings of {algorithm}: field 'net_arch' is missing"
         ):
             make_settings(algorithm, table)
 

@@ -31,8 +31,10 @@ from agents.training.evaluation import Evaluations
 from agents.training.nested_values import read_values, write_values
 from agents.training.plan import EVALUATION_SEED, training_options
 from agents.training.request import TrainingRequest, make_plan
+from agents.training.result import TrainingResult
 from agents.training.run_folder import begin_folder, other_versions
-from agents.training.settings import ALGORITHMS, load_settings
+from agents.training.settings import load_settings
+from agents.training.training_run import TrainingRun
 from shipgym.errors import InputError
 from shipgym.sea import Current, Weather
 
@@ -230,7 +232,7 @@ def test_agents_of_a_suite_learn_over_drawn_models_and_never_see_the_true_ship()
     assert plan.settings.rate_limit == 0.1
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("algorithm", ["ppo", "sac", "td3", "tqc"])
 def test_settings_are_keywords_of_the_algorithms_class(algorithm):
     settings = load_settings(algorithm, given={"schedule": "linear"})
     arguments = sb3_arguments(settings, (2,))
@@ -328,8 +330,8 @@ def test_rewards_are_divided_by_their_scale():
 
 
 def test_a_diverged_training_says_so():
-    run = training.TrainingRun(tiny(), None, 10, 45.0)
-    run.agent.policy.action_net.bias.data[:] = np.nan
+    run = TrainingRun(tiny(), None, 10, 45.0)
+    run.learner.agent.policy.action_net.bias.data[:] = np.nan
     with pytest.raises(
         InputError, match=r"diverged after 0 steps.*lower learning_rate"
     ):
@@ -478,9 +480,7 @@ def test_lq_is_reached_by_what_costs_a_thousandth_more_at_most(cost, reached):
         {"steps": 5, "cost": cost},
         {"steps": 9, "cost": 9.0},
     )
-    result = training.TrainingResult(
-        None, None, curve, 9.0, 9, 9, 10.0, 1.0, True, None
-    )
+    result = TrainingResult(None, None, curve, 9.0, 9, 9, 10.0, 1.0, True, None)
     assert result.lq_reached["steps"] == (5 if reached else 9)
     assert replace(result, lq_cost=None).lq_reached is None
 
