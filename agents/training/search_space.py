@@ -24,7 +24,7 @@ def search_space(algorithm: str, fixed: Sequence[str] = ()) -> dict[str, Any]:
     integer = optuna.IntDistribution
     choice = optuna.CategoricalDistribution
 
-    space = {}
+    space: dict[str, Any] = {}
     if issubclass(settings_of(algorithm), GradientSettings):
         space |= {
             "learning_rate": real(1e-4, 3e-3, log=True),

@@ -104,7 +104,7 @@ LINES = (
     ),
     (f"train cma-es {TASK_OF_OWN} {GENERATIONS} --threads 2 --out evolved", 0),
     ("train cma-es --resume --max-seconds 60 --out evolved", 0),
-    ("export evolved/agent.json --c evolved", 0),
+    ("export evolved/agent.json --c evolved-c", 0),
     (f"tune cma-es {TASK_OF_OWN} {GENERATIONS} --trials 1 --out study3", 0),
     (f"tune ppo {TASK} --address 127.0.0.1:9 --out study2", 2),
     (
