@@ -3,7 +3,7 @@
 All networks of a generation steer side by side in one batch of ships, on the same
 episodes, which are others in each generation; what is learned is the mean of the
 distribution that they are drawn from. The search begins with an output of 0, so at the
-cost of the base. Above `FULL_MATRIX` weights only the diagonal of the covariance is
+cost of the base. Above 100 weights only the diagonal of the covariance is
 adapted.
 
 Sources: Hansen 2016, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772 (the
@@ -29,10 +29,6 @@ from agents.training.settings import CMASettings
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.extras import library
-
-#: Weights up to which the whole covariance matrix is adapted.
-FULL_MATRIX = 100
-GIVEN_UP = 1e12  # cost of an episode in which a network gave no finite command
 
 
 class EvolutionLearner:
@@ -89,8 +85,9 @@ class EvolutionLearner:
         )
         decisions = np.ceil(found.steps / self.settings.action_repeat)
         self.steps += int(decisions.sum())
-        gave_up = found.failed | ~np.isfinite(found.costs)
-        costs = np.where(gave_up, GIVEN_UP, found.costs)
+        cost_of_failure = 1e12  # no finite command
+        failed = found.failed | ~np.isfinite(found.costs)
+        costs = np.where(failed, cost_of_failure, found.costs)
         means = costs.reshape(self.settings.population, -1).mean(axis=1)
         return np.asarray(means)
 
@@ -156,12 +153,13 @@ class WeightSearch:
 
         self.units = shape.scales()
         start = shape.start(numbers)
+        largest_matrix = 100  # weights
         options = {
             "popsize": population,
             "randn": draw,
             "seed": np.nan,  # the global random numbers of NumPy stay as they are
             "verbose": -9,
-            "CMA_diagonal": shape.n_weights > FULL_MATRIX,
+            "CMA_diagonal": shape.n_weights > largest_matrix,
         }
         self.strategy = cma.CMAEvolutionStrategy(start, sigma, options)
         #: Costs of each generation, shape (population,).
@@ -186,8 +184,10 @@ class WeightSearch:
 def network_shape(plan: TrainingPlan, base: Controller | None) -> NetworkShape:
     """Shape of the network that a plan learns."""
     settings = plan.settings
-    n_observed = settings.frame_stack * len(plan.task.design.observed())
-    n_inputs = n_observed if base is None else n_observed + 1
+    observed = plan.task.design.observed()
+    n_inputs = settings.frame_stack * len(observed)
+    if base is not None:
+        n_inputs += 1  # its command
     n_outputs = OUTPUTS[plan.task.task.action]
     sizes = (n_inputs, *settings.net_arch, n_outputs)
     return NetworkShape(sizes, settings.activation)
