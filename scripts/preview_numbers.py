@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from agents import PreviewLQ
-from agents.controllers.lq import LQ
+from agents.controllers.quiet_lq import QuietLQ
 from agents.rollouts.rollout import rollout
 from shipgym import load_model
 from shipgym.arrays import Floats
@@ -40,7 +40,9 @@ class Panel(NamedTuple):
 PANELS = (
     Panel("lookahead_lengths", (1.2, 2.5, 5.0)),
     Panel("lead_lengths", (0.8, 1.6, 2.4)),
+    Panel("lead_power", (-1.0, 0.0, 2.0)),
     Panel("window_lengths", (0.1, 0.5, 3.0), shows="delta"),
+    Panel("arc_factor", (1.0, 1.5, 2.5)),
     Panel("inside_lengths", (-0.4, 0.0, 0.4)),
     Panel("feed_forward_lengths", (-0.6, 0.0, 0.6)),
     Panel("crab_share", (0.0, 1.0, 1.5), sea="current"),
@@ -50,6 +52,8 @@ PANELS = (
     Panel("speed_power", (-1.0, 0.0, 2.0)),
     Panel("lq_rudder_weight", (0.02, 0.1, 1.0), shows="delta"),
     Panel("lq_rate_weight_s2", (1.0, 10.0, 200.0), shows="delta"),
+    Panel("lq_rudder_time", (0.0, 0.1, 0.2), shows="delta", sea="rough"),
+    Panel("lq_rudder_band_deg", (0.0, 1.0, 2.0), shows="delta", sea="rough"),
 )
 UNITS = {
     "cross_track": (1.0, "cross-track error, m"),
@@ -59,7 +63,7 @@ UNITS = {
 
 def main() -> None:
     """Sail and draw."""
-    figure, axes = plt.subplots(4, 3, figsize=(12.0, 11.0), layout="constrained")
+    figure, axes = plt.subplots(4, 4, figsize=(15.0, 11.0), layout="constrained")
     for panel, axis in zip(PANELS, axes.flat, strict=True):
         factor, label = UNITS[panel.shows]
         for value, style in zip(panel.values, (":", "-", "--"), strict=True):
@@ -96,7 +100,7 @@ def sailed(settings: Mapping[str, float], panel: Panel) -> Floats:
             inner[name.removeprefix("lq_")] = value
         else:
             own[name] = value
-    autopilot = LQ.from_model(SHIP, dt=task.interval(SHIP), **inner)
+    autopilot = QuietLQ.from_model(SHIP, dt=task.interval(SHIP), **inner)
     guide = PreviewLQ.from_model(SHIP, task=task, autopilot=autopilot, **own)
     names = ("delta", "cross_track")
     run = rollout(guide, Engine(SHIP, 1, task), [SEED], record=names)

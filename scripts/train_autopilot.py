@@ -15,7 +15,8 @@ from agents import load_agent
 from agents.controllers.designs import design
 from agents.rollouts.rollout import episode_costs
 from agents.training.request import TrainingRequest, make_plan
-from agents.training.training import TrainingProgress, train
+from agents.training.result import TrainingProgress
+from agents.training.training import train
 
 NEW_SEEDS = np.arange(1_000_000, 1_000_100)
 

@@ -31,7 +31,8 @@ from agents.policies.policy import LearnedPolicy
 from agents.suites.suite import SETS, BenchmarkTask, find_task, load_suite
 from agents.training import run_folder
 from agents.training.request import TrainingRequest, make_plan
-from agents.training.training import TrainingProgress, train
+from agents.training.result import TrainingProgress
+from agents.training.training import train
 from shipgym.arrays import Floats
 from shipgym.files import read_json, write_json
 

@@ -4,8 +4,8 @@
     python scripts/tune_controllers.py --tasks sharp-turns --again
 
 All have the same budget of processor seconds and episodes. MPC, which takes fifty times
-as long for a command, is led by what was found for `preview-lq` and given none more
-than that. The suite's file of tuned settings is written after every controller and
+as long for a command, is led by what was found for `preview-lq` where that costs less
+on the model. The suite's file of tuned settings is written after every controller and
 task: stopped at any moment, it goes on where it was.
 """
 
@@ -15,6 +15,9 @@ import argparse
 from dataclasses import asdict, replace
 from typing import Any
 
+import numpy as np
+
+from agents.controllers.designs import INNER
 from agents.suites.reference import load_tuned
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, suite_file
 from agents.training.controller_search import (
@@ -24,6 +27,7 @@ from agents.training.controller_search import (
     tune_controller,
     unseen_costs,
 )
+from agents.training.controller_space import lq_space
 from shipgym.files import write_json
 
 CONTROLLERS = ("lq", "ilos", "wheel-over", "preview-lq", "mpc")
@@ -38,7 +42,7 @@ def main() -> None:
     parser.add_argument("--suite", default=DEFAULT_SUITE)
     parser.add_argument("--tasks", help="names, separated by commas; by default all")
     parser.add_argument("--controllers", default=",".join(CONTROLLERS))
-    parser.add_argument("--seconds", type=float, default=35.0)
+    parser.add_argument("--seconds", type=float, default=75.0)
     parser.add_argument("--episodes", type=int, default=24)
     parser.add_argument(
         "--again", action="store_true", help="also what is there already"
@@ -53,16 +57,16 @@ def tune_task(task: BenchmarkTask, arguments: argparse.Namespace) -> None:
     """Tune controllers on a task and write the settings of each as it is found."""
     budget = SearchBudget(seconds=arguments.seconds, episodes=arguments.episodes)
     path = suite_file(task.suite, "tuned")
-    tasks: dict[str, Any] = load_tuned(task.suite) if path.exists() else {}
-    of_task = tasks.setdefault(task.name, {})
     for kind in arguments.controllers.split(","):
+        of_task = kept_settings(task).get(task.name, {})
         if kind in of_task and not arguments.again:
             continue
         if kind == "mpc":
             best = led_by_rule(task, of_task[RULE])
         else:
             best = tune_controller(kind, task, budget)
-        of_task[kind] = asdict(best)
+        tasks = kept_settings(task)  # others may have tuned other tasks meanwhile
+        tasks.setdefault(task.name, {})[kind] = asdict(best)
         content = {
             "suite": arguments.suite,
             "seconds": arguments.seconds,
@@ -75,23 +79,31 @@ def tune_task(task: BenchmarkTask, arguments: argparse.Namespace) -> None:
         print(f"{task.name:20s} {kind:14s} {costs}  {best.seconds:5.1f} s", flush=True)
 
 
+def kept_settings(task: BenchmarkTask) -> dict[str, Any]:
+    """Settings by task and controller that the file of its suite holds."""
+    path = suite_file(task.suite, "tuned")
+    return load_tuned(task.suite) if path.exists() else {}
+
+
 def led_by_rule(task: BenchmarkTask, found: dict[str, Any]) -> FoundSettings:
-    """Settings of MPC from those found for the rule, without a search of its own."""
+    """Settings of MPC: those found for the rule, or its own where they cost less."""
     rule = found["settings"]
     settings = {
         "lookahead_lengths": rule["lookahead_lengths"],
         "reach_lengths": rule["lead_lengths"],
         "crab_share": rule["crab_share"],
     }
-    for name, value in rule.items():
-        if name.startswith("lq_"):
-            settings[name] = value
-    start_cost, cost = unseen_costs("mpc", task, [{}, settings], found["episodes"])
+    for setting in lq_space(task):
+        name = INNER + setting.name
+        settings[name] = rule[name]
+    candidates: list[dict[str, float]] = [{}, settings]
+    costs = unseen_costs("mpc", task, candidates, found["episodes"])
+    better = int(np.argmin(costs))
     return replace(
         FoundSettings(**found),
-        settings=settings,
-        cost=float(cost),
-        start_cost=float(start_cost),
+        settings=candidates[better],
+        cost=float(costs[better]),
+        start_cost=float(costs[0]),
     )
 
 

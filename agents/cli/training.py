@@ -26,10 +26,12 @@ if TYPE_CHECKING:
 
     from agents.training.plan import TrainingPlan
     from agents.training.request import TrainingRequest
-    from agents.training.training import TrainingResult
+    from agents.training.result import TrainingResult
     from agents.training.tuning import TuningResult, TuningTrial
 
-Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
+Algorithm = Annotated[
+    str, Argument(metavar="ALGORITHM", help="ppo, sac, td3, tqc or cma-es.")
+]
 Environment = Annotated[
     str | None,
     Option(
@@ -216,12 +218,12 @@ def _checked_plan(request: TrainingRequest, out: Path, resume: bool) -> Training
         plan = make_plan(request)
 
     steps = request.settings.get("total_steps", 0)
-    rollout = plan.settings.rollout
+    rollout = getattr(plan.settings, "rollout", 1)
     if steps % rollout:
         rounded = -(-steps // rollout) * rollout
         warn(
-            f"total_steps: {steps:,} is rounded up to {rounded:,}: rollouts of"
-            f" {plan.settings.ships} ships have {rollout:,} steps"
+            f"total_steps: {steps:,} is rounded up to {rounded:,}: a rollout of all"
+            f" ships has {rollout:,} steps"
         )
     return plan
 

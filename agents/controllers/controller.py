@@ -20,7 +20,12 @@ from agents.controllers.law import (
     Signals,
     linear_law,
 )
-from agents.controllers.linear_loop import SIGNALS, SampledShip, sample_ship
+from agents.controllers.linear_loop import (
+    SIGNALS,
+    SampledShip,
+    sample_ship,
+    small_motions,
+)
 from agents.controllers.margins import Compensator, Margins
 from agents.controllers.memory import (
     checked_observation,
@@ -33,7 +38,7 @@ from shipgym import ShipModel
 from shipgym.arrays import Flags, Floats, finite
 from shipgym.engine.records import Record, leaves
 from shipgym.files import write_json
-from shipgym.ships.linear import linearise, nomoto_of
+from shipgym.ships.linear import nomoto_of
 from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 
 Action = NDArray[np.float32]
@@ -91,6 +96,8 @@ class Controller:
     gain_names: ClassVar[tuple[str, ...]] = ()
     #: What it observes of the environment.
     observes: ClassVar[tuple[str, ...]] = OBSERVATION_NAMES
+    #: What it observes too where that is shown next.
+    may_observe: ClassVar[tuple[str, ...]] = ()
     #: Its law (`agents.controllers.law`), and the record of what that remembers of each
     #: ship.
     law: ClassVar[Law] = staticmethod(linear_law)
@@ -99,6 +106,8 @@ class Controller:
     reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "sway", "rudder")
     #: Whether it leads another controller, its `autopilot`, which the file holds too.
     has_autopilot: ClassVar[bool] = False
+    #: Kind of that controller, where it is designed with it.
+    leads: ClassVar[str] = "lq"
     #: Whether the file holds its design model too, its `ship`.
     has_ship: ClassVar[bool] = False
     #: Arrays that the file holds beside the gains: names of fields, and their axes: a
@@ -145,7 +154,8 @@ class Controller:
             Further fields of the class.
         """
         scales = observation_scales(model).tolist()
-        response = nomoto_of(*linearise(model, ship.about))
+        motions = small_motions(model)
+        response = nomoto_of(motions.steering, motions.rudder)
         answer = {"nomoto_K": response.K, "nomoto_T": response.T}
         made = cls(
             gains=gains,

@@ -55,7 +55,8 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
     expected = (*FIELDS, *_further_fields(design))
     check_keys(content, expected, where, expected)
     names = _names(content["observation_names"], where)
-    check_names(names, design.observes, f"{where}: observation_names")
+    further = tuple(name for name in design.may_observe if name in names)
+    check_names(names, design.observes + further, f"{where}: observation_names")
 
     rudder = Bounds(-np.pi, np.pi)  # rad
     with placed(where):
@@ -66,7 +67,7 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
             margins=_margins(content["margins"]),
             observation_scales=read_scales(content["observation_scales"], names),
             design=_design(content["design"], design),
-            observation_names=design.observes,
+            observation_names=names,
             **read_model(content["model"]),
             **_arrays(content.get("arrays", {}), design.arrays),
             **_parts(content, design),

@@ -16,7 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import ANY_NUMBER, Action, Bounds, Controller
 from agents.controllers.interface import Policy
-from agents.controllers.law import Number, PathSignals, Turns, gathered, wrapped
+from agents.controllers.law import (
+    Number,
+    PathSignals,
+    Turns,
+    clipped,
+    gathered,
+    wrapped,
+)
 from agents.controllers.lq import LQ
 from agents.controllers.margins import Compensator, Margins
 from agents.controllers.memory import (
@@ -99,7 +106,8 @@ class Guided(Controller):
             margins = Margins(np.inf, np.inf, np.inf, np.inf)
         like.check_fits_model(model)
 
-        scales = _scales_of(task, model, cls.observes)
+        names = cls.observed_in(task, model)
+        scales = _scales_of(task, model, names)
         task_lookahead = task.lookahead * model.particulars["length"]
         design_model = {"ship": model} if cls.has_ship else {}
         return cls(
@@ -108,13 +116,22 @@ class Guided(Controller):
             neutral_sway=like.neutral_sway,
             margins=margins,
             observation_scales=scales,
-            observation_names=cls.observes,
+            observation_names=names,
             model_name=like.model_name,
             model_sha256=like.model_sha256,
             design={"dt": dt, **design},
             autopilot=autopilot,
             **design_model,
         )
+
+    @classmethod
+    def observed_in(cls, task: Task, model: ShipModel) -> tuple[str, ...]:
+        """Names of what it observes in a task."""
+        shown = [quantity.name for quantity in task.observed(model)]
+        n = len(cls.observes)
+        following = tuple(shown[n : n + len(cls.may_observe)])
+        has_more = following == cls.may_observe
+        return cls.observes + cls.may_observe if has_more else cls.observes
 
     @property
     def path_radius(self) -> float:
@@ -224,6 +241,8 @@ class Guided(Controller):
             surge=known["surge"],
             yaw_rate=known["yaw_rate"],
             rudder=known["rudder"],
+            roll=known.get("roll", zero),
+            roll_rate=known.get("roll_rate", zero),
             turns=turns,
         )
         shown = shown_course(seen, self.gains["task_lookahead"], self.path_radius)
@@ -292,5 +311,5 @@ def arc_turned(along_arc: Number, angle: Number, radius: float) -> Number:
 
     It is 0 before the arc, and the whole angle behind it.
     """
-    turned = np.clip(along_arc / radius, 0.0, np.abs(angle))
+    turned = clipped(along_arc / radius, 0.0, np.abs(angle))
     return np.sign(angle) * turned

@@ -50,6 +50,8 @@ class PathSignals(NamedTuple):
     surge: Number  # m/s
     yaw_rate: Number  # rad/s
     rudder: Number  # rad
+    roll: Number  # rad
+    roll_rate: Number  # rad/s
     turns: Turns
 
 
@@ -91,6 +93,11 @@ def linear_law(
     return order, memory
 
 
+def clipped(value: Number, low: Number, high: Number) -> Number:
+    """Return a number within bounds; faster than `np.clip` for few ships."""
+    return np.minimum(np.maximum(value, low), high)
+
+
 def wrapped(angle: Number) -> Number:
     """Return the same angle in [-pi, pi)."""
     return np.mod(angle + np.pi, 2.0 * np.pi) - np.pi
@@ -105,4 +112,4 @@ def gathered(
     `reach`: largest integral, rad s.
     """
     counts = (np.abs(error) <= INTEGRAL_ZONE) & (started > 0.0)
-    return np.clip(integral + np.where(counts, error * dt, 0.0), -reach, reach)
+    return clipped(integral + np.where(counts, error * dt, 0.0), -reach, reach)

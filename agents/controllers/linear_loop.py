@@ -8,6 +8,8 @@ and rate are not.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -48,6 +50,28 @@ class SampledShip:
     B: Floats
     dt: float
     about: StraightRunning
+
+
+class SmallMotions(NamedTuple):
+    """Linear ship about straight running: d/dt (v, r) = steering (v, r) + rudder delta.
+
+    SI units, deviations.
+    """
+
+    about: StraightRunning
+    steering: Floats  # shape (2, 2)
+    rudder: Floats  # shape (2,)
+
+
+@lru_cache(maxsize=16)
+def small_motions(model: ShipModel) -> SmallMotions:
+    """Linearise a ship about straight running; a search designs on one ship often.
+
+    Raises InputError if she has no straight course.
+    """
+    about = straight_running(model)
+    steering, rudder = linearise(model, about)
+    return SmallMotions(about, steering, rudder)
 
 
 def checked_interval(model: ShipModel, dt: float | None) -> float:
@@ -92,8 +116,7 @@ def sample_ship(model: ShipModel, dt: float, first_order: bool = False) -> Sampl
     first_order : bool
         Whether yaw is reduced to K / (1 + T s), without sway or memory.
     """
-    about = straight_running(model)
-    steering, rudder = linearise(model, about)
+    about, steering, rudder = small_motions(model)
     linear = np.column_stack([steering, rudder])
     if first_order:
         form = nomoto_of(steering, rudder)

@@ -97,20 +97,47 @@ class LQ(Controller):
         rate_weight_s2 : float, optional
             Weight of the squared rudder rate, s^2; by default `rate_weight`.
         """
-        interval = checked_interval(model, dt)
-        cost = steering_cost(
+        made = lq_design(
             model,
+            dt=dt,
             integral_lengths=integral_lengths,
             rudder_weight=rudder_weight,
             rate_weight_s2=rate_weight_s2,
         )
-        ship = measured = sample_ship(model, interval)
-        if "q" in model.state_names:
-            measured = sample_ship(model, interval, first_order=True)
+        return cls.designed(model, made.ship, made.gains, made.design)
 
-        design = {"integral_lengths": float(integral_lengths), **cost.weights}
-        gains = lq_gains(measured, cost)
-        return cls.designed(model, ship, gains, design)
+
+class LQDesign(NamedTuple):
+    """Gains of LQ on a ship, and how they were found."""
+
+    ship: SampledShip
+    gains: dict[str, float]
+    design: dict[str, float]
+
+
+def lq_design(
+    model: ShipModel,
+    dt: float | None,
+    integral_lengths: float,
+    rudder_weight: float,
+    rate_weight_s2: float | None,
+) -> LQDesign:
+    """Design LQ with the arguments of `LQ.from_model`."""
+    interval = checked_interval(model, dt)
+    cost = steering_cost(
+        model,
+        integral_lengths=integral_lengths,
+        rudder_weight=rudder_weight,
+        rate_weight_s2=rate_weight_s2,
+    )
+    ship = measured = sample_ship(model, interval)
+    if "q" in model.state_names:
+        measured = sample_ship(model, interval, first_order=True)
+    return LQDesign(
+        ship=ship,
+        gains=lq_gains(measured, cost),
+        design={"integral_lengths": float(integral_lengths), **cost.weights},
+    )
 
 
 def steering_cost(

@@ -46,11 +46,16 @@ def to_rows(record: Any, n_ships: int) -> Floats:
 
 
 def selected(record: Any, index: Any) -> Any:
-    """Record of some of the ships, by an index of its columns."""
+    """Record of some of the ships, by an index of its columns.
+
+    A number in place of a column is that of all ships.
+    """
     values = []
     for value in record:
         if isinstance(value, tuple):
             values.append(selected(value, index))
+        elif np.ndim(value) == 0:
+            values.append(value)
         else:
             values.append(value[..., index])
     return type(record)(*values)

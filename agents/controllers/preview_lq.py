@@ -1,9 +1,10 @@
 """LQ path tracking with preview: the path's course is read ahead and averaged.
 
 LQ steers heading and yaw rate around a course that is read from the path one lead
-ahead, averaged over a window, with feed-forward of the path's curvature, a track to the
-inside of turns, and the angle of drift by a current countered. Waves are kept from the
-rudder by a low-pass on the yaw rate and by a dead-band on the heading error.
+ahead, averaged over a window, with feed-forward of the path's curvature and the angle
+of drift by a current countered. The path may be her own, on wider arcs inside the
+planned ones. Heel and its rate change the course where they are seen. Waves are kept
+from the rudder by low-passes and dead-bands on yaw rate, heading error and order.
 
 Sources: Tomizuka 1975, Optimal continuous finite preview problem, IEEE Transactions on
 Automatic Control 20 (preview in LQ tracking); Fossen 2011, Handbook of Marine Craft
@@ -19,10 +20,17 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 
 from agents.controllers.controller import ANY_NUMBER, Bounds
-from agents.controllers.guided import COURSE_ERROR, TURNS, Guided, bend
+from agents.controllers.guided import COURSE_ERROR, TURNS, Guided, arc_turned
 from agents.controllers.interface import Policy
-from agents.controllers.law import Law, Number, PathSignals, Turns, wrapped
+from agents.controllers.law import Law, Number, PathSignals, clipped, wrapped
 from agents.controllers.lq import LQ
+from agents.controllers.own_path import (
+    OwnPath,
+    Radii,
+    TurnMemory,
+    own_path,
+    remembered,
+)
 from agents.controllers.wheel_over import own_lead
 from shipgym import InputError, ShipModel
 from shipgym.checks import check_number
@@ -39,15 +47,20 @@ class PreviewGains(NamedTuple):
     lead: float  # m along the path, to the middle of the window
     window: float  # m, over which the path's course is averaged
     path_radius: float  # m, of its arcs
+    own_radius: float  # m, of the arcs of the own path, which is inside of it
     inside: float  # m of track to the inside, per rad that the path turns in the window
     feed_forward: float  # m: change of course per curvature of the path
     crab_share: float  # share of the angle of drift by the current that is countered
     crab_update: float  # share of a new angle of drift in its low-pass
     yaw_update: float  # share of a new yaw rate in its low-pass
     yaw_gain: float  # s: gain of LQ on the yaw rate over that on the heading error
+    roll_gain: float  # rad of course per rad of heel
+    roll_rate_gain: float  # s: rad of course per rad/s of heel
     dead_band: float  # rad, of the heading error
     speed_power: float  # of service speed over speed, on the heading error
+    lead_power: float  # of speed over service speed, on the lead
     service_speed: float  # m/s
+    interval: float  # s, between two commands
 
 
 class PreviewMemory(NamedTuple):
@@ -55,6 +68,14 @@ class PreviewMemory(NamedTuple):
 
     crab: Number  # rad, filtered
     yaw_rate: Number  # rad/s, filtered
+    turns: TurnMemory
+
+
+class Window(NamedTuple):
+    """Stretch of the path ahead."""
+
+    begins: Number  # m
+    ends: Number  # m
 
 
 class PathCourse(NamedTuple):
@@ -68,49 +89,78 @@ def preview_law(
     seen: PathSignals, memory: PreviewMemory, p: PreviewGains
 ) -> tuple[Number, PreviewMemory]:
     """Course that keeps to the path and turns with it."""
-    ahead = course_ahead(seen.turns, p)
-    track = seen.cross_track - p.inside * ahead.turned
-    along = ahead.mean + p.feed_forward * ahead.turned / p.window
-    over_ground = along - np.arctan2(track, p.lookahead)
+    advance = seen.surge * p.interval
+    turns = remembered(seen.turns, memory.turns, advance, p.path_radius)
+    slowness = p.service_speed / np.maximum(seen.surge, 0.25 * p.service_speed)
 
     leeway = np.arctan2(seen.sway, seen.surge)  # through the water
     drift = wrapped(seen.drift - leeway)
     crab = memory.crab + p.crab_update * (drift - memory.crab)
-    course = over_ground - p.crab_share * crab
+    course = along_path(seen, turns, slowness, p) - p.crab_share * crab
 
     error = wrapped(seen.heading_error + course)
-    quiet = error - np.clip(error, -p.dead_band, p.dead_band)
-    slowness = p.service_speed / np.maximum(seen.surge, 0.25 * p.service_speed)
-    steered = quiet * np.exp(p.speed_power * np.log(slowness))
-
+    quiet = error - clipped(error, -p.dead_band, p.dead_band)
+    by_heading = quiet * np.exp(p.speed_power * np.log(slowness))
     yaw_rate = memory.yaw_rate + p.yaw_update * (seen.yaw_rate - memory.yaw_rate)
-    steered = steered + p.yaw_gain * (yaw_rate - seen.yaw_rate)
-    return steered - seen.heading_error, PreviewMemory(crab, yaw_rate)
+    by_yaw_rate = p.yaw_gain * (yaw_rate - seen.yaw_rate)
+    by_roll = p.roll_gain * seen.roll + p.roll_rate_gain * seen.roll_rate
+    steered = by_heading + by_yaw_rate + by_roll
+    return steered - seen.heading_error, PreviewMemory(crab, yaw_rate, turns)
 
 
-def course_ahead(turns: Turns, p: PreviewGains) -> PathCourse:
-    """Course of the path in the window."""
-    begins = p.lead - 0.5 * p.window
-    ends = p.lead + 0.5 * p.window
-    radius = p.path_radius
-    summed = summed_bend(ends, turns, radius) - summed_bend(begins, turns, radius)
+def along_path(
+    seen: PathSignals, turns: TurnMemory, slowness: Number, p: PreviewGains
+) -> Number:
+    """Course over ground along the own path, and back to it, rad.
+
+    It is against the direction of the planned path beside the ship.
+    """
+    path = own_path(seen.turns, turns, Radii(planned=p.path_radius, own=p.own_radius))
+    lead = p.lead * np.exp(-p.lead_power * np.log(slowness))
+    half = 0.5 * p.window
+    ahead = course_ahead(path, Window(lead - half, lead + half), p.own_radius)
+
+    here = path.leaving.course + path.first.course
+    by_turn = p.feed_forward * ahead.turned / p.window
+    aside = path.leaving.aside + path.first.aside + p.inside * ahead.turned
+    back = np.arctan2(seen.cross_track - aside, p.lookahead)
+    return here + ahead.mean + by_turn - back
+
+
+def course_ahead(path: OwnPath, window: Window, radius: float) -> PathCourse:
+    """Course of the own path in a window."""
+    begins, ends = window
+    summed = summed_turn(ends, path, radius) - summed_turn(begins, path, radius)
     return PathCourse(
-        mean=summed / p.window,
-        turned=bend(ends, turns, radius) - bend(begins, turns, radius),
+        mean=summed / (ends - begins),
+        turned=turned_by(ends, path, radius) - turned_by(begins, path, radius),
     )
 
 
-def summed_bend(distance: float, turns: Turns, radius: float) -> Number:
-    """Integral of `bend` over the path from the ship to a distance ahead, rad m."""
-    first = summed_arc(distance - turns.next_distance, turns.next_angle, radius)
-    second = summed_arc(distance - turns.second_distance, turns.second_angle, radius)
-    return first + second
+def turned_by(distance: Number, path: OwnPath, radius: float) -> Number:
+    """Change of the own path's course over a distance ahead, rad."""
+    leaving, first, second = path
+    return (
+        arc_turned(distance - leaving.distance, leaving.angle, radius)
+        + arc_turned(distance - first.distance, first.angle, radius)
+        + arc_turned(distance - second.distance, second.angle, radius)
+    )
+
+
+def summed_turn(distance: Number, path: OwnPath, radius: float) -> Number:
+    """Integral of `turned_by` from the ship to a distance ahead, rad m."""
+    leaving, first, second = path
+    return (
+        summed_arc(distance - leaving.distance, leaving.angle, radius)
+        + summed_arc(distance - first.distance, first.angle, radius)
+        + summed_arc(distance - second.distance, second.angle, radius)
+    )
 
 
 def summed_arc(along_arc: Number, angle: Number, radius: float) -> Number:
     """Integral of `arc_turned` to a distance along an arc of an angle, rad m."""
     size = np.abs(angle)
-    turned = np.clip(along_arc / radius, 0.0, size)
+    turned = clipped(along_arc / radius, 0.0, size)
     on_arc = 0.5 * radius * turned * turned
     behind = size * np.maximum(along_arc - radius * size, 0.0)
     return np.sign(angle) * (on_arc + behind)
@@ -141,6 +191,14 @@ class PreviewSettings(NamedTuple):
         Heading error that is left alone.
     speed_power : float
         Power of service speed over speed in the gain on the heading error.
+    lead_power : float
+        Power of speed over service speed in the lead: 1 for a lead in time.
+    arc_factor : float
+        Radius of the own path's arcs over that of the planned ones, at least 1.
+    roll_gain : float
+        Change of course per heel.
+    roll_time : float
+        Change of course per rate of heel, in times to travel one ship length.
     """
 
     lookahead_lengths: float
@@ -153,6 +211,10 @@ class PreviewSettings(NamedTuple):
     yaw_time: float
     dead_band_deg: float
     speed_power: float
+    lead_power: float
+    arc_factor: float
+    roll_gain: float
+    roll_time: float
 
     def check(self) -> None:
         """Refuse numbers out of their range; InputError names the setting."""
@@ -164,7 +226,11 @@ class PreviewSettings(NamedTuple):
             check_number(getattr(self, name), name, at_least=0.0)
         check_number(self.crab_share, "crab_share", at_least=0.0, at_most=2.0)
         check_number(self.dead_band_deg, "dead_band_deg", at_least=0.0, at_most=180.0)
-        check_number(self.speed_power, "speed_power", at_least=-2.0, at_most=4.0)
+        for name in ("speed_power", "lead_power"):
+            check_number(getattr(self, name), name, at_least=-2.0, at_most=4.0)
+        check_number(self.arc_factor, "arc_factor", at_least=1.0, at_most=100.0)
+        for name in ("roll_gain", "roll_time"):
+            check_number(getattr(self, name), name, at_least=-100.0, at_most=100.0)
 
     def gains(self, model: ShipModel, dt: float) -> dict[str, float]:
         """Gains in SI units for a ship and a control interval, s."""
@@ -181,17 +247,23 @@ class PreviewSettings(NamedTuple):
             "yaw_update": dt / (dt + self.yaw_time * travel_time),
             "dead_band": float(np.radians(self.dead_band_deg)),
             "speed_power": float(self.speed_power),
+            "lead_power": float(self.lead_power),
+            "roll_gain": float(self.roll_gain),
+            "roll_rate_gain": self.roll_time * travel_time,
+            "interval": dt,
         }
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PreviewLQ(Guided):
-    """LQ around the course of the path ahead: track keeping by 14 numbers."""
+    """LQ around the course of the path ahead: track keeping by 19 numbers."""
 
     kind: ClassVar[str] = "preview-lq"
+    leads: ClassVar[str] = "quiet-lq"
     law: ClassVar[Law] = staticmethod(preview_law)
     memory_record: ClassVar[Record] = PreviewMemory
     observes: ClassVar[tuple[str, ...]] = (*Guided.observes, *COURSE_ERROR, *TURNS)
+    may_observe: ClassVar[tuple[str, ...]] = ("roll", "roll_rate")
     reads: ClassVar[tuple[str, ...]] = (
         "cross_track",
         "drift",
@@ -214,6 +286,9 @@ class PreviewLQ(Guided):
         "yaw_update": Bounds(0.0, 1.0),
         "dead_band": Bounds(0.0, np.pi),
         "speed_power": Bounds(-2.0, 4.0),
+        "lead_power": Bounds(-2.0, 4.0),
+        "own_radius": Bounds(1e-6, ANY_NUMBER.largest),
+        "interval": Bounds(1e-3, 1e4),
         "service_speed": Bounds(1e-6, ANY_NUMBER.largest),
     }
 
@@ -236,6 +311,10 @@ class PreviewLQ(Guided):
         yaw_time: float = 0.0,
         dead_band_deg: float = 0.0,
         speed_power: float = 0.0,
+        lead_power: float = 0.0,
+        arc_factor: float = 1.0,
+        roll_gain: float = 0.0,
+        roll_time: float = 0.0,
     ) -> Self:
         """Design on a model, for the paths of a task.
 
@@ -280,17 +359,29 @@ class PreviewLQ(Guided):
             yaw_time=yaw_time,
             dead_band_deg=dead_band_deg,
             speed_power=speed_power,
+            lead_power=lead_power,
+            arc_factor=arc_factor,
+            roll_gain=roll_gain,
+            roll_time=roll_time,
         )
         settings.check()
         own = settings.gains(model, dt)
         inner = autopilot.gains
+        radius = model.particulars["length"] * asked.turn_radius
         gains = {
             **own,
-            "path_radius": model.particulars["length"] * asked.turn_radius,
+            "path_radius": radius,
+            "own_radius": radius * arc_factor,
             "yaw_gain": inner["yaw_rate"] / inner["heading_error"],
             "service_speed": model.particulars["speed"],
         }
         return cls.leading(model, autopilot, asked, gains, {})
+
+    @property
+    def needed_signals(self) -> tuple[str, ...]:
+        """Signals that it reads, heel where it is observed."""
+        heel = self.observation_names[len(self.observes) :]
+        return (*self.reads, *heel)
 
     @cached_property
     def parameters(self) -> PreviewGains:

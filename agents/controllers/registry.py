@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "pid": "agents.controllers.pid:PID",
     "lq": "agents.controllers.lq:LQ",
+    "quiet-lq": "agents.controllers.quiet_lq:QuietLQ",
     "lqg": "agents.controllers.lqg:LQG",
     "turn-rate": "agents.controllers.turn_rate:TurnRate",
     "los": "agents.controllers.los_autopilot:LineOfSight",
@@ -27,8 +28,9 @@ _HOMES = {
     "mpc": "agents.controllers.mpc:MPC",
 }
 BUILT_IN = tuple(_HOMES)
-#: Those first that others build on; the suites know no rate of turn to steer.
-CLASSICAL = tuple(kind for kind in BUILT_IN if kind != "turn-rate")
+#: Those first that others build on. The suites know no rate of turn to steer, and the
+#: order of LQ is filtered where a filter is found for it.
+CLASSICAL = tuple(kind for kind in BUILT_IN if kind not in ("turn-rate", "quiet-lq"))
 C = TypeVar("C", bound="Controller")
 
 #: Controllers that users registered.

@@ -26,11 +26,11 @@ from agents.controllers.law import (
     Turns,
     wrapped,
 )
+from agents.controllers.linear_loop import small_motions
 from agents.controllers.lq import LQ
 from shipgym import ShipModel
 from shipgym.checks import check_number
 from shipgym.ships.by_name import takes_name
-from shipgym.ships.linear import linearise, straight_running
 from shipgym.tasks.task import Task, path_following_task
 from shipgym.wrong_types import typed
 
@@ -183,7 +183,7 @@ class SteadyTurn(NamedTuple):
 
 def steady_turn(model: ShipModel) -> SteadyTurn:
     """Solve 0 = A (v, r) + B delta for sway and rudder."""
-    steering, rudder = linearise(model, straight_running(model))
+    _, steering, rudder = small_motions(model)
     by_sway, by_yaw_rate = steering.T
     by_sway_and_rudder = np.column_stack([by_sway, rudder])
     solution = np.linalg.solve(by_sway_and_rudder, -by_yaw_rate)

@@ -202,6 +202,8 @@ def path_signals(error: Number, given: BridgeInput) -> PathSignals:
         surge=given.surge,
         yaw_rate=given.yaw_rate,
         rudder=given.rudder,
+        roll=given.roll,
+        roll_rate=given.roll_rate,
         turns=turns,
     )
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from agents.controllers.interface import Policy
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats
-from shipgym.envs.engine import Engine
+from shipgym.envs.engine import Engine, episode_keys
 from shipgym.tasks.task import Task
 from shipgym.wrong_types import typed
 
@@ -75,6 +75,7 @@ def rollout(
     engine: Engine,
     seeds: ArrayLike,
     *,
+    number: int = 0,
     record: bool | Collection[str] = False,
     tolerant: bool = False,
     show: Callable[[NDArray[np.float32]], NDArray[np.float32]] | None = None,
@@ -92,6 +93,9 @@ def rollout(
         With a lane for each seed.
     seeds : array-like of int, shape (n,)
         Of the episodes.
+    number : int
+        Number of the episodes under their seeds: a lane that sails on has them one
+        after another.
     record : bool or collection of str
         Names of physical states and of entries of `info` to record; True for all.
     tolerant : bool
@@ -104,7 +108,7 @@ def rollout(
     """
     log = _Log(engine, record)
     helmsman = _Helmsman(policy, tolerant)
-    observations = engine.reset(seeds)
+    observations = engine.begin(episode_keys(seeds), number)
     log.look()
 
     starts = log.sailing

@@ -122,23 +122,6 @@ def check_weights(parameters: State) -> None:
                 )
 
 
-def check_run(run: Any) -> None:
-    """Raise ValueError unless this is a training's record of its evaluations."""
-    evaluation = {
-        "steps": COUNT,
-        "seconds": NUMBER,
-        "cost": NUMBER,
-        "mean_return": optional_number,
-    }
-    own = {
-        "best_cost": optional_number,
-        "best_steps": COUNT,
-        "curve": list_of(evaluation),
-        "seconds": NUMBER,
-    }
-    check_like(run, own, "run")
-
-
 def _check_observations(agent: Any, observations: Any) -> None:
     if not all(map(agent.observation_space.contains, observations)):
         raise ValueError(

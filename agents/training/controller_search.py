@@ -260,17 +260,28 @@ class CandidateEpisodes:
             return np.zeros(0)
         n_episodes = len(self.seeds)
         if type(controllers[0]).is_closed_form():
-            n = len(controllers)
+            # all places of an engine sail: a new one would take longer
+            n = self._places(len(controllers))
+            fillers = [controllers[0]] * (n - len(controllers))
+            batch = side_by_side([*controllers, *fillers], n_episodes)
             seeds = np.tile(self.seeds, n)
-            batch = side_by_side(controllers, n_episodes)
             costs = episode_costs(batch, self._engine(n * n_episodes), seeds)
-            return np.asarray(costs.reshape(n, n_episodes).mean(axis=1))
+            means = costs.reshape(n, n_episodes).mean(axis=1)
+            return np.asarray(means[: len(controllers)])
 
         engine = self._engine(n_episodes)
         means = []
         for controller in controllers:
             means.append(episode_costs(controller, engine, self.seeds).mean())
         return np.array(means)
+
+    def _places(self, number: int) -> int:
+        """Number of candidates of the engine at hand that has places for so many."""
+        for n_ships in self._engines:
+            places = n_ships // len(self.seeds)
+            if number <= places <= 2 * number:
+                return places
+        return number
 
     def _engine(self, n_ships: int) -> Engine:
         if n_ships not in self._engines:

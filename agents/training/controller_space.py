@@ -72,7 +72,8 @@ def search_space(kind: str, task: BenchmarkTask) -> list[Setting]:
     if not leads:
         return space
     of_autopilot = []
-    for setting in lq_space(task):
+    led = controller_class(kind).leads
+    for setting in SEARCHED[led](task):
         of_autopilot.append(setting._replace(name=INNER + setting.name))
     return [*space, *of_autopilot]
 
@@ -135,26 +136,43 @@ def mpc_space(task: BenchmarkTask) -> list[Setting]:
     return [*wheel_over_space(task), factor("deviation_deg", 3.0, 0.5)]
 
 
-def preview_space(task: BenchmarkTask) -> list[Setting]:
-    """All settings of `PreviewLQ.from_model`."""
+def quiet_space(task: BenchmarkTask) -> list[Setting]:
+    """Those of LQ, the low-pass and the dead-band."""
     return [
+        *lq_space(task),
+        factor("rudder_time", 0.01, 1.2),
+        factor("rudder_band_deg", 0.05, 1.2),
+    ]
+
+
+def preview_space(task: BenchmarkTask) -> list[Setting]:
+    """All settings of `PreviewLQ.from_model` that the task lets act."""
+    space = [
         *los_space(task),
         factor("lead_lengths", own_lead(task.ship, None), 0.4),
         factor("window_lengths", 0.5, 0.7),
         Setting("inside_lengths", 0.0, 0.2, low=-5.0, high=5.0),
         Setting("feed_forward_lengths", 0.0, 0.3, low=-10.0, high=10.0),
+        Setting("arc_factor", 1.1, 0.3, low=1.0, high=10.0),
         Setting("crab_share", 1.0, 0.2, low=0.0, high=2.0),
         factor("crab_time", 0.05, 1.0),
         factor("yaw_time", 0.01, 1.2),
         factor("dead_band_deg", 0.05, 1.2),
         Setting("speed_power", 0.0, 0.5, low=-2.0, high=4.0),
+        Setting("lead_power", 0.0, 0.5, low=-2.0, high=4.0),
     ]
+    shown = {quantity.name for quantity in task.task.observed(task.ship)}
+    if "roll" in shown:
+        space.append(Setting("roll_gain", 0.0, 0.2, low=-10.0, high=10.0))
+        space.append(Setting("roll_time", 0.0, 0.2, low=-10.0, high=10.0))
+    return space
 
 
 #: Settings that are searched, by kind of controller.
 SEARCHED: Mapping[str, Callable[[BenchmarkTask], list[Setting]]] = {
     "pid": pid_space,
     "lq": lq_space,
+    "quiet-lq": quiet_space,
     "lqg": lqg_space,
     "los": los_space,
     "ilos": ilos_space,

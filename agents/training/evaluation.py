@@ -10,6 +10,7 @@ from agents.controllers.designs import design
 from agents.controllers.interface import Policy, check_fits
 from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
+from agents.training.likeness import check_like, list_of, optional_number
 from shipgym.errors import InputError
 
 
@@ -89,3 +90,20 @@ class Evaluations:
     def to_dict(self) -> dict[str, Any]:
         """Return the evaluations ready for JSON."""
         return asdict(self)
+
+
+def check_evaluations(run: Any) -> None:
+    """Raise ValueError unless this is a training's record of its evaluations."""
+    evaluation = {
+        "steps": 0,
+        "seconds": 0.0,
+        "cost": 0.0,
+        "mean_return": optional_number,
+    }
+    own = {
+        "best_cost": optional_number,
+        "best_steps": 0,
+        "curve": list_of(evaluation),
+        "seconds": 0.0,
+    }
+    check_like(run, own, "run")

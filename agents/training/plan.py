@@ -9,7 +9,13 @@ from agents.controllers.interface import model_hash
 from agents.policies.policy import OUTPUTS
 from agents.policies.weights_file import as_json
 from agents.suites.suite import BenchmarkTask
-from agents.training.settings import LearningSettings, make_settings, settings_of
+from agents.training.settings import (
+    SEEDS_EACH,
+    GradientSettings,
+    LearningSettings,
+    make_settings,
+    settings_of,
+)
 from shipgym import ShipModel
 from shipgym.checks import check_choice, check_keys, check_whole
 from shipgym.errors import InputError
@@ -19,7 +25,6 @@ from shipgym.tasks.task import Task
 
 #: Seeds below those that are scored: of training a thousand for each `seed`, then those
 #: held out.
-SEEDS_EACH = 1000
 EVALUATION_SEED = 900_000
 N_EVALUATIONS = 100
 
@@ -33,7 +38,7 @@ class TrainingPlan:
 
     Attributes
     ----------
-    algorithm : {"ppo", "sac", "td3", "tqc"}
+    algorithm : {"ppo", "sac", "td3", "tqc", "cma-es"}
     task : BenchmarkTask
         Environment, model and options; evaluation is on it as it is.
     settings : LearningSettings
@@ -61,7 +66,6 @@ class TrainingPlan:
                 f" {type(self.settings).__name__}"
             )
         check_whole(self.seed, "seed", at_least=0, at_most=799)
-        check_whole(self.settings.ships, "ships", at_least=1, at_most=SEEDS_EACH)
         check_whole(self.threads, "threads", at_least=1, at_most=1024)
         check_whole(
             self.settings.action_repeat,
@@ -77,7 +81,7 @@ class TrainingPlan:
         action = self.task.task.action
         base = self.settings.base
         check_choice(action, OUTPUTS, "action")
-        if action == "rudder-discrete" and self.algorithm != "ppo":
+        if action == "rudder-discrete" and self.algorithm not in ("ppo", "cma-es"):
             raise InputError(
                 f"action: expected one that {self.algorithm} learns, got '{action}';"
                 " take ppo"
@@ -143,7 +147,8 @@ def _read_option(value: Any, name: str) -> Any:
 def training_options(plan: TrainingPlan) -> dict[str, Any]:
     """Keywords of the environment that the ships learn in.
 
-    They earn what the setting `reward` says, unless the task's options do.
+    They earn what the setting `reward` says, where the algorithm has it, unless the
+    task's options do.
     With `randomise`, or the setting `model_uncertainty`, each episode has a ship drawn
     from the model's covariance, where it has one; with `randomise` also an approach
     speed of 0.8 to 1.1 times the service speed, and any of the sea states that the
@@ -151,7 +156,8 @@ def training_options(plan: TrainingPlan) -> dict[str, Any]:
     """
     task = plan.task
     options = task.arguments
-    options.setdefault("bounded", plan.settings.reward == "bounded")
+    if isinstance(plan.settings, GradientSettings):
+        options.setdefault("bounded", plan.settings.reward == "bounded")
     uncertain = plan.settings.model_uncertainty == "covariance"
     has_covariance = task.ship.covariance is not None
     if has_covariance and (plan.randomise or uncertain):

@@ -37,6 +37,7 @@ PACKAGES = (
     "torch",
     "stable-baselines3",
     "sb3-contrib",
+    "cma",
 )
 CONFIGURATION: Shape = {
     "algorithm": (str,),

@@ -4,8 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from agents.training.settings import (
+    GradientSettings,
     LearningSettings,
     OffPolicySettings,
+    PPOSettings,
     changed,
     settings_of,
 )
@@ -22,10 +24,21 @@ def search_space(algorithm: str, fixed: Sequence[str] = ()) -> dict[str, Any]:
     integer = optuna.IntDistribution
     choice = optuna.CategoricalDistribution
 
-    space = {
-        "learning_rate": real(1e-4, 3e-3, log=True),
-        "one_minus_gamma": real(1e-3, 0.1, log=True),
-        "net_arch": choice(["32 32", "64 64", "128 128"]),
+    space: dict[str, Any] = {}
+    if issubclass(settings_of(algorithm), GradientSettings):
+        space |= {
+            "learning_rate": real(1e-4, 3e-3, log=True),
+            "one_minus_gamma": real(1e-3, 0.1, log=True),
+            "net_arch": choice(["32 32", "64 64", "128 128"]),
+        }
+    if algorithm == "cma-es":
+        space |= {
+            "net_arch": choice(["", "8", "16", "8 8"]),  # the first is linear
+            "population": choice([12, 24, 48]),
+            "episodes": choice([8, 16, 32]),
+            "sigma": real(0.02, 0.5, log=True),
+        }
+    space |= {
         "activation": choice(["relu", "tanh"]),
         "action_repeat": choice([1, 4, 16]),
     }
@@ -85,7 +98,7 @@ def with_parameters(
             varied[name] = [int(width) for width in widths]
 
     minibatches = varied.pop("minibatches", None)
-    if minibatches is not None:
+    if minibatches is not None and isinstance(settings, PPOSettings):
         before = settings.to_dict()
         n_steps = varied.get("n_steps", before["n_steps"])
         varied["batch_size"] = settings.ships * n_steps // minibatches

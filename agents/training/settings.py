@@ -27,6 +27,9 @@ from shipgym.errors import InputError
 from shipgym.files import read_toml, shipped_toml
 from shipgym.tasks.task import ACTIONS
 
+#: Seeds of training for each `seed` of a plan.
+SEEDS_EACH = 1000
+
 
 def setting(
     meaning: str,
@@ -56,16 +59,6 @@ class LearningSettings(ABC):
         "decisions to learn from, of all ships together", at_least=1
     )
     evaluate_every: int = setting("decisions between evaluations", at_least=1)
-    ships: int = setting("ships that sail at once", at_least=1)
-    batch_size: int = setting("samples of one gradient step", at_least=1)
-    learning_rate: float = setting(
-        "learning rate of Adam at the beginning", above=0.0, at_most=1.0
-    )
-    schedule: str = setting(
-        "course of the learning rate; linear falls to 0 at the end of the training",
-        options=("constant", "linear"),
-    )
-    gamma: float = setting("discount of a decision", at_least=0.0, at_most=1.0)
     net_arch: tuple[int, ...] = setting(
         "widths of the hidden layers of the policy, and of PPO's value", at_least=1
     )
@@ -102,17 +95,6 @@ class LearningSettings(ABC):
         " speeds as the task has them",
         options=("none", "covariance"),
     )
-    reward: str = setting(
-        "what ships earn: minus the steering cost, which reward_scale suits, or the"
-        " bounded reward that environments give by default",
-        options=("cost", "bounded"),
-    )
-    reward_scale: float | str = setting(
-        "divisor of rewards before they are limited to [-10, 10]; running is the"
-        " standard deviation of their discounted sum so far",
-        above=0.0,
-        word="running",
-    )
 
     def __post_init__(self) -> None:
         for one in fields(self):
@@ -132,18 +114,45 @@ class LearningSettings(ABC):
     def _check_together(self) -> None:
         """Refuse settings that do not fit each other."""
 
-    @property
-    @abstractmethod
-    def rollout(self) -> int:
-        """Decisions of all ships between two updates; a training has whole rollouts."""
-
     def to_dict(self) -> dict[str, Any]:
         """Return the settings by name, ready for JSON."""
         return dict(as_json(self))
 
 
 @dataclass(frozen=True)
-class PPOSettings(LearningSettings):
+class GradientSettings(LearningSettings):
+    """Settings of the algorithms that learn by gradients."""
+
+    ships: int = setting("ships that sail at once", at_least=1, at_most=SEEDS_EACH)
+    batch_size: int = setting("samples of one gradient step", at_least=1)
+    learning_rate: float = setting(
+        "learning rate of Adam at the beginning", above=0.0, at_most=1.0
+    )
+    schedule: str = setting(
+        "course of the learning rate; linear falls to 0 at the end of the training",
+        options=("constant", "linear"),
+    )
+    gamma: float = setting("discount of a decision", at_least=0.0, at_most=1.0)
+    reward: str = setting(
+        "what ships earn: minus the steering cost, which reward_scale suits, or the"
+        " bounded reward that environments give by default",
+        options=("cost", "bounded"),
+    )
+    reward_scale: float | str = setting(
+        "divisor of rewards before they are limited to [-10, 10]; running is the"
+        " standard deviation of their discounted sum so far",
+        above=0.0,
+        word="running",
+    )
+
+    @property
+    @abstractmethod
+    def rollout(self) -> int:
+        """Decisions of all ships between two updates; a training has whole rollouts."""
+
+
+@dataclass(frozen=True)
+class PPOSettings(GradientSettings):
     """Proximal policy optimisation (Schulman et al. 2017, arXiv:1707.06347)."""
 
     n_steps: int = setting("decisions of each ship in a rollout", at_least=1)
@@ -185,7 +194,7 @@ class PPOSettings(LearningSettings):
 
 
 @dataclass(frozen=True)
-class OffPolicySettings(LearningSettings):
+class OffPolicySettings(GradientSettings):
     """Settings of the algorithms that learn from a replay buffer."""
 
     buffer_size: int = setting("decisions that are remembered", at_least=1)
@@ -270,12 +279,40 @@ class TQCSettings(SACSettings):
             )
 
 
+@dataclass(frozen=True)
+class CMASettings(LearningSettings):
+    """Evolution strategy with covariance matrix adaptation (Hansen 2016).
+
+    Source: The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772.
+    """
+
+    population: int = setting(
+        "networks that are tried in a generation", at_least=4, at_most=SEEDS_EACH
+    )
+    episodes: int = setting(
+        "episodes that each of them is tried on, the same for all of a generation and"
+        " others in the next",
+        at_least=1,
+        at_most=SEEDS_EACH,
+    )
+    sigma: float = setting(
+        "standard deviation of the weights in the first generation, in units of one"
+        " over the square root of a layer's inputs",
+        above=0.0,
+        at_most=10.0,
+    )
+
+    def _check_together(self) -> None:
+        """All settings fit each other."""
+
+
 #: Settings by algorithm.
 ALGORITHMS: Mapping[str, type[LearningSettings]] = {
     "ppo": PPOSettings,
     "sac": SACSettings,
     "td3": TD3Settings,
     "tqc": TQCSettings,
+    "cma-es": CMASettings,
 }
 
 
@@ -337,7 +374,7 @@ def load_settings(
 
     Parameters
     ----------
-    algorithm : {"ppo", "sac", "td3", "tqc"}
+    algorithm : {"ppo", "sac", "td3", "tqc", "cma-es"}
     environment : str
         "course-keeping", "path-following", or the path of a task's file.
     task : str

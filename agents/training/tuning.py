@@ -190,7 +190,8 @@ def train_trial(job: dict[str, Any]) -> dict[str, Any]:
     What a base does before anything is learned says nothing about the settings: step 0
     does not count.
     """
-    from agents.training.training import TrainingProgress, train
+    from agents.training.result import TrainingProgress
+    from agents.training.training import train
 
     plan = TrainingPlan.from_configuration(job["configuration"], threads=1)
     curve: list[tuple[int, float]] = []

@@ -156,7 +156,7 @@ def training() -> Any:
     """A run into which checkpoints are put back, the one that the corpus's is of."""
     import torch
 
-    from agents.training.training import TrainingRun
+    from agents.training.training_run import TrainingRun
 
     torch.set_num_threads(1)
     with warnings.catch_warnings(

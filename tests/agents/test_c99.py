@@ -21,6 +21,7 @@ from agents import (
     AdaptiveLineOfSight,
     IntegralLineOfSight,
     LineOfSight,
+    PreviewLQ,
     TurnRate,
     WheelOver,
     load_agent,
@@ -28,6 +29,7 @@ from agents import (
 from agents.cli import app
 from agents.controllers.guided import TURNS, bend
 from agents.controllers.law import Turns
+from agents.controllers.quiet_lq import QuietLQ
 from agents.deployment.autopilot import Autopilot, BridgeInput
 from agents.deployment.autopilot_c99 import autopilot_source
 from agents.deployment.c99 import checked_name, degrees, heading, knots, single
@@ -192,12 +194,33 @@ class Slowing(PID):
         return Speeds(self.gains["proportional"], 7.7)
 
 
+def every_number():
+    """LQ with preview in which every number has an effect, heel among them."""
+    ship = load_model("container-4dof-output-error")
+    return PreviewLQ.from_model(
+        ship,
+        autopilot=QuietLQ.from_model(ship, rudder_time=0.1, rudder_band_deg=0.5),
+        task=path_following_task(roll=True),
+        arc_factor=1.4,
+        crab_time=1.0,
+        dead_band_deg=0.3,
+        feed_forward_lengths=0.2,
+        inside_lengths=0.2,
+        lead_power=0.5,
+        roll_gain=0.3,
+        roll_time=0.2,
+        speed_power=0.5,
+        yaw_time=0.1,
+    )
+
+
 #: Controllers, and whether C gives the same numbers bit for bit.
 HEADING = {
     "pid": PID.from_model(MARINER),
     "lq": LQ.from_model(MARINER),
     "lqg": LQG.from_model(MARINER),
     "lqg_in_waves": LQG.from_model(MARINER, wave_period=9.0),
+    "quiet_lq": QuietLQ.from_model(MARINER, rudder_time=0.1, rudder_band_deg=1.0),
     "turn_rate": TurnRate.from_model(MARINER),
     "my_own": Slowing(**vars(PID.from_model(MARINER))),
 }
@@ -209,6 +232,8 @@ GUIDANCE = {
     "wheel_over_rate": WheelOver.from_model(
         MARINER, autopilot=TurnRate.from_model(MARINER)
     ),
+    "preview": PreviewLQ.from_model(MARINER),
+    "preview_all": every_number(),
 }
 LEARNED = {
     "ppo": random_policy(),

@@ -15,10 +15,10 @@ from agents.training import run_folder
 from agents.training.algorithms import make_agent
 from agents.training.checkpoints import (
     agent_state,
-    check_run,
     check_weights,
     restore_agent,
 )
+from agents.training.evaluation import check_evaluations
 from agents.training.likeness import check_like
 from agents.training.nested_values import (
     CONTENT,
@@ -263,10 +263,10 @@ def test_a_run_of_another_form_is_refused(change, said):
         "curve": [ROW, {**ROW, "mean_return": -1.0}],
         "seconds": 3.0,
     }
-    check_run(record)
-    check_run({**record, "best_cost": None, "curve": []})
+    check_evaluations(record)
+    check_evaluations({**record, "best_cost": None, "curve": []})
     with pytest.raises(ValueError, match=said):
-        check_run({**record, **change})
+        check_evaluations({**record, **change})
 
 
 def rewritten(path, change):

@@ -6,11 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents import LQ, PID, PreviewLQ, WheelOver, check_controller, load_agent
-from agents.controllers.guided import bend
 from agents.controllers.law import Turns
-from agents.controllers.preview_lq import summed_bend
+from agents.controllers.own_path import Radii, TurnMemory, own_path
+from agents.controllers.preview_lq import summed_turn, turned_by
+from agents.controllers.quiet_lq import QuietLQ
 from agents.controllers.side_by_side import side_by_side
 from agents.rollouts.rollout import episode_costs
+from shipgym import load_model
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.tasks.task import path_following_task
@@ -27,9 +29,11 @@ def test_the_mean_course_is_the_integral_of_the_course(
     distance, first, first_angle, second, second_angle, radius
 ):
     turns = Turns(first, first_angle, first + second, second_angle)
+    nothing = TurnMemory(0.0, 0.0, 0.0, 0.0)
+    path = own_path(turns, nothing, Radii(planned=radius, own=radius))
     points = np.linspace(0.0, distance, 4001)
-    courses = [bend(point, turns, radius) for point in points]
-    summed = summed_bend(distance, turns, radius)
+    courses = turned_by(points, path, radius)
+    summed = summed_turn(distance, path, radius)
     assert summed == pytest.approx(np.trapezoid(courses, points), abs=1e-3 * 3000.0)
 
 
@@ -51,6 +55,8 @@ def test_designs_side_by_side_steer_as_each_alone():
             MARINER,
             task=PATH,
             autopilot=LQ.from_model(MARINER, rudder_weight=0.5),
+            arc_factor=1.5,
+            lead_power=0.5,
             inside_lengths=0.3,
             feed_forward_lengths=0.2,
             crab_time=0.2,
@@ -68,11 +74,28 @@ def test_designs_side_by_side_steer_as_each_alone():
 
 
 def test_it_is_a_controller_and_a_file(tmp_path):
-    guide = PreviewLQ.from_model(MARINER, task=PATH, dead_band_deg=0.2)
+    quiet = QuietLQ.from_model(MARINER, rudder_time=0.1, rudder_band_deg=0.5)
+    guide = PreviewLQ.from_model(
+        MARINER, task=PATH, autopilot=quiet, arc_factor=1.3, dead_band_deg=0.2
+    )
     check_controller(guide, MARINER, PATH, n_steps=20)
     guide.save(tmp_path / "guide.json")
     again = load_agent(tmp_path / "guide.json", MARINER)
     assert (again.kind, again.gains) == ("preview-lq", guide.gains)
+
+
+def test_heel_turns_the_rudder_where_a_task_shows_it(tmp_path):
+    ship = load_model("container")
+    task = path_following_task(roll=True)
+    guide = PreviewLQ.from_model(ship, task=task, roll_gain=0.5, roll_time=0.1)
+    guide.save(tmp_path / "guide.json")
+    again = load_agent(tmp_path / "guide.json", ship)
+    level = np.zeros((1, len(again.observation_names)))
+    level[0, [1, 4]] = 1.0  # on course at service speed
+    heeled = level.copy()
+    heeled[0, again.observation_names.index("roll")] = 0.5
+    assert again.predict(heeled)[0] != again.predict(level)[0]
+    assert "roll" not in PreviewLQ.from_model(ship).observation_names
 
 
 @pytest.mark.parametrize(
@@ -86,6 +109,10 @@ def test_it_is_a_controller_and_a_file(tmp_path):
         ("crab_time", -1.0),
         ("dead_band_deg", 200.0),
         ("speed_power", 9.0),
+        ("lead_power", np.inf),
+        ("arc_factor", 0.5),
+        ("roll_gain", 200.0),
+        ("roll_time", np.nan),
     ],
 )
 def test_numbers_beyond_their_bounds_are_refused(name, value):

@@ -72,6 +72,9 @@ BOUNDS = [
     ("tqc", "n_quantiles", 3, 2),
     ("tqc", "top_quantiles_to_drop", 0, -1),
     ("tqc", "top_quantiles_to_drop", 24, 25),
+    ("cma-es", "population", 4, 3),
+    ("cma-es", "episodes", 1000, 1001),
+    ("cma-es", "sigma", 1e-9, 0.0),
 ]
 
 
@@ -183,9 +186,9 @@ def test_a_value_comes_from_the_nearest_table():
         table = load_settings(algorithm).to_dict()
         assert type(make_settings(algorithm, table)) is kind
         assert make_settings(algorithm, table).to_dict() == table
-        del table["gamma"]
+        del table["net_arch"]
         with pytest.raises(
-            InputError, match=f"settings of {algorithm}: field 'gamma' is missing"
+            InputError, match=f"settings of {algorithm}: field 'net_arch' is missing"
         ):
             make_settings(algorithm, table)
 

@@ -31,8 +31,10 @@ from agents.training.evaluation import Evaluations
 from agents.training.nested_values import read_values, write_values
 from agents.training.plan import EVALUATION_SEED, training_options
 from agents.training.request import TrainingRequest, make_plan
+from agents.training.result import TrainingResult
 from agents.training.run_folder import begin_folder, other_versions
-from agents.training.settings import ALGORITHMS, load_settings
+from agents.training.settings import load_settings
+from agents.training.training_run import TrainingRun
 from shipgym.errors import InputError
 from shipgym.sea import Current, Weather
 
@@ -57,6 +59,7 @@ TINY = {
     "sac": OFF_POLICY,
     "td3": OFF_POLICY,
     "tqc": OFF_POLICY,
+    "cma-es": {"base": "none", "population": 4, "episodes": 2, "total_steps": 600},
 }
 SHORT = {"episode_steps": 20, "change_interval_steps": 10}
 OPTIONS = [f"--option={name}={value}" for name, value in SHORT.items()]
@@ -116,6 +119,7 @@ def stopping_at(steps):
         ("sac", {"reward_scale": 10.0}),
         ("td3", {"buffer_size": 80}),
         ("tqc", {"base": "lq", "ent_coef": 0.1}),
+        ("cma-es", {"base": "lq", "net_arch": [4]}),
     ],
 )
 def test_a_killed_run_ends_as_one_that_was_not(algorithm, settings, tmp_path):
@@ -230,7 +234,7 @@ def test_agents_of_a_suite_learn_over_drawn_models_and_never_see_the_true_ship()
     assert plan.settings.rate_limit == 0.1
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("algorithm", ["ppo", "sac", "td3", "tqc"])
 def test_settings_are_keywords_of_the_algorithms_class(algorithm):
     settings = load_settings(algorithm, given={"schedule": "linear"})
     arguments = sb3_arguments(settings, (2,))
@@ -328,8 +332,8 @@ def test_rewards_are_divided_by_their_scale():
 
 
 def test_a_diverged_training_says_so():
-    run = training.TrainingRun(tiny(), None, 10, 45.0)
-    run.agent.policy.action_net.bias.data[:] = np.nan
+    run = TrainingRun(tiny(), None, 10, 45.0)
+    run.learner.agent.policy.action_net.bias.data[:] = np.nan
     with pytest.raises(
         InputError, match=r"diverged after 0 steps.*lower learning_rate"
     ):
@@ -478,9 +482,7 @@ def test_lq_is_reached_by_what_costs_a_thousandth_more_at_most(cost, reached):
         {"steps": 5, "cost": cost},
         {"steps": 9, "cost": 9.0},
     )
-    result = training.TrainingResult(
-        None, None, curve, 9.0, 9, 9, 10.0, 1.0, True, None
-    )
+    result = TrainingResult(None, None, curve, 9.0, 9, 9, 10.0, 1.0, True, None)
     assert result.lq_reached["steps"] == (5 if reached else 9)
     assert replace(result, lq_cost=None).lq_reached is None
 
@@ -542,6 +544,8 @@ def test_a_training_learns_whole_rollouts():
         ("ppo --task sharp-trns", "Did you mean 'sharp-turns'?"),
         ("ppo --env curse-keeping", "Did you mean 'course-keeping'?"),
         ("ppo --set gama=0.9", "Did you mean 'gamma'?"),
+        ("cma-es --set gamma=0.9", "settings of cma-es: unknown key 'gamma'"),
+        ("cma-es --set population=3", "population: expected an integer of at least 4"),
         ("ppo --threads 1025", "threads: expected an integer of at least 1 and"),
         ("ppo --set gamma=nan", "--set gamma: expected a number of magnitude"),
         ("ppo --set gamma=2", "gamma: expected a number >= 0 and <= 1"),

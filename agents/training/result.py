@@ -1,0 +1,71 @@
+"""Progress and result of a training."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from agents.policies.policy import LearnedPolicy
+from agents.training.plan import TrainingPlan
+
+
+class TrainingProgress(NamedTuple):
+    """Progress of a training."""
+
+    #: decisions learned from, and to learn from
+    steps: int
+    total: int
+    seconds: float  # spent so far, also before it was resumed
+    #: mean cost of the episodes held out, at the last evaluation, at the best one, and
+    #: of LQ
+    cost: float | None
+    best_cost: float | None
+    lq_cost: float | None
+    evaluated: bool = False  # there is a new evaluation
+
+
+@dataclass(frozen=True)
+class TrainingResult:
+    """The result of a training."""
+
+    plan: TrainingPlan
+    policy: LearnedPolicy  # the best one
+    #: evaluations: steps, seconds, cost on the episodes held out, mean return of those
+    #: learned from
+    curve: tuple[Mapping[str, Any], ...]
+    # mean cost of the policy on the episodes held out, which it was chosen by
+    best_cost: float
+    #: when the policy was found, and when the training ended
+    best_steps: int
+    steps: int
+    lq_cost: float | None  # of LQ on the same episodes
+    seconds: float  # of training and evaluation, also before it was resumed
+    finished: bool  # false where the time was up before
+    resumed_from: int | None  # steps of the checkpoint that it went on from
+
+    @property
+    def lq_reached(self) -> Mapping[str, Any] | None:
+        """First evaluation that cost no more than LQ, to a thousandth, if any.
+
+        A network that has learned nothing yet adds nearly nothing to its base.
+        """
+        if self.lq_cost is None:
+            return None
+        for evaluation in self.curve:
+            if evaluation["cost"] <= 1.001 * self.lq_cost:
+                return evaluation
+        return None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result for programs."""
+        return {
+            "configuration": self.plan.configuration(),
+            "steps": self.steps,
+            "finished": self.finished,
+            "resumed_from": self.resumed_from,
+            "seconds": self.seconds,
+            "best_cost": self.best_cost,
+            "best_steps": self.best_steps,
+            "lq_cost": self.lq_cost,
+            "lq_reached": self.lq_reached,
+            "curve": list(self.curve),
+        }
