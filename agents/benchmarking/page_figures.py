@@ -137,7 +137,10 @@ def bound_score(result: BenchmarkResult) -> float | None:
     for task, reference in result.summary["reference"].items():
         if tasks[task]["on"] == "ship":
             scores.append(score(reference["bound"], reference["rule"]))
-    return finite(float(geometric_mean(scores))) if scores else None
+    if not scores:
+        return None
+    mean = geometric_mean(scores)
+    return finite(float(mean))
 
 
 def _relative_costs_figure(result: BenchmarkResult) -> Figure:

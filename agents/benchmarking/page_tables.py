@@ -238,10 +238,15 @@ def _gain_cell(gain: Mapping[str, Any] | None) -> TableCell:
     shown = _interval_cell(gain, _tenth_percent)
     if gain is None or gain["low"] is None:
         return shown
-    if gain["low"] <= 0.0 <= gain["high"]:
+    colour = None
+    if gain["low"] > 0.0:
+        colour = BETTER
+    elif gain["high"] < 0.0:
+        colour = WORSE
+    if colour is None:
         return shown
-    colour = BETTER if gain["value"] > 0.0 else WORSE
-    return replace(shown, kind="tinted", tint=_tint(colour, 22.0))
+    tint = _tint(colour, 22.0)
+    return replace(shown, kind="tinted", tint=tint)
 
 
 def _tint(colour: str, percent_of_it: float) -> str:
@@ -286,8 +291,10 @@ def _improvement_cell(interval: Mapping[str, Any] | None) -> TableCell:
     value = interval["value"]
     colour = BETTER if value >= 0.5 else WORSE
     most_tint = 42.0  # per cent of the colour
-    tint = _tint(colour, most_tint * abs(2.0 * value - 1.0))
-    return replace(_interval_cell(interval, _whole_percent), kind="tinted", tint=tint)
+    share = abs(2.0 * value - 1.0)
+    tint = _tint(colour, most_tint * share)
+    shown = _interval_cell(interval, _whole_percent)
+    return replace(shown, kind="tinted", tint=tint)
 
 
 def metrics_table(result: BenchmarkResult, task: str, name: str) -> SortableTable:

@@ -113,15 +113,22 @@ def _task_rows(
     rows = []
     cells = result.cells(task)
     for name, cell in cells.items():
-        rows.append((cell["cost"]["value"], (f"  {name}", *_figures(cell))))
+        cost = cell["cost"]["value"]
+        row = (f"  {name}", *_figures(cell))
+        rows.append((cost, row))
 
     reference = result.summary["reference"].get(task)
     if reference and BEST_KNOWN not in cells:
         bound = reference["bound"]
-        gain = 100.0 * (1.0 - bound / reference["rule"])
-        nothing = "-"
-        cost = number(bound, 2)
-        row = ("  bound", cost, nothing, nothing, number(gain, 1), nothing, "", "")
+        gain = _percent(1.0 - bound / reference["rule"])
+        row = (
+            "  bound",
+            number(bound, 2),
+            "-",
+            "-",
+            number(gain, 1),
+            "-",
+        )
         rows.append((bound, row))
     return rows
 
@@ -129,17 +136,21 @@ def _task_rows(
 def _figures(cell: Mapping[str, Any]) -> tuple[str, ...]:
     """Return cost and gain with intervals, lost ships and share of success."""
     cost = cell["cost"]
-    gain = cell["gain"]
-    success = cell["metrics"].get("success", {"mean": None})
-    share = success["mean"]
+    middle = cell["cost_iqm"]
+    gain = {end: _percent(share) for end, share in cell["gain"].items()}
+    n_lost = cell["lost"] + cell["failed"]
+    success = "-"
+    reached = cell["metrics"].get("success")
+    if reached is not None and reached["mean"] is not None:
+        success = f"{_percent(reached['mean']):.0f} %"
     return (
         number(cost["value"], 2),
         between((cost["low"], cost["high"]), 2),
-        number(cell["cost_iqm"]["value"], 2),
-        number(_percent(gain["value"]), 1),
-        between((_percent(gain["low"]), _percent(gain["high"])), 1),
-        str(cell["lost"] + cell["failed"]),
-        "-" if share is None else f"{100.0 * share:.0f} %",
+        number(middle["value"], 2),
+        number(gain["value"], 1),
+        between((gain["low"], gain["high"]), 1),
+        str(n_lost),
+        success,
     )
 
 

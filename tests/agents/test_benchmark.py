@@ -709,8 +709,8 @@ def test_results_run_nothing_that_they_name(copy, suite, source, tmp_path, monke
         ("results.json", lambda data: data[:500], "may be cut short"),
         (
             "results.json",
-            lambda data: data.replace(b'"format": 1', b'"format": 9'),
-            "expected format 1, .* got 9",
+            lambda data: data.replace(b'"format": 2', b'"format": 9'),
+            "expected format 2, .* got 9",
         ),
         (
             "results.json",
