@@ -26,14 +26,13 @@ from typing import Any
 from agents.agent_file import PRETRAINED, load_agent
 from agents.benchmarking.results import BenchmarkResult, load_results
 from agents.benchmarking.sources import BEST_KNOWN
-from agents.benchmarking.statistics import ConfidenceInterval, Draws, interval
+from agents.benchmarking.statistics import ConfidenceInterval, Draws, gain_over
 from agents.policies.policy import LearnedPolicy
 from agents.suites.suite import SETS, BenchmarkTask, find_task, load_suite
 from agents.training import run_folder
 from agents.training.request import TrainingRequest, make_plan
 from agents.training.result import TrainingProgress
 from agents.training.training import train
-from shipgym.arrays import Floats
 from shipgym.files import read_json, write_json
 
 RESULT = "result.json"
@@ -170,9 +169,9 @@ def print_table(result: BenchmarkResult, tasks: list[str], algorithm: str) -> No
         for on, end in SETS.items():
             learned = result.figures(algorithm, task + end)
             baseline = result.figures(best, task + end)
-            gains[on] = gain_of(learned, baseline, draws, number)
+            gains[on] = gain_over(learned, baseline, draws, number)
         learned = result.figures(algorithm, task)
-        over_fast = gain_of(learned, result.figures(fast, task), draws, number)
+        over_fast = gain_over(learned, result.figures(fast, task), draws, number)
         lost = [
             result.figures(name, f"{task}-far", "terminated").mean()
             for name in (algorithm, best)
@@ -197,16 +196,6 @@ def best_baseline(
     cells: Mapping[str, Any] = result.summary["tasks"][task]
     baselines = set(cells) - {algorithm, BEST_KNOWN, without}
     return min(baselines, key=lambda name: float(cells[name]["cost"]["value"]))
-
-
-def gain_of(
-    learned: Floats, baseline: Floats, draws: Draws, task: int
-) -> ConfidenceInterval:
-    """Share of a baseline's cost that the agents save, over episodes and seeds."""
-    drawn_costs = draws.means(learned, task, 1).mean(axis=1)
-    drawn_baseline = draws.means(baseline, task, 0).mean(axis=1)
-    gain = 1.0 - learned.mean() / baseline.mean()
-    return interval(float(gain), 1.0 - drawn_costs / drawn_baseline)
 
 
 def aim_of(gain: ConfidenceInterval) -> str:

@@ -21,10 +21,10 @@ from agents.benchmarking.page_replays import (
 )
 from agents.benchmarking.page_tables import (
     costs_table,
+    gains_table,
     improvement_table,
     metrics_table,
     ranking_table,
-    scores_table,
 )
 from agents.benchmarking.replays import EpisodeId, Rerun, rerun
 from agents.benchmarking.results import RESULTS, BenchmarkResult
@@ -89,13 +89,17 @@ def _page(result: BenchmarkResult, again: Rerun, count: int) -> str:
     scores_caption = "Relative costs."
     cost_tables = [costs_table(result)]
     if summary["reference"]:
-        scores_caption = "Scores with their 95 % intervals."
-        cost_tables.append(scores_table(result))
+        scores_caption = (
+            "Scores with their 95 % intervals: ● geometric mean, ◇ interquartile mean."
+            " Dotted: the tuned rule, 1, and the bound from clairvoyance."
+        )
+        cost_tables.append(gains_table(result))
     profile = None
     if summary["profile"]["shares"]:
         profile_caption = (
-            "Share of all episodes that score more than the threshold; higher is"
-            " better. Dotted: wheel-over from the model, and the best known."
+            "Share of all episodes that score more than the threshold, which is the"
+            " cost of the tuned rule in the same episode over that of the controller;"
+            " higher is better. Dotted: as cheap as the rule."
         )
         profile = _figure("profile-figure", profile_figure(result), profile_caption)
     failures_title = (

@@ -8,7 +8,8 @@ import numpy as np
 
 from agents.benchmarking.results import BenchmarkResult
 from agents.benchmarking.sources import BEST_KNOWN
-from shipgym.arrays import Floats
+from agents.benchmarking.statistics import geometric_mean, score
+from shipgym.arrays import Floats, finite
 from shipgym.plots import (
     INK,
     MUTED,
@@ -38,9 +39,8 @@ COLOURS = (
     "#8f8a00",
 )
 DASHES = ("solid", "dash", "dot")
-SCORE = "wheel-over from the model 0, best known 1"
 #: Range of the axis of scores, and of relative costs; others are drawn at its ends.
-SCORE_RANGE, RELATIVE_RANGE = (-1.5, 1.5), (0.0, 4.0)
+SCORE_RANGE, RELATIVE_RANGE = (0.0, 1.25), (0.0, 4.0)
 
 
 class Look(NamedTuple):
@@ -85,27 +85,77 @@ def scores_figure(result: BenchmarkResult) -> Figure:
 
     Where there are no scores it shows relative costs.
     """
+    if not result.summary["reference"]:
+        return _relative_costs_figure(result)
+    traces = []
+    lowest = 1.0
+    for total in result.summary["ranking"]:
+        if total["score"]["value"] is not None:
+            mean, middle = _score_traces(total, looks(result.ranking))
+            traces += [mean, middle]
+            lowest = min(lowest, mean.x[0], middle.x[0])
+
+    # grouped markers would have the axis begin at 0
+    shown = [max(lowest - 0.1, SCORE_RANGE[0]), SCORE_RANGE[1]]
+    title = "score: cost of the tuned rule over this one"
+    figure = row_panel(traces, axis(title, range=shown), row_height=22)
+    figure.update_layout(scattermode="group", scattergap=0.5)
+    _add_score_line(figure, 1.0, "rule")
+    bound = bound_score(result)
+    if bound is not None:
+        _add_score_line(figure, min(bound, SCORE_RANGE[1]), "bound")
+    return figure
+
+
+def _score_traces(
+    total: Mapping[str, Any], look: Mapping[str, Look]
+) -> tuple[Any, Any]:
+    """Return the geometric mean of a controller and below it the interquartile one."""
+    name = total["name"]
+    colour = look[name].colour
+    mean = _interval_trace(name, total["score"], SCORE_RANGE, colour)
+    mean.update(offsetgroup="mean", orientation="h")
+    middle = _interval_trace(name, total["score_iqm"], SCORE_RANGE, colour)
+    middle.update(
+        offsetgroup="interquartile mean",
+        orientation="h",
+        marker={"size": 8, "symbol": f"{_open(middle.marker.symbol)}-open"},
+        error_x={"thickness": 1.2},
+    )
+    return mean, middle
+
+
+def _open(symbol: str) -> str:
+    """Symbol of an interquartile mean: a diamond, or the triangle of the edge."""
+    return "diamond" if symbol == "circle" else symbol
+
+
+def bound_score(result: BenchmarkResult) -> float | None:
+    """Return the score of the bound on the ship; None where it is not known."""
+    tasks = result.summary["suite"]["tasks"]
+    scores = []
+    for task, reference in result.summary["reference"].items():
+        if tasks[task]["on"] == "ship":
+            scores.append(score(reference["bound"], reference["rule"]))
+    if not scores:
+        return None
+    mean = geometric_mean(scores)
+    return finite(float(mean))
+
+
+def _relative_costs_figure(result: BenchmarkResult) -> Figure:
+    """Return the relative costs, the best on top."""
     look = looks(result.ranking)
-    has_scores = bool(result.summary["reference"])
-    limits = SCORE_RANGE if has_scores else RELATIVE_RANGE
     traces = []
     for total in result.summary["ranking"]:
         name = total["name"]
         cost = total["relative_cost"]
-        interval = total["score"]
-        if not has_scores:
-            interval = {"value": cost, "low": cost, "high": cost}
-        if interval["value"] is not None:
-            trace = _interval_trace(name, interval, limits, look[name].colour)
+        if cost is not None:
+            point = {"value": cost, "low": cost, "high": cost}
+            trace = _interval_trace(name, point, RELATIVE_RANGE, look[name].colour)
             traces.append(trace)
-
     title = "cost relative to the lowest, geometric mean over tasks"
-    if has_scores:
-        title = f"score: {SCORE}"
-    figure = row_panel(traces, title, row_height=30)
-    if has_scores:
-        _add_score_lines(figure)
-    return figure
+    return row_panel(traces, title, row_height=30)
 
 
 def _interval_trace(
@@ -138,10 +188,13 @@ def _interval_trace(
     )
 
 
-def _add_score_lines(figure: Figure) -> None:
-    """Add lines at the scores 0 and 1."""
-    for value in (0.0, 1.0):
-        figure.add_vline(x=value, line={"color": MUTED, "width": 1.2, "dash": "dot"})
+def _add_score_line(figure: Figure, value: float, text: str) -> None:
+    """Add a dotted line at a score, with its name."""
+    figure.add_vline(
+        x=value,
+        line={"color": MUTED, "width": 1.2, "dash": "dot"},
+        annotation={"text": text, "font": {"size": 11, "color": MUTED}},
+    )
 
 
 def profile_figure(result: BenchmarkResult) -> Figure:
@@ -162,9 +215,10 @@ def profile_figure(result: BenchmarkResult) -> Figure:
             lines.append(curve)
 
     y_axis = axis("episodes that score more, %", range=[-2, 102])
-    panel = Panel(lines, f"score of an episode: {SCORE}", y_axis)
+    title = "score of an episode: cost of the tuned rule in it over this one"
+    panel = Panel(lines, title, y_axis)
     figure = page_panels([panel], height=380)
-    _add_score_lines(figure)
+    _add_score_line(figure, 1.0, "rule")
     return figure
 
 

@@ -8,9 +8,10 @@ from agents.benchmarking.page_replays import best_controllers
 from agents.benchmarking.results import BenchmarkResult
 from agents.benchmarking.sources import BEST_KNOWN
 from agents.suites.limits import LIMITED_FIGURES
-from shipgym.pages.numbers import fixed, number, percent
+from agents.suites.reference import RULE
+from shipgym.pages.numbers import NONE, fixed, number, percent
 
-BETTER, WORSE = "#1d70b8", "#d9822b"  # tints of probabilities of improvement
+BETTER, WORSE = "#1d70b8", "#d9822b"  # tints of improvements
 
 
 class Metric(NamedTuple):
@@ -112,12 +113,15 @@ class SortableTable:
 
 def ranking_table(result: BenchmarkResult) -> SortableTable:
     """Return scores, relative costs, lost ships, and who is best in how many tasks."""
-    caption = "No score: no best known costs are kept of these episodes."
+    caption = "No score: the cost of the tuned rule in these tasks is not kept."
     if result.summary["reference"]:
         caption = (
-            "Score: share of the way from wheel-over designed on the model (0) to the"
-            " best known cost (1), interquartile mean over tasks, with bootstrap 95 %"
-            " interval."
+            f"Score: cost of the tuned rule ({RULE}) over that of the controller, so"
+            " that 1 is as cheap and more is cheaper; geometric mean over tasks, by"
+            " which is ranked, and interquartile mean over tasks and training runs,"
+            " which does not see the extremes, both with bootstrap 95 % interval."
+            " Below the rule: probability of costing less than the rule in the same"
+            " episode, %."
         )
     caption += (
         " Relative cost: geometric mean over tasks of the cost over the lowest one."
@@ -129,6 +133,8 @@ def ranking_table(result: BenchmarkResult) -> SortableTable:
         TableHead("controller", kind=""),
         TableHead("place", sorted="ascending"),
         TableHead("score", descending=True),
+        TableHead("interquartile mean", descending=True),
+        TableHead("below the rule, %", descending=True),
         TableHead("relative cost"),
         TableHead("best in tasks", descending=True),
         TableHead("tasks", descending=True),
@@ -143,29 +149,37 @@ def ranking_table(result: BenchmarkResult) -> SortableTable:
     rows = []
     for place, ranked in enumerate(result.summary["ranking"], start=1):
         name = ranked["name"]
-        relative_cost = ranked["relative_cost"]
-        wins = _count_cell(best.count(name))
-        if name == BEST_KNOWN:
-            wins = TableCell(key=0)
-        cells = [
-            _count_cell(place),
-            _interval_cell(ranked["score"], fixed),
-            TableCell(fixed(relative_cost), relative_cost),
-            wins,
-            _count_cell(ranked["tasks"]),
-            _failure_cell(ranked["lost"]),
-            _failure_cell(ranked["failed"]),
-            _failure_cell(ranked["exceeding"]),
-        ]
-        rows.append(_controller_row(name, cells))
+        n_best = 0 if name == BEST_KNOWN else best.count(name)
+        row = _ranking_row(ranked, place, n_best)
+        rows.append(_controller_row(name, row))
     return SortableTable("ranking-table", caption, heads, rows)
+
+
+def _ranking_row(ranked: Mapping[str, Any], place: int, n_best: int) -> list[TableCell]:
+    relative_cost = ranked["relative_cost"]
+    wins = _count_cell(n_best)
+    if ranked["name"] == BEST_KNOWN:
+        wins = TableCell(key=0)
+    return [
+        _count_cell(place),
+        _interval_cell(ranked["score"], _thousandths),
+        _interval_cell(ranked["score_iqm"], _thousandths),
+        _interval_cell(ranked["improvement"], _whole_percent),
+        TableCell(fixed(relative_cost), relative_cost),
+        wins,
+        _count_cell(ranked["tasks"]),
+        _failure_cell(ranked["lost"]),
+        _failure_cell(ranked["failed"]),
+        _failure_cell(ranked["exceeding"]),
+    ]
 
 
 def costs_table(result: BenchmarkResult) -> SortableTable:
     """Return the cost of each controller in each task; the lowest is marked."""
     caption = (
-        "Mean cost of an episode (the sum of the steps'; less is better) and its"
-        " bootstrap 95 % interval. ★ marks the lowest, among those usable at sea."
+        "Mean cost of an episode (the sum of the steps'; less is better), its bootstrap"
+        " 95 % interval, and the interquartile mean, IQM, which rare bad ends do not"
+        " change. ★ marks the lowest mean, among those usable at sea."
     )
     names = result.ranking
     heads = [TableHead("task", kind=""), *(TableHead(name) for name in names)]
@@ -175,37 +189,80 @@ def costs_table(result: BenchmarkResult) -> SortableTable:
         best = best_controllers(result, task)
         row = []
         for name in names:
-            cost = cells[name]["cost"] if name in cells else None
-            is_best = name in best
-            row.append(_interval_cell(cost, number, star=is_best))
+            shown = TableCell()
+            if name in cells:
+                shown = _cost_cell(cells[name], name in best)
+            row.append(shown)
         rows.append(_task_row(task, row))
     return SortableTable("costs-table", caption, heads, rows)
 
 
-def scores_table(result: BenchmarkResult) -> SortableTable:
-    """Return the score of each controller in each task with reference costs."""
+def _cost_cell(cell: Mapping[str, Any], is_best: bool) -> TableCell:
+    """Return a cell with a mean cost, its interval and the interquartile mean."""
+    shown = _interval_cell(cell["cost"], number, star=is_best)
+    middle = number(cell["cost_iqm"]["value"])
+    return replace(shown, below=f"{shown.below}\nIQM {middle}")
+
+
+def gains_table(result: BenchmarkResult) -> SortableTable:
+    """Return by how much each controller is cheaper than the rule in each task."""
     caption = (
-        "Scores: 0 is the cost of wheel-over designed on the model, 1 the best known,"
-        " with 95 % interval."
+        f"Gain over the tuned rule ({RULE}): share of its mean cost that is saved, in"
+        " per cent, with bootstrap 95 % interval, paired over episodes. Blue: cheaper,"
+        " the interval clear of 0; orange: more expensive. Bound: the lowest cost known"
+        " of each episode, reached with full knowledge of ship and weather, which no"
+        " autopilot has."
     )
     names = result.ranking
     heads = [
         TableHead("task", kind=""),
-        TableHead("cost of 0"),
-        TableHead("cost of 1"),
+        TableHead("rule's cost"),
+        TableHead("bound"),
         *(TableHead(name, descending=True) for name in names),
     ]
     rows = []
     for task, reference in result.summary["reference"].items():
         cells = result.cells(task)
-        zero = reference["zero"]
-        best = reference["best"]
-        row = [TableCell(number(zero), zero), TableCell(number(best), best)]
+        rule = reference["rule"]
+        bound = reference["bound"]
+        row = [TableCell(number(rule), rule), TableCell(number(bound), bound)]
         for name in names:
-            score = cells[name]["score"] if name in cells else None
-            row.append(_interval_cell(score, fixed))
+            gain = cells[name]["gain"] if name in cells else None
+            row.append(_gain_cell(gain))
         rows.append(_task_row(task, row))
-    return SortableTable("scores-table", caption, heads, rows)
+    return SortableTable("gains-table", caption, heads, rows)
+
+
+def _gain_cell(gain: Mapping[str, Any] | None) -> TableCell:
+    """Return a cell with a gain in per cent, tinted if it is clear of 0."""
+    shown = _interval_cell(gain, _tenth_percent)
+    if gain is None or gain["low"] is None:
+        return shown
+    colour = None
+    if gain["low"] > 0.0:
+        colour = BETTER
+    elif gain["high"] < 0.0:
+        colour = WORSE
+    if colour is None:
+        return shown
+    tint = _tint(colour, 22.0)
+    return replace(shown, kind="tinted", tint=tint)
+
+
+def _tint(colour: str, percent_of_it: float) -> str:
+    return f"color-mix(in srgb,{colour} {percent_of_it:.0f}%,white)"
+
+
+def _thousandths(value: float | None) -> str:
+    return fixed(value, 3)
+
+
+def _whole_percent(share: float | None) -> str:
+    return NONE if share is None else fixed(100.0 * share, 0)
+
+
+def _tenth_percent(share: float | None) -> str:
+    return NONE if share is None else fixed(100.0 * share, 1)
 
 
 def improvement_table(result: BenchmarkResult) -> SortableTable:
@@ -232,18 +289,12 @@ def _improvement_cell(interval: Mapping[str, Any] | None) -> TableCell:
     if interval is None or interval["value"] is None:
         return TableCell()
     value = interval["value"]
-    low = 100.0 * interval["low"]
-    high = 100.0 * interval["high"]
     colour = BETTER if value >= 0.5 else WORSE
     most_tint = 42.0  # per cent of the colour
-    share = most_tint * abs(2.0 * value - 1.0)
-    return TableCell(
-        text=f"{100.0 * value:.0f}",
-        key=value,
-        kind="tinted",
-        below=f"{low:.0f} to {high:.0f}",
-        tint=f"color-mix(in srgb,{colour} {share:.0f}%,white)",
-    )
+    share = abs(2.0 * value - 1.0)
+    tint = _tint(colour, most_tint * share)
+    shown = _interval_cell(interval, _whole_percent)
+    return replace(shown, kind="tinted", tint=tint)
 
 
 def metrics_table(result: BenchmarkResult, task: str, name: str) -> SortableTable:
@@ -348,7 +399,7 @@ def _failure_cell(count: int) -> TableCell:
 
 
 def _controller_row(name: str, cells: Sequence[TableCell]) -> TableRow:
-    badge = "not one autopilot" if name == BEST_KNOWN else ""
+    badge = "bound from clairvoyance" if name == BEST_KNOWN else ""
     return TableRow(name, cells, badge=badge)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from shipgym.checks import ANY_KEY, Shape, check_choice, check_shape, check_whole
 
-FORMAT, KIND = 1, "shipgym-benchmark"
+FORMAT, KIND = 2, "shipgym-benchmark"
 
 TEXT, COUNT, NUMBER = (str,), (int,), (int, float)
 TEXT_OR_NULL, NUMBER_OR_NULL = (str, NoneType), (int, float, NoneType)
@@ -33,8 +33,9 @@ CONTROLLER: Shape = {
 CELL: Shape = {
     "cost": {"value": NUMBER, "low": NUMBER_OR_NULL, "high": NUMBER_OR_NULL},
     "cost_iqm": INTERVAL,
-    "score": INTERVAL,
-    "relative_cost": NUMBER_OR_NULL,
+    "score": INTERVAL,  # cost of the rule over this cost
+    "gain": INTERVAL,  # share of the rule's cost that is saved
+    "relative_cost": NUMBER_OR_NULL,  # to the lowest one here
     "runs": COUNT,
     "lost": COUNT,
     "failed": COUNT,
@@ -51,7 +52,10 @@ CELL: Shape = {
     },
 }
 TOTAL: dict[str, Shape] = {
-    "score": INTERVAL,
+    "score": INTERVAL,  # geometric mean over tasks
+    "score_iqm": INTERVAL,  # interquartile mean over runs and tasks
+    "improvement": INTERVAL,  # probability of costing less than the rule
+    "scored_tasks": COUNT,  # those in which the rule's cost is known
     "relative_cost": NUMBER_OR_NULL,
     "tasks": COUNT,
     "lost": COUNT,
@@ -73,8 +77,8 @@ SUMMARY: dict[str, Shape] = {
     "seeds": {"first": COUNT, "count": COUNT},
     "controllers": {ANY_KEY: CONTROLLER},
     "tasks": {ANY_KEY: {ANY_KEY: CELL}},  # by task and controller
-    # costs whose scores are 0 and 1, by task
-    "reference": {ANY_KEY: {"zero": NUMBER, "best": NUMBER}},
+    # mean costs of the tuned rule, and the bound from clairvoyance, by task
+    "reference": {ANY_KEY: {"rule": NUMBER, "bound": NUMBER}},
     "ranking": [RANKED],  # best first
     # probability that the first costs less than the second
     "improvement": {ANY_KEY: {ANY_KEY: INTERVAL}},

@@ -1,9 +1,9 @@
 """Statistics of costs and scores, as in rliable, with episodes drawn as well.
 
-A score is the share of the way from the cost of wheel-over designed on the model (0) to
-the best known cost (1). Costs have the shape (n_runs, n_episodes), runs being training
-runs of a learned agent; a controller that is not trained has one. `task` and
-`controller` are numbers.
+A score is the cost of the tuned rule over that of a controller: 1 as cheap as the rule,
+above 1 cheaper. Costs have the shape (n_runs, n_episodes), runs being training runs of
+a learned agent; a controller that is not trained has one. `task` and `controller` are
+numbers.
 
 The bootstrap is stratified: in every task runs and, within them, episodes are drawn
 with replacement. All controllers get the same draws of episodes, because they all ran
@@ -13,17 +13,17 @@ Sources: Agarwal, Schwarzer, Castro, Courville & Bellemare 2021, Deep Reinforcem
 Learning at the Edge of the Statistical Precipice, NeurIPS 34 (interquartile mean,
 stratified bootstrap, probability of improvement, performance profiles); Efron &
 Tibshirani 1993, An Introduction to the Bootstrap, chapters 13 (percentile interval) and
-8 (more than one source of chance).
+8 (more than one source of chance); Fleming & Wallace 1986, How Not to Lie with
+Statistics, CACM 29 (ratios are averaged by their geometric mean).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import trim_mean
 
-from agents.suites.reference import ScoreScale
 from shipgym.arrays import Floats, Integers, finite
 
 TRIMMED = 0.25  # of the scores at each end
@@ -156,48 +156,106 @@ def weighted_interquartile_mean(values: Floats, weights: Integers) -> Floats:
     return means
 
 
-def score(cost: ArrayLike, zero: ArrayLike, best: ArrayLike) -> Floats:
-    """Share of the way from the cost `zero` to `best`; NaN if there is no way."""
-    way = np.subtract(zero, cost)
-    whole_way = np.subtract(zero, best)
+def score(cost: ArrayLike, rule_cost: ArrayLike) -> Floats:
+    """Cost of the rule over that of a controller; NaN if both are 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = way / whole_way
-    return np.where(whole_way > 0.0, share, np.nan)
+        return np.asarray(np.divide(rule_cost, cost))
 
 
-def aggregate_score(
-    costs: Sequence[Floats],
-    references: Sequence[ScoreScale],
+def gain_over(
+    costs: Floats,
+    other_costs: Floats,
     draws: Draws,
-    tasks: Sequence[int],
-    controller: int,
+    task: int,
+    controllers: tuple[int, int] = (1, 0),
 ) -> ConfidenceInterval:
-    """Interquartile mean of the scores of all runs and tasks.
+    """Share of another controller's cost that one saves, paired over episodes.
 
     Parameters
     ----------
-    costs : sequence of arrays of shape (n_runs, n_episodes)
-        Costs of each task.
-    references : sequence of pairs
-        Costs whose scores are 0 and 1 in each task.
+    costs, other_costs : array of shape (n_runs, n_episodes)
+        Costs of both; the other's may be of one run, shape (n_episodes,).
     draws : Draws
-    tasks : sequence of int
+    task : int
+    controllers : pair of int
+        Numbers of both, whose training runs are drawn independently.
+    """
+    number, other = controllers
+    baseline = np.atleast_2d(other_costs)
+    drawn_costs = draws.means(costs, task, number).mean(axis=1)
+    drawn_baseline = draws.means(baseline, task, other).mean(axis=1)
+
+    gain = _saved(costs.mean(), baseline.mean())
+    return interval(float(gain), _saved(drawn_costs, drawn_baseline))
+
+
+def _saved(cost: ArrayLike, other_cost: ArrayLike) -> Floats:
+    """Share of another cost that is saved; no number if that is 0."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(1.0 - np.divide(cost, other_cost))
+
+
+def mean_score(
+    costs: Mapping[int, Floats],
+    rule_costs: Mapping[int, Floats],
+    draws: Draws,
+    controller: int,
+) -> ConfidenceInterval:
+    """Geometric mean over tasks of the scores: every task counts the same.
+
+    Parameters
+    ----------
+    costs : mapping of int to array of shape (n_runs, n_episodes)
+        Costs of a controller by task.
+    rule_costs : mapping of int to array of shape (n_episodes,)
+        Costs of the rule in these tasks, and maybe in others.
+    draws : Draws
     controller : int
     """
-    if not tasks:
-        return NOTHING
     scores = []
-    drawn = []
-    for task, cost, (zero, best) in zip(tasks, costs, references, strict=True):
-        run_costs = cost.mean(axis=1)
-        drawn_costs = draws.means(cost, task, controller)
-        scores.append(score(run_costs, zero, best))
-        drawn.append(score(drawn_costs, zero, best))
+    drawn_scores = []
+    for task, cost in costs.items():
+        rule_cost = rule_costs[task]
+        drawn_costs = draws.means(cost, task, controller).mean(axis=1)
+        drawn_rule = draws.shares(task) @ rule_cost
+        scores.append(score(cost.mean(), rule_cost.mean()))
+        drawn_scores.append(score(drawn_costs, drawn_rule))
+    if not scores:
+        return NOTHING
+    value = geometric_mean(scores)
+    return interval(float(value), geometric_mean(drawn_scores))
 
+
+def geometric_mean(values: ArrayLike) -> Floats:
+    """Geometric mean over the first axis."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logarithms = np.log(values)
+        return np.asarray(np.exp(logarithms.mean(axis=0)))
+
+
+def interquartile_score(
+    costs: Mapping[int, Floats],
+    rule_costs: Mapping[int, Floats],
+    draws: Draws,
+    controller: int,
+) -> ConfidenceInterval:
+    """Interquartile mean of the scores of all runs and tasks, without the extremes.
+
+    Parameters are those of `mean_score`.
+    """
+    scores = []
+    drawn_scores = []
+    for task, cost in costs.items():
+        rule_cost = rule_costs[task]
+        drawn_costs = draws.means(cost, task, controller)
+        drawn_rule = draws.shares(task) @ rule_cost
+        scores.append(score(cost.mean(axis=1), rule_cost.mean()))
+        drawn_scores.append(score(drawn_costs, drawn_rule[:, None]))
+    if not scores:
+        return NOTHING
     value = interquartile_mean(np.concatenate(scores))
-    drawn_scores = np.concatenate(drawn, axis=1)
-    drawn_values = interquartile_mean(drawn_scores, axis=1)
-    return interval(float(value), drawn_values)
+    all_drawn = np.concatenate(drawn_scores, axis=1)
+    return interval(float(value), interquartile_mean(all_drawn, axis=1))
 
 
 def improvement(

@@ -12,15 +12,10 @@ import numpy as np
 from agents.benchmarking import statistics
 from agents.benchmarking.cells import Cell, Cells
 from agents.benchmarking.sources import BEST_KNOWN
-from agents.benchmarking.statistics import (
-    NOTHING,
-    ConfidenceInterval,
-    Draws,
-    score,
-)
+from agents.benchmarking.statistics import NOTHING, Draws, score
 from agents.suites.limits import exceeded
-from agents.suites.reference import ScoreScale, reference_costs
-from agents.suites.suite import N_EPISODES, SETS, BenchmarkTask
+from agents.suites.reference import ReferenceCosts, reference_costs
+from agents.suites.suite import SETS, BenchmarkTask
 from shipgym.arrays import Floats, finite
 
 
@@ -49,9 +44,12 @@ def summarise(
         by_task[task.name] = costs.of_task(number)
 
     reference = {}
-    for number, (zero, best) in costs.reference.items():
+    for number, known in costs.reference.items():
         task_name = tasks[number].name
-        reference[task_name] = {"zero": zero, "best": best}
+        reference[task_name] = {
+            "rule": float(known.rule.mean()),
+            "bound": float(known.bound.mean()),
+        }
     return {
         "tasks": by_task,
         "reference": reference,
@@ -96,17 +94,24 @@ class _Costs:
         return Draws(len(self.tasks), self.n_episodes)
 
     @cached_property
-    def reference(self) -> dict[int, ScoreScale]:
-        """Costs whose scores are 0 and 1 by task; they are of all scored episodes."""
+    def reference(self) -> dict[int, ReferenceCosts]:
+        """Costs of the rule, and the bound, in these episodes by task."""
         suite = self.tasks[0].suite
-        if self.n_episodes < N_EPISODES or not suite:
-            return {}
-        known = reference_costs(suite)
+        known = reference_costs(suite) if suite else {}
         reference = {}
         for number, task in enumerate(self.tasks):
             if task.name in known:
-                reference[number] = known[task.name]
+                rule, bound = known[task.name]
+                reference[number] = ReferenceCosts(
+                    rule=rule[: self.n_episodes],
+                    bound=bound[: self.n_episodes],
+                )
         return reference
+
+    @cached_property
+    def rule_costs(self) -> dict[int, Floats]:
+        """Costs of the rule by task, shape (n_episodes,)."""
+        return {task: known.rule for task, known in self.reference.items()}
 
     def tasks_on(self, on: str) -> list[int]:
         """Return the numbers of the tasks of a set of episodes."""
@@ -139,15 +144,27 @@ class _Costs:
     def _cost_figures(
         self, controller: int, task: int, lowest: float
     ) -> dict[str, Any]:
-        """Costs and score of a controller in a task, whose lowest cost is given."""
+        """Costs, score and gain in a task, whose lowest cost is given."""
         costs = self.costs[controller][task]
         cost = statistics.mean_cost(costs, self.draws, task, controller)
         cost_iqm = statistics.interquartile_cost(costs, self.draws, task, controller)
-        score = _score_of(cost, self.reference.get(task))
+        score = gain = NOTHING
+        if task in self.rule_costs:
+            score = statistics.mean_score(
+                {task: costs}, self.rule_costs, self.draws, controller
+            )
+            gain = statistics.gain_over(
+                costs,
+                self.rule_costs[task],
+                draws=self.draws,
+                task=task,
+                controllers=(controller, len(self.names)),
+            )
         return {
             "cost": cost.to_dict(),
             "cost_iqm": cost_iqm.to_dict(),
             "score": score.to_dict(),
+            "gain": gain.to_dict(),
             "relative_cost": finite(cost.value / lowest),
         }
 
@@ -155,8 +172,8 @@ class _Costs:
         """Return the controllers, the best first.
 
         Those that could run all tasks come first, and of them those within all limits;
-        they are ordered by score if every task has references, otherwise by relative
-        cost.
+        they are ordered by score if the rule's cost is known in every task, otherwise
+        by relative cost.
         """
         elsewhere = [on for on in SETS if on != "ship" and self.tasks_on(on)]
         ranked = []
@@ -168,20 +185,19 @@ class _Costs:
             ranked.append({"name": name, **on_ship, "elsewhere": totals})
 
         tasks = self.tasks_on("ship")
-        by_score = all(task in self.reference for task in tasks)
+        by_score = all(task in self.rule_costs for task in tasks)
         return sorted(ranked, key=lambda total: _sort_key(total, by_score))
 
     def _total(
         self, controller: int, on: str, by_task: Mapping[str, Any]
     ) -> dict[str, Any]:
         """Return the totals of a controller in all tasks of a set of episodes."""
-        tasks = [task for task in self.tasks_on(on) if task in self.costs[controller]]
-        scored = [task for task in tasks if self._has_room(task)]
+        costs = self.costs[controller]
+        tasks = [task for task in self.tasks_on(on) if task in costs]
         name = self.names[controller]
         cells = [by_task[self.tasks[task].name][name] for task in tasks]
         return {
-            "score": self._score(controller, scored).to_dict(),
-            "scored_tasks": len(scored),
+            **self._scores(controller, tasks),
             "relative_cost": _relative_cost(cells),
             "tasks": len(tasks),
             "lost": sum(cell["lost"] for cell in cells),
@@ -189,23 +205,29 @@ class _Costs:
             "exceeding": sum(bool(cell["exceeded"]) for cell in cells),
         }
 
-    def _score(self, controller: int, tasks: Sequence[int]) -> ConfidenceInterval:
-        """Score of a controller over tasks."""
-        costs = self.costs[controller]
-        return statistics.aggregate_score(
-            costs=[costs[task] for task in tasks],
-            references=[self.reference[task] for task in tasks],
-            draws=self.draws,
-            tasks=tasks,
-            controller=controller,
-        )
+    def _scores(self, controller: int, tasks: Sequence[int]) -> dict[str, Any]:
+        """Scores over tasks, and the probability of costing less than the rule."""
+        scored = [task for task in tasks if task in self.rule_costs]
+        costs = {task: self.costs[controller][task] for task in scored}
+        rule_runs = {task: self.rule_costs[task][None, :] for task in scored}
 
-    def _has_room(self, task: int) -> bool:
-        """Return whether the best known cost of a task is below that of wheel-over."""
-        if task not in self.reference:
-            return False
-        zero, best = self.reference[task]
-        return zero > best
+        mean = statistics.mean_score(costs, self.rule_costs, self.draws, controller)
+        middle = statistics.interquartile_score(
+            costs, self.rule_costs, self.draws, controller
+        )
+        rule_number = len(self.names)
+        better = statistics.improvement(
+            costs=costs,
+            other_costs=rule_runs,
+            draws=self.draws,
+            controllers=(controller, rule_number),
+        )
+        return {
+            "score": mean.to_dict(),
+            "score_iqm": middle.to_dict(),
+            "improvement": better.to_dict(),
+            "scored_tasks": len(scored),
+        }
 
     def _on_ship(self, controller: int) -> dict[int, Floats]:
         """Costs of a controller by task, on the ship."""
@@ -231,7 +253,7 @@ class _Costs:
     def profiles(self) -> dict[str, Any]:
         """Return the share of episodes whose score is above each threshold."""
         shares = {}
-        thresholds = np.arange(-20, 31) / 20.0  # scores of the performance profile
+        thresholds = np.arange(41) / 20.0  # scores of the performance profile
         for controller, name in enumerate(self.names):
             scores = self._episode_scores(controller)
             if len(scores):
@@ -240,25 +262,13 @@ class _Costs:
         return {"thresholds": thresholds.tolist(), "shares": shares}
 
     def _episode_scores(self, controller: int) -> Floats:
-        """Scores of all episodes on the ship that have one, shape (n,)."""
+        """Scores of all episodes on the ship, the rule in the same one, shape (n,)."""
         scores = [np.zeros(0)]
         for task, costs in self._on_ship(controller).items():
-            if self._has_room(task):
-                zero, best = self.reference[task]
-                scores.append(score(costs, zero, best).ravel())
+            if task in self.rule_costs:
+                scores.append(score(costs, self.rule_costs[task]).ravel())
         all_scores = np.concatenate(scores)
         return all_scores[np.isfinite(all_scores)]
-
-
-def _score_of(
-    cost: ConfidenceInterval, reference: ScoreScale | None
-) -> ConfidenceInterval:
-    """Score of a mean cost; it falls as the cost rises, so that the bounds swap."""
-    if reference is None:
-        return NOTHING
-    costs = [cost.value, cost.high, cost.low]
-    scores = score(costs, *reference)
-    return ConfidenceInterval(*scores.tolist())
 
 
 def _relative_cost(cells: Sequence[Mapping[str, Any]]) -> float | None:

@@ -1,15 +1,17 @@
 """Files kept beside a suite: its best known costs, and settings of its controllers.
 
-    SUITE-best.json     by task: `zero`, mean cost of wheel-over designed on the model;
-                        of each scored episode the lowest known cost, `costs`, and what
-                        reached it, `by` (scripts/best_known.py)
+    SUITE-best.json     by task, of each scored episode: the cost of the tuned rule,
+                        `rule_costs`, which scores are relative to; the bound from
+                        clairvoyance, `costs`, and what reached it, `by`
+                        (scripts/best_known.py)
     SUITE-tuned.json    `tasks`: by task and controller `settings`, `cost`,
                         `start_cost`, `evaluations` (scripts/tune_controllers.py)
 
 `suite` is a `Suite.source` in all of these functions.
 """
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,15 +22,31 @@ from shipgym.arrays import Floats
 from shipgym.checks import ANY_KEY, Shape, check_shape, check_table
 from shipgym.files import read_json
 
-#: Costs whose scores are 0 and 1.
-ScoreScale = tuple[float, float]
-BEST: Shape = {ANY_KEY: {"zero": (int, float), "costs": [(int, float)], "by": [(str,)]}}
+#: Controller whose cost scores are relative to.
+RULE = "tuned-preview-lq"
+BEST: Shape = {ANY_KEY: {"costs": [(int, float)], "by": [(str,)]}}
+
+
+class ReferenceCosts(NamedTuple):
+    """Costs of each scored episode of a task, which a controller is compared with.
+
+    Attributes
+    ----------
+    rule : array of shape (100,)
+        Of the tuned rule.
+    bound : array of shape (100,)
+        The lowest that is known, reached with full knowledge.
+    """
+
+    rule: Floats
+    bound: Floats
 
 
 def best_known(suite: str) -> dict[str, dict[str, Any]]:
-    """Return the best known costs by task, as in the file; empty if there is none.
+    """Return what is kept by task, as in the file; empty if there is none.
 
-    Raises InputError naming the field of the file at fault.
+    `rule_costs` is missing where the rule has not been run. Raises InputError naming
+    the field of the file at fault.
     """
     path = suite_file(suite, "best")
     if not path.exists():
@@ -36,28 +54,41 @@ def best_known(suite: str) -> dict[str, dict[str, Any]]:
     content = read_json(path, "file of best known costs", "take another copy")
     check_shape(content, BEST, str(path))
     for task, known in content.items():
-        n_costs = len(known["costs"])
-        n_by = len(known["by"])
-        if n_costs != N_EPISODES or n_by != N_EPISODES:
-            raise InputError(
-                f"{path}: {task}: expected costs of {N_EPISODES} episodes and what"
-                f" reached them, got {n_costs} and {n_by}"
-            )
+        _check_costs(known, f"{path}: {task}")
     return dict(content)
 
 
-def reference_costs(suite: str) -> dict[str, ScoreScale]:
-    """Return the mean costs whose scores are 0 and 1, by task.
+def _check_costs(known: Mapping[str, Any], where: str) -> None:
+    """Refuse costs of a task that are not of all scored episodes."""
+    n_costs = len(known["costs"])
+    n_by = len(known["by"])
+    if n_costs != N_EPISODES or n_by != N_EPISODES:
+        raise InputError(
+            f"{where}: expected costs of {N_EPISODES} episodes and what reached them,"
+            f" got {n_costs} and {n_by}"
+        )
+    if "rule_costs" in known:
+        rule_costs = known["rule_costs"]
+        check_shape(rule_costs, [(int, float)], f"{where}.rule_costs")
+        if len(rule_costs) != N_EPISODES:
+            raise InputError(
+                f"{where}.rule_costs: expected costs of {N_EPISODES} episodes, got"
+                f" {len(rule_costs)}"
+            )
 
-    The first is that of wheel-over designed on the model, the second the best known.
+
+def reference_costs(suite: str) -> dict[str, ReferenceCosts]:
+    """Return the costs of the tuned rule and the bound, by task.
+
+    Tasks are left out where the rule's cost is not known, or is 0.
     """
-    scales = {}
+    references = {}
     for task, known in best_known(suite).items():
-        zero = float(known["zero"])
-        costs = known["costs"]
-        best = float(np.mean(costs))
-        scales[task] = (zero, best)
-    return scales
+        rule = np.array(known.get("rule_costs", 0.0), dtype=np.float64)
+        bound = np.array(known["costs"], dtype=np.float64)
+        if rule.mean() > 0.0:
+            references[task] = ReferenceCosts(rule, bound)
+    return references
 
 
 def best_costs(task: BenchmarkTask) -> Floats:

@@ -233,21 +233,24 @@ def test_the_ranking_is_of_the_ship_and_the_rest_stands_beside_it(suite, tmp_pat
     assert len(set(costs)) == 3
 
 
-def test_scores_are_of_best_known_costs_and_settings_are_those_that_were_tuned(
+def test_scores_are_relative_to_the_rule_and_settings_are_those_that_were_tuned(
     tmp_path,
 ):
     tuned = {
         "lq": {"settings": {"integral_lengths": 80.0}, "cost": 24.0},
         "pid": {"settings": {"damping": 0.9}, "cost": 25.0},
     }
-    known = {"zero": 30.0, "costs": [0.0, 1.0] * 50, "by": ["lq", "ppo"] * 50}
+    known = {
+        "rule_costs": [20.0, 40.0] * 50,
+        "costs": [0.0, 1.0] * 50,
+        "by": ["lq", "ppo"] * 50,
+    }
     suite = write_suite(
         tmp_path, best={"calm": known}, tuned={"tasks": {"calm": tuned}}
     )
-    look = benchmark("tuned-lq", suite, "calm", episodes=2)
-    assert (
-        look.summary["reference"] == {}
-    )  # costs of all episodes, not of the first two
+    look = benchmark("tuned-lq", suite, "calm", episodes=3)
+    known_costs = {"rule": pytest.approx(80.0 / 3.0), "bound": pytest.approx(1.0 / 3.0)}
+    assert look.summary["reference"] == {"calm": known_costs}  # of these episodes
     names = "tuned-best,tuned-lq,tuned-mpc,best-known"
     own = {"own": lambda task: LQ.from_model(task.ship, integral_lengths=80.0)}
     result, other = (benchmark(one, suite, "calm") for one in (names, own))
@@ -257,18 +260,24 @@ def test_scores_are_of_best_known_costs_and_settings_are_those_that_were_tuned(
     refused = result.summary["controllers"]["tuned-mpc"]["refused"]["calm"]
     assert "expected one that was tuned" in refused
     cells = result.summary["tasks"]["calm"]
-    assert cells["best-known"]["score"]["value"] == 1.0
+    assert cells["best-known"]["score"]["value"] == pytest.approx(60.0)
     cost = cells["tuned-lq"]["cost"]["value"]
-    assert cells["tuned-lq"]["score"]["value"] == pytest.approx((30.0 - cost) / 29.5)
+    assert cells["tuned-lq"]["score"]["value"] == pytest.approx(30.0 / cost)
+    assert cells["tuned-lq"]["gain"]["value"] == pytest.approx(1.0 - cost / 30.0)
     assert result.ranking == ["best-known", "tuned-best", "tuned-lq", "tuned-mpc"]
 
 
+def kept(rule, bound):
+    """What a suite keeps of a task: the rule and the bound cost the same in each."""
+    return {"rule_costs": [rule] * 100, "costs": [bound] * 100, "by": ["lq"] * 100}
+
+
 def test_a_summary_of_a_hundred_episodes_by_hand(tmp_path):
-    """Two tasks, in one of which 0 and 1 cost the same, and one far from the design."""
-    known = {"calm": (30.0, 20.0), "same": (5.0, 5.0), "calm-far": (40.0, 10.0)}
+    """Two tasks, in one of which the rule costs nothing, and one far from design."""
     best = {
-        name: {"zero": zero, "costs": [best] * 100, "by": ["lq"] * 100}
-        for name, (zero, best) in known.items()
+        "calm": kept(30.0, 20.0),
+        "free": kept(0.0, 0.0),
+        "calm-far": kept(40.0, 10.0),
     }
     source = str(write_suite(tmp_path, best=best))
     tasks = [
@@ -278,7 +287,7 @@ def test_a_summary_of_a_hundred_episodes_by_hand(tmp_path):
             suite=source,
             limits={},
         )
-        for name in known
+        for name in best
     ]
 
     def cell(*costs, times=(1e-6,)):
@@ -287,66 +296,68 @@ def test_a_summary_of_a_hundred_episodes_by_hand(tmp_path):
 
     cells = {
         ("a", "calm"): cell(25.0, 20.0, times=(1e-6, 3e-6)),
-        ("a", "same"): cell(5.0, 5.0),
+        ("a", "free"): cell(5.0, 5.0),
         ("a", "calm-far"): cell(10.0, 10.0),
         ("b", "calm"): cell(30.0, 30.0),
-        ("b", "same"): cell(10.0, 10.0),
+        ("b", "free"): cell(10.0, 10.0),
         ("b", "calm-far"): Cell(refused="no"),
     }
     summary = summarise(tasks, ["b", "a"], cells)
     first, second = summary["ranking"]
     assert (first["name"], first["tasks"], first["scored_tasks"]) == ("a", 2, 1)
-    assert (first["score"]["value"], first["relative_cost"]) == pytest.approx(
-        (0.75, 1.0)
+    names = ("score", "score_iqm", "improvement")
+    assert [first[name]["value"] for name in names] == pytest.approx(
+        [4.0 / 3.0, 4.0 / 3.0, 1.0]
     )
-    assert (second["score"]["value"], second["relative_cost"]) == pytest.approx(
-        (0.0, np.sqrt(8.0 / 3.0))
-    )
+    assert [second[name]["value"] for name in names] == pytest.approx([1.0, 1.0, 0.5])
+    assert first["relative_cost"] == pytest.approx(1.0)
+    assert second["relative_cost"] == pytest.approx(np.sqrt(8.0 / 3.0))
+    gain = summary["tasks"]["calm"]["a"]["gain"]
+    assert gain["value"] == pytest.approx(0.25)
+    assert 0.2 < gain["low"] < gain["high"] < 0.3
+    assert summary["tasks"]["free"]["a"]["gain"]["value"] is None
     far, other_far = first["elsewhere"]["far"], second["elsewhere"]["far"]
-    assert far["score"]["value"] == pytest.approx(1.0)
+    assert far["score"]["value"] == pytest.approx(4.0)
     assert (far["tasks"], other_far["tasks"]) == (1, 0)
     time = summary["tasks"]["calm"]["a"]["microseconds_per_action"]
     assert time == pytest.approx(2.0)
-    assert summary["reference"]["calm-far"] == {"zero": 40.0, "best": 10.0}
+    assert summary["reference"]["calm-far"] == {"rule": 40.0, "bound": 10.0}
     thresholds, shares = summary["profile"].values()
-    at = [thresholds.index(one) for one in (-1.0, -0.05, 0.0, 0.5, 1.0)]
-    # scores of 0.5 and 1 of `calm` alone
+    at = [thresholds.index(one) for one in (0.0, 0.95, 1.0, 1.2, 1.5)]
+    # scores of 1.2 and 1.5 of `calm` alone
     assert [shares["a"][k] for k in at] == [1.0, 1.0, 1.0, 0.5, 0.0]
     assert [shares["b"][k] for k in at] == [1.0, 1.0, 0.0, 0.0, 0.0]
     assert summary["improvement"]["a"]["b"]["value"] == 1.0
 
 
-def test_controllers_that_could_run_more_tasks_come_first(tmp_path):
-    """Then those with a higher score, or without scores those that cost less."""
-    best = {
-        name: {"zero": zero, "costs": [0.0] * 100, "by": ["lq"] * 100}
-        for name, zero in {"one": 100.0, "two": 10.0}.items()
-    }
+@pytest.mark.parametrize("rule", [True, False])
+def test_controllers_that_could_run_more_tasks_come_first(tmp_path, rule):
+    """Then those with a higher geometric mean of the scores, which one hard task shows.
+
+    Without the rule's costs that of the relative costs: the order is the same.
+    """
+    names = [f"task-{k}" for k in range(8)]
+    best = {name: kept(100.0, 50.0) for name in names} if rule else {}
+    suite = str(write_suite(tmp_path, best=best))
     tasks = [
-        SimpleNamespace(
-            name=name,
-            on="ship",
-            suite=str(write_suite(tmp_path, best=best)),
-            limits={},
-        )
-        for name in best
+        SimpleNamespace(name=name, on="ship", suite=suite, limits={}) for name in names
     ]
+    costs = {
+        "part": [1.0],
+        "hidden": [99.0] * 7 + [1000.0],
+        "even": [100.0] * 8,
+    }
+    cells = {("part", name): Cell(refused="no") for name in names}
+    for controller, means in costs.items():
+        for name, mean in zip(names, means, strict=False):
+            run = ScoredRun({"cost": np.full(100, mean)})
+            cells[controller, name] = Cell([run])
 
-    costs = {"part": (1.0,), "cheap": (60.0, 0.1), "dear": (10.0, 5.0)}
-
-    def cells(n_episodes):
-        found = {("part", "two"): Cell(refused="no")}
-        for name, means in costs.items():
-            for task, mean in zip(best, means, strict=False):
-                run = ScoredRun({"cost": np.full(n_episodes, mean)})
-                found[name, task] = Cell([run])
-        return found
-
-    names = list(costs)
-    scored = summarise(tasks, names, cells(100))["ranking"]
-    assert [one["name"] for one in scored] == ["dear", "cheap", "part"]
-    unscored = summarise(tasks, names, cells(2))["ranking"]
-    assert [one["name"] for one in unscored] == ["cheap", "dear", "part"]
+    ranking = summarise(tasks, list(costs), cells)["ranking"]
+    assert [one["name"] for one in ranking] == ["even", "hidden", "part"]
+    if rule:
+        even, hidden, _ = ranking
+        assert hidden["score_iqm"]["value"] > even["score_iqm"]["value"]
 
 
 def test_episodes_without_a_figure_are_not_counted():
@@ -698,8 +709,8 @@ def test_results_run_nothing_that_they_name(copy, suite, source, tmp_path, monke
         ("results.json", lambda data: data[:500], "may be cut short"),
         (
             "results.json",
-            lambda data: data.replace(b'"format": 1', b'"format": 9'),
-            "expected format 1, .* got 9",
+            lambda data: data.replace(b'"format": 2', b'"format": 9'),
+            "expected format 2, .* got 9",
         ),
         (
             "results.json",
@@ -781,7 +792,7 @@ def test_results_that_do_not_agree_with_their_episodes_are_refused(copy, change,
             "r.json: name of a task: expected .* got 'rough'",
         ),
         (
-            lambda one: one["reference"].update(rough={"zero": 1, "best": 0}),
+            lambda one: one["reference"].update(rough={"rule": 1, "bound": 0}),
             "r.json: name of a task: expected .* got 'rough'",
         ),
         (

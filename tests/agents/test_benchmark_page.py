@@ -68,8 +68,8 @@ class Lazy:
 def suite(tmp_path_factory):
     """The path of a suite with best known costs."""
     best = {
-        task: {"zero": zero, "costs": [best] * N, "by": ["search"] * N}
-        for task, (zero, best) in REFERENCES.items()
+        task: {"rule_costs": [rule] * N, "costs": [bound] * N, "by": ["search"] * N}
+        for task, (rule, bound) in REFERENCES.items()
     }
     return write_suite(tmp_path_factory.mktemp("suite"), SUITE, best=best)
 

@@ -2,16 +2,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import trim_mean
+from scipy.stats import gmean, trim_mean
 
 from agents.benchmarking.statistics import (
     Draws,
-    aggregate_score,
+    gain_over,
     improvement,
     interquartile_cost,
     interquartile_mean,
+    interquartile_score,
     interval,
     mean_cost,
+    mean_score,
     performance_profile,
     score,
     weighted_interquartile_mean,
@@ -40,9 +42,10 @@ def test_weighted_interquartile_means_are_scipys_of_the_samples(values, seed):
     )
 
 
-def test_scores_are_the_way_from_wheel_over_to_the_best_known():
-    assert score([30.0, 25.0, 20.0, 40.0], 30.0, 20.0).tolist() == [0.0, 0.5, 1.0, -1.0]
-    assert np.isnan(score(1.0, 2.0, 2.0))
+def test_scores_are_the_cost_of_the_rule_over_that_of_a_controller():
+    assert score([30.0, 15.0, 60.0], 30.0).tolist() == [1.0, 2.0, 0.5]
+    assert score(0.0, 30.0) == np.inf
+    assert np.isnan(score(0.0, 0.0))
 
 
 def test_interval_of_a_mean_is_that_of_theory():
@@ -70,12 +73,14 @@ def test_intervals_of_every_statistic_are_those_of_theory():
     draws = Draws(1, 1000, n_draws=1000)
     sigma = 10.0 / np.sqrt(1000)
     wins = improvement({0: costs}, {0: np.full((1, 1000), 50.0)}, draws, (0, 1))
-    scores = aggregate_score([costs], [(60.0, 40.0)], draws, [0], 0)
+    rule_costs = {0: np.full(1000, 50.0)}
     middle = np.sqrt(1.19) * sigma
     for found, error in (
         (mean_cost(costs, draws, 0), sigma),
         (interquartile_cost(costs, draws, 0), middle),
-        (scores, sigma / 20.0),
+        (mean_score({0: costs}, rule_costs, draws, 0), sigma / 50.0),
+        (interquartile_score({0: costs}, rule_costs, draws, 0), sigma / 50.0),
+        (gain_over(costs, rule_costs[0], draws, 0), sigma / 50.0),
         (wins, 0.5 / np.sqrt(1000)),
     ):
         assert found.low < found.value < found.high
@@ -107,12 +112,60 @@ def test_interquartile_cost_does_not_see_one_bad_end():
     assert interquartile_cost(lost, draws, 0).high < 52.0
 
 
-def test_aggregate_score_without_chance_is_the_interquartile_mean_of_the_scores():
-    levels = [0.0, 0.2, 0.4, 0.6, 0.8, 9.0, -9.0, 0.5]
-    costs = [np.full((1, 10), 30.0 - 10.0 * level) for level in levels]
-    found = aggregate_score(costs, [(30.0, 20.0)] * 8, Draws(8, 10), range(8), 0)
-    expected = float(interquartile_mean(levels))
-    assert found == pytest.approx((expected, expected, expected))
+def test_scores_without_chance_are_the_means_of_those_of_the_tasks():
+    levels = [1.0, 1.2, 1.4, 0.6, 0.8, 9.0, 0.01, 0.5]
+    costs = {task: np.full((1, 10), 30.0 / level) for task, level in enumerate(levels)}
+    rule_costs = {task: np.full(10, 30.0) for task in range(9)}
+    draws = Draws(9, 10)
+    expected = {
+        mean_score: gmean(levels),
+        interquartile_score: float(interquartile_mean(levels)),
+    }
+    for statistic, value in expected.items():
+        found = statistic(costs, rule_costs, draws, 0)
+        assert found == pytest.approx((value, value, value))
+        assert np.isnan(statistic({}, rule_costs, draws, 0)).all()
+
+
+def test_one_hard_task_shows_in_the_geometric_mean_alone():
+    costs = {task: np.full((1, 10), 10.0) for task in range(12)}
+    rule_costs = {task: np.full(10, 10.0) for task in range(12)}
+    costs[7] = np.full((1, 10), 1000.0)
+    draws = Draws(12, 10)
+    assert interquartile_score(costs, rule_costs, draws, 0).value == 1.0
+    mean = mean_score(costs, rule_costs, draws, 0)
+    assert mean.value == pytest.approx(0.01 ** (1.0 / 12.0))
+
+
+def test_scores_and_gains_are_paired_over_episodes():
+    """Episodes differ tenfold, but the rule costs 5 % more in each of them."""
+    costs = RANDOM.uniform(10.0, 100.0, (1, 100))
+    rule_costs = 1.05 * costs[0]
+    draws = Draws(1, 100)
+    gain = gain_over(costs, rule_costs, draws, 0)
+    assert gain == pytest.approx([1.0 - 1.0 / 1.05] * 3)
+    scored = mean_score({0: costs}, {0: rule_costs}, draws, 0)
+    assert scored == pytest.approx([1.05] * 3)
+    assert gain_over(rule_costs[None], costs, draws, 0).value == pytest.approx(-0.05)
+
+
+def test_training_runs_that_differ_widen_the_interval_of_a_gain():
+    rule_costs = np.full(100, 50.0)
+    costs = rule_costs + np.array([[-20.0], [-10.0], [0.0], [10.0], [20.0]])
+    gain = gain_over(costs, rule_costs, Draws(1, 100), 0)
+    assert gain.value == 0.0
+    assert gain.low < -0.1
+    assert gain.high > 0.1
+
+
+@given(st.lists(st.floats(1.0, 1e3), min_size=4, max_size=4), st.floats(0.1, 10.0))
+def test_a_gain_is_the_score_in_one_task_put_as_a_saving(costs, unit):
+    cost = np.array([costs])
+    rule_costs = np.array([3.0, 5.0, 2.0, 8.0])
+    draws = Draws(1, 4, n_draws=20)
+    gain = gain_over(cost, rule_costs, draws, 0)
+    scored = mean_score({0: unit * cost}, {0: unit * rule_costs}, draws, 0)
+    assert gain.value == pytest.approx(1.0 - 1.0 / scored.value)
 
 
 def probability_of_improvement(one, other):

@@ -127,10 +127,11 @@ def test_steps_and_costs_are_those_of_each_autopilot():
 
 
 SCORES = {
-    "best-known": {"value": 1.0, "low": None, "high": None},
-    "pid": {"value": 0.25, "low": 0.125, "high": 0.5},
+    "best-known": {"value": 1.125, "low": None, "high": None},
+    "pid": {"value": 0.5, "low": 0.375, "high": 0.75},
     "lq": {"value": None, "low": None, "high": None},
 }
+MIDDLE = {"value": 0.625, "low": 0.5, "high": 0.75}
 RELATIVE = {"best-known": 1.0, "pid": 1.5, "lq": None}
 
 
@@ -139,10 +140,14 @@ def results(scores=SCORES, relative=RELATIVE, costs=(), **summary):
     ranking = []
     for name, score in scores.items():
         total = {"name": name, "score": score, "relative_cost": relative[name]}
-        ranking.append(total)
+        ranking.append(total | {"score_iqm": MIDDLE})
     costs = dict(costs)
     content = {
-        "reference": {"calm": {"zero": 3.0, "best": 1.0}},
+        "suite": {"tasks": {"calm": {"on": "ship"}, "calm-far": {"on": "far"}}},
+        "reference": {
+            "calm": {"rule": 3.5, "bound": 3.0},
+            "calm-far": {"rule": 9.0, "bound": 1.0},
+        },
         "ranking": ranking,
         "controllers": scores,
         "tasks": {"calm": costs},
@@ -157,35 +162,52 @@ def results(scores=SCORES, relative=RELATIVE, costs=(), **summary):
 
 
 def test_scores_are_drawn_with_their_intervals():
+    """Geometric and interquartile mean of each, and lines at the rule and the bound."""
     figure = scores_figure(results())
-    drawn = {}
+    drawn = []
     for trace in figure.data:
         error = trace.error_x
-        drawn[trace.name] = (trace.x[0], error.array[0], error.arrayminus[0])
-    assert drawn == {"best-known": (1.0, 0.0, 0.0), "pid": (0.25, 0.25, 0.125)}
-    assert sorted(shape.x0 for shape in figure.layout.shapes) == [0.0, 1.0]
+        drawn.append((trace.name, trace.x[0], error.array[0], error.arrayminus[0]))
+    assert drawn == [
+        ("best-known", 1.125, 0.0, 0.0),
+        ("best-known", 0.625, 0.125, 0.125),
+        ("pid", 0.5, 0.25, 0.125),
+        ("pid", 0.625, 0.125, 0.125),
+    ]
+    assert [trace.marker.symbol for trace in figure.data[2:]] == [
+        "circle",
+        "diamond-open",
+    ]
+    assert [shape.x0 for shape in figure.layout.shapes] == [
+        1.0,
+        pytest.approx(3.5 / 3.0),
+    ]
+    names = [annotation.text for annotation in figure.layout.annotations]
+    assert names == ["rule", "bound"]
     assert figure.layout.xaxis.title.text.startswith("score")
+    assert figure.layout.xaxis.range[0] == pytest.approx(0.4)
 
-    unscored = scores_figure(results(reference={}))
-    assert [trace.x[0] for trace in unscored.data] == [1.0, 1.5]
-    assert not unscored.layout.shapes
-    assert unscored.layout.xaxis.title.text.startswith("cost relative")
+
+def test_relative_costs_are_drawn_where_there_are_no_scores():
+    figure = scores_figure(results(reference={}))
+    assert [trace.x[0] for trace in figure.data] == [1.0, 1.5]
+    assert not figure.layout.shapes
+    assert figure.layout.xaxis.title.text.startswith("cost relative")
 
 
 @pytest.mark.parametrize(
-    ("score", "reference", "place", "symbol"),
+    ("score", "summary", "place", "symbol"),
     [
-        ((-300.0, -240.0, -1.0), {"calm": {}}, -1.5, "triangle-left"),
-        ((1.25, 7.0, 9.0), {"calm": {}}, 1.5, "triangle-right"),
-        ((1.25, 7.0, 9.0), {}, 4.0, "triangle-right"),  # of the relative cost
+        ((1.1, 7.0, 9.0), {}, 1.25, "triangle-right"),
+        ((1.25, 7.0, 9.0), {"reference": {}}, 4.0, "triangle-right"),
     ],
 )
-def test_a_number_beyond_the_axis_stands_at_its_edge(score, reference, place, symbol):
+def test_a_number_beyond_the_axis_stands_at_its_edge(score, summary, place, symbol):
     interval = dict(zip(("low", "value", "high"), score, strict=True))
-    result = results({"pid": interval}, {"pid": 90.0}, reference=reference)
-    (mark,) = scores_figure(result).data
+    result = results({"pid": interval}, {"pid": 90.0}, **summary)
+    mark = scores_figure(result).data[0]
     assert (mark.x[0], mark.marker.symbol) == (place, symbol)
-    assert mark.customdata[0] == (interval["value"] if reference else 90.0)
+    assert mark.customdata[0] == (90.0 if summary else interval["value"])
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,16 @@ import numpy as np
 import pytest
 
 import shipgym
+from agents import benchmark
 from agents.suites.environments import read_environment
 from agents.suites.limits import exceeded
-from agents.suites.reference import best_costs, best_known, load_tuned, reference_costs
+from agents.suites.reference import (
+    RULE,
+    best_costs,
+    best_known,
+    load_tuned,
+    reference_costs,
+)
 from agents.suites.suite import (
     BenchmarkTask,
     find_task,
@@ -313,26 +320,43 @@ def test_a_suite_without_best_known_costs_has_no_references(tmp_path):
         load_tuned(suite.source)
 
 
-def test_references_are_the_cost_of_wheel_over_and_the_mean_of_the_best(tmp_path):
-    known = {"calm": {"zero": 30, "costs": [1.0, 3.0] * 50, "by": ["lq"] * 100}}
-    suite = load_suite(write_suite(tmp_path, best=known))
-    assert reference_costs(suite.source) == {"calm": (30.0, 2.0)}
+def test_references_are_the_costs_of_the_rule_and_the_bound(tmp_path):
+    bound = {"costs": [1.0, 3.0] * 50, "by": ["lq"] * 100}
+    best = {"calm": bound | {"rule_costs": [2, 4] * 50}, "turns": bound}
+    suite = load_suite(write_suite(tmp_path, best=best))
+    references = reference_costs(suite.source)
+    assert list(references) == ["calm"]  # nobody has run the rule in the other
+    assert [costs[:2].tolist() for costs in references["calm"]] == [[2, 4], [1, 3]]
     assert best_costs(suite.task("calm"))[:3].tolist() == [1.0, 3.0, 1.0]
-    zero, best = reference_costs("shipgym-v1")["sharp-turns"]
-    assert best == best_costs(SHIPPED.task("sharp-turns")).mean() < zero
+
+
+def test_no_cost_of_the_rule_is_below_the_bound():
+    references = reference_costs("shipgym-v1")
+    assert list(references) == [task.name for task in SHIPPED.tasks]
+    for rule, bound in references.values():
+        assert (bound <= rule * (1.0 + 1e-9)).all()
+
+
+def test_the_rule_that_scores_are_relative_to_is_the_tuned_one():
+    """Where it was tuned again: `python scripts/best_known.py results`."""
+    result = benchmark(RULE, tasks="sharp-turns", episodes=2)
+    for cells in result.summary["tasks"].values():
+        assert cells[RULE]["score"]["value"] == pytest.approx(1.0, rel=1e-3)
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"zero": "30"}, r"best.json.*calm.zero: expected .* got '30'"),
+        ({"rule_costs": "30"}, r"best.json: calm.rule_costs: expected .* got '30'"),
+        ({"rule_costs": [None] * 100}, r"calm.rule_costs\[0\]: expected .* got None"),
+        ({"rule_costs": [1] * 99}, r"calm.rule_costs: expected .* got 99"),
         ({"costs": ["1"] * 100}, r"best.json.*calm.costs\[0\]: expected .* got '1'"),
         ({"costs": [1.0] * 99}, "best.json: calm: expected costs of 100 episodes"),
         ({"by": ["lq"] * 101}, "best.json: calm: .* got 100 and 101"),
     ],
 )
 def test_best_known_costs_with_a_wrong_field_are_refused(tmp_path, changes, said):
-    known = {"zero": 30.0, "costs": [1.0] * 100, "by": ["lq"] * 100}
+    known = {"rule_costs": [30.0] * 100, "costs": [1.0] * 100, "by": ["lq"] * 100}
     path = write_suite(tmp_path, best={"calm": known | changes})
     with pytest.raises(InputError, match=said):
         best_known(str(path))
