@@ -84,7 +84,14 @@ class Kept:
             with np.load(path, allow_pickle=False) as file:
                 written = json.loads(str(file["about"]))
                 arrays = {name: file[name] for name in cls.names}
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        except (
+            OSError,
+            ValueError,
+            TypeError,  # a single array, which is no archive
+            KeyError,
+            EOFError,
+            zipfile.BadZipFile,
+        ):
             raise InputError(
                 f"{path}: expected a file of this search, got another or a broken one;"
                 f" {remedy}"
