@@ -1,0 +1,1 @@
+"""Search of rudder commands on the true ship, the weather to come known."""
