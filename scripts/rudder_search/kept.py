@@ -81,7 +81,8 @@ class Kept:
         """Read a file; InputError if it is broken, or about something else."""
         remedy = "give another --out"
         try:
-            with np.load(path, allow_pickle=False) as file:
+            content = BytesIO(path.read_bytes())
+            with np.load(content, allow_pickle=False) as file:
                 written = json.loads(str(file["about"]))
                 arrays = {name: file[name] for name in cls.names}
         except (
@@ -107,8 +108,9 @@ class Kept:
     def save(self, path: Path) -> None:
         """Write the file, whole or not at all."""
         content = BytesIO()
-        text = np.array(json.dumps(self.about))
-        np.savez_compressed(content, about=text, **self.arrays)
+        about = np.array(json.dumps(self.about))
+        arrays: dict[str, Any] = {"about": about, **self.arrays}
+        np.savez_compressed(content, **arrays)
         with atomic_path(path) as draft:
             draft.write_bytes(content.getvalue())
 
@@ -132,7 +134,7 @@ class Kept:
     def source(self, number: int) -> str:
         """Name of the entry that an episode was started from."""
         entries: list[str] = self.about["entries"]
-        return entries[self.arrays["started_from"][number]]
+        return entries[int(self.arrays["started_from"][number])]
 
     def check(self, task: BenchmarkTask, number: int) -> None:
         """Replay an episode in an engine of one ship; InputError for another cost."""

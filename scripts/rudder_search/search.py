@@ -90,7 +90,8 @@ class _Visit:
         padded = np.zeros((N_LANES, self.lanes.n_steps), dtype=np.float32)
         padded[:] = found.course
         self.try_out(padded)
-        n_sailed = int(others.any(axis=0).nonzero()[0].max(initial=0)) + 1
+        commanded = np.any(others != 0.0, axis=0)
+        n_sailed = int(np.flatnonzero(commanded).max(initial=0)) + 1
         self.changes = RandomChanges(self.random, others, n_sailed)
 
         spacing = search.spacings[found.visits % len(search.spacings)]

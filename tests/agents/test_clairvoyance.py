@@ -21,7 +21,11 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def suite(folder):
-    known = {"rule_costs": [1.0] * N_EPISODES, "costs": [1e6] * N_EPISODES, "by": ["lq"] * N_EPISODES}
+    known = {
+        "rule_costs": [1.0] * N_EPISODES,
+        "costs": [1e6] * N_EPISODES,
+        "by": ["lq"] * N_EPISODES,
+    }
     return write_suite(folder, best={"turns": known})
 
 
