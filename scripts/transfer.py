@@ -7,7 +7,7 @@ the same 100 episodes on the ship:
 
     wheel-over     designed on the model, or on the ship
     tuned          the classical controller that cost least on the model, its settings
-                   by direct search there, or, with the same budget, on the ship
+                   searched there, or, with the same budget, on the ship
     ppo            the five agents of `agents/pretrained`, learned over models drawn
                    from the covariance and added to `tuned`; or three learned on the
                    ship, with the same settings, and added to that tuned on her
@@ -98,7 +98,10 @@ def main() -> None:
     parser.add_argument("tasks", nargs="*", help=f"by default {', '.join(TASKS)}")
     parser.add_argument("--out", type=Path, default=Path("transfer"))
     parser.add_argument(
-        "--runs", type=int, default=RUNS, help="of training on the ship"
+        "--runs",
+        type=int,
+        default=RUNS,
+        help="of training on the ship; 0 leaves the agents out",
     )
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
@@ -148,6 +151,8 @@ def run_transfers(name: str, out: Path, runs: int) -> Iterator[tuple[str, Transf
         transfer([tuned("base", model, DEFAULT_SUITE)], [tuned_on_ship]),
     )
 
+    if runs == 0:
+        return
     base_file = out / f"{name}-tuned.json"
     tuned_on_ship.save(base_file)
     agents = [load_agent(path) for path in pretrained(name, "ppo")]
