@@ -299,10 +299,10 @@ class Helm(HelmCommands):
             distance = self.sensors.value("waypoint_distance", now)
             return inf if distance is None else distance / speed
 
-        reach = self.pilot.agent.gains["turn_reach"]
         for turn in ("next", "second"):
-            to_go = inputs[f"{turn}_turn_distance"] - reach
             angle = inputs[f"{turn}_turn_angle"]
+            reach = self.pilot.agent.turn_reach(angle)
+            to_go = inputs[f"{turn}_turn_distance"] - reach
             if angle and to_go > 0.0:
                 return float(to_go / speed)
         return inf
