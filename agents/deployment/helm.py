@@ -140,8 +140,9 @@ class Helm(HelmCommands):
         preposition = "with" if has_route else "without"
         if has_route != bool(turns) or not turns <= {*Route.GIVES}:
             raise InputError(
-                "route: expected 'wheel-over' or 'mpc' of shipgym autopilot with a"
-                f" route, or another without, got '{name}' {preposition} a route"
+                "route: expected 'preview-lq', 'wheel-over' or 'mpc' of shipgym"
+                " autopilot with a route, or another without, got"
+                f" '{name}' {preposition} a route"
             )
 
     def hear(self, line: str, source: str, now: float) -> None:

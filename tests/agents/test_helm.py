@@ -203,7 +203,7 @@ def test_a_rate_of_turn_is_steered_or_limits_the_way_to_a_heading(
 def test_what_steers_no_route_and_no_rate_is_refused():
     route = Route(np.array([[54.0, 7.5], [54.1, 7.5]]), 600.0)
     with pytest.raises(
-        InputError, match=r"route: expected 'wheel-over' .* got 'pid' with a route"
+        InputError, match=r"route: expected 'preview-lq', .* got 'pid' with a route"
     ):
         Helm(PID_MARINER, None, Limits(), route)
     with pytest.raises(InputError, match="got 'wheel-over' without a route"):
