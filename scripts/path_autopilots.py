@@ -139,7 +139,7 @@ def cell(row: Mapping[str, Any] | None) -> str:
     """Cost, ships lost and cross-track error of a row."""
     if row is None or "cost" not in row:
         return "-"
-    return f"{row['cost']:.1f}, {row['lost']}, {row['cross_track']:.2f}"
+    return f"{row['cost']:.1f}, {row['lost']}, {row['cross_track']:.3f}"
 
 
 def against_wheel_over(
