@@ -39,9 +39,9 @@ class Panel(NamedTuple):
 
 PANELS = (
     Panel("lookahead_lengths", (1.2, 2.5, 5.0)),
-    Panel("lead_lengths", (0.8, 1.6, 2.4)),
+    Panel("lead_lengths", (0.8, 1.75, 2.6)),
     Panel("lead_power", (-1.0, 0.0, 2.0)),
-    Panel("window_lengths", (0.1, 0.5, 3.0), shows="delta"),
+    Panel("window_lengths", (0.2, 1.75, 4.0), shows="delta"),
     Panel("arc_factor", (1.0, 1.5, 2.5)),
     Panel("inside_lengths", (-0.4, 0.0, 0.4)),
     Panel("feed_forward_lengths", (-0.6, 0.0, 0.6)),
@@ -94,7 +94,7 @@ def sailed(settings: Mapping[str, float], panel: Panel) -> Floats:
     if panel.sea == "current":
         options["sea"] = Weather(current=Current(1.5, towards_deg=90.0))
     task = path_following_task(**options)
-    own, inner = {}, {}
+    own, inner = {"window_lengths": 1.75}, {}
     for name, value in settings.items():
         if name.startswith("lq_"):
             inner[name.removeprefix("lq_")] = value

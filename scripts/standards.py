@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from agents import LQ, WheelOver
+from agents import LQ, PreviewLQ
 from agents.verification.standards import standards
 from agents.verification.tracks import keep_track, track_task
 from shipgym.ships import load_model
@@ -16,7 +16,7 @@ def main(names: list[str]) -> None:
     for name in names:
         ship = load_model(name)
         track = keep_track(
-            WheelOver.from_model(ship, task=track_task(ship)), [ship, ship]
+            PreviewLQ.from_model(ship, task=track_task(ship)), [ship, ship]
         )
         found.append(standards(ship, LQ.from_model(ship), [track]))
     for rows in zip(*found, strict=True):

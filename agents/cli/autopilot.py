@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -47,8 +48,8 @@ def autopilot_command(
         Option(
             metavar="NAMES",
             help=(
-                "Autopilots to design; default: pid,lq,turn-rate,wheel-over. "
-                "Others: lqg, preview-lq, mpc."
+                "Autopilots to design; default: pid,lq,turn-rate,preview-lq. "
+                "Others: lqg, wheel-over, mpc."
             ),
         ),
     ] = None,
@@ -64,7 +65,7 @@ def autopilot_command(
         Option(
             min=0.0,
             metavar="SECONDS",
-            help="Search the settings of each design, so long; adds preview-lq.",
+            help="Search the settings of each design, so long.",
         ),
     ] = 0.0,
     engine: EngineName = "local",
@@ -85,9 +86,7 @@ def autopilot_command(
     from agents.verification.chain import build_autopilot
     from agents.verification.verify import DESIGNS
 
-    designs = list(DESIGNS)
-    if tune > 0.0:
-        designs.append("preview-lq")
+    designs: Sequence[str] = DESIGNS
     if autopilots is not None:
         designs = [name.strip() for name in autopilots.split(",")]
     with progress_bars() as on_progress:

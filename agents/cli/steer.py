@@ -43,7 +43,10 @@ RouteFile = Annotated[
     Path | None,
     Option(
         metavar="CSV",
-        help="Route for wheel-over: columns latitude, longitude, degrees.",
+        help=(
+            "Route for preview-lq, wheel-over or mpc: columns latitude, longitude,"
+            " degrees."
+        ),
     ),
 ]
 LimitValues = Annotated[

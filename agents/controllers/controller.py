@@ -215,6 +215,13 @@ class Controller:
                 read.append(name)
         return tuple(read)
 
+    def turn_reach(self, angle: float) -> float:
+        """Distance before a turn of an angle, rad, at which it is begun, m.
+
+        It is 0 for what does not look ahead.
+        """
+        return self.gains.get("turn_reach", 0.0)
+
     @classmethod
     def is_closed_form(cls) -> bool:
         """Return True if it steers by its `law` alone, which can be translated to C."""

@@ -30,6 +30,7 @@ from agents.controllers.own_path import (
     TurnMemory,
     own_path,
     remembered,
+    tangent,
 )
 from agents.controllers.wheel_over import own_lead
 from shipgym import InputError, ShipModel
@@ -176,7 +177,8 @@ class PreviewSettings(NamedTuple):
     lead_lengths : float
         How far ahead the path's course is read, ship lengths; by default `own_lead`.
     window_lengths : float
-        Over which it is averaged, ship lengths: longer turns more gently.
+        Over which it is averaged, ship lengths: longer turns more gently; by default
+        the lead.
     inside_lengths : float
         How far inside a turn the ship is to be, ship lengths per radian that the path
         turns in the window.
@@ -303,7 +305,7 @@ class PreviewLQ(Guided):
         task: Task | None = None,
         lookahead_lengths: float | None = None,
         lead_lengths: float | None = None,
-        window_lengths: float = 0.5,
+        window_lengths: float | None = None,
         inside_lengths: float = 0.0,
         feed_forward_lengths: float = 0.0,
         crab_share: float = 1.0,
@@ -319,8 +321,8 @@ class PreviewLQ(Guided):
         """Design on a model, for the paths of a task.
 
         The defaults follow from the model: the lead is the distance that her heading
-        and her way lag behind in a steady turn (`own_lead`), the window half a ship
-        length, and nothing else is added.
+        and her way lag behind in a steady turn (`own_lead`), the window is as long as
+        the lead, from half of it to one and a half, and nothing else is added.
 
         Raises InputError if an argument is out of its range, the autopilot is not LQ,
         or it was designed for another ship.
@@ -348,6 +350,8 @@ class PreviewLQ(Guided):
             lookahead_lengths = asked.lookahead
         if lead_lengths is None:
             lead_lengths = own_lead(model, autopilot)
+        if window_lengths is None:
+            window_lengths = lead_lengths
         settings = PreviewSettings(
             lookahead_lengths=lookahead_lengths,
             lead_lengths=lead_lengths,
@@ -376,6 +380,13 @@ class PreviewLQ(Guided):
             "service_speed": model.particulars["speed"],
         }
         return cls.leading(model, autopilot, asked, gains, {})
+
+    def turn_reach(self, angle: float) -> float:
+        """See `Controller.turn_reach`: where the window comes to her own arc."""
+        gains = self.gains
+        radii = Radii(planned=gains["path_radius"], own=gains["own_radius"])
+        earlier = float(tangent(angle, radii))
+        return gains["lead"] + 0.5 * gains["window"] + earlier
 
     @property
     def needed_signals(self) -> tuple[str, ...]:

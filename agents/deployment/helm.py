@@ -140,8 +140,9 @@ class Helm(HelmCommands):
         preposition = "with" if has_route else "without"
         if has_route != bool(turns) or not turns <= {*Route.GIVES}:
             raise InputError(
-                "route: expected 'wheel-over' or 'mpc' of shipgym autopilot with a"
-                f" route, or another without, got '{name}' {preposition} a route"
+                "route: expected 'preview-lq', 'wheel-over' or 'mpc' of shipgym"
+                " autopilot with a route, or another without, got"
+                f" '{name}' {preposition} a route"
             )
 
     def hear(self, line: str, source: str, now: float) -> None:
@@ -299,10 +300,10 @@ class Helm(HelmCommands):
             distance = self.sensors.value("waypoint_distance", now)
             return inf if distance is None else distance / speed
 
-        reach = self.pilot.agent.gains["turn_reach"]
         for turn in ("next", "second"):
-            to_go = inputs[f"{turn}_turn_distance"] - reach
             angle = inputs[f"{turn}_turn_angle"]
+            reach = self.pilot.agent.turn_reach(angle)
+            to_go = inputs[f"{turn}_turn_distance"] - reach
             if angle and to_go > 0.0:
                 return float(to_go / speed)
         return inf

@@ -147,10 +147,11 @@ def quiet_space(task: BenchmarkTask) -> list[Setting]:
 
 def preview_space(task: BenchmarkTask) -> list[Setting]:
     """All settings of `PreviewLQ.from_model` that the task lets act."""
+    lead_lengths = own_lead(task.ship, None)
     space = [
         *los_space(task),
-        factor("lead_lengths", own_lead(task.ship, None), 0.4),
-        factor("window_lengths", 0.5, 0.7),
+        factor("lead_lengths", lead_lengths, 0.4),
+        factor("window_lengths", lead_lengths, 0.7),
         Setting("inside_lengths", 0.0, 0.2, low=-5.0, high=5.0),
         Setting("feed_forward_lengths", 0.0, 0.3, low=-10.0, high=10.0),
         Setting("arc_factor", 1.1, 0.3, low=1.0, high=10.0),

@@ -259,7 +259,11 @@ def with_standards(found: Verification, model: ShipModel) -> Verification:
         if pilot.design is not None and pilot.key not in refused:
             designs.append(pilot.design)
     best = designs[0]
-    tracks = [track for track in found.tracks if track.key not in refused]
+    tracks = []
+    for track in found.tracks:
+        sees_turns = "path_radius" in track.controller.gains
+        if sees_turns and track.key not in refused:
+            tracks.append(track)
     requirements = standards(model, best, tracks)
     return replace(found, standards=tuple(requirements))
 

@@ -231,12 +231,11 @@ def _wheel_overs(guide: Controller, along: SteeredRun) -> Integers:
     """
     to_go = []
     for given in along.given:
-        distance = given["next_turn_distance"]
-        is_turn = given["next_turn_angle"] != 0.0
-        to_go.append(distance if is_turn else np.nan)
+        angle = given["next_turn_angle"]
+        distance = given["next_turn_distance"] - guide.turn_reach(angle)
+        to_go.append(np.nan if angle == 0.0 else distance)
 
-    reach = guide.gains["turn_reach"]
     before = np.array(to_go[:-1])
     after = np.array(to_go[1:])
-    enters = (before > reach) & (after <= reach)
+    enters = (before > 0.0) & (after <= 0.0)
     return 1 + np.flatnonzero(enters)

@@ -1,5 +1,6 @@
 """Designs whose settings are searched on the models drawn, by CMA-ES."""
 
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -11,6 +12,7 @@ from agents.training.controller_search import (
     FoundSettings,
     SearchBudget,
     tune_controller,
+    unseen_costs,
 )
 from agents.verification.tracks import track_task
 from identification.progress import Progress
@@ -24,15 +26,17 @@ class Tuned(NamedTuple):
 
     controller: Controller
     found: FoundSettings
+    on_draws: bool  # whether they were searched on models drawn
 
     @property
     def in_words(self) -> str:
         """Sentence for the report."""
         found = self.found
+        where = "models drawn" if self.on_draws else "episodes of the identified model"
         return (
             f"{found.evaluations} candidates in {found.seconds:.0f} s of processor;"
             f" cost {found.start_cost:.3g} as designed, {found.cost:.3g} tuned, on"
-            " models drawn that the search has not seen"
+            f" {where} that the search has not seen"
         )
 
 
@@ -40,21 +44,39 @@ def tuned_design(kind: str, model: ShipModel, seconds: float, tell: Progress) ->
     """Design of a kind with settings searched on models drawn from the covariance.
 
     A heading autopilot is tried in course keeping, a path autopilot on drawn paths in a
-    current of a tenth of the ship's speed. Raises InputError if there is no design with
-    enough margin.
+    current of a tenth of the ship's speed; on the model alone where models drawn are
+    lost that no settings hold (`holds_draws`). Raises InputError if there is no design
+    with enough margin.
     """
     follows_path = controller_class(kind).has_autopilot
     task = path_task(model) if follows_path else course_keeping_task()
     environment = "path-following" if follows_path else "course-keeping"
+    drawn = model_task(environment, model, task)
+    alone = model_task(environment, replace(model, covariance=None), task)
+    on_draws = holds_draws(kind, drawn, alone)
     found = tune_controller(
         kind,
-        model_task(environment, model, task),
+        drawn if on_draws else alone,
         SearchBudget(seconds=seconds),
         on_progress=partial(_told, tell, kind),
     )
     given_task = track_task(model) if follows_path else task
     given = model_task(environment, model, given_task)
-    return Tuned(design(kind, given, found.settings), found)
+    return Tuned(design(kind, given, found.settings), found, on_draws)
+
+
+def holds_draws(kind: str, drawn: ModelTask, alone: ModelTask) -> bool:
+    """True if a design costs about as much on models drawn as on the model alone.
+
+    Ships that are lost are charged so much that a search on them gives up steering for
+    what few of them it may yet hold, and costs many times more on the ship herself.
+    """
+    most = 3.0  # times the cost on the model
+    episodes = SearchBudget().episodes
+    on_drawn, on_model = (
+        float(unseen_costs(kind, task, [{}], episodes)[0]) for task in (drawn, alone)
+    )
+    return on_drawn <= most * on_model
 
 
 def _told(tell: Progress, kind: str, spent: float, seconds: float, _: float) -> None:

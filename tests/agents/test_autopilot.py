@@ -32,9 +32,9 @@ def test_the_folder_holds_report_model_metrics_and_all_autopilots(chain):
         "metrics.json",
         "model.json",
         "pid.json",
+        "preview-lq.json",
         "report.html",
         "turn-rate.json",
-        "wheel-over.json",
     ]
     assert list(folder.parent.iterdir()) == [folder]
 
@@ -65,18 +65,16 @@ def test_metrics_tell_probabilities_margins_and_ranking(chain):
         assert metrics["controllers"][name]["margins"]["phase_margin_deg"] > 30.0
 
 
-def test_wheel_over_keeps_to_the_track_in_a_current_on_every_model_drawn(chain):
-    """Within half a ship length; with a quarter of the turn's reach by more."""
+def test_lq_with_preview_keeps_to_the_track_in_a_current_on_every_model_drawn(chain):
+    """Within half a ship length; with a lead of next to nothing by more."""
     _, result, _ = chain
     (track,), length = result.verification.tracks, result.model.particulars["length"]
     assert track.arrived.all()
     assert len(track.largest) == 25
     assert track.largest.max() < 0.5 * length
-    told = result.metrics["tracks"]["wheel-over"]
+    told = result.metrics["tracks"]["preview-lq"]
     assert told["cross_track_largest_m"] == track.largest[0]
-    late = replace(
-        track.controller, gains={**track.controller.gains, "turn_reach": 1.0}
-    )
+    late = replace(track.controller, gains={**track.controller.gains, "lead": 1.0})
     assert keep_track(late, [result.model]).largest[0] > 1.5 * track.largest[0]
 
 

@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from agents import LQ, PID, TurnRate, WheelOver
+from agents import LQ, PID, PreviewLQ, TurnRate, WheelOver
 from agents.deployment.autopilot import Autopilot
 from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER
@@ -210,3 +210,56 @@ def test_wheel_over_is_what_the_page_says():
         assert bridge.step(given) == pytest.approx(
             max(-limit, min(limit, order)), abs=1e-9
         )
+
+
+def course_ahead(given, gains):
+    """Mean change of the path's course in the window, by steps 2 and 3 of the page."""
+    radius = gains["path_radius"]
+
+    def turned(to):
+        whole = 0.0
+        for one in ("next", "second"):
+            angle = given[f"{one}_turn_angle"]
+            ahead = to - max(0.0, given[f"{one}_turn_distance"])
+            t = max(0.0, min(abs(angle), ahead / radius))
+            s = abs(angle) * max(0.0, ahead - radius * abs(angle))
+            whole += math.copysign(radius * t**2 / 2.0 + s, angle)
+        return whole
+
+    lead, half = gains["lead"], gains["window"] / 2.0
+    return (turned(lead + half) - turned(lead - half)) / gains["window"]
+
+
+def test_lq_with_preview_is_what_the_page_says():
+    agent = PreviewLQ.from_model(MARINER, task=Task.of("PathFollowing"))
+    random = np.random.default_rng(1)
+    bridge, gains, integral = Autopilot(agent), agent.gains, 0.0
+    helm = json.loads(json.dumps(agent.to_dict()))["autopilot"]
+    of, neutral, limit = helm["gains"], helm["neutral_rudder"], MARINER.steering.limit
+    for step in range(300):
+        given = {name: random.normal(0.0, 0.05) for name in bridge.inputs}
+        to_go = 600.0 - 5.0 * step  # to the turn, and along it
+        left = max(0.1, 1.0 - max(0.0, -to_go) / gains["path_radius"])
+        given |= {
+            "surge": 7.5 + given["surge"],
+            "cross_track": 1000.0 * given["cross_track"],
+            "next_turn_distance": to_go,
+            "next_turn_angle": left,
+            "second_turn_distance": to_go + 900.0,
+            "second_turn_angle": -0.5,
+        }
+        crab = given["course"] - given["heading"]
+        crab = wrap(crab - math.atan2(given["sway"], given["surge"]))
+        back = math.atan(given["cross_track"] / gains["lookahead"])
+        wanted = given["set_point"] - back + course_ahead(given, gains)
+        error = wrap(wanted - gains["crab_share"] * crab - given["heading"])
+        if step and abs(error) <= math.radians(10.0):
+            integral += error * helm["design"]["dt"]
+
+        order = neutral + of["heading_error"] * error
+        order += of["heading_error_integral"] * integral
+        order += of["yaw_rate"] * given["yaw_rate"]
+        order += of["sway"] * (given["sway"] - helm["neutral_sway"])
+        order += of["rudder"] * (given["rudder"] - neutral)
+        within = max(-limit, min(limit, order))
+        assert bridge.step(given) == pytest.approx(within, abs=1e-9)

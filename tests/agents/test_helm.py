@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents import LQ, PID, TurnRate, WheelOver, load_agent
+from agents import LQ, PID, PreviewLQ, TurnRate, WheelOver, load_agent
 from agents.deployment.helm import MANUAL, STANDBY, STEERING, Helm
 from agents.deployment.nmea import NmeaReading
 from agents.deployment.route import Route
@@ -20,6 +20,7 @@ from tests.agents.steering import sentence
 PID_MARINER, LQ_MARINER = PID.from_model(MARINER), LQ.from_model(MARINER)
 TURN_RATE = TurnRate.from_model(MARINER)
 WHEEL_OVER = WheelOver.from_model(MARINER, task=Task.of("PathFollowing"))
+PREVIEW = PreviewLQ.from_model(MARINER, task=Task.of("PathFollowing"))
 
 
 def helm(agent=PID_MARINER, **limits):
@@ -116,14 +117,15 @@ def test_the_rudder_ordered_is_limited_and_the_helmsman_is_warned():
     assert found.warnings == ["off heading", "course change ahead"]
 
 
-def test_a_course_change_is_announced_by_the_time_to_turn_or_waypoint():
+@pytest.mark.parametrize("guide", [WHEEL_OVER, PREVIEW], ids=lambda one: one.kind)
+def test_a_course_change_is_announced_by_the_time_to_turn_or_waypoint(guide):
     found = Helm(
-        WHEEL_OVER,
+        guide,
         None,
         Limits(),
         Route(np.array([[54.0, 7.5], [54.1, 7.5], [54.1, 7.6]]), 600.0),
     )
-    reach = WHEEL_OVER.gains["turn_reach"]
+    reach = guide.turn_reach(0.5)
 
     def seconds(next_m, next_angle, second_m, second_angle):
         given = {"next_turn_distance": reach + next_m, "next_turn_angle": next_angle}
@@ -201,7 +203,7 @@ def test_a_rate_of_turn_is_steered_or_limits_the_way_to_a_heading(
 def test_what_steers_no_route_and_no_rate_is_refused():
     route = Route(np.array([[54.0, 7.5], [54.1, 7.5]]), 600.0)
     with pytest.raises(
-        InputError, match=r"route: expected 'wheel-over' .* got 'pid' with a route"
+        InputError, match=r"route: expected 'preview-lq', .* got 'pid' with a route"
     ):
         Helm(PID_MARINER, None, Limits(), route)
     with pytest.raises(InputError, match="got 'wheel-over' without a route"):

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents import LQ, PID, PreviewLQ, WheelOver, check_controller, load_agent
-from agents.controllers.law import Turns
+from agents.controllers.law import PathSignals, Turns
 from agents.controllers.own_path import Radii, TurnMemory, own_path
-from agents.controllers.preview_lq import summed_turn, turned_by
+from agents.controllers.preview_lq import PreviewMemory, summed_turn, turned_by
 from agents.controllers.quiet_lq import QuietLQ
 from agents.controllers.side_by_side import side_by_side
 from agents.rollouts.rollout import episode_costs
@@ -46,6 +46,26 @@ def test_with_nothing_added_it_is_wheel_over():
         for guide in (narrow, WheelOver.from_model(MARINER, task=PATH))
     )
     np.testing.assert_allclose(ours, wheel_over, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("kind", "wider"),
+    [(WheelOver, {}), (PreviewLQ, {}), (PreviewLQ, {"arc_factor": 1.5})],
+)
+def test_a_turn_is_begun_at_the_reach(kind, wider):
+    guide = kind.from_model(MARINER, task=PATH, **wider)
+    speed = MARINER.particulars["speed"]
+
+    def course(distance):
+        turns = Turns(distance, 0.5, 2.0 * distance, 0.0)
+        numbers = dict.fromkeys(PathSignals._fields, 0.0) | {"surge": speed}
+        seen = PathSignals(**numbers | {"turns": turns})
+        nothing = PreviewMemory(0.0, 0.0, TurnMemory(0.0, 0.0, 0.0, 0.0))
+        return guide.course(seen, nothing)[0]
+
+    reach = guide.turn_reach(0.5)
+    assert course(reach + 1.0) == pytest.approx(0.0, abs=1e-9)
+    assert course(reach - 10.0) > 1e-5
 
 
 def test_designs_side_by_side_steer_as_each_alone():

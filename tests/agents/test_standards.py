@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents import LQ, PID, WheelOver
+from agents import LQ, PID, PreviewLQ
 from agents.deployment.steering import Limits
 from agents.verification.standards import (
     REQUIREMENTS,
@@ -26,11 +26,11 @@ from tests.agents.policies import MARINER
 @pytest.fixture(scope="module")
 def track():
     return keep_track(
-        WheelOver.from_model(MARINER, task=track_task(MARINER)), [MARINER, MARINER]
+        PreviewLQ.from_model(MARINER, task=track_task(MARINER)), [MARINER, MARINER]
     )
 
 
-def test_the_mariner_under_lq_and_wheel_over_meets_every_row(track):
+def test_the_mariner_under_lq_and_lq_with_preview_meets_every_row(track):
     rows = {
         row.name: row for row in standards(MARINER, LQ.from_model(MARINER), [track])
     }
@@ -49,9 +49,7 @@ def test_an_autopilot_that_is_too_weak_and_a_late_turn_fail_their_rows(track):
     assert (
         heading_control(MARINER, weak)["overshoot"] > REQUIREMENTS["overshoot"]["limit"]
     )
-    late = replace(
-        track.controller, gains={**track.controller.gains, "turn_reach": 1.0}
-    )
+    late = replace(track.controller, gains={**track.controller.gains, "lead": 1.0})
     found = track_control(MARINER, keep_track(late, [MARINER, MARINER]))
     assert found["cross_track"] > REQUIREMENTS["cross_track"]["limit"]
 
@@ -144,7 +142,7 @@ def test_a_turn_is_announced_from_the_last_quiet_interval_on(warned, lead, track
     last, of 10 m each.
     """
     guide = track.controller
-    to_go = guide.gains["turn_reach"] + 10.0 * np.array([4.0, 3.0, 2.0, 1.0, 0.0, -1.0])
+    to_go = guide.turn_reach(0.5) + 10.0 * np.array([4.0, 3.0, 2.0, 1.0, 0.0, -1.0])
     given = [{"next_turn_distance": one, "next_turn_angle": 0.5} for one in to_go]
     given += [
         {"next_turn_distance": one, "next_turn_angle": 0.0}

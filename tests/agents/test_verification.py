@@ -12,10 +12,12 @@ from agents.verification.refusal import lost_track
 from agents.verification.result import pilot_metrics, track_metrics
 from agents.verification.standards import heading_control
 from agents.verification.tracks import keep_track, track_task
+from agents.verification.tuned import holds_draws, model_task
 from agents.verification.verify import unique_keys
 from agents.verification.view import headline, is_certain
 from identification.progress import PROGRESS
-from shipgym import InputError, load_model
+from shipgym import Current, InputError, Weather, load_model
+from shipgym.tasks.task import path_following_task
 
 
 def track(largest, rms, arrived):
@@ -256,3 +258,16 @@ def test_standards_are_those_of_the_best_design_and_the_tracks_that_are_given(ch
     assert values["cross_track"] is None
     expected = heading_control(chain[1].model, ranked[1].design)
     assert values["overshoot"] == expected["overshoot"]
+
+
+def test_a_search_leaves_models_drawn_that_a_design_loses():
+    ship = load_model("mariner")
+
+    def sailed(current):
+        task = path_following_task(sea=Weather(current=Current(current, 90.0)))
+        return model_task("path-following", ship, task)
+
+    calm = sailed(0.0)
+    assert holds_draws("wheel-over", calm, calm)
+    swept_away = sailed(9.0)  # faster than the ship
+    assert not holds_draws("wheel-over", swept_away, calm)
