@@ -36,7 +36,7 @@ from agents.controllers.memory import (
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 from shipgym.tasks.scales import OBSERVATION_NAMES
-from shipgym.tasks.task import Task
+from shipgym.tasks.task import Task, path_following_task
 
 Observations = NDArray[np.float32]
 
@@ -270,6 +270,15 @@ class Guided(Controller):
         raise InputError(
             f"autopilot: expected a controller of shipgym for {purpose}, got {name}"
         )
+
+
+def with_path(task: Task | None) -> Task:
+    """Task of guidance, by default the environment's; InputError without a path."""
+    if task is None:
+        return path_following_task()
+    if not task.follows_path:
+        raise InputError(f"task: expected one with a path, got '{task.name}'")
+    return task
 
 
 def _scales_of(task: Task, model: ShipModel, names: Sequence[str]) -> tuple[float, ...]:

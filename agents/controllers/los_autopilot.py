@@ -16,14 +16,14 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 
 from agents.controllers.controller import ANY_NUMBER, Bounds
-from agents.controllers.guided import Guided
+from agents.controllers.guided import Guided, with_path
 from agents.controllers.interface import Policy
 from agents.controllers.law import Law, Nothing, Number, PathSignals
 from shipgym import ShipModel
 from shipgym.checks import check_number
 from shipgym.engine.records import Record
 from shipgym.ships.by_name import takes_name
-from shipgym.tasks.task import Task, path_following_task
+from shipgym.tasks.task import Task
 from shipgym.wrong_types import typed
 
 # integral time over lookahead time with which s^2 + s / T + 1 / (T Ti) has a double
@@ -128,7 +128,7 @@ class LineOfSight(Guided):
             with which the way back to the path is critically damped; less swings, more
             is slower.
         """
-        asked = task or path_following_task()
+        asked = with_path(task)
         if lookahead_lengths is None:
             lookahead_lengths = asked.lookahead
         check_number(lookahead_lengths, "lookahead_lengths", above=0.0)

@@ -20,6 +20,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from agents.controllers.controller import Bounds
+from agents.controllers.guided import with_path
 from agents.controllers.interface import Policy
 from agents.controllers.law import (
     Nothing,
@@ -41,7 +42,7 @@ from shipgym.envs.engine import Engine
 from shipgym.ships.by_name import takes_name
 from shipgym.tasks.scales import STEPS_PER_LENGTH
 from shipgym.tasks.steering import HEADING_SCALE
-from shipgym.tasks.task import Task, course_keeping_task, path_following_task
+from shipgym.tasks.task import Task, course_keeping_task
 
 KNOTS = 6  # of a plan
 KNOT_STEPS = int(STEPS_PER_LENGTH)  # control intervals from one knot to the next
@@ -133,7 +134,7 @@ class MPC(WheelOver):
         """
         check_number(horizon_lengths, "horizon_lengths", above=0.0, at_most=40.0)
         check_number(deviation_deg, "deviation_deg", above=0.0, at_most=60.0)
-        asked = task or path_following_task()
+        asked = with_path(task)
         guide = super().from_model(model, autopilot=autopilot, task=asked, **settings)
 
         horizon_s = horizon_lengths * model.travel_time

@@ -16,6 +16,7 @@ class TurnMemory(NamedTuple):
     """Turns that a ship has come to."""
 
     whole: Number  # rad, of the turn ahead or under way
+    left: Number  # rad of it
     on_arc: Number  # 1 while it is under way, else 0
     last: Number  # rad, of the turn before; 0 if there was none
     behind: Number  # m since its end
@@ -50,15 +51,21 @@ def remembered(
 ) -> TurnMemory:
     """Turns that a ship has come to, `advance` metres after the memory."""
     angle = turns.next_angle
-    is_on = (turns.next_distance <= 0.0) & (np.abs(angle) > 0.0)
-    is_under_way = is_on & (np.abs(memory.whole) > np.abs(angle))
-    whole = np.where(is_under_way, memory.whole, angle)
+    noise = 0.1  # rad, by which what is left of a turn may seem to grow
+    is_other_side = angle * memory.whole <= 0.0
+    is_longer = np.abs(angle) > np.abs(memory.left) + noise
+    is_another = is_other_side | is_longer
 
-    is_another = np.abs(whole - memory.whole) > 1e-6
+    is_on = (turns.next_distance <= 0.0) & (np.abs(angle) > 0.0)
+    begins = is_another | (np.abs(angle) > np.abs(memory.whole))
+    under_way = np.where(begins, angle, memory.whole)
+    whole = np.where(is_on, under_way, angle)
+
     is_away = is_another | (turns.next_distance > 0.25 * radius)
     has_left = (memory.on_arc > 0.0) & is_away
     return TurnMemory(
         whole=whole,
+        left=angle,
         on_arc=np.where(is_on, 1.0, 0.0),
         last=np.where(has_left, memory.whole, memory.last),
         behind=np.where(has_left, 0.0, memory.behind + advance),

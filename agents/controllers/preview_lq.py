@@ -20,7 +20,7 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 
 from agents.controllers.controller import ANY_NUMBER, Bounds
-from agents.controllers.guided import COURSE_ERROR, TURNS, Guided, arc_turned
+from agents.controllers.guided import COURSE_ERROR, TURNS, Guided, arc_turned, with_path
 from agents.controllers.interface import Policy
 from agents.controllers.law import Law, Number, PathSignals, clipped, wrapped
 from agents.controllers.lq import LQ
@@ -37,7 +37,7 @@ from shipgym import InputError, ShipModel
 from shipgym.checks import check_number
 from shipgym.engine.records import Record
 from shipgym.ships.by_name import takes_name
-from shipgym.tasks.task import Task, path_following_task
+from shipgym.tasks.task import Task
 from shipgym.wrong_types import typed
 
 
@@ -105,7 +105,8 @@ def preview_law(
     yaw_rate = memory.yaw_rate + p.yaw_update * (seen.yaw_rate - memory.yaw_rate)
     by_yaw_rate = p.yaw_gain * (yaw_rate - seen.yaw_rate)
     by_roll = p.roll_gain * seen.roll + p.roll_rate_gain * seen.roll_rate
-    steered = by_heading + by_yaw_rate + by_roll
+    most = 3.0  # rad; wrapped, a larger one would turn the rudder to the other side
+    steered = clipped(by_heading + by_yaw_rate + by_roll, -most, most)
     return steered - seen.heading_error, PreviewMemory(crab, yaw_rate, turns)
 
 
@@ -221,7 +222,7 @@ class PreviewSettings(NamedTuple):
     def check(self) -> None:
         """Refuse numbers out of their range; InputError names the setting."""
         for name in ("lookahead_lengths", "lead_lengths", "window_lengths"):
-            check_number(getattr(self, name), name, above=0.0)
+            check_number(getattr(self, name), name, at_least=1e-4, at_most=1e4)
         for name in ("inside_lengths", "feed_forward_lengths"):
             check_number(getattr(self, name), name, at_least=-100.0, at_most=100.0)
         for name in ("crab_time", "yaw_time"):
@@ -325,7 +326,8 @@ class PreviewLQ(Guided):
         the lead, from half of it to one and a half, and nothing else is added.
 
         Raises InputError if an argument is out of its range, the autopilot is not LQ,
-        or it was designed for another ship.
+        or it was designed for another ship, for a task without a path, and for gains
+        on heel where the task does not show it.
 
         Parameters
         ----------
@@ -339,7 +341,7 @@ class PreviewLQ(Guided):
         lookahead_lengths, lead_lengths, ... : float, optional
             See `PreviewSettings`.
         """
-        asked = task or path_following_task()
+        asked = with_path(task)
         dt = asked.interval(model)
         if autopilot is None:
             autopilot = LQ.from_model(model, dt=dt)
@@ -369,6 +371,13 @@ class PreviewLQ(Guided):
             roll_time=roll_time,
         )
         settings.check()
+        feels_heel = roll_gain != 0.0 or roll_time != 0.0
+        if feels_heel and "roll" not in cls.observed_in(asked, model):
+            raise InputError(
+                "roll_gain, roll_time: expected 0 for a task that does not show heel,"
+                f" got {roll_gain:g} and {roll_time:g}; give"
+                " path_following_task(roll=True), or leave them out"
+            )
         own = settings.gains(model, dt)
         inner = autopilot.gains
         radius = model.particulars["length"] * asked.turn_radius

@@ -16,7 +16,7 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 
 from agents.controllers.controller import ANY_NUMBER, Bounds
-from agents.controllers.guided import COURSE_ERROR, TURNS, Guided, bend
+from agents.controllers.guided import COURSE_ERROR, TURNS, Guided, bend, with_path
 from agents.controllers.interface import Policy
 from agents.controllers.law import (
     Law,
@@ -31,7 +31,7 @@ from agents.controllers.lq import LQ
 from shipgym import ShipModel
 from shipgym.checks import check_number
 from shipgym.ships.by_name import takes_name
-from shipgym.tasks.task import Task, path_following_task
+from shipgym.tasks.task import Task
 from shipgym.wrong_types import typed
 
 SHORTEST_LEAD, LONGEST_LEAD = 0.1, 10.0  # ship lengths
@@ -119,7 +119,7 @@ class WheelOver(Guided):
         crab_share : float
             Share of the angle of drift by the current that is countered.
         """
-        asked = task or path_following_task()
+        asked = with_path(task)
         if lookahead_lengths is None:
             lookahead_lengths = asked.lookahead
         check_number(lookahead_lengths, "lookahead_lengths", above=0.0)

@@ -133,7 +133,9 @@ def test_course_keeping_and_another_corridor_are_refused():
         check_controller(guided, MARINER, path_following_task(corridor=0.5))
     with pytest.raises(InputError, match=r"observation: expected shape \(9,\)"):
         guided.predict(np.zeros(8))
-    with pytest.raises(InputError, match="task: expected one that shows 'cross_track'"):
+    with pytest.raises(
+        InputError, match="task: expected one with a path, got 'CourseKeeping'"
+    ):
         LineOfSight.from_model(
             MARINER, task=course_keeping_task(), lookahead_lengths=2.0
         )

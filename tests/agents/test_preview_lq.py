@@ -15,10 +15,15 @@ from agents.rollouts.rollout import episode_costs
 from shipgym import load_model
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
-from shipgym.tasks.task import path_following_task
+from shipgym.tasks.task import course_keeping_task, path_following_task
 from tests.agents.mariners import MARINER
 
 PATH = path_following_task(max_turn_deg=90.0, leg_lengths=[12.0, 16.0])
+
+#: Two legs whose arcs of 4 ship lengths leave no straight between turns of 60 degrees.
+S_BEND = np.array(
+    [[0.0, 0.0], [10.0, 0.0], [10.0 + 4.62 * 0.5, 4.62 * np.sqrt(0.75)]],
+)
 
 metres = st.floats(0.0, 3000.0)
 angles = st.floats(-1.5, 1.5)
@@ -29,7 +34,7 @@ def test_the_mean_course_is_the_integral_of_the_course(
     distance, first, first_angle, second, second_angle, radius
 ):
     turns = Turns(first, first_angle, first + second, second_angle)
-    nothing = TurnMemory(0.0, 0.0, 0.0, 0.0)
+    nothing = TurnMemory(0.0, 0.0, 0.0, 0.0, 0.0)
     path = own_path(turns, nothing, Radii(planned=radius, own=radius))
     points = np.linspace(0.0, distance, 4001)
     courses = turned_by(points, path, radius)
@@ -60,7 +65,7 @@ def test_a_turn_is_begun_at_the_reach(kind, wider):
         turns = Turns(distance, 0.5, 2.0 * distance, 0.0)
         numbers = dict.fromkeys(PathSignals._fields, 0.0) | {"surge": speed}
         seen = PathSignals(**numbers | {"turns": turns})
-        nothing = PreviewMemory(0.0, 0.0, TurnMemory(0.0, 0.0, 0.0, 0.0))
+        nothing = PreviewMemory(0.0, 0.0, TurnMemory(0.0, 0.0, 0.0, 0.0, 0.0))
         return guide.course(seen, nothing)[0]
 
     reach = guide.turn_reach(0.5)
@@ -138,6 +143,45 @@ def test_heel_turns_the_rudder_where_a_task_shows_it(tmp_path):
 def test_numbers_beyond_their_bounds_are_refused(name, value):
     with pytest.raises(InputError, match=f"^{name}: .*expected a number"):
         PreviewLQ.from_model(MARINER, **{name: value})
+
+
+@pytest.mark.parametrize("angle_deg", [-60.0, -45.0, 60.0])
+def test_a_turn_at_once_after_another_costs_about_what_wheel_over_costs(angle_deg):
+    legs = S_BEND * MARINER.particulars["length"]
+    angle = np.radians(angle_deg)
+    course = np.radians(60.0) + angle
+    end = legs[-1] + 2000.0 * np.array([np.cos(course), np.sin(course)])
+    task = path_following_task(waypoints=np.vstack([legs, end]))
+    seeds = np.arange(4)
+    engine = Engine(MARINER, 4, task)
+    costs = [
+        episode_costs(guide.from_model(MARINER, task=task), engine, seeds).mean()
+        for guide in (PreviewLQ, WheelOver)
+    ]
+    assert costs[0] < 1.5 * costs[1]
+
+
+@pytest.mark.parametrize("error_deg", [20.0, 60.0, 100.0])
+def test_a_gain_by_speed_never_turns_the_rudder_to_the_other_side(error_deg):
+    guide = PreviewLQ.from_model(MARINER, speed_power=4.0)
+    seen = np.zeros((1, len(guide.observation_names)))
+    error = np.radians(error_deg)
+    seen[0, :2] = np.sin(error), np.cos(error)
+    of_course = guide.observation_names.index("course_error_sin")
+    seen[0, of_course : of_course + 2] = seen[0, :2]  # no current
+    seen[0, guide.observation_names.index("surge")] = 0.3
+    assert guide.predict(seen)[0] == 1.0
+
+
+@pytest.mark.parametrize("guide", [PreviewLQ, WheelOver])
+def test_a_task_without_a_path_is_refused(guide):
+    with pytest.raises(InputError, match=r"^task: expected one with a path, got"):
+        guide.from_model(MARINER, task=course_keeping_task())
+
+
+def test_gains_on_heel_need_a_task_that_shows_it():
+    with pytest.raises(InputError, match=r"^roll_gain, roll_time: expected 0"):
+        PreviewLQ.from_model(MARINER, roll_gain=0.1)
 
 
 def test_it_leads_lq_alone():
