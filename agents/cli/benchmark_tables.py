@@ -120,7 +120,8 @@ def _task_rows(
     reference = result.summary["reference"].get(task)
     if reference and BEST_KNOWN not in cells:
         bound = reference["bound"]
-        gain = _percent(1.0 - bound / reference["rule"])
+        rule = reference["rule"]
+        gain = _percent(1.0 - bound / rule) if rule else None
         row = (
             "  bound",
             number(bound, 2),

@@ -174,10 +174,9 @@ def restored(path: Path) -> Any:
 
 def use_training(run: Any) -> None:
     """What it does next, and its checkpoint."""
-    from agents.training import checkpoints
-
-    run.agent.predict(run.agent._last_obs)
-    checkpoints.agent_state(run.agent)
+    agent = run.learner.agent
+    agent.predict(agent._last_obs)
+    run.learner.state()
     written(run.evaluations.to_dict())
 
 
