@@ -235,8 +235,21 @@ class PreviewSettings(NamedTuple):
         for name in ("roll_gain", "roll_time"):
             check_number(getattr(self, name), name, at_least=-100.0, at_most=100.0)
 
-    def gains(self, model: ShipModel, dt: float) -> dict[str, float]:
-        """Gains in SI units for a ship and a control interval, s."""
+    def check_heel(self, shown: bool) -> None:
+        """Refuse gains on heel that a task does not show; InputError names them."""
+        feels_heel = self.roll_gain != 0.0 or self.roll_time != 0.0
+        if feels_heel and not shown:
+            raise InputError(
+                "roll_gain, roll_time: expected 0 for a task that does not show heel,"
+                f" got {self.roll_gain:g} and {self.roll_time:g}; give"
+                " path_following_task(roll=True), or leave them out"
+            )
+
+    def gains(self, model: ShipModel, task: Task, autopilot: LQ) -> dict[str, float]:
+        """Gains in SI units on the paths of a task, around LQ."""
+        dt = task.interval(model)
+        inner = autopilot.gains
+        radius = model.particulars["length"] * task.turn_radius
         length = model.particulars["length"]
         travel_time = model.travel_time
         return {
@@ -254,6 +267,10 @@ class PreviewSettings(NamedTuple):
             "roll_gain": float(self.roll_gain),
             "roll_rate_gain": self.roll_time * travel_time,
             "interval": dt,
+            "path_radius": radius,
+            "own_radius": radius * self.arc_factor,
+            "yaw_gain": inner["yaw_rate"] / inner["heading_error"],
+            "service_speed": model.particulars["speed"],
         }
 
 
@@ -342,9 +359,8 @@ class PreviewLQ(Guided):
             See `PreviewSettings`.
         """
         asked = with_path(task)
-        dt = asked.interval(model)
         if autopilot is None:
-            autopilot = LQ.from_model(model, dt=dt)
+            autopilot = LQ.from_model(model, dt=asked.interval(model))
         if not isinstance(autopilot, LQ):
             name = type(autopilot).__name__
             raise InputError(f"autopilot: expected LQ, got {name}")
@@ -371,23 +387,8 @@ class PreviewLQ(Guided):
             roll_time=roll_time,
         )
         settings.check()
-        feels_heel = roll_gain != 0.0 or roll_time != 0.0
-        if feels_heel and "roll" not in cls.observed_in(asked, model):
-            raise InputError(
-                "roll_gain, roll_time: expected 0 for a task that does not show heel,"
-                f" got {roll_gain:g} and {roll_time:g}; give"
-                " path_following_task(roll=True), or leave them out"
-            )
-        own = settings.gains(model, dt)
-        inner = autopilot.gains
-        radius = model.particulars["length"] * asked.turn_radius
-        gains = {
-            **own,
-            "path_radius": radius,
-            "own_radius": radius * arc_factor,
-            "yaw_gain": inner["yaw_rate"] / inner["heading_error"],
-            "service_speed": model.particulars["speed"],
-        }
+        settings.check_heel(shown="roll" in cls.observed_in(asked, model))
+        gains = settings.gains(model, asked, autopilot)
         return cls.leading(model, autopilot, asked, gains, {})
 
     def turn_reach(self, angle: float) -> float:
