@@ -37,6 +37,7 @@ import shipgym  # noqa: E402 - the folder above has to be found first
 from identification import IdentificationResult, identify  # noqa: E402
 from identification.uncertainty.model_error import DEFAULT  # noqa: E402
 from shipgym import ShipModel, Trial  # noqa: E402
+from shipgym.errors import InputError  # noqa: E402
 from shipgym.manoeuvres import (  # noqa: E402
     Manoeuvre,
     TurningIndices,
@@ -82,6 +83,18 @@ INDICES = (
 def ship_of(name: str) -> ShipModel:
     """A ship by name, the truth behind the trials."""
     return FOREIGN[name]() if name in FOREIGN else shipgym.load_model(name)
+
+
+def ship_names(text: str) -> list[str]:
+    """Names of ships, separated by commas, as an argument; exit code 2 for unknown."""
+    names = text.split(",")
+    for name in names:
+        try:
+            ship_of(name)
+        except InputError as error:
+            foreign = ", ".join(FOREIGN)
+            raise argparse.ArgumentTypeError(f"{error}; or of {foreign}") from None
+    return names
 
 
 def sea_trials(ship: ShipModel, kind: str, seed: int) -> list[Trial]:

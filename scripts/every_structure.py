@@ -33,7 +33,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from certainty import index_intervals, sea_trials, true_indices
+from certainty import index_intervals, sea_trials, ship_names, true_indices
 from kept_rows import KeptRows
 
 ROOT = Path(__file__).parents[1]
@@ -299,13 +299,13 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("every_structure.jsonl"))
     parser.add_argument("--seeds", type=int, default=1, help="of the noise")
     parser.add_argument("--draws", type=int, default=60, help="models drawn")
-    parser.add_argument("--ships", default=",".join(WORKED_ON))
+    parser.add_argument("--ships", type=ship_names, default=",".join(WORKED_ON))
     parser.add_argument("--new", action="store_true", help="the five that came second")
     parser.add_argument("--structures", default=",".join((*STRUCTURES, AUTO)))
     parser.add_argument("--quick", action="store_true", help="three ships, 30 draws")
     parser.add_argument("--table", action="store_true", help="of FILE, nothing is run")
     given = parser.parse_args()
-    ships = list(SECOND_FIVE) if given.new else given.ships.split(",")
+    ships = list(SECOND_FIVE) if given.new else given.ships
     draws = given.draws
     if given.quick:
         ships, draws = list(QUICK), 30

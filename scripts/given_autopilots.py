@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from certainty import sea_trials, ship_of
+from certainty import sea_trials, ship_names, ship_of
 from kept_rows import KeptRows
 from opened_once import steered
 from verdicts import SHIPS as OF_VERDICTS
@@ -172,7 +172,7 @@ def main() -> None:
     )
     parser.add_argument("--rows", type=Path, default=Path("given_autopilots.jsonl"))
     parser.add_argument("--seeds", type=int, default=1, help="of the noise")
-    parser.add_argument("--ships", default=",".join(SHIPS))
+    parser.add_argument("--ships", type=ship_names, default=",".join(SHIPS))
     parser.add_argument("--trials", default=",".join(KINDS))
     parser.add_argument("--structures", default=",".join(STRUCTURES))
     given = parser.parse_args()
@@ -182,7 +182,7 @@ def main() -> None:
     cases = itertools.product(
         given.trials.split(","),
         given.structures.split(","),
-        given.ships.split(","),
+        given.ships,
         range(given.seeds),
     )
     for kind, structure, name, seed in cases:

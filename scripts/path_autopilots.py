@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from certainty import ship_of
+from certainty import ship_names, ship_of
 from given_autopilots import identified
 from kept_rows import KeptRows
 
@@ -167,7 +167,9 @@ def main() -> None:
     )
     parser.add_argument("--rows", type=Path, default=Path("path_autopilots.jsonl"))
     parser.add_argument(
-        "--ships", help="with commas between; by default of both halves"
+        "--ships",
+        type=ship_names,
+        help="with commas between; by default of both halves",
     )
     parser.add_argument("--half", choices=HALVES, help="ships of one half alone")
     parser.add_argument("--seconds", type=float, default=20.0, help="of each search")
@@ -183,7 +185,7 @@ def main() -> None:
 
     ships = HALVES[given.half] if given.half else sum(HALVES.values(), ())
     if given.ships:
-        ships = tuple(given.ships.split(","))
+        ships = tuple(given.ships)
     tried = tuple(given.settings)
     kept = KeptRows(given.rows, ("ship", "autopilot"))
     for group in ((*DESIGNED, *tried), () if tried else TUNED):

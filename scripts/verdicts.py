@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from certainty import fitted, ship_of
+from certainty import fitted, ship_names, ship_of
 from kept_rows import KeptRows
 
 from shipgym import ShipModel, Trial
@@ -184,12 +184,12 @@ def main() -> None:
     )
     parser.add_argument("--rows", type=Path, default=Path("verdicts.jsonl"))
     parser.add_argument("--seeds", type=int, default=1, help="of the noise")
-    parser.add_argument("--ships", default=",".join(SHIPS))
+    parser.add_argument("--ships", type=ship_names, default=",".join(SHIPS))
     given = parser.parse_args()
     warnings.simplefilter("ignore")
 
     kept = KeptRows(given.rows, ("ship", "trials", "seed"))
-    cases = itertools.product(range(given.seeds), given.ships.split(","), SETS)
+    cases = itertools.product(range(given.seeds), given.ships, SETS)
     for seed, name, kind in cases:
         if (name, kind, seed) not in kept:
             kept.add(case(name, kind, seed))
