@@ -1,7 +1,7 @@
 """Which path autopilot keeps ships of other equations to drawn paths.
 
     python scripts/path_autopilots.py [--rows path_autopilots.jsonl] [--ships kcs,ferry]
-    python scripts/path_autopilots.py --half chosen --settings window_lengths=2
+    python scripts/path_autopilots.py --half chosen --settings weight_1=0.8
 
 prints the table of "On ships that nobody designed for" in docs/preview_lq.md. Each ship
 of tests/ships is put through zigzags 10/10 and 20/20 to both sides with the noise of

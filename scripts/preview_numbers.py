@@ -39,14 +39,14 @@ class Panel(NamedTuple):
 
 PANELS = (
     Panel("lookahead_lengths", (1.2, 2.5, 5.0)),
-    Panel("lead_lengths", (0.8, 1.75, 2.6)),
-    Panel("lead_power", (-1.0, 0.0, 2.0)),
-    Panel("window_lengths", (0.2, 1.75, 4.0), shows="delta"),
-    Panel("arc_factor", (1.0, 1.5, 2.5)),
-    Panel("inside_lengths", (-0.4, 0.0, 0.4)),
-    Panel("feed_forward_lengths", (-0.6, 0.0, 0.6)),
+    Panel("reach_lengths", (4.0, 8.75, 13.0)),
+    Panel("weight_0", (0.7, 1.0, 1.3)),
+    Panel("weight_2", (0.2, 0.5, 0.8)),
+    Panel("weight_3", (-0.1, 0.0, 0.1)),
     Panel("crab_share", (0.0, 1.0, 1.5), sea="current"),
-    Panel("crab_time", (0.0, 1.0, 4.0), sea="current"),
+    Panel("current_time", (0.0, 0.3, 6.0), sea="changing current"),
+    Panel("sway_gain", (-1.0, 0.0, 1.0)),
+    Panel("course_share", (0.0, 0.5, 1.0), shows="delta", sea="rough"),
     Panel("yaw_time", (0.0, 0.1, 0.3), shows="delta", sea="rough"),
     Panel("dead_band_deg", (0.0, 1.0, 3.0), shows="delta", sea="rough"),
     Panel("speed_power", (-1.0, 0.0, 2.0)),
@@ -93,8 +93,11 @@ def sailed(settings: Mapping[str, float], panel: Panel) -> Floats:
         options["sea"] = "rough"
     if panel.sea == "current":
         options["sea"] = Weather(current=Current(1.5, towards_deg=90.0))
+    if panel.sea == "changing current":
+        current = Current(1.5, towards_deg=90.0, variation=1.0, time_constant=120.0)
+        options["sea"] = Weather(current=current)
     task = path_following_task(**options)
-    own, inner = {"window_lengths": 1.75}, {}
+    own, inner = {"course_share": 0.0}, {}
     for name, value in settings.items():
         if name.startswith("lq_"):
             inner[name.removeprefix("lq_")] = value

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from agents.training.controller_search import (
     FoundSettings,
     SearchBudget,
     tune_controller,
-    unseen_costs,
+    unseen_episodes,
 )
 from agents.training.controller_space import lq_space
 from shipgym.files import write_json
@@ -43,7 +44,7 @@ def main() -> None:
     parser.add_argument("--tasks", help="names, separated by commas; by default all")
     parser.add_argument("--controllers", default=",".join(CONTROLLERS))
     parser.add_argument("--seconds", type=float, default=75.0)
-    parser.add_argument("--episodes", type=int, default=24)
+    parser.add_argument("--episodes", type=int, default=16)
     parser.add_argument(
         "--again", action="store_true", help="also what is there already"
     )
@@ -75,8 +76,24 @@ def tune_task(task: BenchmarkTask, arguments: argparse.Namespace) -> None:
             "tasks": tasks,
         }
         write_json(content, path)
+        judge_alike(task, content, path)
         costs = f"{best.start_cost:9.2f} -> {best.cost:9.2f}"
         print(f"{task.name:20s} {kind:14s} {costs}  {best.seconds:5.1f} s", flush=True)
+
+
+def judge_alike(task: BenchmarkTask, content: dict[str, Any], path: Path) -> None:
+    """Write what all that was found for a task costs on the same unseen episodes.
+
+    Searches of other numbers of episodes were judged on others.
+    """
+    of_task = content["tasks"][task.name]
+    for kind, found in of_task.items():
+        if kind == "mpc":
+            continue  # which was judged on those of the rule
+        judges = unseen_episodes(kind, task, content["episodes"])
+        start, cost = judges.costs([{}, found["settings"]])
+        found |= {"start_cost": float(start), "cost": float(cost)}
+    write_json(content, path)
 
 
 def kept_settings(task: BenchmarkTask) -> dict[str, Any]:
@@ -90,14 +107,14 @@ def led_by_rule(task: BenchmarkTask, found: dict[str, Any]) -> FoundSettings:
     rule = found["settings"]
     settings = {
         "lookahead_lengths": rule["lookahead_lengths"],
-        "reach_lengths": rule["lead_lengths"],
+        "reach_lengths": effective_lead(rule),
         "crab_share": rule["crab_share"],
     }
     for setting in lq_space(task):
         name = INNER + setting.name
         settings[name] = rule[name]
     candidates: list[dict[str, float]] = [{}, settings]
-    costs = unseen_costs("mpc", task, candidates, found["episodes"])
+    costs = unseen_episodes("mpc", task, found["episodes"]).costs(candidates)
     better = int(np.argmin(costs))
     return replace(
         FoundSettings(**found),
@@ -105,6 +122,14 @@ def led_by_rule(task: BenchmarkTask, found: dict[str, Any]) -> FoundSettings:
         cost=float(costs[better]),
         start_cost=float(costs[0]),
     )
+
+
+def effective_lead(rule: dict[str, float]) -> float:
+    """Distance ahead, ship lengths, whose course is as much as the rule's."""
+    knots = [0.0, 0.1, 0.2, 0.3, 0.6, 1.0]
+    weights = [*[rule[f"weight_{number}"] for number in range(5)], 0.0]
+    within = float(np.trapezoid(weights, knots))
+    return max(0.1, rule["reach_lengths"] * within)
 
 
 if __name__ == "__main__":

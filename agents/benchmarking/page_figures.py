@@ -103,7 +103,7 @@ def scores_figure(result: BenchmarkResult) -> Figure:
     _add_score_line(figure, 1.0, "rule")
     bound = bound_score(result)
     if bound is not None:
-        _add_score_line(figure, min(bound, SCORE_RANGE[1]), "bound")
+        _add_score_line(figure, min(bound, SCORE_RANGE[1]), "bound", "right")
     return figure
 
 
@@ -188,12 +188,15 @@ def _interval_trace(
     )
 
 
-def _add_score_line(figure: Figure, value: float, text: str) -> None:
-    """Add a dotted line at a score, with its name."""
+def _add_score_line(
+    figure: Figure, value: float, text: str, side: str = "left"
+) -> None:
+    """Add a dotted line at a score, with its name at one side of its top."""
     figure.add_vline(
         x=value,
         line={"color": MUTED, "width": 1.2, "dash": "dot"},
         annotation={"text": text, "font": {"size": 11, "color": MUTED}},
+        annotation_position=f"top {side}",
     )
 
 

@@ -30,6 +30,7 @@ from agents.controllers.margins import Compensator, Margins
 from agents.controllers.memory import (
     checked_observation,
     from_columns,
+    next_rows,
     recalled,
     size_of,
     to_rows,
@@ -262,13 +263,13 @@ class Controller:
         shape = given.shape[:-1]
         memory = self._memory_of(state, episode_start, shape)
         seen = self.signals(np.atleast_2d(given))
-        order, memory = self.steer(seen, memory)
+        order, after = self.steer(seen, memory)
 
         part = np.clip(order / self.rudder_limit, -1.0, 1.0)
         action = part.astype(np.float32).reshape(*shape, 1)
         if self.memory_size:
             n_ships = len(seen.heading_error)
-            rows = to_rows(memory, n_ships)
+            rows = next_rows(after, memory, n_ships)
             state = rows.reshape(*shape, self.memory_size)
         return action, state
 

@@ -29,9 +29,9 @@ from agents.controllers.margins import Compensator, Margins
 from agents.controllers.memory import (
     checked_observation,
     from_columns,
+    next_rows,
     on_course,
     recalled,
-    to_rows,
 )
 from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
@@ -184,7 +184,7 @@ class Guided(Controller):
         starts = None if inner is None else memory.started == 0.0
         action, inner = self.autopilot.predict(shown, inner, starts, deterministic)
 
-        own = to_rows(after, len(rows)).reshape(*shape, -1)
+        own = next_rows(after, memory, len(rows)).reshape(*shape, -1)
         return action, (own, inner)
 
     def _guided(

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from agents.controllers.linear_loop import ERROR, INTEGRAL, RUDDER, SIGNALS, SampledShip
 from shipgym import InputError
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, Integers
 
 Complexes = NDArray[np.complex128]
 
@@ -112,7 +112,8 @@ class Compensator:
         self._check_closed_loop(ship, name)
         omega = frequencies_of(ship)
         response = self.responses(ship, omega)
-        loop: Any = control.frd(response.broken, omega)
+        near = near_crossings(response.broken)
+        loop: Any = control.frd(response.broken[near], omega[near])
         figures = control.stability_margins(loop, returnall=True)
         gains, phases, _, _, crossings, _ = map(np.asarray, figures)
 
@@ -168,6 +169,22 @@ def frequencies_of(ship: SampledShip) -> Floats:
     n_frequencies = 500
     nyquist = np.pi / ship.dt
     return np.geomspace(SLOWEST * nyquist, FASTEST * nyquist, n_frequencies)
+
+
+def near_crossings(response: Complexes) -> Integers:
+    """Numbers of the frequencies about those at which margins are read.
+
+    There a response, of shape (n_frequencies,), crosses the unit circle or the real
+    axis. Splines through all frequencies take several times as long and say the same.
+    """
+    about, apart = 12, 12  # frequencies on each side of a crossing, and elsewhere
+    outside = np.abs(response) > 1.0
+    above = response.imag > 0.0
+    crosses = np.diff(outside) | np.diff(above)
+    places = np.flatnonzero(crosses)[:, None] + np.arange(-about, about + 2)
+    elsewhere = np.arange(0, len(response), apart)  # a spline swings across a gap
+    kept = np.append(elsewhere, places.clip(0, len(response) - 1))
+    return np.unique(kept)
 
 
 def least(values: Floats) -> float:

@@ -45,6 +45,18 @@ def to_rows(record: Any, n_ships: int) -> Floats:
     return rows
 
 
+def next_rows(after: Any, before: Any, n_ships: int) -> Floats:
+    """Rows of a memory as `to_rows`, with what it was before where it is not finite.
+
+    So one observation that is not a number does not stay in filters for good.
+    """
+    rows = to_rows(after, n_ships)
+    is_finite = np.isfinite(rows)
+    if is_finite.all():
+        return rows
+    return np.where(is_finite, rows, to_rows(before, n_ships))
+
+
 def selected(record: Any, index: Any) -> Any:
     """Record of some of the ships, by an index of its columns.
 

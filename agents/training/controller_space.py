@@ -7,6 +7,7 @@ import numpy as np
 
 from agents.controllers.designs import INNER, design, no_path
 from agents.controllers.los_autopilot import CRITICAL
+from agents.controllers.preview_lq import own_reach
 from agents.controllers.registry import controller_class
 from agents.controllers.wheel_over import own_lead
 from agents.suites.suite import BenchmarkTask
@@ -147,25 +148,28 @@ def quiet_space(task: BenchmarkTask) -> list[Setting]:
 
 def preview_space(task: BenchmarkTask) -> list[Setting]:
     """All settings of `PreviewLQ.from_model` that the task lets act."""
-    lead_lengths = own_lead(task.ship, None)
+    course_share = 0.5 if task.task.weather.waves is not None else 0.0
     space = [
         *los_space(task),
-        factor("lead_lengths", lead_lengths, 0.4),
-        factor("window_lengths", lead_lengths, 0.7),
-        Setting("inside_lengths", 0.0, 0.2, low=-5.0, high=5.0),
-        Setting("feed_forward_lengths", 0.0, 0.3, low=-10.0, high=10.0),
-        Setting("arc_factor", 1.1, 0.3, low=1.0, high=10.0),
+        factor("reach_lengths", own_reach(task.ship, None), 0.4),
+        Setting("weight_0", 1.0, 0.15, low=-5.0, high=5.0),
+        Setting("weight_1", 1.0, 0.15, low=-5.0, high=5.0),
+        Setting("weight_2", 0.5, 0.15, low=-5.0, high=5.0),
+        Setting("weight_3", 0.0, 0.15, low=-5.0, high=5.0),
+        Setting("weight_4", 0.0, 0.15, low=-5.0, high=5.0),
+        Setting("reach_power", 0.0, 0.5, low=-2.0, high=4.0),
         Setting("crab_share", 1.0, 0.2, low=0.0, high=2.0),
-        factor("crab_time", 0.05, 1.0),
+        Setting("course_share", course_share, 0.3, low=0.0, high=1.0),
+        factor("current_time", 0.3, 1.0),
         factor("yaw_time", 0.01, 1.2),
+        Setting("sway_gain", 0.0, 0.5, low=-10.0, high=10.0),
         factor("dead_band_deg", 0.05, 1.2),
         Setting("speed_power", 0.0, 0.5, low=-2.0, high=4.0),
-        Setting("lead_power", 0.0, 0.5, low=-2.0, high=4.0),
     ]
     shown = {quantity.name for quantity in task.task.observed(task.ship)}
     if "roll" in shown:
-        space.append(Setting("roll_gain", 0.0, 0.2, low=-10.0, high=10.0))
-        space.append(Setting("roll_time", 0.0, 0.2, low=-10.0, high=10.0))
+        space.append(Setting("roll_gain", 0.0, 0.4, low=-10.0, high=10.0))
+        space.append(Setting("roll_time", 0.0, 0.4, low=-10.0, high=10.0))
     return space
 
 

@@ -12,7 +12,7 @@ from agents.training.controller_search import (
     FoundSettings,
     SearchBudget,
     tune_controller,
-    unseen_costs,
+    unseen_episodes,
 )
 from agents.verification.tracks import track_task
 from identification.progress import Progress
@@ -74,7 +74,8 @@ def holds_draws(kind: str, drawn: ModelTask, alone: ModelTask) -> bool:
     most = 3.0  # times the cost on the model
     episodes = SearchBudget().episodes
     on_drawn, on_model = (
-        float(unseen_costs(kind, task, [{}], episodes)[0]) for task in (drawn, alone)
+        float(unseen_episodes(kind, task, episodes).costs([{}])[0])
+        for task in (drawn, alone)
     )
     return on_drawn <= most * on_model
 

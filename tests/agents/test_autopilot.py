@@ -74,7 +74,7 @@ def test_lq_with_preview_keeps_to_the_track_in_a_current_on_every_model_drawn(ch
     assert track.largest.max() < 0.5 * length
     told = result.metrics["tracks"]["preview-lq"]
     assert told["cross_track_largest_m"] == track.largest[0]
-    late = replace(track.controller, gains={**track.controller.gains, "lead": 1.0})
+    late = replace(track.controller, gains={**track.controller.gains, "reach": 1.0})
     assert keep_track(late, [result.model]).largest[0] > 1.5 * track.largest[0]
 
 

@@ -14,10 +14,13 @@ from agents.suites.reference import load_tuned
 from agents.suites.suite import BenchmarkTask, load_suite
 from agents.training.controller_search import (
     SearchBudget,
+    episodes_of,
     has_margin,
     search,
     settings_at,
+    simplified,
     tune_controller,
+    unseen_episodes,
 )
 from agents.training.controller_space import Setting, factor, search_space
 from shipgym.errors import InputError
@@ -63,6 +66,29 @@ def test_a_search_is_reproducible_and_not_worse_than_the_design() -> None:
     assert replace(first, seconds=0.0) == replace(second, seconds=0.0)
     assert first.cost <= first.start_cost
     assert has_margin(design("pid", NOISY, first.settings))
+
+
+def test_what_a_model_says_nothing_of_is_put_back_to_the_design() -> None:
+    """Nomoto's equation has no sway, but the way back to the path is seen."""
+    task = replace(PATH, model="kvlcc2-nomoto")
+    start = {
+        setting.name: setting.start for setting in search_space("preview-lq", task)
+    }
+    found = {**start, "sway_gain": 1.5}
+    far_sighted = {**start, "lookahead_lengths": 100.0}
+    episodes = unseen_episodes("preview-lq", task, 4)
+    cost = float(episodes.costs([found])[0])
+    plain, plain_cost = simplified(found, cost, far_sighted, episodes)
+    assert plain == start
+    assert plain_cost == pytest.approx(cost, rel=1e-3)
+
+
+def test_episodes_of_a_search_are_exchanged_and_others_judge() -> None:
+    sets = [set(episodes_of(16, number)) for number in range(5)]
+    assert sets[4] == sets[0]
+    searched = set.union(*sets)
+    assert len(searched) == 64
+    assert searched.isdisjoint(unseen_episodes("pid", NOISY, 16).seeds)
 
 
 @pytest.mark.parametrize(

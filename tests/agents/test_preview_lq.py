@@ -1,20 +1,23 @@
 """LQ path tracking with preview: the path is read ahead, averaged, and turned with."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from agents import LQ, PID, PreviewLQ, WheelOver, check_controller, load_agent
-from agents.controllers.law import PathSignals, Turns
-from agents.controllers.own_path import Radii, TurnMemory, own_path
-from agents.controllers.preview_lq import PreviewMemory, summed_turn, turned_by
+from agents.controllers.law import Nothing, PathSignals, Turns
+from agents.controllers.preview_lq import PreviewMemory, summed_weight, weighed_turn
 from agents.controllers.quiet_lq import QuietLQ
+from agents.controllers.seen_current import CurrentMemory
 from agents.controllers.side_by_side import side_by_side
-from agents.rollouts.rollout import episode_costs
+from agents.rollouts.rollout import episode_costs, rollout
 from shipgym import load_model
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
+from shipgym.sea import Current, Weather
 from shipgym.tasks.task import course_keeping_task, path_following_task
 from tests.agents.mariners import MARINER
 
@@ -25,47 +28,98 @@ S_BEND = np.array(
     [[0.0, 0.0], [10.0, 0.0], [10.0 + 4.62 * 0.5, 4.62 * np.sqrt(0.75)]],
 )
 
-metres = st.floats(0.0, 3000.0)
-angles = st.floats(-1.5, 1.5)
+DESIGNED = PreviewLQ.from_model(MARINER, task=PATH)
+
+weights = st.floats(-1.0, 2.0)
 
 
-@given(metres, metres, angles, metres, angles, st.floats(200.0, 900.0))
-def test_the_mean_course_is_the_integral_of_the_course(
-    distance, first, first_angle, second, second_angle, radius
-):
-    turns = Turns(first, first_angle, first + second, second_angle)
-    nothing = TurnMemory(0.0, 0.0, 0.0, 0.0, 0.0)
-    path = own_path(turns, nothing, Radii(planned=radius, own=radius))
+@given(st.floats(0.0, 4000.0), *(5 * [weights]), st.floats(300.0, 3000.0))
+def test_weights_are_summed_as_they_are_interpolated(distance, a, b, c, d, e, reach):
+    named = {"weight_0": a, "weight_1": b, "weight_2": c, "weight_3": d, "weight_4": e}
+    p = DESIGNED.parameters._replace(reach=reach, **named)
     points = np.linspace(0.0, distance, 4001)
-    courses = turned_by(points, path, radius)
-    summed = summed_turn(distance, path, radius)
-    assert summed == pytest.approx(np.trapezoid(courses, points), abs=1e-3 * 3000.0)
+    knots = reach * np.array([0.0, 0.1, 0.2, 0.3, 0.6, 1.0])
+    there = np.interp(points, knots, [a, b, c, d, e, 0.0])
+    summed = np.trapezoid(there, points)
+    assert summed_weight(distance, p) == pytest.approx(summed, abs=1e-3 * reach)
 
 
-def test_with_nothing_added_it_is_wheel_over():
-    narrow = PreviewLQ.from_model(MARINER, task=PATH, window_lengths=1e-4)
-    seeds = np.arange(4)
-    engine = Engine(MARINER, 4, PATH)
-    ours, wheel_over = (
-        episode_costs(guide, engine, seeds)
-        for guide in (narrow, WheelOver.from_model(MARINER, task=PATH))
+@given(st.floats(0.0, 2000.0), st.floats(-1.5, 1.5))
+def test_as_designed_it_reads_the_mean_course_about_one_lead_ahead(distance, angle):
+    p = DESIGNED.parameters
+    points = np.linspace(0.1 * p.reach, 0.3 * p.reach, 8001)
+    size = np.clip((points - distance) / p.path_radius, 0.0, abs(angle))
+    mean = np.sign(angle) * np.mean(size)
+    assert weighed_turn(distance, angle, 1.0, p) == pytest.approx(mean, abs=1e-3)
+
+
+@pytest.mark.parametrize("angle", [0.0, 2.5, -2.5])
+@pytest.mark.parametrize("cross_track", [-40.0, 0.0, 300.0])
+def test_on_a_long_arc_and_on_none_its_course_is_that_of_wheel_over(angle, cross_track):
+    numbers = dict.fromkeys(PathSignals._fields, 0.0)
+    turns = Turns(0.0, angle, 0.0, 0.0)
+    speed = MARINER.particulars["speed"]
+    seen = PathSignals(
+        **numbers | {"surge": speed, "cross_track": cross_track, "turns": turns}
     )
-    np.testing.assert_allclose(ours, wheel_over, rtol=1e-3)
+    wheel_over = WheelOver.from_model(MARINER, task=PATH)
+    nothing = PreviewMemory(CurrentMemory(*([0.0] * 7)), 0.0, 0.0)
+    ours, _ = DESIGNED.course(seen, nothing)
+    theirs, _ = wheel_over.course(seen, Nothing())
+    assert ours == pytest.approx(theirs, abs=1e-12)
+
+
+def test_in_a_current_it_costs_less_than_wheel_over():
+    """The angle against the current is that for the course behind the turn."""
+    seeds = np.arange(8)
+    task = path_following_task(
+        max_turn_deg=90.0, leg_lengths=[12.0, 16.0], sea=Weather(Current(1.5))
+    )
+    engine = Engine(MARINER, 8, task)
+    wheel_over = WheelOver.from_model(MARINER, task=PATH)
+    costs, theirs = (
+        episode_costs(guide, engine, seeds).mean() for guide in (DESIGNED, wheel_over)
+    )
+    assert costs < 0.95 * theirs
+    assert episode_costs(blind(DESIGNED), engine, seeds).mean() > 1.1 * costs
+
+
+def test_in_waves_course_over_ground_steadies_the_rudder():
+    task = path_following_task(sea="rough")
+    seeds = np.arange(4)
+    engine = Engine(MARINER, 4, task)
+    by_compass, by_course = (
+        PreviewLQ.from_model(MARINER, task=task, course_share=share)
+        for share in (0.0, 1.0)
+    )
+    travelled = []
+    for guide in (by_compass, by_course):
+        run = rollout(guide, engine, seeds, record=("rudder_travel",))
+        last = run.steps.astype(int)
+        travelled.append(run.infos["rudder_travel"][last, np.arange(4)].mean())
+    assert travelled[1] < 0.9 * travelled[0]
+    assert PreviewLQ.from_model(MARINER, task=task).gains["course_share"] == 0.5
+    assert DESIGNED.gains["course_share"] == 0.0
+
+
+def blind(guide):
+    """The same without an eye for the current."""
+    return replace(guide, gains={**guide.gains, "crab_share": 0.0})
 
 
 @pytest.mark.parametrize(
-    ("kind", "wider"),
-    [(WheelOver, {}), (PreviewLQ, {}), (PreviewLQ, {"arc_factor": 1.5})],
+    ("kind", "settings"),
+    [(WheelOver, {}), (PreviewLQ, {}), (PreviewLQ, {"weight_2": 0.5})],
 )
-def test_a_turn_is_begun_at_the_reach(kind, wider):
-    guide = kind.from_model(MARINER, task=PATH, **wider)
+def test_a_turn_is_begun_at_the_reach(kind, settings):
+    guide = kind.from_model(MARINER, task=PATH, **settings)
     speed = MARINER.particulars["speed"]
 
     def course(distance):
         turns = Turns(distance, 0.5, 2.0 * distance, 0.0)
         numbers = dict.fromkeys(PathSignals._fields, 0.0) | {"surge": speed}
         seen = PathSignals(**numbers | {"turns": turns})
-        nothing = PreviewMemory(0.0, 0.0, TurnMemory(0.0, 0.0, 0.0, 0.0, 0.0))
+        nothing = PreviewMemory(CurrentMemory(*([0.0] * 7)), 0.0, 0.0)
         return guide.course(seen, nothing)[0]
 
     reach = guide.turn_reach(0.5)
@@ -75,16 +129,16 @@ def test_a_turn_is_begun_at_the_reach(kind, wider):
 
 def test_designs_side_by_side_steer_as_each_alone():
     designs = [
-        PreviewLQ.from_model(MARINER, task=PATH, window_lengths=1.0, yaw_time=0.1),
+        PreviewLQ.from_model(MARINER, task=PATH, reach_lengths=4.0, yaw_time=0.1),
         PreviewLQ.from_model(
             MARINER,
             task=PATH,
             autopilot=LQ.from_model(MARINER, rudder_weight=0.5),
-            arc_factor=1.5,
-            lead_power=0.5,
-            inside_lengths=0.3,
-            feed_forward_lengths=0.2,
-            crab_time=0.2,
+            weight_3=-0.1,
+            weight_4=-0.05,
+            reach_power=0.5,
+            sway_gain=0.3,
+            current_time=0.2,
             dead_band_deg=0.5,
             speed_power=1.0,
         ),
@@ -101,7 +155,7 @@ def test_designs_side_by_side_steer_as_each_alone():
 def test_it_is_a_controller_and_a_file(tmp_path):
     quiet = QuietLQ.from_model(MARINER, rudder_time=0.1, rudder_band_deg=0.5)
     guide = PreviewLQ.from_model(
-        MARINER, task=PATH, autopilot=quiet, arc_factor=1.3, dead_band_deg=0.2
+        MARINER, task=PATH, autopilot=quiet, weight_3=-0.1, dead_band_deg=0.2
     )
     check_controller(guide, MARINER, PATH, n_steps=20)
     guide.save(tmp_path / "guide.json")
@@ -127,15 +181,16 @@ def test_heel_turns_the_rudder_where_a_task_shows_it(tmp_path):
     ("name", "value"),
     [
         ("lookahead_lengths", 0.0),
-        ("lead_lengths", 0.0),
-        ("window_lengths", 0.0),
-        ("inside_lengths", np.nan),
+        ("reach_lengths", 0.0),
+        ("weight_0", np.nan),
+        ("weight_4", 11.0),
         ("crab_share", 3.0),
-        ("crab_time", -1.0),
+        ("course_share", 1.5),
+        ("current_time", -1.0),
         ("dead_band_deg", 200.0),
         ("speed_power", 9.0),
-        ("lead_power", np.inf),
-        ("arc_factor", 0.5),
+        ("reach_power", np.inf),
+        ("sway_gain", 200.0),
         ("roll_gain", 200.0),
         ("roll_time", np.nan),
     ],

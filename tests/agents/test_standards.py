@@ -49,7 +49,7 @@ def test_an_autopilot_that_is_too_weak_and_a_late_turn_fail_their_rows(track):
     assert (
         heading_control(MARINER, weak)["overshoot"] > REQUIREMENTS["overshoot"]["limit"]
     )
-    late = replace(track.controller, gains={**track.controller.gains, "lead": 1.0})
+    late = replace(track.controller, gains={**track.controller.gains, "reach": 1.0})
     found = track_control(MARINER, keep_track(late, [MARINER, MARINER]))
     assert found["cross_track"] > REQUIREMENTS["cross_track"]["limit"]
 

@@ -1,0 +1,130 @@
+"""Current that a ship sees: her way over ground less that through the water.
+
+Where she goes over ground is the course over ground, and how fast, along the path: on a
+leg by what the distance to the next turn falls, on an arc by the angle that is passed.
+The current is a vector beside the path. So the angle by which it sets a ship off is
+known for a course that is yet to be steered.
+
+Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 2.4
+(speeds over ground and through the water, crab angle).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from agents.controllers.law import Number, PathSignals, clipped, wrapped
+
+
+class CurrentMemory(NamedTuple):
+    """Current by the last interval, and what was seen in it."""
+
+    ahead: Number  # m/s, along the path beside the ship
+    aside: Number  # m/s, to starboard of it
+    turned: Number  # rad, by which the path has turned beside her
+    is_known: Number  # 1 once the speed over ground was seen, else 0
+    distance: Number  # m, to the next turn or the end of the path
+    angle: Number  # rad, what was left of it
+    started: Number  # 0 where an episode begins, else 1
+
+
+class CurrentScales(NamedTuple):
+    """Parameters of `seen_current`."""
+
+    update: Number  # share of a new current in its low-pass
+    path_radius: Number  # m
+    sight: Number  # m, beyond which turns are not seen
+    interval: Number  # s
+    slowest: Number  # m/s, speed along the path that is believed
+    fastest: Number  # m/s
+
+
+class Way(NamedTuple):
+    """Motion in the axes of the path beside the ship."""
+
+    ahead: Number  # m/s
+    aside: Number  # m/s, to starboard
+
+
+class Passed(NamedTuple):
+    """What a ship has passed of the path in an interval."""
+
+    turned: Number  # rad, by which the path has turned beside her
+    speed: Number  # m/s, along the path; 0 where it is not known
+
+
+def seen_current(
+    seen: PathSignals, memory: CurrentMemory, p: CurrentScales
+) -> CurrentMemory:
+    """Current by another interval."""
+    passed = passed_path(seen, memory, p)
+    water = way_through_water(seen)
+    carried = turned_back(Way(memory.ahead, memory.aside), passed.turned)
+
+    over_ground = wrapped(seen.drift - seen.heading_error)  # against the path
+    most_across = 1.2  # rad: beyond, the speed along the path says little
+    is_along = np.abs(over_ground) < most_across
+    is_likely = (passed.speed > p.slowest) & (passed.speed < p.fastest)
+    is_seen = is_along & is_likely
+
+    ahead = np.where(is_seen, passed.speed, water.ahead + carried.ahead)
+    slope = np.tan(np.where(is_along, over_ground, 0.0))
+    aside = np.where(is_along, ahead * slope - water.aside, carried.aside)
+    is_first = is_seen & (memory.is_known == 0.0)
+    update = np.where(is_first | (memory.started == 0.0), 1.0, p.update)
+    seen_ahead = clipped(ahead - water.ahead, -p.fastest, p.fastest)
+    seen_aside = clipped(aside, -p.fastest, p.fastest)
+    return CurrentMemory(
+        ahead=carried.ahead + update * (seen_ahead - carried.ahead),
+        aside=carried.aside + update * (seen_aside - carried.aside),
+        turned=passed.turned,
+        is_known=np.where(is_seen, 1.0, memory.is_known),
+        distance=seen.turns.next_distance,
+        angle=seen.turns.next_angle,
+        started=1.0,
+    )
+
+
+def way_through_water(seen: PathSignals) -> Way:
+    """Her way through the water in the axes of the path."""
+    cosine, sine = np.cos(seen.heading_error), np.sin(seen.heading_error)
+    return Way(
+        ahead=seen.surge * cosine + seen.sway * sine,
+        aside=seen.sway * cosine - seen.surge * sine,
+    )
+
+
+def passed_path(seen: PathSignals, memory: CurrentMemory, p: CurrentScales) -> Passed:
+    """Length of leg, or angle of arc, that was passed in an interval."""
+    distance, angle = seen.turns.next_distance, seen.turns.next_angle
+    has_started = memory.started > 0.0
+    is_turning = (distance <= 0.0) & (angle != 0.0)
+    was_turning = has_started & (memory.distance <= 0.0) & (memory.angle != 0.0)
+
+    swept = memory.angle - angle
+    side = np.sign(memory.angle)
+    of_arc = side * swept * (p.path_radius - side * seen.cross_track)
+    of_leg = memory.distance - distance
+    farthest = p.fastest * p.interval
+    noise = 1e-3  # rad, by which the angle of a turn ahead may seem to change
+    is_last_leg = (angle == 0.0) & (memory.angle == 0.0)
+    is_same_turn = has_started & (is_last_leg | (side * angle > 0.0))
+    goes_on = is_same_turn & (side * swept > 0.0) & (of_arc < farthest)
+    is_on_arc = is_turning & goes_on
+    is_in_sight = (distance > 0.0) & (memory.distance < p.sight)
+    is_on_leg = is_same_turn & is_in_sight & (np.abs(swept) < noise)
+
+    rest = np.where(was_turning, memory.angle, 0.0)  # of an arc that has ended
+    turned = np.where(is_on_arc, swept, np.where(is_on_leg, 0.0, rest))
+    along_arc = np.where(is_on_arc & was_turning, of_arc, 0.0)
+    length = np.where(is_on_leg, of_leg, along_arc)
+    return Passed(turned, speed=length / p.interval)
+
+
+def turned_back(way: Way, turned: Number) -> Way:
+    """The same motion in axes that have turned to starboard, rad."""
+    cosine, sine = np.cos(turned), np.sin(turned)
+    return Way(
+        ahead=way.ahead * cosine + way.aside * sine,
+        aside=way.aside * cosine - way.ahead * sine,
+    )
