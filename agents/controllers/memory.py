@@ -83,11 +83,9 @@ def _columns(record: Any) -> Iterator[Any]:
             yield value
 
 
-def checked_observation(
-    observation: ArrayLike, names: Sequence[str], dtype: type[np.generic] = np.float64
-) -> NDArray[Any]:
+def checked_observation(observation: ArrayLike, names: Sequence[str]) -> Floats:
     """Observations of shape (n_ships, n) or (n,), with no fewer entries than names."""
-    given = np.asarray(observation, dtype=dtype)
+    given = np.asarray(observation, dtype=np.float64)
     n = len(names)
     if given.ndim not in (1, 2) or given.shape[-1] < n:
         raise InputError(

@@ -9,7 +9,6 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller
 from agents.controllers.guided import COURSE_ERROR, Guided, shown_course
@@ -26,6 +25,7 @@ from agents.controllers.law import (
 from agents.controllers.memory import from_columns
 from agents.deployment.transfer import Transfer
 from shipgym import InputError
+from shipgym.arrays import Floats
 from shipgym.engine.records import field_types
 from shipgym.tasks import path_following
 from shipgym.tasks.contract import ObservationSpec
@@ -380,7 +380,7 @@ class Autopilot:
         return rudder * self.limit, memory
 
 
-def observations(policy: Any, known: Mapping[str, Number]) -> NDArray[np.float32]:
+def observations(policy: Any, known: Mapping[str, Number]) -> Floats:
     """Scaled, bounded observations of a policy from known quantities in SI units."""
     scales = dict(zip(policy.observation_names, policy.observation_scales, strict=True))
     bounds = observation_bounds()
@@ -389,7 +389,7 @@ def observations(policy: Any, known: Mapping[str, Number]) -> NDArray[np.float32
         low, high = bounds[name]
         scaled = known[name] / scale
         shown.append(np.clip(scaled, low, high))
-    return np.array(shown, dtype=np.float32).T
+    return np.array(shown, dtype=np.float64).T
 
 
 def bridge_parameters(agent: Any) -> BridgeParameters:

@@ -190,9 +190,10 @@ class LearnedPolicy:
         gives it). The state is a `Memory` if the policy `remembers` anything, else as
         given.
         """
-        given = checked_observation(observation, self.observation_names, np.float32)
+        given = checked_observation(observation, self.observation_names)
         *shape, _ = given.shape
-        rows = np.atleast_2d(given)[:, : len(self.observation_names)]
+        shown = np.atleast_2d(given)[:, : len(self.observation_names)]
+        rows = shown.astype(np.float32)  # of the network; a base takes all digits
         if not self.remembers:
             commands = self.commands(self.network(rows))
             return commands.reshape(*shape, commands.shape[1]), state
