@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -66,8 +65,10 @@ def tune_task(task: BenchmarkTask, arguments: argparse.Namespace) -> None:
             best = led_by_rule(task, of_task[RULE])
         else:
             best = tune_controller(kind, task, budget)
+        of_task = {**kept_settings(task).get(task.name, {}), kind: asdict(best)}
+        judge_alike(task, of_task, arguments.episodes)
         tasks = kept_settings(task)  # others may have tuned other tasks meanwhile
-        tasks.setdefault(task.name, {})[kind] = asdict(best)
+        tasks[task.name] = of_task
         content = {
             "suite": arguments.suite,
             "seconds": arguments.seconds,
@@ -76,24 +77,21 @@ def tune_task(task: BenchmarkTask, arguments: argparse.Namespace) -> None:
             "tasks": tasks,
         }
         write_json(content, path)
-        judge_alike(task, content, path)
         costs = f"{best.start_cost:9.2f} -> {best.cost:9.2f}"
         print(f"{task.name:20s} {kind:14s} {costs}  {best.seconds:5.1f} s", flush=True)
 
 
-def judge_alike(task: BenchmarkTask, content: dict[str, Any], path: Path) -> None:
-    """Write what all that was found for a task costs on the same unseen episodes.
+def judge_alike(task: BenchmarkTask, of_task: dict[str, Any], episodes: int) -> None:
+    """Note what all that was found for a task costs on the same unseen episodes.
 
     Searches of other numbers of episodes were judged on others.
     """
-    of_task = content["tasks"][task.name]
     for kind, found in of_task.items():
         if kind == "mpc":
             continue  # which was judged on those of the rule
-        judges = unseen_episodes(kind, task, content["episodes"])
+        judges = unseen_episodes(kind, task, episodes)
         start, cost = judges.costs([{}, found["settings"]])
         found |= {"start_cost": float(start), "cost": float(cost)}
-    write_json(content, path)
 
 
 def kept_settings(task: BenchmarkTask) -> dict[str, Any]:

@@ -384,7 +384,7 @@ class PreviewLQ(Guided):
 
         The defaults follow from the model: by the lead, the distance that her heading
         and her way lag behind in a steady turn (`own_lead`), the path's course is
-        averaged from half a lead ahead to one and a half, and nothing else is added.
+        averaged from half a lead ahead to one and a half.
 
         Raises InputError if an argument is out of its range, the autopilot is not LQ,
         or it was designed for another ship, for a task without a path, and for gains
@@ -403,18 +403,13 @@ class PreviewLQ(Guided):
             See `PreviewSettings`.
         """
         asked = with_path(task)
-        if autopilot is None:
-            autopilot = LQ.from_model(model, dt=asked.interval(model))
-        if not isinstance(autopilot, LQ):
-            name = type(autopilot).__name__
-            raise InputError(f"autopilot: expected LQ, got {name}")
+        led = led_lq(autopilot, model, asked)
         if lookahead_lengths is None:
             lookahead_lengths = asked.lookahead
         if reach_lengths is None:
-            reach_lengths = own_reach(model, autopilot)
+            reach_lengths = own_reach(model, led)
         if course_share is None:
-            in_waves = asked.weather.waves is not None
-            course_share = 0.5 if in_waves else 0.0
+            course_share = own_course_share(asked)
         settings = PreviewSettings(
             lookahead_lengths=lookahead_lengths,
             reach_lengths=reach_lengths,
@@ -436,8 +431,8 @@ class PreviewLQ(Guided):
         )
         settings.check()
         settings.check_heel(shown="roll" in cls.observed_in(asked, model))
-        gains = settings.gains(model, asked, autopilot)
-        return cls.leading(model, autopilot, asked, gains, {})
+        gains = settings.gains(model, asked, led)
+        return cls.leading(model, led, asked, gains, {})
 
     def turn_reach(self, angle: float) -> float:
         """See `Controller.turn_reach`: where weights of a tenth and more begin."""
@@ -459,6 +454,22 @@ class PreviewLQ(Guided):
         """Parameters of its law."""
         own = {name: self.gains[name] for name in PreviewGains._fields}
         return PreviewGains(**own)
+
+
+def led_lq(autopilot: Policy | None, model: ShipModel, task: Task) -> LQ:
+    """LQ that is led, by default designed on the model; InputError for another kind."""
+    if autopilot is None:
+        return LQ.from_model(model, dt=task.interval(model))
+    if not isinstance(autopilot, LQ):
+        name = type(autopilot).__name__
+        raise InputError(f"autopilot: expected LQ, got {name}")
+    return autopilot
+
+
+def own_course_share(task: Task) -> float:
+    """Share of the heading by the course over ground by design: a half in waves."""
+    in_waves = task.weather.waves is not None
+    return 0.5 if in_waves else 0.0
 
 
 def own_reach(model: ShipModel, autopilot: Policy | None) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 
 from agents.controllers.designs import INNER, design, no_path
 from agents.controllers.los_autopilot import CRITICAL
-from agents.controllers.preview_lq import own_reach
+from agents.controllers.preview_lq import own_course_share, own_reach
 from agents.controllers.registry import controller_class
 from agents.controllers.wheel_over import own_lead
 from agents.suites.suite import BenchmarkTask
@@ -148,7 +148,7 @@ def quiet_space(task: BenchmarkTask) -> list[Setting]:
 
 def preview_space(task: BenchmarkTask) -> list[Setting]:
     """All settings of `PreviewLQ.from_model` that the task lets act."""
-    course_share = 0.5 if task.task.weather.waves is not None else 0.0
+    course_share = own_course_share(task.task)
     space = [
         *los_space(task),
         factor("reach_lengths", own_reach(task.ship, None), 0.4),
